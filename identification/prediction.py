@@ -45,6 +45,7 @@ class PredictionSettings:
     # s at an end of unbroken pose, where a low-pass has but one side to go by
     start_margin: float = 0.5
     end_margin: float = 0.1  # s, the same for the position that a prediction is compared with
+    horizon: float = 1.0  # s, of an error's predictions
     start_every: float = 0.25  # s, of an error's predictions
     most_starts: int = 2000  # of an error's predictions in a piece, spread over it
     longest_gap: float = 2.0  # s without a pose, after which the filter starts anew (estimate_log)
@@ -110,10 +111,8 @@ def predict(log: FlightLog, vehicle: Vehicle, horizon_s: float = 0.5, every: int
     )
 
 
-def rollout_error(
-    log: FlightLog, vehicle: Vehicle, segments: Segments, horizon: float = 1.0
-) -> float:
-    """Return the RMS distance (m) between flight and model after ``horizon`` s of prediction, as
+def rollout_error(log: FlightLog, vehicle: Vehicle, segments: Segments) -> float:
+    """Return the RMS distance (m) between flight and model after a second of prediction, as
     ``predict`` makes them.
 
     Args:
@@ -121,7 +120,6 @@ def rollout_error(
         vehicle: whose model predicts, with its declared effects.
         segments: times (s) from and to; a prediction counts if it lies in one of them from its
             start to its end.
-        horizon: s.
 
     Returns:
         NaN where no segment holds an unbroken stretch of pose that is long enough.
@@ -136,8 +134,8 @@ def rollout_error(
         return math.nan
     squares = []
     for piece in pieces:
-        ahead = max(1, round(horizon / piece.period))
-        starts = _start_samples(piece, segments, horizon)
+        ahead = max(1, round(PREDICTION.horizon / piece.period))
+        starts = _start_samples(piece, segments)
         starts = starts[starts + ahead < len(piece.t)]
         if starts.size:
             starts = starts[:: math.ceil(len(starts) / PREDICTION.most_starts)]
@@ -172,14 +170,14 @@ def _rolled_out(
     return states, path
 
 
-def _start_samples(signals: Signals, segments: Segments, horizon: float) -> NDArray[np.intp]:
+def _start_samples(signals: Signals, segments: Segments) -> NDArray[np.intp]:
     """Return the samples at which predictions start that lie in a segment and well inside this
     piece.
     """
     use = PREDICTION
     first = signals.t[0] + use.start_margin
-    last = signals.t[-1] - max(horizon + use.end_margin, use.start_margin)
-    each = (np.arange(t0, t1 - horizon + 1e-9, use.start_every) for t0, t1 in segments)
+    last = signals.t[-1] - max(use.horizon + use.end_margin, use.start_margin)
+    each = (np.arange(t0, t1 - use.horizon + 1e-9, use.start_every) for t0, t1 in segments)
     times = np.concatenate([np.empty(0), *each])
     times = times[(times >= first) & (times <= last)]
     return np.unique(np.round((times - signals.t[0]) / signals.period).astype(np.intp))

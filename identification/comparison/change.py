@@ -81,6 +81,9 @@ class ChangeSettings:
     sure: float = 0.95  # probability from which a place is named without a doubt
 
 
+CHANGES = ChangeSettings()
+
+
 @dataclass(frozen=True, eq=False)
 class Change:
     """What changed from the flights ``before`` to the flights ``after``."""
@@ -96,7 +99,6 @@ class Change:
     carries_more: float
     amount: float  # share of one rotor's thrust, or of the weight: mean, given that place and kind
     amount_std: float
-    sure_from: float
 
     @property
     def place(self) -> str:
@@ -106,28 +108,25 @@ class Change:
     @property
     def sure(self) -> bool:
         """Whether the likeliest place is sure."""
-        return self.places[self.place] >= self.sure_from
+        return self.places[self.place] >= CHANGES.sure
 
 
-def compare(
-    after: Sequence[Trim], before: Sequence[Trim], settings: ChangeSettings | None = None
-) -> Change:
+def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     """Find what changed between two sets of flights of one vehicle.
 
     Args:
         after: the flights in question.
         before: those that they are compared with.
-        settings: default ``ChangeSettings()``.
 
     Raises:
         InputError: a set is empty.
     """
-    use = ChangeSettings() if settings is None else settings
+    use = CHANGES
     if not (len(after) and len(before)):
         raise InputError("compare: expected at least one flight in each of the two sets")
     a, b = (np.array([trim.features for trim in group]) for group in (after, before))
     difference = a.mean(axis=0) - b.mean(axis=0)
-    scatters, scale_logs, freedom = _scatters(a, b, after, before, use)
+    scatters, scale_logs, freedom = _scatters(a, b, after, before)
     unchanged = (1.0 / len(a) + 1.0 / len(b)) * scatters
     unchanged[:, 3, 3] += (use.voltage_power * _voltage_ratio(after, before)) ** 2
     shares = np.mean([trim.thrust / trim.total for trim in before], axis=0)
@@ -140,7 +139,9 @@ def compare(
         return scale_logs[:, None] + _log_t(difference, means, scales, freedom)
 
     nothing = float(np.logaddexp.reduce(logs_of(np.zeros((1, 4)), np.zeros((1, 4))), axis=None))
-    amounts, prior = _amounts(use)
+    amounts = np.linspace(0.02, 4.0, _AMOUNTS) * use.amount
+    prior = np.exp(-0.5 * np.square(amounts / use.amount))
+    prior /= prior.sum()
     tried: dict[str, list[_KindOfChange]] = {}
     for place, kind in _hypotheses():
         means = np.array([_moved(place, kind, amount, shares) for amount in amounts])
@@ -177,7 +178,6 @@ def compare(
         by_kind.get("carries more", 0.0),
         best.amount,
         best.spread,
-        use.sure,
     )
 
 
@@ -188,13 +188,6 @@ class _KindOfChange(NamedTuple):
     evidence: float  # logarithm
     amount: float  # mean, if this changed
     spread: float  # standard deviation of the amount
-
-
-def _amounts(use: ChangeSettings) -> tuple[Array, Array]:
-    """Return amounts of a change (n,) and how likely each is (n,)."""
-    amounts = np.linspace(0.02, 4.0, _AMOUNTS) * use.amount
-    prior = np.exp(-0.5 * np.square(amounts / use.amount))
-    return amounts, prior / prior.sum()
 
 
 def _voltage_ratio(after: Sequence[Trim], before: Sequence[Trim]) -> float:
@@ -235,16 +228,14 @@ def _moved(place: str, kind: str, amount: float, shares: Array) -> Array:
 
 
 def _scatters(
-    a: Array, b: Array, after: Sequence[Trim], before: Sequence[Trim], use: ChangeSettings
+    a: Array, b: Array, after: Sequence[Trim], before: Sequence[Trim]
 ) -> tuple[Array, Array, float]:
     """Return the scale (scales, 4, 4) of one flight's scatter where it is so much larger or smaller
     than usual, the logarithm of how likely each is (scales,), and the degrees of freedom.
     """
-    more = len(a) + len(b) - 2
-    freedom = use.prior_flights + more
-    own_noise = np.mean(
-        [trim.noise for trim in (*after, *before)], axis=0
-    )  # of a flight's own mean
+    use = CHANGES
+    freedom = use.prior_flights + len(a) + len(b) - 2
+    own_noise = np.mean([trim.noise for trim in (*after, *before)], axis=0)
     apart = np.zeros((4, 4))
     for group in (a, b):
         off = group - group.mean(axis=0)

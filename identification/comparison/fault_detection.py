@@ -56,6 +56,9 @@ class FaultSettings:
     sure: float = 0.95  # probability from which a fault is named without a doubt
 
 
+FAULTS = FaultSettings()
+
+
 @dataclass(frozen=True, eq=False)
 class RotorFault:
     """What a search found in one flight."""
@@ -67,7 +70,6 @@ class RotorFault:
     rotor: int
     onset: tuple[float, float, float]  # s, of the log's clock
     remaining: tuple[float, float, float]  # share of its thrust that is left
-    sure_from: float
     seconds: float  # of flight that were looked at
     ended: str  # why nothing later was looked at; empty: the log's end
     lag: float  # s, of the rotors
@@ -81,23 +83,22 @@ class RotorFault:
     @property
     def sure(self) -> bool:
         """Whether the likeliest is sure."""
-        return self.probabilities[self.likeliest] >= self.sure_from
+        return self.probabilities[self.likeliest] >= FAULTS.sure
 
 
-def find_fault(channels: Channels, settings: FaultSettings | None = None) -> RotorFault:
+def find_fault(channels: Channels) -> RotorFault:
     """Look for a rotor that lost thrust during a flight.
 
     Raises:
         InputError: too little flight.
     """
-    use = FaultSettings() if settings is None else settings
-    samples = sample(channels)
-    search = _Search(samples, _rows(len(samples.t), use), use)
+    use, samples = FAULTS, sample(channels)
+    search = _Search(samples, _rows(len(samples.t)))
     search.find_curve(channels.thrust_known)
     best = search.tried[search.likeliest()]
     evidence, starts, start_weights = search.onsets(best)
     names = ["1", "2", "3", "4", ALL, OTHER]
-    each, shares, weights = _patterns(best, use)
+    each, shares, weights = _patterns(best)
     prior = np.array([*[use.prior[1] / 4] * 4, use.prior[2], use.prior[3]])
     logs = np.log(prior) + each
     # the prior of an event of some kind is in ``prior``; how likely it is that there was one, with
@@ -116,7 +117,6 @@ def find_fault(channels: Channels, settings: FaultSettings | None = None) -> Rot
         rotor,
         when,
         remaining,
-        use.sure,
         len(samples.t) * STEP,
         samples.ended,
         best.balance.lag,
@@ -124,11 +124,12 @@ def find_fault(channels: Channels, settings: FaultSettings | None = None) -> Rot
     )
 
 
-def _patterns(best: "_Tried", use: FaultSettings) -> tuple[Array, Array, Array]:
+def _patterns(best: "_Tried") -> tuple[Array, Array, Array]:
     """Return the log-evidence (6,) of rotors 1 to 4, of all rotors and of another force and torque
     from what the channels say; shares (E,) that may be lost, and how likely each is by each rotor
     (4, E).
     """
+    use = FAULTS
     shares = np.linspace(*use.losses, use.steps)
     log_evidence, weights = [], []
     # only what speaks under every hypothesis, so that all explain the same numbers
@@ -164,15 +165,15 @@ def _normal(seen: Array, means: Array, std: Array) -> Array:
     return total
 
 
-def _rows(count: int, use: FaultSettings) -> NDArray[np.int64]:
+def _rows(count: int) -> NDArray[np.int64]:
     """Return where a fault may begin: everywhere, or in a long flight evenly spread and everywhere
     near the end, where little is left to see it by.
     """
-    rows = np.arange(use.before, count - use.after)
-    if len(rows) > use.places:
-        early = rows[: -use.places // 4]
-        step = math.ceil(len(early) / (0.75 * use.places))
-        rows = np.concatenate([early[::step], rows[-use.places // 4 :]])
+    rows, most = np.arange(FAULTS.before, count - FAULTS.after), FAULTS.places
+    if len(rows) > most:
+        early = rows[: -most // 4]
+        step = math.ceil(len(early) / (0.75 * most))
+        rows = np.concatenate([early[::step], rows[-most // 4 :]])
     return rows
 
 
@@ -191,20 +192,19 @@ class _Tried:
 class _Search:
     """The likeliest jump, with the lags and curves that were tried."""
 
-    def __init__(self, samples: Samples, rows: NDArray[np.int64], use: FaultSettings) -> None:
-        self.samples, self.rows, self.use = samples, rows, use
-        self.begins = [Begin(part, lagged) for lagged in (False, True) for part in use.parts]
+    def __init__(self, samples: Samples, rows: NDArray[np.int64]) -> None:
+        self.samples, self.rows = samples, rows
+        self.begins = [Begin(part, lagged) for lagged in (False, True) for part in FAULTS.parts]
         self.tried: dict[tuple[float, float, float], _Tried] = {}
 
     def find_curve(self, thrust_known: bool) -> None:
         """Try lags, and then curves, each from the best so far."""
-        use = self.use
-        middle = use.lags[len(use.lags) // 2]
-        curves = use.curves[:1] if thrust_known else use.curves
+        middle = FAULTS.lags[len(FAULTS.lags) // 2]
+        curves = FAULTS.curves[:1] if thrust_known else FAULTS.curves
         for curve in curves:
             self._try((middle, *curve))
         _, bend, dead = self.likeliest()
-        for lag in use.lags:
+        for lag in FAULTS.lags:
             self._try((lag, bend, dead))
         lag = self.likeliest()[0]
         for curve in curves:
@@ -220,7 +220,7 @@ class _Search:
         one = FaultBalance(self.samples, self.samples.thrust(*key), key[0])
         usual = one.noises(one.residuals())
         noise = usual
-        for _ in range(self.use.rounds):
+        for _ in range(FAULTS.rounds):
             _, row, begin = self._jump(one, noise)
             noise = one.noises(one.residuals(row, begin))
         self.tried[key] = _Tried(one, usual, noise, *self._jump(one, noise))
@@ -250,7 +250,7 @@ class _Search:
         time is (T,).
         """
         logs = np.array([best.balance.steps(best.noise, self.rows, b) for b in self.begins])
-        rows = np.arange(max(best.row - 5, self.use.before), min(best.row + 6, self.rows[-1] + 1))
+        rows = np.arange(max(best.row - 5, FAULTS.before), min(best.row + 6, self.rows[-1] + 1))
         fine = np.array([best.balance.steps(best.noise, rows, begin) for begin in self.begins])
         parts = np.array([begin.part for begin in self.begins])
         starts = self.samples.t[rows][None] + STEP * (parts[:, None] - 0.5)

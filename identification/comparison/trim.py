@@ -21,7 +21,7 @@ from scipy.ndimage import uniform_filter1d
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
-from ..logs.flight_phases import FLIGHT, flight_phases
+from ..logs.flight_phases import FLIGHT, flight_phases, flying
 from ..motion.smoothing import runs_of
 
 Array = NDArray[np.float64]
@@ -29,9 +29,9 @@ Array = NDArray[np.float64]
 LEAST_SECONDS = 3.0  # of steady flight: a mean over less follows single manoeuvres
 CALM = 1.5  # m/s: faster, the airflow decides how the rotors share the work
 # of a log without a pose:
-HIGH = 0.5  # of the level that a tenth of the samples exceed: the rotors carry the vehicle
 EDGE = 1.5  # s after the rotors start and before they stop: taking off and landing
 NEAR = 0.1  # of the median thrust: further off, the vehicle climbs, sinks or pulls
+_SMOOTH = 0.25  # s
 BATCH = 1.5  # s: the loop's answer to a gust is over
 
 
@@ -161,13 +161,11 @@ def carrying(t: Array, total: Array) -> NDArray[np.bool_]:
         total: (N,) thrust of all rotors, in any unit.
     """
     high = float(np.quantile(total, 0.9))
-    flying = total > HIGH * high
-    if high <= 0.0 or not flying.any():
-        return np.zeros(len(t), dtype=np.bool_)
-    smooth = _smooth(total, t)
-    flying = smooth > HIGH * high  # a single low sample is no landing
     steady = np.zeros(len(t), dtype=np.bool_)
-    for first, end in runs_of(flying):
+    if high <= 0.0:
+        return steady
+    smooth = _smooth(total, t)
+    for first, end in runs_of(smooth > 0.5 * high):  # a single low sample is no landing
         # a log may begin and end in flight
         start = t[first] + (EDGE if first > 0 else 0.0)
         stop = t[end - 1] - (EDGE if end < len(t) else 0.0)
@@ -182,14 +180,14 @@ def carrying(t: Array, total: Array) -> NDArray[np.bool_]:
 def _scaled_speeds(thrust: Array, vehicle: Vehicle) -> Array:
     """Return speeds (N, 4) in rad/s whose median thrust while the rotors are high is the weight."""
     total = thrust.sum(axis=1)
-    flying = total > HIGH * float(np.quantile(total, 0.9))
-    scale = vehicle.weight / float(np.median(total[flying])) if flying.any() else 0.0
+    carried = total[flying(total)]
+    scale = vehicle.weight / float(np.median(carried)) if len(carried) else 0.0
     speeds: Array = np.sqrt(np.maximum(scale * thrust, 0.0) / vehicle.k)
     return speeds
 
 
-def _smooth(values: Array, t: Array, seconds: float = 0.25) -> Array:
+def _smooth(values: Array, t: Array) -> Array:
     """Return a running mean, so that the noise of a pose is not taken for motion."""
-    width = max(1, round(seconds / float(np.median(np.diff(t)))))
+    width = max(1, round(_SMOOTH / float(np.median(np.diff(t)))))
     smooth: Array = uniform_filter1d(values, width, mode="nearest")
     return smooth

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...runtime.page_files import write_json, write_png
-from .change import NOWHERE, SOMETHING_ELSE, Change
+from .change import CHANGES, NOWHERE, SOMETHING_ELSE, Change
 from .fault_channels import Samples
 from .fault_detection import ALL, NOTHING, OTHER, RotorFault
 from .trim import Trim
@@ -137,9 +137,9 @@ def _draw_change(change: Change) -> Any:
     chances = [change.places[name] for name in names]
     right.barh(names, chances, color=[_RED if n == change.place else _GREY for n in names])
     right.set_xlim(0.0, 1.0)
-    right.axvline(change.sure_from, color=_DARK, lw=1, ls="--")
+    right.axvline(CHANGES.sure, color=_DARK, lw=1, ls="--")
     right.set_xlabel("probability that something changed there")
-    right.set_title(f"sure from {change.sure_from:g} (dashed)", fontsize=10)
+    right.set_title(f"sure from {CHANGES.sure:g} (dashed)", fontsize=10)
     return figure
 
 

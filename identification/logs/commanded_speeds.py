@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
 from .flight_log import FlightLog
+from .flight_phases import flying
 
 Array = NDArray[np.float64]
 
-_FLYING = 0.5  # of the 90 % quantile of the thrust: less is ground, take-off or landing
 # s, up to which less is a dip in flight: without thrust a vehicle falls 5 m meanwhile. Without the
 # dips high thrusts alone would remain, whose mean is above the weight
 _DIP = 1.0
@@ -116,7 +116,7 @@ def _scale_by_accelerometer(log: FlightLog, relative: Array, vehicle: Vehicle) -
 
 def _flying(t: Array, total: Array) -> NDArray[np.bool_]:
     """Return which samples (N,) are in flight, by a relative thrust."""
-    return _without_dips(t, total > _FLYING * float(np.quantile(total, 0.9)))
+    return _without_dips(t, flying(total))
 
 
 def _without_dips(t: Array, high: NDArray[np.bool_]) -> NDArray[np.bool_]:

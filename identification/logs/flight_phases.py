@@ -20,6 +20,13 @@ _CLIMB = 0.1  # m/s: slower is not climbing or sinking
 _CLIMB_WINDOW = 0.25  # s, either side, over which the climb rate is taken
 
 
+def flying(total: Array) -> NDArray[np.bool_]:
+    """Return at which samples (N,) the rotors carry a vehicle, by their thrust (N,) in any unit:
+    above half of the level that a tenth of the samples exceed.
+    """
+    return np.asarray(total > 0.5 * np.quantile(total, 0.9))
+
+
 class Phase(NamedTuple):
     """One stretch of a flight, from ``start`` to ``end`` in s."""
 

@@ -26,6 +26,7 @@ from ..motion.smoothing import CUTOFFS, low_pass, runs_of
 from .evidence import Evidence, contradicted, recognise
 from .excerpt import excerpt
 from .flight_log import FlightLog
+from .flight_phases import flying
 from .inertial import GYRO_READINGS, INERTIAL
 from .readings import DECLARED, rotor_readings
 from .stuck_channels import stuck_notes
@@ -496,9 +497,9 @@ def _check_imu(log: FlightLog, vehicle: Vehicle, least: float | None, where: str
 def _check_gravity(force: Array, speeds: Array, vehicle: Vehicle, where: str) -> None:
     """Check that the specific force (n, 3) of a flight is gravity, upwards."""
     thrust = np.square(speeds) @ vehicle.k
-    flying = thrust > 0.5 * float(np.quantile(thrust, 0.9))
-    middle = np.median(force[flying], axis=0)
-    size = float(np.median(np.linalg.norm(force[flying], axis=1)))
+    carried = flying(thrust)
+    middle = np.median(force[carried], axis=0)
+    size = float(np.median(np.linalg.norm(force[carried], axis=1)))
     low, high = _GRAVITY
     if not low <= size / vehicle.gravity <= high:
         for unit, (factor, how) in _FORCE_UNITS.items():

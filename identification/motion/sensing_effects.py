@@ -5,7 +5,7 @@ Everything in this folder that compares a log's motion with a model takes the co
 the filter, which undoes these effects by itself, takes the log as it is.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,14 +18,7 @@ from ..logs.flight_log import FlightLog
 _MODEL = np.dtype(MODEL_FIELDS)
 
 
-@dataclass(frozen=True)
-class SensingSettings:
-    """Where the poses of a log are unbroken."""
-
-    longest_gap: float = 0.1  # s without a pose, over which nothing is interpolated
-
-
-SENSING = SensingSettings()
+LONGEST_GAP = 0.1  # s without a pose, over which nothing is interpolated
 
 
 @compiled
@@ -84,7 +77,7 @@ def _settled(log: FlightLog, delay: float) -> np.ndarray:
     longer made up.
     """
     seen = np.flatnonzero(log.valid)
-    broken = np.diff(log.t[seen], prepend=-np.inf) > SENSING.longest_gap
+    broken = np.diff(log.t[seen], prepend=-np.inf) > LONGEST_GAP
     starts = np.append(-np.inf, log.t[seen[broken]])
     began = starts[np.searchsorted(starts, log.t, side="right") - 1]
     settled: np.ndarray = log.t >= np.where(np.isfinite(began), began + delay - 1e-9, np.inf)

@@ -245,20 +245,6 @@ def _transient(diagnosis: Diagnosis) -> str:
     return f"{size} in {largest.channel} at {rounded(largest.t)}{_SPACE}s{where}"
 
 
-def doubt_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return what a name does not settle: effects that these logs cannot tell apart, and tentative
-    ones.
-    """
-    told = [confusion(effect) for effect in diagnosis.effects if effect.indistinguishable_from]
-    unsure = [effect.name for effect in diagnosis.effects if effect.tentative]
-    if unsure:
-        told.append(
-            f"{in_words(unsure)} {'is' if len(unsure) == 1 else 'are'} tentative: the true cause "
-            "may be another effect, in the library or not."
-        )
-    return told
-
-
 def ranking_sentences(diagnosis: Diagnosis) -> list[str]:
     """Return why an effect that alone explains more than a named one was not named: where chart and
     names differ.
@@ -354,13 +340,21 @@ def _probability(diagnosis: Diagnosis) -> list[str]:
 
 
 def _doubts(diagnosis: Diagnosis) -> list[str]:
-    """Return what the names do not settle, in two sentences: the headline has the alternatives."""
-    undecided = [e.name for e in diagnosis.effects if e.indistinguishable_from]
-    told = doubt_sentences(diagnosis)
-    if len(undecided) < 2:
-        return told
-    alike = f"For {in_words(undecided)}, another effect explains these logs equally well."
-    return [alike, *told[len(undecided) :]]
+    """Return what the names do not settle: effects that these logs cannot tell apart, in one
+    sentence where there are several, since the headline has the alternatives; and tentative ones.
+    """
+    undecided = [effect for effect in diagnosis.effects if effect.indistinguishable_from]
+    told = [confusion(effect) for effect in undecided]
+    if len(undecided) > 1:
+        names = in_words([effect.name for effect in undecided])
+        told = [f"For {names}, another effect explains these logs equally well."]
+    unsure = [effect.name for effect in diagnosis.effects if effect.tentative]
+    if unsure:
+        told.append(
+            f"{in_words(unsure)} {'is' if len(unsure) == 1 else 'are'} tentative: the true cause "
+            "may be another effect, in the library or not."
+        )
+    return told
 
 
 def _spreads(effect: NamedEffect) -> list[str]:

@@ -25,7 +25,7 @@ from .estimates import Intervals, estimates_of, thrust_of
 from .geometry import SPIN, USUAL, Geometry
 from .motors import MotorResponse, motor_response
 from .parameters import FORCE_BIAS, OPTIONAL, POSITIVE, first_model
-from .result import ESTIMATES, IDENTIFIED, NOTHING, Estimate, Identified, told
+from .result import IDENTIFIED, NOTHING, WIDEST, Estimate, Identified, told
 from .solve import VehicleFit, fall_with, lag_with, solve
 from .spectra import SPECTRUM
 
@@ -285,7 +285,7 @@ def _not_told(fit: VehicleFit, geometry: Geometry) -> tuple[dict[str, str], dict
         if doubtful:  # turning is quick, and quick motion contradicts itself here
             reasons[axis] = f"quick {motion} contradicts slow motion in these logs"
             instead[axis] = usual
-        elif 1.96 * fit.deviation(axis) > ESTIMATES.widest:
+        elif 1.96 * fit.deviation(axis) > WIDEST:
             reasons[axis] = f"the flight hardly shows {motion}"
             instead[axis] = usual
     if reasons and not geometry.known:
@@ -294,7 +294,7 @@ def _not_told(fit: VehicleFit, geometry: Geometry) -> tuple[dict[str, str], dict
             "with quick roll and pitch"
         )
     both = values["Jx"] + values["Jy"]
-    wide = 1.96 * fit.deviation("Jz") > ESTIMATES.widest
+    wide = 1.96 * fit.deviation("Jz") > WIDEST
     if doubtful or wide or not 0.3 < values["Jz"] / both < 1.3:
         reasons["Jz"] = (
             "quick motion contradicts slow motion in these logs"

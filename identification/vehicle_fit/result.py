@@ -17,23 +17,15 @@ Array = NDArray[np.float64]
 IDENTIFIED, ASSUMED, GIVEN, NOTHING = "identified", "assumed", "given", "not identifiable"
 
 
-@dataclass(frozen=True)
-class EstimateSettings:
-    """What is asked of an estimate before it counts as identified."""
-
-    # half-width of a 95 % interval as a share of the value (of its logarithm), beyond which a
-    # positive quantity is not identifiable: a factor of 2 either way is what one would guess of a
-    # vehicle by its looks
-    widest: float = 0.5
-
-
-ESTIMATES = EstimateSettings()
+# half-width of a 95 % interval as a share of the value (of its logarithm), beyond which a positive
+# quantity is not identifiable: a factor of 2 either way is what one would guess by the looks
+WIDEST = 0.5
 
 
 def told(known: tuple[float, float, float]) -> bool:
     """Return whether value, low and high of a positive quantity are narrow enough to count."""
     _, low, high = known
-    return low > 0.0 and 0.5 * math.log(high / low) <= ESTIMATES.widest
+    return low > 0.0 and 0.5 * math.log(high / low) <= WIDEST
 
 
 @dataclass(frozen=True)

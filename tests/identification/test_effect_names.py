@@ -133,23 +133,6 @@ def test_a_library_under_other_names_explains_the_same(name):
         assert_alike(own, called_back(report(log), new))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["late", "heavier", "wind"])
-def test_an_alphabet_the_other_way_round_explains_the_same(name):
-    """Which effect comes first in the library makes no difference to what is named."""
-    log = flight(name)
-    order = {effect: i for i, effect in enumerate(names())}
-    own = json.loads(report(log))
-    with renamed(lambda effect: f"law{99 - order[effect]}") as new:
-        turned = called_back(report(log), new)
-    assert turned["verdict"] == own["verdict"]
-    for a, b in zip(own["effects"], turned["effects"], strict=True):
-        assert a["name"] == b["name"]
-        assert a["tentative"] == b["tentative"]
-        assert set(a["indistinguishable_from"]) == set(b["indistinguishable_from"])
-        assert b["coefficients"] == pytest.approx(a["coefficients"], rel=1e-3, abs=1e-6)
-
-
 @pytest.mark.parametrize(
     ("original", "own", "name"),
     [

@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.support.data_paths import NANOBENCH, data_file
 from tests.support.model_flights import simulate_model
-from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from windwrench.dynamics import InputError, load_vehicle
 from windwrench.estimator import UKFTuning
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.flight_phases import (
@@ -19,7 +18,6 @@ from windwrench.identification.logs.flight_phases import (
     TAKE_OFF,
     flight_phases,
 )
-from windwrench.identification.logs.reading import read_log
 from windwrench.identification.report.wrench_picture import plot_wrench
 from windwrench.identification.wrench_series import (
     counts,
@@ -28,23 +26,8 @@ from windwrench.identification.wrench_series import (
     write_wrench,
 )
 
-HEADER = [
-    "t",
-    "fx",
-    "fy",
-    "fz",
-    "tx",
-    "ty",
-    "tz",
-    "std_fx",
-    "std_fy",
-    "std_fz",
-    "std_tx",
-    "std_ty",
-    "std_tz",
-    "nis",
-    "status",
-]
+WRENCH = [f"{kind}{axis}" for kind in "ft" for axis in "xyz"]
+HEADER = ["t", *WRENCH, *(f"std_{name}" for name in WRENCH), "nis", "status"]
 
 
 @pytest.fixture(scope="module")
@@ -77,19 +60,7 @@ def held_flight(vehicle, t, lift=0.3, lost=None, seed=0):
 
 
 def finite(series):
-    return all(
-        np.isfinite(getattr(series, name)).all()
-        for name in (
-            "force",
-            "torque",
-            "std_force",
-            "std_torque",
-            "position",
-            "quaternion",
-            "velocity",
-            "angular_velocity",
-        )
-    )
+    return np.isfinite(series.state[:, :19]).all() and np.isfinite(series.std).all()
 
 
 def test_a_constant_force_is_found(vehicle):
@@ -103,13 +74,6 @@ def test_a_constant_force_is_found(vehicle):
     assert torque.max() < 0.01
     assert np.isnan(series.nis[0])
     assert 4.0 < np.mean(series.nis[200:]) < 8.0
-
-
-def test_tuning_is_passed_on(vehicle):
-    log = held_flight(vehicle, 0.005 * np.arange(200))
-    fast = estimate_log(log, vehicle, UKFTuning.for_vehicle(vehicle, 0.005, rise_time=0.2))
-    slow = estimate_log(log, vehicle, UKFTuning.for_vehicle(vehicle, 0.005, rise_time=2.0))
-    assert np.all(fast.std_force[-1] > slow.std_force[-1])
 
 
 @settings(max_examples=15, deadline=None)
@@ -284,59 +248,8 @@ def test_phases_cover_the_log_in_order(top, climb, stay, start, end):
     assert phases[-1].end == t[-1]
     for one, other in pairwise(phases):
         assert one.start < one.end == other.start
-
-
-def test_phases_without_a_flight(vehicle):
-    t, height, speeds, _ = hop(vehicle)
-    assert [p.name for p in flight_phases(t, height, 0 * speeds, vehicle)] == [GROUND]
-    assert [p.name for p in flight_phases(t, 0 * height, speeds, vehicle)] == [GROUND]
-    assert [p.name for p in flight_phases(t, height, speeds + 300, vehicle)] == [FLIGHT]
-
-
-# measured flights
-
-
-@pytest.mark.measured
-@pytest.mark.parametrize("name", NANOBENCH)
-def test_nanobench_flights(name, tmp_path):
-    vehicle = load_vehicle("crazyflie")
-    log = read_log(data_file(f"nanobench/{name}.csv"), reader="nanobench", vehicle=vehicle)
-    series = estimate_log(log, vehicle)
-    assert finite(series)
-    assert np.isfinite(series.nis[1:]).all()
-    phases = flight_phases(series.t, series.position[:, 2], log.rotor_speeds, vehicle)
-    assert [phase.name for phase in phases] == [GROUND, TAKE_OFF, FLIGHT, LANDING, GROUND]
-    for phase, (least, most) in zip(
-        phases, [(2, 4), (1, 3), (29, 33), (1, 2.5), (3, 5)], strict=True
-    ):
-        assert least < phase.end - phase.start < most
-    # the floor carries the vehicle before and after; in the air a full battery would lift three
-    # quarters of it more
-    weight = vehicle.weight
-    assert series.force[150, 2] == pytest.approx(weight, rel=0.01)
-    assert series.force[-1, 2] == pytest.approx(weight, rel=0.02)
-    flying = (series.t > phases[2].start + 2) & (series.t < phases[2].end)
-    assert -0.85 * weight < series.force[flying, 2].mean() < -0.65 * weight
-    assert np.abs(series.force[flying, :2]).max() < 0.25 * weight
-    assert np.abs(series.torque[flying]).max() < 0.2 * weight * vehicle.arm_l
-    assert plot_wrench(series, log, tmp_path / "wrench.png").stat().st_size > 20_000
-    # what a diagnosis of these flights finds, declared: next to nothing is left
-    known = vehicle.with_effects(
-        EffectSetting("battery_sag", {"n": 1.5}), EffectSetting("thrust_scale", {"s": -0.28})
-    )
-    assert np.abs(estimate_log(log, known).force[flying, 2].mean()) < 0.05 * weight
-
-
-@pytest.mark.parametrize(
-    "name", [f"{kind}_{k:02d}" for kind in ("labelled", "unlabelled") for k in range(8)]
-)
-def test_simulated_flights(name):
-    vehicle = load_vehicle(data_file("flights/vehicle.yaml"))
-    log = read_log(data_file(f"flights/{name}.csv.gz"), vehicle=vehicle)
-    assert log.notes == ()
-    series = estimate_log(log, vehicle)
-    assert finite(series)
-    assert np.abs(series.force).max() < vehicle.weight
+    still = flight_phases(t, height, 0 * speeds, vehicle)
+    assert [phase.name for phase in still] == [GROUND]
 
 
 def test_gyro_and_accelerometer_of_a_log_sharpen_its_estimate(vehicle):

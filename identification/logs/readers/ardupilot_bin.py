@@ -29,8 +29,9 @@ from scipy.spatial.transform import Rotation
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ..flight_log import FlightLog
+from ..flight_phases import flying
 from ..rotor_orders import ORDERS, Order, order_words
-from .balanced_thrust import balanced_speeds, flying
+from .balanced_thrust import balanced_speeds
 from .dataflash import BEGINS as BEGINS
 from .dataflash import DataFlash, Messages, read_dataflash
 from .streams import Stream, flight_log, from_ned, slerp

@@ -16,13 +16,6 @@ Array = NDArray[np.float64]
 _STEEPEST = 0.2  # cosine of the tilt below which a sample says nothing
 
 
-def flying(total: Array) -> NDArray[np.bool_]:
-    """Return at which samples (N,) a vehicle flies, by its relative thrust alone: above half of its
-    high level.
-    """
-    return np.asarray(total > 0.5 * np.quantile(total, 0.9))
-
-
 def balanced_speeds(
     path: Path,
     relative: Stream,

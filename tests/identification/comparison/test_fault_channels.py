@@ -72,14 +72,6 @@ def test_nothing_is_read_behind_a_clipped_gyro_or_an_impact():
     assert sample(hover(gyro=turning)).ended == ""
 
 
-def test_commands_are_uncertain_between_their_own_samples_where_these_are_far_apart():
-    rng = np.random.default_rng(1)
-    command = 0.4 + 0.05 * rng.standard_normal((80, 4))
-    between = sample(hover(command_rate=10.0, command=command)).between
-    assert between.max() > 0.03
-    assert not sample(hover()).between.any()
-
-
 def test_a_log_of_the_kits_format_gives_its_channels():
     channels = hover()
     n = len(channels.gyro_times)

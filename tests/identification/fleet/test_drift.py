@@ -120,14 +120,6 @@ def test_an_effect_that_comes_is_told_though_its_coefficient_is_constant():
     assert appearance_of("a", "mass", [1, 2], [1, 2, 3, 4]) is None
 
 
-def test_an_effect_is_there_where_another_name_stands_for_it():
-    """The name that a diagnosis picks among equals may change; that is no change of the vehicle."""
-    rows = [row("a", i, [("mass", 1.0, 0.1, False, ["thrust_scale"])]) for i in range(1, 9)]
-    rows += [row("a", i, [("thrust_scale", 1.0, 0.1, False, ["mass"])]) for i in range(9, 17)]
-    assert fleet_of(rows).appearances == ()
-    assert all(not any(one.series.sure) for one in fleet_of(rows).trends)
-
-
 def test_drifts_are_told_and_chance_is_not():
     rng = np.random.default_rng(3)
     rows, individuals = [], 60

@@ -3,7 +3,7 @@
 import pytest
 
 from windwrench.dynamics import InputError, dump_vehicle, load_vehicle
-from windwrench.identification.fleet.manifest import MANIFEST, find_logs, natural, read_manifest
+from windwrench.identification.fleet.manifest import MANIFEST, find_logs, read_manifest
 
 
 @pytest.fixture
@@ -81,17 +81,6 @@ def test_a_manifest_says_what_logs_do_not(folder, form):
     assert found["beta/b.ulg"].vehicle == str(folder / "beta" / "vehicle.yaml")
     assert len(doubts) == 1
     assert "gamma/*" in doubts[0]
-
-
-def test_the_files_own_times_order_them_on_request(folder):
-    (folder / "fleet.yaml").write_text("order: modified\nlogs: []\n")
-    logs, _ = find_logs([folder / "alpha"], read_manifest(folder / "fleet.yaml"))
-    assert all(log.time is not None for log in logs)
-
-
-def test_names_are_ordered_as_people_do():
-    names = ["b", "flight10", "flight9", "2", "10", "", "flight9b"]
-    assert sorted(names, key=natural) == ["", "2", "10", "b", "flight9", "flight9b", "flight10"]
 
 
 def test_a_map_stands_in_place_of_a_reader(folder):

@@ -68,22 +68,6 @@ def test_the_key_is_of_all_that_an_outcome_depends_on(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "kind", "words"),
-    [
-        ("t,px\n0,1\n", "input", "missing column(s) py"),
-        ("", "input", "a.csv"),
-    ],
-)
-def test_a_bad_log_is_an_outcome(tmp_path, text, kind, words):
-    path = tmp_path / "a.csv"
-    path.write_text(text)
-    found = diagnose_one(LogTask(FleetLog(str(path), "a.csv", "ardrone2"), A))
-    assert (found["key"], found["status"], found["kind"]) == (A, "refused", kind)
-    assert words in found["reason"]
-    assert "\n" not in found["reason"]
-
-
-@pytest.mark.parametrize(
     ("error", "kind"), [(MemoryError(), "memory"), (ZeroDivisionError("a\nb"), "error")]
 )
 def test_an_error_of_any_kind_is_an_outcome(monkeypatch, error, kind):

@@ -111,18 +111,6 @@ def test_pieces_of_several_logs_stand_side_by_side():
     assert plot.table.head == ("Piece", "Time (s)", "Held out", "Before", "After")
 
 
-def test_the_table_behind_a_plot_has_its_numbers():
-    trace = made_trace()
-    table = page_plots(made_diagnosis(trace)).time[0].table
-    assert len(table.rows) == 16
-    rows = np.array_split(np.arange(len(trace.t)), 16)[5]
-    rms = [rounded(np.sqrt(np.mean(x[rows, 0] ** 2)), 2) for x in (trace.before, trace.after)]
-    assert list(table.rows[5][-2:]) == rms
-    held = [trace.held_out[rows].mean() for rows in np.array_split(np.arange(len(trace.t)), 16)]
-    words = ["no" if share == 0 else "yes" if share == 1 else "in part" for share in held]
-    assert [row[1] for row in table.rows] == words
-
-
 def test_only_the_pages_own_scripts_may_run():
     rude = "</script><script>alert(1)</script>\u2028"
     made = made_diagnosis(replace(made_trace(), log=rude))
@@ -171,18 +159,6 @@ def test_the_first_screen_says_how_sure_and_what_next():
     )
     bare = replace(made, verdict="nothing to explain", effects=())
     assert next_step(bare).startswith("Keep the model as it is")
-
-
-def test_many_doubts_take_two_sentences():
-    made = made_diagnosis(made_trace(effects=("rotor_drag", "mass")))
-    doubtful = tuple(
-        replace(effect, indistinguishable_from=("wind",), tentative=True) for effect in made.effects
-    )
-    assert sureness_sentences(replace(made, effects=doubtful))[:2] == [
-        "For rotor_drag and mass, another effect explains these logs equally well.",
-        "rotor_drag and mass are tentative: the true cause may be another effect, in the library "
-        "or not.",
-    ]
 
 
 def test_a_torque_that_the_logs_do_not_tell_is_not_drawn():

@@ -130,9 +130,3 @@ def test_gazebo_turns_its_rotors_the_right_way():
     assert moment * constant == pytest.approx(v.p[0], rel=1e-4)
     assert text.count("<timeConstantUp>0.05<") == 4
     assert "not known from these logs: maxRotVelocity" in text
-
-
-def test_what_is_no_speed_is_said():
-    it = found(curve=MotorCurve((0.0, 0.0, 0.15)), commands=True)
-    assert "speeds are not" in EXPORTS["gazebo"](it)
-    assert "speeds are not" in EXPORTS["rotorpy"](it)

@@ -103,15 +103,6 @@ def test_an_imu_and_commands_are_enough(inertial):
     assert thrust.sum() == pytest.approx(MASS * 9.81, rel=0.05)
 
 
-def test_measured_speeds_show_no_lag(inertial):
-    logs = [replace(log, rotor_speeds=speeds, command=None) for log, speeds in inertial[:2]]
-    found = identify(logs, MASS, parse_geometry(str(ARM)))
-    check(found, "k", K, 0.05)
-    check(found, "Jxx", INERTIA[0, 0], 0.05)
-    assert found["motor_lag"].status == "not identifiable"
-    assert found.vehicle.motor_curve is None
-
-
 def test_speeds_beside_commands_show_the_motors(inertial):
     logs = [replace(log, rotor_speeds=speeds) for log, speeds in inertial[:2]]
     found = identify(logs, MASS, parse_geometry(str(ARM)))

@@ -7,7 +7,6 @@ from windwrench.identification.vehicle_fit.channels import MotionPiece
 from windwrench.identification.vehicle_fit.columns import (
     Drive,
     air_columns,
-    lagged,
     rotor_columns,
 )
 from windwrench.identification.vehicle_fit.geometry import SPIN, parse_geometry
@@ -66,15 +65,6 @@ def test_coefficients_are_newton_and_euler():
         want = np.linalg.solve(inertia, torque - np.cross(w, inertia @ w)) + np.array([0, 0.1, 0])
         assert got[i, :3] == pytest.approx(force, rel=1e-6, abs=1e-4)
         assert got[i, 3:] == pytest.approx(want, rel=1e-6, abs=2e-3)
-
-
-def test_the_lag_is_that_of_the_effect():
-    x = np.random.default_rng(1).normal(size=(50, 2))
-    y, state = lagged(x, 0.03, 0.005), x[0].copy()
-    for k in range(len(x)):
-        state += (1 - np.exp(-0.005 / 0.03)) * (x[k] - state)
-        assert y[k] == pytest.approx(state)
-    assert lagged(x, 0.0, 0.005) is x
 
 
 @pytest.mark.parametrize(
