@@ -25,11 +25,7 @@ class Link(ABC):
     def __init__(self, text: str) -> None:
         self._text = text
         self.opened: Any = None  # a socket or a port, once it is open
-
-    @property
-    @abstractmethod
-    def connected(self) -> bool:
-        """Whether there is someone to send to."""
+        self.peer: Any = None  # whom to send to, once it is known
 
     @abstractmethod
     def open(self) -> None:
@@ -41,7 +37,7 @@ class Link(ABC):
 
     @abstractmethod
     def write(self, data: bytes) -> None:
-        """Send, and do not wait.
+        """Send to the peer, and do not wait.
 
         Raises:
             OSError: it does not take more now.
@@ -58,7 +54,7 @@ class Link(ABC):
         """Close it."""
         if self.opened is not None:
             self.opened.close()
-            self.opened = None
+            self.opened = self.peer = None
 
 
 class Datagrams(Link):
@@ -68,12 +64,6 @@ class Datagrams(Link):
         super().__init__(address.text)
         self._host, self._port = address.host or host, address.port
         self._calls = address.scheme == "udpout"
-        self._peer: Any = None
-
-    @property
-    def connected(self) -> bool:
-        """Whether there is someone to send to."""
-        return self._peer is not None
 
     def open(self) -> None:
         """Listen, or call."""
@@ -85,7 +75,7 @@ class Datagrams(Link):
             self.opened = socket.socket(family, kind, protocol)
             self.opened.setblocking(False)
             if self._calls:
-                self._peer = address
+                self.peer = address
             else:
                 self.opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
                 self.opened.bind(address)
@@ -101,13 +91,13 @@ class Datagrams(Link):
             data, peer = self.opened.recvfrom(_LARGEST)
         except (BlockingIOError, ConnectionError):
             return None
-        self._peer = self._peer if self._calls else peer
+        self.peer = self.peer if self._calls else peer
         return bytes(data)
 
     def write(self, data: bytes) -> None:
         """Send to whoever there is."""
-        if self.connected:
-            self.opened.sendto(data, self._peer)
+        if self.peer is not None:
+            self.opened.sendto(data, self.peer)
 
 
 class SerialPort(Link):
@@ -118,17 +108,13 @@ class SerialPort(Link):
         self._path = address.path
         self._baud = int(address.number("baud", baud, least=1.0))
 
-    @property
-    def connected(self) -> bool:
-        """Whether the port is open."""
-        return self.opened is not None
-
     def open(self) -> None:
         """Open the port."""
         need("serial", "mavlink")
         serial: Any = importlib.import_module("serial")
         try:
             self.opened = serial.Serial(self._path, self._baud, timeout=0, write_timeout=0)
+            self.peer = self._path
         except (OSError, ValueError) as error:
             raise InputError(f"{self._text}: cannot be opened: {error}") from error
 

@@ -77,7 +77,7 @@ class Mavlink(Source):
     def receive(self, timeout: float) -> list[Sample] | None:
         """Return what the messages that are there hold."""
         now = time.monotonic_ns()
-        if now >= self._due_heartbeat and self.link.connected:
+        if now >= self._due_heartbeat and self.link.peer is not None:
             self._due_heartbeat = now + _SECOND
             d = self._dialect
             self._mav.heartbeat_send(
@@ -122,7 +122,7 @@ class Mavlink(Source):
 
     def send(self, output: Output) -> None:
         """Send the wrench back, in north, east, down."""
-        if self.link.connected and output.row.has_pose:
+        if self.link.peer is not None and output.row.has_pose:
             self._sender.send(self._mav, output)
 
     def close(self) -> None:

@@ -6,8 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.live.stream import VEHICLE, Pipeline, flight, log_of
-from windwrench.dynamics import InputError
-from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.wrench_series import estimate_log
 from windwrench.live.messages import Sample
 
@@ -155,21 +153,6 @@ def test_rates_may_change_on_the_way():
     live = Pipeline().take(slow)
     found = np.mean([o.estimate.force for o in live.outputs if o.t > 6.0], axis=0)
     assert np.abs(found - flown["force"][1200:].mean(axis=0)).max() < 0.05
-
-
-def test_commands_need_a_motor_curve():
-    flown = flight()
-    samples = whole(flown)[:50]
-    for sample in samples:
-        sample.rotor_speeds, sample.command = None, np.full(4, 0.5)
-    with pytest.raises(InputError, match="states no motor_curve"):
-        Pipeline().take(samples)
-    from dataclasses import replace
-
-    curve = MotorCurve((0.0, 0.0, VEHICLE.weight))
-    live = Pipeline(replace(VEHICLE, motor_curve=curve)).take(samples)
-    assert live.rows[0].commanded
-    np.testing.assert_allclose(live.rows[0].rotor_speeds, VEHICLE.hover_rate)
 
 
 def test_measured_rotor_speeds_are_waited_for():

@@ -1,11 +1,9 @@
 """Recordings: whole whenever they end, and the log that the live filter saw."""
 
 import numpy as np
-import pytest
 
 from tests.live.stream import Pipeline, flight
 from tests.live.test_pipeline import VEHICLE, split, whole
-from windwrench.dynamics import InputError
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.wrench_series import estimate_log
 from windwrench.live.recorder import Recorder
@@ -62,14 +60,6 @@ def test_nothing_is_written_of_a_stream_that_is_none(tmp_path):
     rows = Pipeline().take(whole(flight())[:150]).rows
     record(tmp_path / "flight.csv", rows, close=False)
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("name", ["there.csv", "flight.csv.gz", "flight.parquet"])
-def test_a_recording_never_takes_the_place_of_a_log(tmp_path, name):
-    (tmp_path / "there.csv").write_text("a flight")
-    with pytest.raises(InputError, match="--record"):
-        Recorder(tmp_path / name, VEHICLE, Tallies(), 0.3)
-    assert (tmp_path / "there.csv").read_text() == "a flight"
 
 
 def test_inertial_rows_between_poses(tmp_path):
