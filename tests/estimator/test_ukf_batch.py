@@ -6,9 +6,9 @@ import pickle
 import numpy as np
 import pytest
 
-from tests.support.flights import PERIOD, yawing_flight
+from tests.support.flights import yawing_flight
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
-from windwrench.estimator import UKFTuning, WrenchUKF, WrenchUKFBatch
+from windwrench.estimator import WrenchUKF, WrenchUKFBatch
 
 VEHICLE = load_vehicle("ardrone2")
 COUNT, STEPS = 11, 150  # more than are side by side at once
@@ -86,21 +86,37 @@ def test_each_is_the_single_filter_bit_for_bit(samples, vehicles, gate):
         np.testing.assert_array_equal(getattr(together, name)[-1], getattr(last, name))
 
 
-def test_it_starts_from_what_is_given_for_each_or_for_all():
-    batch = WrenchUKFBatch(VEHICLE, 2, UKFTuning(), PERIOD)
-    P = np.stack([1e-4 * np.eye(18), 4e-4 * np.eye(18)])
-    batch.reset(
-        [[0, 0, 1], [0, 0, 2]],
-        [1, 0, 0, 0],
-        P,
-        velocity=[1, 0, 0],
-        angular_velocity=[[0, 0, 1], [0, 0, 2]],
-    )
-    for n in range(2):
-        ukf = WrenchUKF(VEHICLE, UKFTuning(), PERIOD)
-        ukf.reset([0, 0, n + 1], [1, 0, 0, 0], P[n], [1, 0, 0], [0, 0, n + 1])
-        np.testing.assert_array_equal(batch.estimate.state[n], ukf.estimate.state)
-        np.testing.assert_array_equal(batch.covariance[n], ukf.covariance)
+TURNS = np.array([[0.0, 0, 1], [0, 0, 60], [0, 0, -2]])
+UNKNOWN_ATTITUDES = [np.diag(np.r_[np.full(3, x), np.full(15, 1e-4)]) for x in (1e-4, 0.4, 1e-3)]
+
+
+@pytest.mark.parametrize(
+    ("common", "each"),
+    [
+        ({}, {}),
+        ({"velocity": [1, 0, 0]}, {"covariance": 1e-4 * np.eye(18) * np.ones((3, 1, 1))}),
+        ({}, {"angular_velocity": TURNS}),
+        ({}, {"covariance": np.stack(UNKNOWN_ATTITUDES)}),
+    ],
+    ids=["a pose alone", "velocity and covariance", "too fast for a series", "attitude unknown"],
+)
+def test_it_starts_from_what_is_given_and_coasts_as_single_filters_do(common, each):
+    """One may spin too fast for the series of sine and cosine; the attitude's variance is held
+    where nobody measures an attitude, which only some of those side by side need.
+    """
+    batch, single, q = WrenchUKFBatch(VEHICLE, 3), WrenchUKF(VEHICLE), [1, 0, 0, 0]
+    places = [[0, 0, n + 1] for n in range(3)]
+    speeds = np.full((3, 4), 1.05 * VEHICLE.hover_rate)
+    batch.reset(places, q, **common, **each)
+    together = [batch.estimate, *(batch.step(speeds) for _ in range(5))]
+    for n in range(3):
+        single.reset(places[n], q, **common, **{name: values[n] for name, values in each.items()})
+        alone = [single.estimate, *(single.step(speeds[n]) for _ in range(5))]
+        for a, b in zip(together, alone, strict=True):  # an estimate stays what it was
+            np.testing.assert_array_equal(a.state[n], b.state)
+        np.testing.assert_array_equal(batch.covariance[n], single.covariance)
+    assert len(batch) == 3
+    assert np.isnan(together[-1].nis).all()
 
 
 @pytest.mark.parametrize(
@@ -118,54 +134,6 @@ def test_a_copy_flies_on_alone(samples, duplicate):
     for k in range(2, 20):
         expected = batch.step(rotors[k], position[k], quaternion[k])
     np.testing.assert_array_equal(last.state, expected.state)
-
-
-def test_one_may_spin_too_fast_for_the_series_of_sine_and_cosine():
-    batch, single = WrenchUKFBatch(VEHICLE, 3), WrenchUKF(VEHICLE)
-    rates, speeds = (
-        np.array([[0.0, 0, 1], [0, 0, 60], [0, 0, -2]]),
-        np.full((3, 4), VEHICLE.hover_rate),
-    )
-    batch.reset([0, 0, 1], [1, 0, 0, 0], angular_velocity=rates)
-    for _ in range(3):
-        together = batch.step(speeds)
-    for n in range(3):
-        single.reset([0, 0, 1], [1, 0, 0, 0], angular_velocity=rates[n])
-        for _ in range(3):
-            alone = single.step(speeds[n])
-        np.testing.assert_array_equal(together.state[n], alone.state)
-
-
-def test_an_attitude_that_nobody_measures_stays_an_attitude():
-    """Where its variance is held, which only some of those side by side need."""
-    P = np.stack(
-        [np.diag(np.r_[np.full(3, scale), np.full(15, 1e-4)]) for scale in (1e-4, 0.4, 1e-3)]
-    )
-    batch, single = WrenchUKFBatch(VEHICLE, 3), WrenchUKF(VEHICLE)
-    batch.reset([0, 0, 1], [1, 0, 0, 0], P)
-    speeds = np.full((3, 4), VEHICLE.hover_rate)
-    for n in range(3):
-        single.reset([0, 0, 1], [1, 0, 0, 0], P[n])
-        for _ in range(5):
-            single.step(speeds[n])
-        if n == 0:
-            for _ in range(5):
-                batch.step(speeds)
-        np.testing.assert_array_equal(batch.covariance[n], single.covariance)
-
-
-def test_without_a_pose_it_predicts_and_an_estimate_stays_what_it_was():
-    batch, ukf = WrenchUKFBatch(VEHICLE, 3), WrenchUKF(VEHICLE)
-    batch.reset([0, 0, 1], [1, 0, 0, 0])
-    ukf.reset([0, 0, 1], [1, 0, 0, 0])
-    speeds = np.full(4, 1.05 * VEHICLE.hover_rate)
-    first = batch.step(np.tile(speeds, (3, 1)))
-    kept = first.state.copy()
-    batch.step(np.tile(speeds, (3, 1)))
-    np.testing.assert_array_equal(first.state, kept)
-    np.testing.assert_array_equal(kept[1], ukf.step(speeds).state)
-    assert len(batch) == 3
-    assert np.isnan(first.nis).all()
 
 
 SPEEDS, POSITION, QUATERNION = (

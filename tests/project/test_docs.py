@@ -73,67 +73,39 @@ def run_shell(content, environment, dry, where):
         if words[:2] == ["pip", "install"]:
             check_pip(words)
         elif words[0] == "make":
-            assert re.search(
-                rf"^{words[1]}:", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M
-            ), f"no target {words[1]}"
+            targets = (ROOT / "Makefile").read_text(encoding="utf-8")
+            assert re.search(rf"^{words[1]}:", targets, re.M), f"no target {words[1]}"
         elif "--cluster" in words and find_spec("ray") is None:
             continue
         elif words[0] == "export":
             name, _, value = words[1].partition("=")
             environment[name] = value
         else:
-            done = subprocess.run(
-                [*words, *(["--dry-run"] if dry else [])],
-                env=environment,
-                capture_output=True,
-                text=True,
-            )
-            assert done.returncode == 0, (
-                f"{where}: {shlex.join(words)}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
-            )
+            words += ["--dry-run"] if dry else []
+            done = subprocess.run(words, env=environment, capture_output=True, text=True)
+            said = f"{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
+            assert done.returncode == 0, f"{where}: {shlex.join(words)}\n{said}"
 
 
 def prepare(page, folder):
     """Put there what a page takes for given: logs of others."""
     if page.name == "diagnose.md":
-        pytest.importorskip(
-            "pyulog", reason="pyulog is not installed: pip install 'windwrench[logs]'"
-        )
-        pytest.importorskip(
-            "rosbags", reason="rosbags is not installed: pip install 'windwrench[logs]'"
-        )
         from tests.support.converted_flights import write_bag, write_ulog
         from windwrench.cli import app
         from windwrench.identification.logs.reading import read_log
 
-        app(
-            [
-                "record",
-                "--effect",
-                "rotor_drag:kdx=1.2e-4,kdy=1.2e-4",
-                "--seconds",
-                "40",
-                "--seed",
-                "1",
-                "--quiet",
-                "--out",
-                str(folder / "given.csv"),
-            ],
-            standalone_mode=False,
-        )
+        drag = ("--effect", "rotor_drag:kdx=1.2e-4,kdy=1.2e-4", "--seconds", "40", "--seed", "1")
+        given = ("--quiet", "--out", str(folder / "given.csv"))
+        app(["record", *drag, *given], standalone_mode=False)
         log = read_log(folder / "given.csv")
         write_ulog(log, folder / "flight.ulg")
         write_bag(log, folder / "flight_bag")
-    for name in (
-        re.findall(r"results/[\w-]+/best", page.read_text(encoding="utf-8"))
-        if page.name != "train.md"
-        else ()
-    ):
-        for ending in (".npz", ".json"):  # what a dry run does not train
+    policies = re.findall(r"results/[\w-]+/best", page.read_text(encoding="utf-8"))
+    for name in policies if page.name != "train.md" else ():  # what a dry run does not train
+        for ending in (".npz", ".json"):
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(
-                ROOT / "training" / "policies" / f"sac-0{ending}", folder / f"{name}{ending}"
-            )
+            kept = ROOT / "training" / "policies" / f"sac-0{ending}"
+            shutil.copy(kept, folder / f"{name}{ending}")
     for name in re.findall(r"\bB\d\w+\.csv\b", page.read_text(encoding="utf-8")):
         found = next(iter(DATA.rglob(name)), None)
         if found is None:
@@ -170,11 +142,9 @@ def test_every_code_block_runs(page, tmp_path, monkeypatch):
 
 def test_the_reader_of_pages_reads_blocks(tmp_path):
     page = tmp_path / "page.md"
-    page.write_text(
-        f'```python title="a b.py"\nx\n```\n\n{DRY_RUN}\n```sh\nwindwrench fly \\\n  --seed 1 # '
-        f"why\n```\n\n"
-        "```sh\nmake test\n```\n"
-    )
+    flown = "```sh\nwindwrench fly \\\n  --seed 1 # why\n```"
+    titled = '```python title="a b.py"\nx\n```'
+    page.write_text(f"{titled}\n\n{DRY_RUN}\n{flown}\n\n```sh\nmake test\n```\n")
     found = list(blocks(page))
     assert [(language, title, dry) for _, language, title, dry, _ in found] == [
         ("python", "a b.py", False),

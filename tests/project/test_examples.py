@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.support.own_effects import joined
 from tests.support.paths import ROOT
+from tests.support.searches import DRAG, recorded
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics import effects as library
-from windwrench.dynamics.vehicle import EffectSetting
-from windwrench.envs.recording import record_flight
-from windwrench.identification.logs.flight_log import FlightLog, write_log
+from windwrench.identification.logs.flight_log import write_log
 
 FOLDER = ROOT / "examples"
 
@@ -27,27 +27,17 @@ def example(monkeypatch, tmp_path):
     return importlib.import_module
 
 
-def forget_added_effects():
-    for cached in (library._files, library.names, library.get):
-        cached.cache_clear()
-
-
 @pytest.fixture
-def own_library(monkeypatch):
+def own_library(tmp_path):
     """Take effects that a test adds to the library out again."""
-    monkeypatch.setenv("WINDWRENCH_EFFECTS", "")
-    forget_added_effects()
-    yield
-    monkeypatch.undo()
-    forget_added_effects()
+    with joined(tmp_path):
+        yield
 
 
 def test_every_script_is_tested_and_in_the_table():
     scripts = {path.stem for path in FOLDER.glob("*.py")}
-    table, tests = (
-        (FOLDER / "README.md").read_text(encoding="utf-8"),
-        Path(__file__).read_text(encoding="utf-8"),
-    )
+    table = (FOLDER / "README.md").read_text(encoding="utf-8")
+    tests = Path(__file__).read_text(encoding="utf-8")
     assert [name for name in scripts if f"]({name}.py)" not in table] == []
     assert [name for name in scripts if f'example("{name}")' not in tests] == []
 
@@ -83,10 +73,8 @@ def test_fans_on_paths_of_ones_own_are_followed_and_drawn(example, tmp_path):
     t = np.linspace(0.0, 20.0, 4001)
     assert np.abs(np.gradient(script.chirp(t), t)).max() < 0.4  # m/s, what the law can follow
     assert set(np.unique(script.steps(t))) == {0.0, 0.35}
-    followed, left_alone = (
-        script.main(tmp_path / "followed"),
-        script.main(tmp_path / "hover", controller="hover"),
-    )
+    followed = script.main(tmp_path / "followed")
+    left_alone = script.main(tmp_path / "hover", controller="hover")
     assert all(followed[name] < left_alone[name] for name in script.PATHS)
     assert (tmp_path / "followed" / "fan_path.png").read_bytes().startswith(b"\x89PNG")
 
@@ -146,16 +134,9 @@ def test_the_node_takes_in_a_late_pose_at_its_own_time_and_goes_on_without_any(e
 
 
 def test_a_folder_of_logs_makes_one_table_though_a_log_is_broken(example, tmp_path):
-    vehicle = load_vehicle("ardrone2")
-    drag = EffectSetting("rotor_drag", {"kdx": 1.2e-4, "kdy": 1.2e-4})
-    for name, effects, seconds in (
-        ("plain", (), 16.0),
-        ("drag", (drag,), 16.0),
-        ("broken", (), 1.0),
-    ):
-        flown = record_flight(vehicle, effects, "excite", seconds, seed=2)
-        log = FlightLog(flown["t"], flown["position"], flown["quaternion"], flown["rotor_speeds"])
-        write_log(log, tmp_path / f"{name}.csv")
+    drag = {"rotor_drag": DRAG}
+    for name, effects, seconds in (("plain", {}, 16), ("drag", drag, 16), ("broken", {}, 1)):
+        write_log(recorded("excite", seconds, 2, **effects), tmp_path / f"{name}.csv")
     text = (tmp_path / "broken.csv").read_text()
     (tmp_path / "broken.csv").write_text(text.replace("omega4", "rpm4", 1))
     script = example("diagnose_a_folder")
@@ -167,9 +148,8 @@ def test_a_folder_of_logs_makes_one_table_though_a_log_is_broken(example, tmp_pa
     assert rows["broken.csv"]["verdict"] == ""
     assert rows["drag.csv"]["effects"].startswith("rotor_drag: kdx = 0.00012")
     assert rows["drag.csv"]["error"] == ""
-    assert float(rows["drag.csv"]["force_after_N"]) < 0.9 * float(
-        rows["drag.csv"]["force_before_N"]
-    )
+    after, before = (float(rows["drag.csv"][f"force_{name}_N"]) for name in ("after", "before"))
+    assert after < 0.9 * before
     assert rows["plain.csv"]["verdict"] == "nothing to explain"
     with pytest.raises(InputError, match=r"holds no \.csv file"):
         script.main(tmp_path / "diagnoses" / "none")
