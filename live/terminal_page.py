@@ -47,7 +47,7 @@ def _lines(snapshot: Snapshot) -> list[Text]:
     silent = snapshot.silence > SILENT
     status = f"SILENT for {snapshot.silence:.1f} s" if silent else output.estimate.status
     good = not silent and output.estimate.status == "tracking"
-    nis = output.estimate.nis
+    nis, rates = output.estimate.nis, sorted(snapshot.rates.items())
     lines = [
         Text.assemble(
             "status   ",
@@ -57,7 +57,7 @@ def _lines(snapshot: Snapshot) -> list[Text]:
             else f"   t {output.t:.2f} s",
             f"   restarts {snapshot.restarts}",
         ),
-        Text("rates    " + rates_words(snapshot)),
+        Text("rates    " + ", ".join(f"{kind} {rate:.0f} Hz" for kind, rate in rates)),
     ]
     median, most = snapshot.latency_ms
     timing = f"latency  {median:.2f} ms, 99 % within {most:.2f} ms" if median == median else ""
@@ -76,11 +76,6 @@ def _lines(snapshot: Snapshot) -> list[Text]:
     if snapshot.recorded:
         lines.append(Text(f"recorded {snapshot.recorded} rows"))
     return lines
-
-
-def rates_words(snapshot: Snapshot) -> str:
-    """Return how often each kind of message comes."""
-    return ", ".join(f"{kind} {rate:.0f} Hz" for kind, rate in sorted(snapshot.rates.items()))
 
 
 def counts_words(counts: dict[str, int]) -> str:

@@ -25,11 +25,6 @@ def add_esc_status(dialect: Any) -> Any:
         id, msgname, name = NUMBER, "ESC_STATUS", "ESC_STATUS"
         fieldnames = ("index", "time_usec", "rpm", "voltage", "current")
         ordered_fieldnames = ("time_usec", "rpm", "voltage", "current", "index")
-        fieldtypes = ("uint8_t", "uint64_t", "int32_t", "float", "float")
-        fielddisplays_by_name: dict[str, str] = {}  # noqa: RUF012 - as pymavlink's own have it
-        fieldenums_by_name: dict[str, str] = {}  # noqa: RUF012
-        fieldunits_by_name = {"time_usec": "us", "rpm": "rpm", "voltage": "V", "current": "A"}  # noqa: RUF012
-        native_format = bytearray(b"<QiffB")
         orders = (4, 0, 1, 2, 3)
         lengths = (1, 4, 4, 4, 1)
         array_lengths = (0, 4, 4, 4, 0)
