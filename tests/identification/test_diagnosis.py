@@ -20,7 +20,6 @@ from windwrench.identification.findings import Diagnosis
 from windwrench.identification.inference.regression import Flights, held_out
 from windwrench.identification.inference.search import Search
 from windwrench.identification.inference.stepwise_search import find_effects
-from windwrench.identification.inference.whitening import Whitener
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.motion.sensor_noise import sensor_noise, with_noise
@@ -461,17 +460,6 @@ def test_sensor_noise_is_read_off_the_log():
     assert noise.attitude == pytest.approx(0.005, rel=0.05)
     louder = sensor_noise(with_noise(log, noise, rng), vehicle)
     assert louder.position == pytest.approx(math.sqrt(2) * noise.position, rel=0.05)
-
-
-def test_whitened_noise_is_white():
-    flights = Flights([fly()], VEHICLE)
-    remainder = flights.residual({})
-    white = Whitener(
-        remainder, flights.sensor_noise, flights.start, flights.fit_rows, flights.period
-    )(remainder)[20:]
-    assert np.all(np.abs(white.std(axis=0) - 1.0) < 0.15)
-    lag = np.mean(white[1:] * white[:-1], axis=0) / np.mean(white * white, axis=0)
-    assert np.all(np.abs(lag) < 0.2)
 
 
 @pytest.mark.parametrize(

@@ -15,11 +15,11 @@ import pytest
 
 from tests.support.browser import look, needs_browser
 from tests.support.diagnoses import made_diagnosis, made_trace
-from windwrench.identification.findings import CHANNELS, Probabilities
+from windwrench.identification.findings import CHANNELS
 from windwrench.identification.report.files import write_report
 from windwrench.identification.report.page import error_table, report_page
 from windwrench.identification.report.plot_numbers import page_plots, telling_samples
-from windwrench.identification.report.words import next_step, rounded, sureness_sentences
+from windwrench.identification.report.words import rounded
 
 UPLOT = {
     "uPlot.iife.min.js": "19c8d4c6ad88929a79f4ae49d6f7161566dfd0ba3d15cc495e974f787eb78f1f",
@@ -135,30 +135,6 @@ def test_the_library_is_as_it_was_published():
     page = report_page(made_diagnosis(), "command")
     assert "Copyright (c) 2022 Leon Sorokin" in page
     assert "uPlot (v1.6.32)" in page
-
-
-def test_the_first_screen_says_how_sure_and_what_next():
-    made = made_diagnosis()
-    (effect,) = made.effects
-    assert sureness_sentences(made)[0] == (
-        "rotor_drag: no other effect of the library explains the flight as well "
-        "(kdx ± 1.2\N{NO-BREAK SPACE}%, standard deviations)."
-    )
-    assert "1 block, 3\N{NO-BREAK SPACE}s, that no fit used" in sureness_sentences(made)[-1]
-    assert next_step(made).startswith("Use vehicle.yaml")
-    doubtful = replace(made, effects=(replace(effect, indistinguishable_from=("body_drag",)),))
-    assert next_step(doubtful).startswith("To tell rotor_drag from body_drag, fly: ")
-    assert "cannot distinguish rotor_drag" in sureness_sentences(doubtful)[0]
-    advised = replace(made, verdict="partly explained", advice=("Fly higher. " * 40,))
-    assert next_step(advised).endswith("Fly higher.")
-    assert len(next_step(advised)) < 200
-    stated = Probabilities({effect.name: 0.95}, (), 0.03)
-    assert sureness_sentences(replace(made, probabilities=stated))[0] == (
-        "Probability that it acts: rotor_drag 95\N{NO-BREAK SPACE}%. "
-        "Probability of a cause outside the library: 3.0\N{NO-BREAK SPACE}%."
-    )
-    bare = replace(made, verdict="nothing to explain", effects=())
-    assert next_step(bare).startswith("Keep the model as it is")
 
 
 def test_a_torque_that_the_logs_do_not_tell_is_not_drawn():
