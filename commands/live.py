@@ -113,7 +113,7 @@ def live(
     from ..identification.logs.log_map import load_map
     from ..live.filtering import LiveSettings, warm_up
     from ..live.recorder import Recorder
-    from ..live.session import Means, Session, SessionSettings
+    from ..live.session import Means, Session
     from ..live.sources.open import kind_of, make_source
     from ..live.tallies import Tallies
 
@@ -126,7 +126,7 @@ def live(
     model = load_vehicle(vehicle or _SIMULATED)
     if diagnose_after and record is None:
         raise InputError("--diagnose-after: expected --record LOG with it, the log to diagnose")
-    settings = LiveSettings(horizon=horizon, rate_hz=rate)
+    settings = LiveSettings(horizon=horizon, rate_hz=rate, wait=wait, seconds=seconds)
     if gate is not None:
         settings = replace(settings, gate=checked_gate(gate) or None)
     tallies, means = Tallies(), Means()
@@ -153,7 +153,6 @@ def live(
         stream,
         settings,
         recorder,
-        SessionSettings(wait=wait, seconds=seconds),
         tell,
         out_text.flush if lines else lambda: None,
     )

@@ -25,11 +25,13 @@ _FIRST_SECONDS = 1.0  # after which fewer do, of a source that is slow
 
 @dataclass(frozen=True)
 class LiveSettings:
-    """How a stream is filtered."""
+    """How a stream is filtered, when it is said to be none, and when it is over."""
 
     gate: float | None = GATE  # as of a log
     horizon: float = 0.3  # s that a row may lie in the past; later is too late
     rate_hz: float | None = None  # of rows, where it is known; then none are held back
+    wait: float = 10.0  # s for the first estimate; 0: for ever
+    seconds: float | None = None  # s of the stream's time, after which it is over
 
 
 @dataclass(slots=True)

@@ -32,14 +32,6 @@ _POLL = 0.1  # s between two looks at whether to end
 _TURN = 2e-4  # s after which Python's threads take turns: an arrival waits no longer for the page
 
 
-@dataclass(frozen=True)
-class SessionSettings:
-    """When a stream is said to be none, or to be over."""
-
-    wait: float = 10.0  # s for the first estimate; 0: for ever
-    seconds: float | None = None  # s of the stream's time, after which it is over
-
-
 @dataclass
 class Snapshot:
     """What there is to show, now."""
@@ -63,9 +55,8 @@ class Session:
 
     Args:
         source: of messages; it states the vehicle and counts.
-        live: settings of the filter.
+        settings: of the stream.
         recorder: where rows are recorded; None: nowhere.
-        settings: of the session.
         tell: called with each estimate, in the stream's thread.
         flush: called when all that has come is dealt with.
     """
@@ -73,18 +64,17 @@ class Session:
     def __init__(
         self,
         source: Source,
-        live: LiveSettings | None = None,
+        settings: LiveSettings | None = None,
         recorder: Recorder | None = None,
-        settings: SessionSettings | None = None,
         tell: Callable[[Output], None] = lambda output: None,
         flush: Callable[[], None] = lambda: None,
     ) -> None:
         tallies = source.tallies
         self.source, self.tallies, self.recorder = source, tallies, recorder
-        self.filter = LiveFilter(source.vehicle, tallies, live)
-        self._clocks = Clocks(tallies, self.filter.settings.horizon, source.paced)
+        self.filter = LiveFilter(source.vehicle, tallies, settings)
+        self._settings = self.filter.settings
+        self._clocks = Clocks(tallies, self._settings.horizon, source.paced)
         self._joiner = Joiner(source.vehicle, tallies)
-        self._settings = settings or SessionSettings()
         self._tell, self._flush = tell, flush
         self._stop = threading.Event()
         self._first = self._last = time.monotonic_ns()  # of messages

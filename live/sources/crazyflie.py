@@ -77,23 +77,21 @@ class CrazyflieLog(Source):
         if not crtp.CLASSES:
             crtp.init_drivers()
         self._decompress = importlib.import_module("cflib.utils.encoding").decompress_quaternion
-        connected, failed = threading.Event(), threading.Event()
+        answers: queue.SimpleQueue[str] = queue.SimpleQueue()  # why not; empty: it is connected
         self._cf = crazyflie.Crazyflie()
-
-        def fail(uri: str, message: str) -> None:
-            self._problem = str(message).strip().splitlines()[0][:300] if message else "no answer"
-            failed.set()
-            connected.set()
-
-        self._cf.connected.add_callback(lambda uri: connected.set())
-        self._cf.connection_failed.add_callback(fail)
+        self._cf.connected.add_callback(lambda uri: answers.put(""))
+        self._cf.connection_failed.add_callback(
+            lambda uri, message: answers.put(_first_line(message) or "no answer")
+        )
         self._cf.connection_lost.add_callback(self._lost)
         self._cf.open_link(self._uri)
-        came = connected.wait(_CONNECTS)
-        if failed.is_set() or not came:
+        try:
+            problem = answers.get(timeout=_CONNECTS)
+        except queue.Empty:
+            problem = f"no answer within {_CONNECTS:g} s"
+        if problem:
             self.close()
-            why = self._problem or f"no answer within {_CONNECTS:g} s"
-            raise InputError(f"{self.name}: no Crazyflie there: {why}")
+            raise InputError(f"{self.name}: no Crazyflie there: {problem}")
         self._start(log)
 
     def _start(self, log: Any) -> None:
@@ -201,3 +199,7 @@ class CrazyflieLog(Source):
         return f"log blocks every {self._period} ms" + (
             f"; {self._problem}" if self._problem else ""
         )
+
+
+def _first_line(message: object) -> str:
+    return str(message or "").strip().partition("\n")[0][:300]

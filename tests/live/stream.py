@@ -12,7 +12,7 @@ from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.live.clocks import Clocks
 from windwrench.live.filtering import LiveFilter, LiveSettings
 from windwrench.live.rows import Joiner
-from windwrench.live.session import Session, SessionSettings
+from windwrench.live.session import Session
 from windwrench.live.sources.open import make_source
 from windwrench.live.tallies import Tallies
 from windwrench.runtime.errors import InputError
@@ -99,7 +99,7 @@ class Running:
         self.source.descriptor = descriptor  # of a table
         self.session = Session(
             self.source,
-            settings=SessionSettings(**{"wait": 0.0} | settings),
+            settings=LiveSettings(**{"wait": 0.0} | settings),
             tell=self.outputs.append,
         )
         if watched:
