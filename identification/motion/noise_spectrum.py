@@ -12,10 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from ..logs.flight_log import FlightLog
-from .smoothing import unbroken
+from .smoothing import turned, unbroken
 
 Array = NDArray[np.float64]
 
@@ -104,15 +103,7 @@ def _channels(log: FlightLog) -> Iterator[tuple[str, list[Array], float]]:
         pieces = unbroken(log.t, rows, NOISE_SPECTRUM.gap * period)
         pieces = [piece for piece in pieces if len(piece) > NOISE_SPECTRUM.segment]
         turning = name == "attitude"
-        yield name, [_angle(quaternion[r]) if turning else x[r] for r in pieces], period
-
-
-def _angle(quaternion: Array) -> Array:
-    """Return the sum (n - 1, 3) of the rotations (rad) between quaternions (n, 4): white noise
-    stays white in it, but for a small share that the motion turns.
-    """
-    turned = Rotation.from_quat(quaternion, scalar_first=True)
-    return np.asarray(np.cumsum((turned[:-1].inv() * turned[1:]).as_rotvec(), axis=0))
+        yield name, [turned(quaternion[r]) if turning else x[r] for r in pieces], period
 
 
 def _amplitudes(pieces: Sequence[Array]) -> tuple[Array, Array] | None:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from ...dynamics.vehicle import Mocap, Vehicle
 from ..logs.flight_log import FlightLog
 from .inertial_signals import imu_noise, pose_rate, reads_imu
-from .smoothing import CUTOFFS, high_pass, robust_std
+from .smoothing import CUTOFFS, high_pass, robust_std, turned
 
 Array = NDArray[np.float64]
 
@@ -45,15 +45,8 @@ def sensor_noise(log: FlightLog, vehicle: Vehicle) -> SensorNoise:
     steps = np.diff(log.t[seen])
     whole = np.flatnonzero(steps < 1.5 * np.median(steps))
     position = high_pass(log.position[seen], CUTOFFS.noise_share_of_rate)[whole]
-    turned = Rotation.from_quat(log.quaternion[seen], scalar_first=True)
-    angle = (
-        turned[:-1].inv() * turned[1:]
-    ).as_rotvec()  # white noise differenced: twice its power, and a known shape
-    return SensorNoise(
-        robust_std(position),
-        robust_std(high_pass(np.cumsum(angle, axis=0), CUTOFFS.noise_share_of_rate)),
-        step / np.sqrt(12.0),
-    )
+    angle = high_pass(turned(log.quaternion[seen]), CUTOFFS.noise_share_of_rate)
+    return SensorNoise(robust_std(position), robust_std(angle), step / np.sqrt(12.0))
 
 
 def with_noise(log: FlightLog, noise: SensorNoise, rng: np.random.Generator) -> FlightLog:

@@ -11,6 +11,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter, savgol_filter, sosfiltfilt
+from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 
@@ -113,6 +114,14 @@ def derivative(x: Array, period: float, order: int = 1) -> Array:
     200 Hz, would be a centre of mass that is off.
     """
     return np.asarray(savgol_filter(x, 5, 4, deriv=order, delta=period, axis=0))
+
+
+def turned(quaternion: Array) -> Array:
+    """Return the sum (n - 1, 3) of the rotations (rad, body) between quaternions (n, 4). White
+    noise stays white in this sum, but for a small share that the motion turns.
+    """
+    attitude = Rotation.from_quat(quaternion, scalar_first=True)
+    return np.asarray(np.cumsum((attitude[:-1].inv() * attitude[1:]).as_rotvec(), axis=0))
 
 
 def continuous(quaternion: Array) -> Array:

@@ -143,7 +143,8 @@ def pieces_of(
     pieces: list[MotionPiece] = []
     for number, (log, (first, last)) in enumerate(zip(logs, windows, strict=True)):
         posed = "pose" in (sources.rate, sources.force)
-        for piece in (_posed if posed else _inertial)(log, number, sources, gravity):
+        for motion in _posed(log, sources, gravity) if posed else _inertial(log, sources):
+            piece = _piece(log, number, motion, sources)
             inside = (piece.t >= log.t[0] + first) & (piece.t <= log.t[0] + last)
             for part in _cut(piece, inside):
                 pieces += _cut(part, _flying(part))
@@ -155,8 +156,12 @@ def pieces_of(
     return pieces, sources
 
 
-def _posed(log: FlightLog, number: int, sources: Sources, gravity: float) -> Iterator[MotionPiece]:
-    """Yield pieces whose force, and rate where there is no gyro, are the pose's derivatives."""
+# times, period, specific force, angular acceleration, angular velocity and velocity in body axes
+_Motion = tuple[Array, float, Array | None, Array, Array, Array | None]
+
+
+def _posed(log: FlightLog, sources: Sources, gravity: float) -> Iterator[_Motion]:
+    """Yield motion whose force, and rate where there is no gyro, are the pose's derivatives."""
     for s in log_signals(log, wide_hz=np.inf):
         inverse = Rotation.from_matrix(s.rotation).inv()
         force = inverse.apply(s.acceleration + np.array([0.0, 0.0, gravity]))
@@ -166,14 +171,11 @@ def _posed(log: FlightLog, number: int, sources: Sources, gravity: float) -> Ite
         if sources.rate == "gyro" and log.gyro is not None:
             rate = _sensor(log, log.gyro, s.t)
             turning = derivative(rate, s.period)
-        velocity = inverse.apply(s.velocity)
-        yield _piece(log, number, s.t, s.period, force, rate, turning, velocity, sources)
+        yield s.t, s.period, force, turning, rate, inverse.apply(s.velocity)
 
 
-def _inertial(
-    log: FlightLog, number: int, sources: Sources, gravity: float
-) -> Iterator[MotionPiece]:
-    """Yield pieces whose rate, and force if any, are the IMU's; velocity is the pose's, where there
+def _inertial(log: FlightLog, sources: Sources) -> Iterator[_Motion]:
+    """Yield motion whose rate, and force if any, are the IMU's; velocity is the pose's, where there
     is one.
     """
     assert log.gyro is not None
@@ -186,30 +188,16 @@ def _inertial(
         rate = _sensor(log, log.gyro, t)
         force = None if log.accelerometer is None else _sensor(log, log.accelerometer, t)
         velocity = _velocity(log, t) if sources.velocity else None
-        turning = derivative(rate, period)
-        yield _piece(log, number, t, period, force, rate, turning, velocity, sources)
+        yield t, period, force, derivative(rate, period), rate, velocity
 
 
-def _piece(
-    log: FlightLog,
-    number: int,
-    t: Array,
-    period: float,
-    force: Array | None,
-    rate: Array,
-    turning: Array,
-    velocity: Array | None,
-    sources: Sources,
-) -> MotionPiece:
+def _piece(log: FlightLog, number: int, motion: _Motion, sources: Sources) -> MotionPiece:
+    """Return a piece with the rotors beside its motion, thinned out where it is fast."""
+    t, period = motion[:2]
     speeds = log.rotor_speeds if sources.rotors == "rotor speeds" else None
     piece = MotionPiece(
         number,
-        t,
-        period,
-        force,
-        turning,
-        rate,
-        velocity,
+        *motion,
         None if speeds is None else resampled(t, log.t, speeds),
         None if log.command is None else resampled(t, log.t, log.command),
         None if log.voltage is None else np.interp(t, log.t, log.voltage),

@@ -23,7 +23,7 @@ from .columns import Drive
 from .effect_settings import effect_of
 from .estimates import Intervals, estimates_of, thrust_of
 from .geometry import SPIN, USUAL, Geometry
-from .motors import MotorResponse, motor_response
+from .motors import motor_response
 from .parameters import FORCE_BIAS, OPTIONAL, POSITIVE, first_model
 from .result import IDENTIFIED, NOTHING, WIDEST, Estimate, Identified, told
 from .solve import VehicleFit, fall_with, lag_with, solve
@@ -116,7 +116,11 @@ def identify(
         estimates.append(_lag_alone(pieces, fit))
     motors = None if commands or "lag" in fit.model.free else motor_response(pieces)
     if motors is not None:
-        estimates = [_lag_of(motors) if e.name == effect_of(Role.LAG) else e for e in estimates]
+        how = (
+            f"rotor speeds against commands, {100 * motors.left:.0f} % of their variation left over"
+        )
+        lag = Estimate(effect_of(Role.LAG), *motors.known, "s", IDENTIFIED, how)
+        estimates = [lag if e.name == lag.name else e for e in estimates]
     named = {e.name: e for e in estimates}
     vehicle = vehicle_of(name, fit, named, geometry, logs, gravity, voltage, step, motors)
     return Identified(
@@ -131,12 +135,6 @@ def identify(
         fit.balance.seconds,
         len(fit.balance.segments),
     )
-
-
-def _lag_of(motors: MotorResponse) -> Estimate:
-    how = f"rotor speeds against commands, {100 * motors.left:.0f} % of their variation left over"
-    name = effect_of(Role.LAG)
-    return Estimate(name, motors.lag, motors.low, motors.high, "s", IDENTIFIED, how)
 
 
 def _lag_alone(pieces: list[MotionPiece], fit: VehicleFit) -> Estimate:

@@ -19,8 +19,7 @@ Array = NDArray[np.float64]
 class MotorSettings:
     """How the response is fitted."""
 
-    shortest_lag: float = 1e-3  # s
-    longest_lag: float = 0.5  # s
+    lags: tuple[float, float] = (1e-3, 0.5)  # s, the shortest and the longest
     segment: float = 5.0  # s: errors further apart are taken as independent
     powers: int = 3  # speed against u^0, u^1, u^2
 
@@ -33,9 +32,7 @@ class MotorResponse:
     """Rotor speed in rad/s against command, and its lag."""
 
     speed: Array  # (3,) coefficients of u^0, u^1, u^2
-    lag: float  # s
-    low: float  # of its 95 % interval
-    high: float
+    known: tuple[float, float, float]  # s, the lag, and the ends of its 95 % interval
     left: float  # share of the speeds' standard deviation that it does not explain
 
 
@@ -65,13 +62,11 @@ def motor_response(pieces: list[MotionPiece]) -> MotorResponse | None:
         best = np.linalg.lstsq(x, target, rcond=None)[0]
         return best, target - x @ best
 
-    bounds = (np.log(MOTORS.shortest_lag), np.log(MOTORS.longest_lag))
-    found = minimize_scalar(
-        lambda s: float(np.sum(np.square(fitted(float(np.exp(s)))[1]))),
-        bounds=bounds,
-        method="bounded",
-        options={"xatol": 1e-3},
-    )
+    def misfit(log_lag: float) -> float:
+        return float(np.sum(np.square(fitted(float(np.exp(log_lag)))[1])))
+
+    bounds = tuple(np.log(MOTORS.lags))
+    found = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-3})
     lag = float(np.exp(found.x))
     best, residual = fitted(lag)
     step = 0.01 * lag
@@ -81,12 +76,10 @@ def motor_response(pieces: list[MotionPiece]) -> MotorResponse | None:
     seconds = pieces[0].period * np.arange(len(speeds)).repeat(speeds.shape[1])
     block = (seconds / MOTORS.segment).astype(int)
     count = int(block.max()) + 1
-    scores = np.array(
-        [moves[block == b].T @ residual[block == b] for b in range(count)]
-    )  # errors go on within a segment: a sandwich over segments
+    # errors go on within a segment: a sandwich over segments
+    scores = np.array([moves[block == b].T @ residual[block == b] for b in range(count)])
     meat = scores.T @ scores * (count / max(count - 1, 1))
     size = float(np.sqrt((inverse @ meat @ inverse)[-1, -1]))
     width = float(student.ppf(0.975, max(count - 1, 3))) * size
-    return MotorResponse(
-        best, lag, max(lag - width, 0.0), lag + width, float(np.std(residual) / np.std(target))
-    )
+    known = (lag, max(lag - width, 0.0), lag + width)
+    return MotorResponse(best, known, float(np.std(residual) / np.std(target)))
