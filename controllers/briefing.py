@@ -3,32 +3,13 @@ kind of fan, and for those that say so, how the fan is known to move.
 """
 
 from dataclasses import dataclass, field
-from typing import Protocol, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..dynamics.vehicle import Vehicle
 from ..dynamics.vehicle_file import load_vehicle
-
-
-class FilterTuning(Protocol):
-    """What ``FilterNoise`` reads of a wrench filter's tuning (``estimator.UKFTuning``): standard
-    deviations in one of its steps, a number or one along each axis.
-    """
-
-    @property
-    def motor_torque_noise(self) -> ArrayLike: ...  # noqa: D102
-    @property
-    def torque_walk(self) -> ArrayLike: ...  # noqa: D102
-    @property
-    def thrust_noise(self) -> ArrayLike: ...  # noqa: D102
-    @property
-    def force_walk(self) -> ArrayLike: ...  # noqa: D102
-    @property
-    def position_noise(self) -> ArrayLike: ...  # noqa: D102
-    @property
-    def attitude_noise(self) -> ArrayLike: ...  # noqa: D102
 
 
 def _along(value: ArrayLike, axis: int) -> float:
@@ -50,8 +31,10 @@ class FilterNoise:
     period: float = 0.005  # s, of a step
 
     @classmethod
-    def of(cls, tuning: FilterTuning, period: float) -> Self:
-        """Return what a wrench filter of this tuning was told, whose step takes ``period`` s."""
+    def of(cls, tuning: Any, period: float) -> Self:
+        """Return what a wrench filter of this ``estimator.UKFTuning`` was told, whose step takes
+        ``period`` s.
+        """
         return cls(
             _along(tuning.motor_torque_noise, 2),
             _along(tuning.torque_walk, 2),

@@ -223,17 +223,6 @@ class InformedTracker(_Belief):
         self._place = start + now
         self._velocity = (then - now) / self.ahead
 
-    def deviation_ahead(self, seconds: float) -> float:
-        """Return the standard deviation (m) of where the fan will be some seconds from now, given
-        all that has been observed.
-        """
-        time = max(self._sensing.count - 1, 0) * DECISION_PERIOD + seconds
-        speed, travel, offset = self._motion.T
-        place = self._side * offset + self._sign * place_after(self._kind, speed, travel, time)
-        shares = np.exp(self._weight)
-        shares /= shares.sum()
-        return float(np.sqrt(shares @ (place - shares @ place) ** 2))
-
     def _choose(self, chosen: NDArray[np.int64]) -> None:
         if self.leave > 0.0:
             self._free = self._free[chosen]

@@ -9,7 +9,8 @@ import hashlib
 import io
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -156,6 +157,17 @@ class _Network:
         return np.clip(out, -self._largest, self._largest).astype(np.float32)
 
 
+@contextmanager
+def _entries_named(name: str) -> Iterator[None]:
+    """Name an entry of a card that is missing or spoiled."""
+    try:
+        yield
+    except (KeyError, TypeError, ValueError) as error:
+        if isinstance(error, InputError) and str(error).startswith(name):
+            raise
+        raise InputError(f"{name}: the card lacks or spoils an entry: {error}") from error
+
+
 class TrainedPolicy(_Network):
     """A policy of ``FanTracking`` that was learned, as a controller.
 
@@ -171,7 +183,7 @@ class TrainedPolicy(_Network):
     """
 
     def __init__(self, card: Mapping[str, Any], weights: Weights, name: str = "policy") -> None:
-        try:
+        with _entries_named(name):
             seen = card["features"]
             self.features = Features(
                 tuple(seen["frame"]), int(seen["history"]), tuple(map(float, seen["scale"]))
@@ -183,10 +195,6 @@ class TrainedPolicy(_Network):
                     f"least 1"
                 )
             super().__init__(card, weights, self.features.size, MAX_COMMAND, name)
-        except (KeyError, TypeError, ValueError) as error:
-            if isinstance(error, InputError) and str(error).startswith(name):
-                raise
-            raise InputError(f"{name}: the card lacks or spoils an entry: {error}") from error
         if weights[f"weight{layers_of(weights) - 1}"].shape[0] != 1:
             raise InputError(f"{name}: the last layer must give one number")
         self.reset()
@@ -229,16 +237,12 @@ class TaskPolicy(_Network):
     """
 
     def __init__(self, card: Mapping[str, Any], weights: Weights, name: str = "policy") -> None:
-        try:
+        with _entries_named(name):
             self.task, largest = str(card["task"]), float(card["largest"])
             self._scale = np.array(card["scale"], dtype=np.float32)
             if self._scale.ndim != 1:
                 raise InputError(f"{name}: scale must be a list of numbers")
             super().__init__(card, weights, len(self._scale), largest, name)
-        except (KeyError, TypeError, ValueError) as error:
-            if isinstance(error, InputError) and str(error).startswith(name):
-                raise
-            raise InputError(f"{name}: the card lacks or spoils an entry: {error}") from error
         self.reset()
 
     def __call__(

@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 
 from windwrench.controllers import Admittance, AdmittancePID, Lead, Ratio
-from windwrench.controllers.flight_response import half_response
 from windwrench.controllers.observation import FORCE_X, MAX_COMMAND, OBSERVATION_SIZE, TORQUE_Z
-from windwrench.dynamics import load_vehicle
-from windwrench.envs.closed_loop import ClosedLoop
-from windwrench.envs.plant import NOISE, PlantSettings
 
 
 def observation(torque=0.0, force=0.5):
@@ -48,18 +44,3 @@ def test_the_integral_follows_and_does_not_wind_up():
     assert turned[-1] > 0.0
     pid.reset()
     assert pid(observation(0.0))[0] == 0.0
-
-
-def test_half_of_a_step_is_flown_when_the_linear_loop_says_so():
-    vehicle = load_vehicle("ardrone2")
-    settings = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0, sensor_noise=False)
-    loop = ClosedLoop(vehicle, settings=settings)
-    rng = np.random.default_rng(0)
-    loop.reset(rng, np.array([0.0, 0.0, 1.2]))
-    loop.run(rng.standard_normal((200, NOISE)))
-    loop.setpoint[4] = 0.3
-    ticks = 0
-    while loop.velocity[1] < 0.15 and ticks < 400:
-        loop.run(rng.standard_normal((1, NOISE)))
-        ticks += 1
-    assert 0.005 * ticks == pytest.approx(half_response(), abs=0.03)

@@ -213,15 +213,6 @@ def test_only_the_limit_is_told_of_gusts():
         assert pilot._briefing.air.turbulence == told
 
 
-def test_a_fan_s_place_to_come_is_less_certain():
-    pilot = InformedTracker(particles=300)
-    env = FanTrackingEnv("base")
-    observation, _ = env.reset(seed=3)
-    for _ in range(15):
-        observation = env.step(pilot(observation))[0]
-    assert 0.0 < pilot.deviation_ahead(0.0) < pilot.deviation_ahead(1.5)
-
-
 def test_a_fan_that_leaves_the_family_is_found_again():
     """It stands for 5 s and then goes, which no motion of the family does."""
     path = np.concatenate([np.zeros(60), np.cumsum(np.full(30, 0.2 * 0.08))])
