@@ -7,7 +7,7 @@ axis. (In the body frame of a vehicle that faces the fan, y and the sign turn ro
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,20 +41,15 @@ class FanLaw:
         return np.clip(wanted, -MAX_COMMAND, MAX_COMMAND).astype(np.float32)
 
 
+@dataclass(eq=False)
 class Hover(FanLaw):
     """Stays where it is: the lower bound, score 0."""
 
+    axes: int = 1  # that are commanded
+
     def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
         """Return no velocity."""
-        return (0.0,)
-
-
-class Hover2D(FanLaw):
-    """Stays where it is: the lower bound, score 0."""
-
-    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
-        """Return no velocities."""
-        return 0.0, 0.0
+        return (0.0,) * self.axes
 
 
 @dataclass(eq=False)
@@ -63,7 +58,7 @@ class Oracle(FanLaw):
 
     gain: float = 2.0  # 1/s, from the true offset to velocity
     # entries of the environment's ``info``: the fan's place and velocity, and the vehicle's place
-    entries: ClassVar[tuple[str, str, str]] = "fan_y", "fan_velocity", "y"
+    entries: tuple[str, str, str] = "fan_y", "fan_velocity", "y"
 
     def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
         """Return the fan's velocity, and a share of the true offset.
@@ -78,12 +73,6 @@ class Oracle(FanLaw):
             )
         fan, velocity, own = (info[name] for name in self.entries)
         return tuple(np.atleast_1d(velocity + self.gain * (fan - own)).tolist())
-
-
-class Oracle2D(Oracle):
-    """Sees the fan: moves with it and towards its axis. The upper bound, score 1."""
-
-    entries = "fan", "fan_velocity", "position"
 
 
 @dataclass(eq=False)

@@ -18,10 +18,8 @@ from .fan_laws import (
     Admittance2D,
     AdmittancePID,
     Hover,
-    Hover2D,
     Lead,
     Oracle,
-    Oracle2D,
     Ratio,
     Ratio2D,
 )
@@ -98,10 +96,10 @@ _WIND: Laws = {
 TASK_LAWS: dict[str, Laws] = {
     STANDARD_TASK: CONTROLLERS,
     "FanTracking2D": {
-        "hover": Hover2D,
+        "hover": partial(Hover, axes=2),
         "admittance": Admittance2D,
         "ratio": Ratio2D,
-        "oracle": Oracle2D,
+        "oracle": partial(Oracle, entries=("fan", "fan_velocity", "position")),
     },
     "WindHover": _WIND,
     "WindTrajectory": _WIND,

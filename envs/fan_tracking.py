@@ -117,20 +117,13 @@ class FanTrackingEnv(Task):
     | Parameter     | Default      | Description                                                               |
     | ------------- | ------------ | ------------------------------------------------------------------------- |
     | `scenario`    | `"base"`     | one of `windwrench.envs.SCENARIOS`, or a `Scenario`                        |
-    | `vehicle`     | `"ardrone2"` | preset, YAML path or `Vehicle`: what filter and flight loop know            |
-    | `effects`     | `()`         | effects of the true vehicle that nobody declared                           |
-    | `truth`       | `None`       | the true vehicle, before `effects`; default: as declared                    |
     | `fan`         | `None`       | a `Fan`, in place of the standard one                                      |
-    | `settings`    | `None`       | a `PlantSettings`: motor lag, unmodelled disturbance, dropouts             |
     | `fan_path`    | `None`       | function from times (n,) s to the fan's y (n,) m, in place of the scenario's |
-    | `estimator`   | `"ukf"`      | `"ukf"`, or `"constant-gain"`: the filter's converged gain, for faster training |
     | `observe`     | `"wrench"`   | what is seen: `"wrench"`, `"wrench-without-fx"`, `"pose"` or `"history"`    |
-    | `normalize`   | `False`      | whether observations are divided by fixed scales (see above)              |
-    | `stages`      | `()`         | stages of your own in a tick: ``windwrench.envs.Stage``                    |
-    | `render_mode` | `None`       | `"human"` (needs a display) or `"rgb_array"`                               |
 
+    All arguments of ``windwrench.envs.task.Task`` come beside these.
     ``metadata["render_modes"]`` of an environment names what this machine can show: without a display, no
-    `"human"`. ``reset`` knows no ``options`` and refuses any.
+    `"human"`. ``reset`` refuses any ``options``.
 
     ## Version history
 
@@ -223,6 +216,40 @@ class FanTrackingEnv(Task):
     def _get_reward(self, info: dict[str, Any], change: Array) -> dict[str, float]:
         tracking, steady = reward_terms(info["offset"], float(change[0]))
         return {"reward_tracking": tracking, "reward_change": steady}
+
+
+TRUTH = frozenset({"force", "torque"})  # what every environment's ``info`` holds
+
+
+class SensingFanTracking(FanTrackingEnv):
+    """``FanTrackingEnv`` with more in ``info``, for ablations.
+
+    ``std_force``, ``std_torque``: the filter's standard deviations (3,) N and Nm.
+    """
+
+    def _get_info(self) -> dict[str, Any]:
+        info = super()._get_info()
+        std = np.sqrt(np.diagonal(self.loop.covariance)[12:18])
+        info["std_torque"], info["std_force"] = std[:3].copy(), std[3:].copy()
+        return info
+
+
+def scenario_env(
+    scenario: str, sources: frozenset[str] = frozenset(), estimator: str = "ukf"
+) -> FanTrackingEnv:
+    """Return a scenario's environment, with what a policy must find in its ``info``.
+
+    Args:
+        scenario: name.
+        sources: what ``info`` must hold, as ``controllers.features.Features.sources`` names it.
+        estimator: ``ukf``, or ``constant-gain``, its fast stand-in.
+
+    Raises:
+        InputError: a name that does not exist.
+    """
+    if not sources - TRUTH:
+        return FanTrackingEnv(scenario, estimator=estimator)
+    return SensingFanTracking(scenario, estimator=estimator)
 
 
 __all__ = ["DECISION_TICKS", "EPISODE_SECONDS", "LOST_OFFSET", "FanTrackingEnv"]

@@ -87,17 +87,9 @@ class FanTracking2DEnv(Task):
     | Parameter     | Default      | Description                                                       |
     | ------------- | ------------ | ----------------------------------------------------------------- |
     | `scenario`    | `"base"`     | one of `windwrench.envs.SCENARIOS`, or a `Scenario`                |
-    | `vehicle`     | `"ardrone2"` | preset, YAML path or `Vehicle`: what filter and flight loop know    |
-    | `effects`     | `()`         | effects of the true vehicle that nobody declared                   |
-    | `truth`       | `None`       | the true vehicle, before `effects`; default: as declared            |
     | `fan`         | `None`       | a `Fan`, in place of the standard one with a cage                  |
-    | `settings`    | `None`       | a `PlantSettings`: motor lag, unmodelled disturbance, dropouts     |
-    | `estimator`   | `"ukf"`      | `"ukf"`, or `"constant-gain"`: the filter's converged gain          |
-    | `normalize`   | `False`      | whether observations are divided by the scales above               |
-    | `stages`      | `()`         | stages of your own in a tick: ``windwrench.envs.Stage``             |
-    | `render_mode` | `None`       | `"human"` (needs a display) or `"rgb_array"`                       |
 
-    ``reset`` knows no ``options`` and refuses any.
+    All arguments of ``windwrench.envs.task.Task`` come beside these. ``reset`` refuses any ``options``.
 
     ## Version history
 

@@ -49,16 +49,16 @@ class Task(gym.Env[Frame, Frame], ABC):
 
     Args:
         scenario: a name, or a scenario of the task's kind.
-        render_mode: ``"human"``, ``"rgb_array"`` or None.
+        render_mode: ``"human"`` (needs a display), ``"rgb_array"`` or None.
         vehicle: what filter and flight loop know: preset, YAML path or ``Vehicle``.
         effects: of the true vehicle, which nobody declared.
         truth: the true vehicle, before ``effects``; default: as declared.
-        settings: of the plant.
-        estimator: one of ``closed_loop.ESTIMATORS``.
-        normalize: whether observations are divided by their scales.
+        settings: of the plant: motor lag, unmodelled disturbance, dropouts.
+        estimator: ``"ukf"``, or ``"constant-gain"``: the filter's converged gain, which is faster.
+        normalize: whether observations, and actions in m/s2, are divided by fixed scales.
         width: of a picture, in pixels.
         height: likewise.
-        stages: of a user's own, in the pipeline of a tick.
+        stages: of a user's own, in the pipeline of a tick: ``windwrench.envs.Stage``.
 
     Raises:
         InputError: an argument that names what does not exist.

@@ -129,19 +129,11 @@ class WindHoverEnv(Task):
     | Parameter     | Default      | Description                                                          |
     | ------------- | ------------ | -------------------------------------------------------------------- |
     | `scenario`    | `"base"`     | one of `windwrench.envs.wind_scenarios.WIND_SCENARIOS`, or a `WindScenario` |
-    | `vehicle`     | `"ardrone2"` | preset, YAML path or `Vehicle`: what filter and flight loop know       |
-    | `effects`     | `()`         | effects of the true vehicle that nobody declared                      |
-    | `truth`       | `None`       | the true vehicle, before `effects`; default: as declared               |
     | `winds`       | `None`       | winds in place of the scenario's: any object with ``velocity(points, time)`` |
-    | `settings`    | `None`       | a `PlantSettings`: motor lag, unmodelled disturbance, dropouts        |
-    | `estimator`   | `"ukf"`      | `"ukf"`, or `"constant-gain"`: the filter's converged gain             |
-    | `normalize`   | `False`      | whether observations and actions are divided by the scales above      |
     | `model_in_loop` | `True`     | whether the flight loop counters the effects that `vehicle` declares    |
     | `gains`       | `None`       | a `FlightGains`: of the flight loop                                    |
-    | `stages`      | `()`         | stages of your own in a tick: ``windwrench.envs.Stage``                |
-    | `render_mode` | `None`       | `"human"` (needs a display) or `"rgb_array"`                          |
 
-    ``reset`` knows no ``options`` and refuses any.
+    All arguments of ``windwrench.envs.task.Task`` come beside these. ``reset`` refuses any ``options``.
 
     ## Version history
 

@@ -14,10 +14,9 @@ from ..controllers.trained_policy import (
     load_policy,
     load_task_policy,
 )
-from ..envs.fan_tracking import FanTrackingEnv
+from ..envs.fan_tracking import FanTrackingEnv, scenario_env
 from ..envs.fan_tracking_2d import FanTracking2DEnv
 from ..envs.scenarios import SCENARIOS
-from ..envs.watched_fan_tracking import scenario_env
 from ..envs.wind_scenarios import WIND_SCENARIOS
 from ..envs.wind_tasks import WindHoverEnv, WindTrajectoryEnv
 from ..runtime.errors import InputError, unknown_name

@@ -8,11 +8,10 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.wrappers import TimeLimit
 from numpy.typing import NDArray
 
-from ..envs.fan_tracking import FanTrackingEnv
+from ..envs.fan_tracking import TRUTH, FanTrackingEnv, scenario_env
 from ..envs.lanes.vector import FanTrackingLanes
 from ..envs.scenarios import SCENARIOS
 from ..envs.vector import FanTrackingVectorEnv
-from ..envs.watched_fan_tracking import TRUTH, scenario_env
 from ..evaluation.episodes import DECISIONS
 from ..runtime.errors import InputError, unknown_name
 
@@ -119,7 +118,7 @@ def make_training_env(
         name: scenario or tier.
         estimator: of the environment: ``ukf``, or ``constant-gain``, its fast stand-in.
         sources: what ``info`` must hold beyond the environment's own (see
-            ``envs.watched_fan_tracking``).
+            ``envs.fan_tracking``).
 
     Raises:
         InputError: a name that does not exist.
