@@ -17,6 +17,7 @@ from ..runtime.errors import InputError
 
 Array = NDArray[np.float64]
 _RESAMPLES = 2_000
+_LEVEL = 0.95  # of an interval
 _AT_ONCE = 1_000_000  # numbers drawn at a time
 _LAST_TWO = (-2, -1)
 
@@ -140,38 +141,28 @@ def hierarchical_draws(
     return np.concatenate(values)
 
 
-def interval_of(draws: ArrayLike, level: float = 0.95) -> tuple[float, float]:
-    """Return the percentile interval that holds a share ``level`` of the draws (n,).
-
-    Raises:
-        InputError: a level that is no share.
-    """
-    if not 0.0 < level < 1.0:
-        raise InputError(f"bootstrap: level must lie between 0 and 1, got {level}")
-    low, high = np.quantile(np.asarray(draws), [(1.0 - level) / 2.0, (1.0 + level) / 2.0])
+def interval_of(draws: ArrayLike) -> tuple[float, float]:
+    """Return the percentile interval that holds 95 % of the draws (n,)."""
+    low, high = np.quantile(np.asarray(draws), [(1.0 - _LEVEL) / 2.0, (1.0 + _LEVEL) / 2.0])
     return float(low), float(high)
 
 
 def hierarchical_bootstrap(
-    statistic: Callable[..., Any],
-    *matrices: ArrayLike,
-    resamples: int = _RESAMPLES,
-    seed: int = 0,
-    level: float = 0.95,
+    statistic: Callable[..., Any], *matrices: ArrayLike, resamples: int = _RESAMPLES, seed: int = 0
 ) -> tuple[float, float]:
-    """Return the percentile interval of ``hierarchical_draws``; arguments and errors are its own,
-    and those of ``interval_of``.
+    """Return the 95 % percentile interval of ``hierarchical_draws``, whose arguments and errors
+    these are.
     """
-    draws = hierarchical_draws(statistic, *matrices, resamples=resamples, seed=seed)
-    return interval_of(draws, level)
+    return interval_of(hierarchical_draws(statistic, *matrices, resamples=resamples, seed=seed))
 
 
-def sign_probability(draws: ArrayLike, null: float = 0.0) -> float:
-    """Return the two-sided p-value of a statistic being ``null``, from its bootstrap draws (n,):
-    twice the share on the rarer side, never below what n draws can tell.
+def sign_probability(draws: ArrayLike) -> float:
+    """Return the two-sided p-value of a statistic being zero, from its bootstrap draws (n,).
+
+    The value is twice the share on the rarer side, and never below what n draws can tell.
     """
     values = np.asarray(draws, dtype=np.float64)
-    rarer = min(int(np.sum(values >= null)), int(np.sum(values <= null)))
+    rarer = min(int(np.sum(values >= 0.0)), int(np.sum(values <= 0.0)))
     return min(1.0, 2.0 * (rarer + 1) / (len(values) + 1))
 
 

@@ -1,4 +1,4 @@
-"""Laws with a memory, and the flight loop's answer."""
+"""Laws with a memory."""
 
 import numpy as np
 import pytest

@@ -85,9 +85,9 @@ def test_the_hierarchical_interval_covers_other_policies_and_other_episodes():
             + rng.normal(0.0, 1.0, (1, 40))
             + rng.normal(0.0, 0.5, (8, 40))
         )
-        low, high = hierarchical_bootstrap(mean, scores, resamples=400, seed=k, level=0.9)
+        low, high = hierarchical_bootstrap(mean, scores, resamples=400, seed=k)
         inside += low <= 2.0 <= high
-    assert 0.82 <= inside / 150 <= 0.97
+    assert 0.88 <= inside / 150 <= 0.99
 
 
 def test_a_single_policy_stays_and_a_pair_is_drawn_together():
@@ -111,7 +111,7 @@ def test_the_sign_s_probability_is_that_of_a_normal_draw():
     assert sign_probability(-draws) == pytest.approx(sign_probability(draws))
     assert sign_probability(np.full(99, 1.0)) == pytest.approx(0.02)
     assert sign_probability(np.zeros(50)) == 1.0
-    assert interval_of(draws, 0.5) == pytest.approx((1.0 - 0.337, 1.0 + 0.337), abs=0.01)
+    assert interval_of(draws) == pytest.approx((1.0 - 0.98, 1.0 + 0.98), abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,6 @@ def test_the_sign_s_probability_is_that_of_a_normal_draw():
         (lambda: mean([[np.nan]]), "finite numbers"),
         (lambda: probability_of_improvement([[1.0]], [[1.0, 2.0]]), "same tasks"),
         (lambda: paired_wins([[1.0]], [[1.0, 2.0]]), "same tasks"),
-        (lambda: hierarchical_bootstrap(mean, [[1.0]], level=0.0), "level"),
         (lambda: hierarchical_bootstrap(relative_change, [[1.0]], [[1.0, 2.0]]), "same tasks"),
         (lambda: holm([0.5, 1.5]), "probabilities"),
     ],
