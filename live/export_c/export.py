@@ -187,6 +187,10 @@ def export_c(
         autoescape=False,  # C, no page
     )
     environment.filters |= {"literal": literal, "table": table, "shape": shape}
+    # places in arrays that the template of the motion names, beside that of the effects
+    places = "WW_STEP WW_ROTOR_TIME" + (" WW_ROTOR_ACCELERATION" if wrench else "")
+    effects_c = environment.get_template("effects.c.j2").render(context | {"places": places})
+    context["places"] = definitions(effects_c)
     files = {
         name: in_precision(environment.get_template(source).render(context), precision)
         for name, source in FILES.items()
@@ -234,21 +238,4 @@ def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], list[Effect]
         if any(called in other for other in (code, *functions)):
             file = Path(__file__).parent / "templates" / f"{name}.c.j2"
             functions.insert(0, file.read_text(encoding="utf-8"))
-    # what the template of the effects names
-    always = "WW_STEP WW_ROTOR_TIME "
-    if found["wrench"]:
-        always += (
-            "WW_POSITION WW_VELOCITY WW_RATE WW_WIND WW_ROTATION WW_ROTOR_SPEED WW_ROTOR_THRUST "
-            "WW_TIME WW_ROTOR_ACCELERATION"
-        )
-    if found["sensing"]:
-        always += (
-            " WW_SAMPLE_SIZE WW_SAMPLE_POSITION WW_SAMPLE_QUATERNION WW_DIRECTION WW_HAS_POSITION "
-            "WW_HAS_QUATERNION"
-        )
-    return (
-        found["wrench"],
-        found["rotor input"],
-        found["sensing"],
-        "\n".join([definitions(always + code) + "\n", *functions, code]),
-    )
+    return found["wrench"], found["rotor input"], found["sensing"], "\n".join([*functions, code])
