@@ -111,7 +111,7 @@ def test_after_a_long_gap_the_filter_starts_anew(vehicle, rows_between):
     if rows_between:
         lost = slice(1000, 1500)
     else:
-        t[1000:] += 3600.0
+        t[1000:] += 1e8  # s, which cost nothing
     series = estimate_log(held_flight(vehicle, t, lost=lost), vehicle)
     again = 1500 if rows_between else 1000
     assert "the filter restarted" in series.notes[0]
@@ -122,14 +122,6 @@ def test_after_a_long_gap_the_filter_starts_anew(vehicle, rows_between):
     assert np.all(series.std_force[again] > 1.3 * series.std_force[999])
     np.testing.assert_allclose(series.force[-100:].mean(axis=0), [0, 0, 0.3], atol=0.05)
     assert finite(series)
-
-
-def test_gaps_of_years_cost_nothing(vehicle):
-    t = 0.005 * np.arange(400)
-    t[200:] += 1e8
-    series = estimate_log(held_flight(vehicle, t), vehicle)
-    assert finite(series)
-    assert np.all(series.std_force[200] > 0.5 * vehicle.weight)
 
 
 @pytest.mark.parametrize("smooth", [False, True])

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from tests.identification.vehicle_fit.flown import inertial_flights
 from tests.support.data_paths import data_file
 from tests.support.golden_identification import failing_flight
 from windwrench.cli import app
@@ -70,15 +69,6 @@ def test_a_failing_rotor_is_named_with_its_time():
     assert "Rotor 3 (" in said
     assert fault_data(found)["rotor"] == 3
     assert json.dumps(fault_data(found))
-
-
-def test_a_flight_without_a_fault_names_no_rotor():
-    ((log, _),) = inertial_flights([3])
-    found = find_fault(channels_of_log(log))
-    assert found.likeliest == "nothing"
-    assert fault_headline(found).startswith("No rotor lost thrust")
-    assert fault_data(found)["rotor"] is None
-    assert sum(found.probabilities.values()) == pytest.approx(1.0)
 
 
 @pytest.mark.measured

@@ -34,18 +34,6 @@ def residual(log, vehicle=VEHICLE):
     )
 
 
-def test_it_is_the_true_wrench_where_a_simulator_knows_it():
-    log = fly(
-        EffectSetting("rotor_drag", {"kdx": 4e-4, "kdy": 4e-4}),
-        settings=replace(QUIET, sensor_noise=False),
-    )
-    r, signals, edge = residual(log)
-    truth = low_pass(log.force, CUTOFF, signals.period)[edge:-edge]
-    for axis in range(2):
-        assert np.corrcoef(r[:, axis], truth[:, axis])[0, 1] > 0.999
-        assert r[:, axis].std() == pytest.approx(truth[:, axis].std(), rel=0.03)
-
-
 @pytest.mark.parametrize(
     "effect",
     [

@@ -104,29 +104,3 @@ def test_drone_models_mixes_and_counts_in_rpm():
     ours = (rpm * 2 * np.pi / 60)[[3, 2, 1, 0]]  # front-left, rear-left, ...
     assert [thrust.sum(), *torque] == pytest.approx(v.rotor_wrench(ours), rel=1e-4)
     assert "rotor_dyn_coef" not in table
-
-
-def test_drone_models_takes_lag_and_drag_as_its_model_has_them():
-    """Rotor speeds follow at 1/tau (1/s); drag in body axes points against the velocity."""
-    it = found(
-        EffectSetting("rotor_drag", {"kdx": 2e-6, "kdy": 3e-6}),
-        EffectSetting("body_drag", {"dx": 1e-3}),
-    )
-    table = tomllib.loads(EXPORTS["drone-models"](it))["crazyflie"]
-    assert table["rotor_dyn_coef"] == pytest.approx([20.0, 0.0, 20.0, 0.0])
-    hover = it.vehicle.hover_rate
-    drag = np.diag([4 * hover * 2e-6 + 1e-3, 4 * hover * 3e-6, 0.0])
-    np.testing.assert_allclose(table["drag_matrix"], -drag, rtol=1e-4)
-
-
-def test_gazebo_turns_its_rotors_the_right_way():
-    text = EXPORTS["gazebo"](found())
-    v = load_vehicle("crazyflie")
-    turning = re.findall(r"<turningDirection>(\w+)<", text)
-    assert turning == ["ccw" if s > 0 else "cw" for s in v.spin]
-    constant = float(re.search(r"<motorConstant>(\S+)<", text)[1])
-    assert constant == pytest.approx(v.k[0])
-    moment = float(re.search(r"<momentConstant>(\S+)<", text)[1])
-    assert moment * constant == pytest.approx(v.p[0], rel=1e-4)
-    assert text.count("<timeConstantUp>0.05<") == 4
-    assert "not known from these logs: maxRotVelocity" in text

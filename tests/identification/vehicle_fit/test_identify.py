@@ -65,18 +65,6 @@ def test_commanded_speeds_show_the_vehicle_and_its_lag(crazyflie, commanded):
     assert again.omega_source == "commanded"
 
 
-def test_without_an_arm_only_ratios_are_identified(crazyflie, commanded):
-    found = identify(commanded, crazyflie.mass, parse_geometry(None))
-    check(found, "k", crazyflie.k[0], 0.05)
-    check(found, "l/Jxx", crazyflie.arm_l / crazyflie.inertia[0, 0], 0.05)
-    assert {found[n].status for n in ("arm_l", "Jxx", "Jyy", "Jzz", "p")} == {"assumed"}
-    assert found["arm_l"].low < crazyflie.arm_l < found["arm_l"].high
-    assert any("--geometry" in line for line in found.advice)
-    vehicle = parse_vehicle(dump_vehicle(found.vehicle))
-    ratio = vehicle.arm_l / vehicle.inertia[0, 0]
-    assert ratio == pytest.approx(crazyflie.arm_l / crazyflie.inertia[0, 0], rel=0.05)
-
-
 def test_a_hover_does_not_show_what_it_does_not_excite(crazyflie):
     hover = [plant_flight(crazyflie, trajectory="hover", seconds=12.0)]
     found = identify(hover, crazyflie.mass, parse_geometry(str(crazyflie.arm_l)))
@@ -101,19 +89,6 @@ def test_an_imu_and_commands_are_enough(inertial):
     assert vehicle.motor_curve is not None
     thrust = vehicle.commanded_thrust(np.full((1, 4), hover))
     assert thrust.sum() == pytest.approx(MASS * 9.81, rel=0.05)
-
-
-def test_speeds_beside_commands_show_the_motors(inertial):
-    logs = [replace(log, rotor_speeds=speeds) for log, speeds in inertial[:2]]
-    found = identify(logs, MASS, parse_geometry(str(ARM)))
-    check(found, "k", K, 0.05)
-    # a row's command is held over the step that ends there: half a step of 4 ms each way
-    assert found["motor_lag"].value == pytest.approx(0.05, abs=0.004)
-    vehicle = parse_vehicle(dump_vehicle(found.vehicle))
-    assert vehicle.effects == ()
-    assert vehicle.omega_source == "measured"
-    thrust = vehicle.commanded_thrust(np.full((1, 4), 0.5))
-    assert thrust[0] == pytest.approx(np.full(4, K * (0.5 * FULL) ** 2), rel=0.05)
 
 
 def test_intervals_hold_the_truth_about_as_often_as_they_say(inertial):
