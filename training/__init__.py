@@ -1,1 +1,1 @@
-"""Experiments: flying controllers through episodes and comparing them."""
+"""Policies that learn, and gains that are searched; the only room that knows torch."""

@@ -209,106 +209,63 @@ def rules(judged: Iterable[Judgement]) -> list[Rule]:
         return [j for j in full if j.group in groups]
 
     typical, third, pairs, presets = of("typical"), of("third"), of("pair"), of("preset")
-    nothing, outside = of("nothing", "strong turbulence"), of("outsider", "held back")
+    nothing, held_back = of("nothing", "strong turbulence"), of("held back")
+    outside = [*of("outsider"), *held_back]
     alone = [j for j in typical if j.right]
+    right_presets, right_pairs = ([j for j in some if j.right] for some in (presets, pairs))
     known = [j for j in typical + third + presets + nothing if j.right]
+    out_of_library = [j for size in ("typical", "small") for j in left_out(every, size)]
+    wrong = [j for j in out_of_library if j.outcome == WRONG]
+    unseen = [j for j in held_back if j.cause in UNSEEN]
+    explained = [j for j in full if j.verdict == "explained"]
+    one, same = "1. one effect of typical size: right name, no other", "1. the same"
+    third_size = "2. one effect of a third of that size: right name, no other"
+    doubtful = (
+        "3. outside the library, {}: `unexplained` or `partly explained`, every name tentative"
+    )
+    within = "1. every coefficient that is not zero within 5 %, where the names are right"
+    not_wrong = "5. left out of the library, {}: not confidently wrong, by kind"
+    shown = "4. hover: the true effect is named, or indistinguishable from one that is named"
+    cannot = (
+        "5. of those confidently wrong: flights on which the whole library says that it cannot tell"
+    )
+    marked = "5. right names, or rightly none, that the search for structure marks tentative"
+    unbiased = (
+        "1. the same of both, expected of an unbiased fit with the standard deviations that were "
+        "reported"
+    )
     out = [
+        _share(one, typical, _is_right, 0.95),
         _share(
-            "1. one effect of typical size: right name, no other", typical, lambda j: j.right, 0.95
+            f"{same} with the presets hummingbird and crazyflie, in part", presets, _is_right, 0.95
         ),
-        _share(
-            "1. the same with the presets hummingbird and crazyflie, in part",
-            presets,
-            lambda j: j.right,
-            0.95,
-        ),
-        _coefficients(
-            "1. every coefficient that is not zero within 5 %, where the names are right", alone
-        ),
-        _coefficients("1. the same with the presets", [j for j in presets if j.right]),
-        _unbiased(
-            "1. the same of both, expected of an unbiased fit with the standard deviations that "
-            "were reported",
-            [j for j in alone + presets if j.right],
-        ),
-        _share(
-            "2. one effect of a third of that size: right name, no other",
-            third,
-            lambda j: j.right,
-            0.90,
-        ),
-        _share("2. two effects: both right names, no other", pairs, lambda j: j.right, 0.90),
-        _share(
-            "3. no effect: nothing named",
-            nothing,
-            lambda j: not j.named and j.outcome != FAILED,
-            1.0,
-        ),
+        _coefficients(within, alone),
+        _coefficients(f"{same} with the presets", right_presets),
+        _unbiased(unbiased, alone + right_presets),
+        _share(third_size, third, _is_right, 0.90),
+        _share("2. two effects: both right names, no other", pairs, _is_right, 0.90),
+        _share("3. no effect: nothing named", nothing, _names_nothing, 1.0),
         *(
-            _share(
-                f"3. outside the library, {words}: `unexplained` or `partly explained`, every name "
-                f"tentative",
-                [j for j in outside if j.size == size],
-                doubts,
-                1.0,
-            )
+            _share(doubtful.format(words), [j for j in outside if j.size == size], doubts, 1.0)
             for size, words in (("typical", "typical size"), ("small", "a third of it"))
         ),
-        _share(
-            "3. the same, held-back disturbances of both sizes alone", of("held back"), doubts, 1.0
-        ),
-        _share(
-            "3. the same, the six that no rule has seen alone",
-            [j for j in of("held back") if j.cause in UNSEEN],
-            doubts,
-            1.0,
-        ),
+        _share("3. the same, held-back disturbances of both sizes alone", held_back, doubts, 1.0),
+        _share("3. the same, the six that no rule has seen alone", unseen, doubts, 1.0),
         _share("4. hover: no name confidently wrong", of("hover"), _not_wrong, 1.0),
-        _share(
-            "4. hover: the true effect is named, or indistinguishable from one that is named",
-            of("hover"),
-            lambda j: set(j.truth) <= set(j.classes),
-            None,
-        ),
-        _by_kind(
-            "5. left out of the library, typical size: not confidently wrong, by kind",
-            left_out(every, "typical"),
-            0.90,
-        ),
-        _by_kind(
-            "5. left out of the library, a third: not confidently wrong, by kind",
-            left_out(every, "small"),
-            0.80,
-        ),
-        _share(
-            "5. of those confidently wrong: flights on which the whole library says that it cannot "
-            "tell",
-            [
-                j
-                for size in ("typical", "small")
-                for j in left_out(every, size)
-                if j.outcome == WRONG
-            ],
-            lambda j: undecided(j, full),
-            None,
-        ),
-        _share(
-            "5. right names, or rightly none, that the search for structure marks tentative",
-            known,
-            lambda j: j.outcome == RIGHT_TENTATIVE,
-            0.03,
-            at_most=True,
-        ),
+        _share(shown, of("hover"), lambda j: set(j.truth) <= set(j.classes), None),
+        _by_kind(not_wrong.format("typical size"), left_out(every, "typical"), 0.90),
+        _by_kind(not_wrong.format("a third"), left_out(every, "small"), 0.80),
+        _share(cannot, wrong, lambda j: undecided(j, full), None),
+        _share(marked, known, _is_doubted, 0.03, at_most=True),
         _share(
             "5. right names of two effects that it marks tentative",
-            [j for j in pairs if j.right],
-            lambda j: j.outcome == RIGHT_TENTATIVE,
+            right_pairs,
+            _is_doubted,
             0.10,
             at_most=True,
         ),
         _floor(
-            "6. residual after, over the noise floor, where the verdict is `explained`",
-            [j for j in full if j.verdict == "explained"],
+            "6. residual after, over the noise floor, where the verdict is `explained`", explained
         ),
     ]
     for name, bar in ROLLOUT_BARS.items():
@@ -319,19 +276,10 @@ def rules(judged: Iterable[Judgement]) -> list[Rule]:
             continue
         worst = max(some, key=lambda j: j.rollout_ratio)
         met = sum(j.rollout_ratio <= bar for j in some)
-        out.append(
-            Rule(
-                rule,
-                f"<= {bar:g}",
-                f"{worst.rollout_ratio:.2f} at worst, {met} of {len(some)} within; there "
-                f"the true model comes to {worst.rollout_of_truth:.2f}",
-                met == len(some),
-                len(some),
-            )
-        )
-    foreign = outside + [
-        j for size in ("typical", "small") for j in left_out(every, size) if j.without
-    ]
+        told = f"{worst.rollout_ratio:.2f} at worst, {met} of {len(some)} within; "
+        told += f"there the true model comes to {worst.rollout_of_truth:.2f}"
+        out.append(Rule(rule, f"<= {bar:g}", told, met == len(some), len(some)))
+    foreign = outside + [j for j in out_of_library if j.without]
     inside = [j for j in full if j.group not in ("outsider", "held back")]
     return [
         *out,
@@ -339,6 +287,18 @@ def rules(judged: Iterable[Judgement]) -> list[Rule]:
         *_probabilities(inside, foreign),
         _gusts([j for j in full if j.right]),
     ]
+
+
+def _is_right(j: Judgement) -> bool:
+    return j.right
+
+
+def _is_doubted(j: Judgement) -> bool:
+    return j.outcome == RIGHT_TENTATIVE
+
+
+def _names_nothing(j: Judgement) -> bool:
+    return not j.named and j.outcome != FAILED
 
 
 def doubts(j: Judgement) -> bool:
@@ -557,10 +517,5 @@ def _rotorpy(some: Sequence[Judgement]) -> list[Rule]:
             ),
             1.0,
         ),
-        _share(
-            "7. RotorPy, aerodynamics off: nothing named",
-            off,
-            lambda j: not j.named and j.outcome != FAILED,
-            1.0,
-        ),
+        _share("7. RotorPy, aerodynamics off: nothing named", off, _names_nothing, 1.0),
     ]
