@@ -21,16 +21,20 @@ _COLOURS = 128  # of a picture; lines and their soft edges need no more
 
 
 @cache
-def page_template(package: str, name: str) -> "Template":
-    """Return a package's template of an HTML page: every text is escaped, and a name that the page
-    was not given is an error.
+def page_template(package: str, name: str, html: bool = True) -> "Template":
+    """Return a package's template: in a page (HTML) every text is escaped, and a name that the
+    template was not given is an error. Filters: ``g6``, six significant digits; ``toml_float``, the
+    same as TOML's float.
     """
     from jinja2 import Environment, StrictUndefined  # most of the kit writes no page
 
     source = resources.files(package).joinpath(name).read_text(encoding="utf-8")
-    return Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    ).from_string(source)
+    environment = Environment(
+        autoescape=html, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters["g6"] = lambda x: f"{x:.6g}"
+    environment.filters["toml_float"] = lambda x: repr(float(f"{x:.6g}") + 0.0)
+    return environment.from_string(source)
 
 
 def write_json(data: Any, path: Path, allow_nan: bool = False) -> None:

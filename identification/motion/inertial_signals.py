@@ -63,10 +63,7 @@ class InertialSignals(Signals):
 def pose_rate(log: FlightLog) -> float:
     """Return how many new poses a second a log holds; 0 where it holds none."""
     rows = np.flatnonzero(np.isfinite(log.position).all(axis=1))
-    if len(rows) < 2:
-        return 0.0
-    new = np.append(True, np.any(np.diff(log.position[rows], axis=0) != 0.0, axis=1))
-    times = log.t[rows[new]]
+    times = log.t[_changed(rows, log.position)]
     return float(1.0 / np.median(np.diff(times))) if len(times) > 1 else 0.0
 
 
@@ -225,10 +222,13 @@ def _measured(log: FlightLog, there: Mask, t: Array) -> NDArray[np.intp]:
     last digit was held.
     """
     rows = np.flatnonzero(there & (log.t >= t[0]) & (log.t <= t[-1]))
-    if len(rows) < 2:
-        return rows
-    values = np.column_stack([log.position[rows], np.nan_to_num(log.quaternion[rows])])
-    return np.asarray(rows[np.append(True, np.any(np.diff(values, axis=0) != 0.0, axis=1))])
+    return _changed(rows, np.column_stack([log.position, np.nan_to_num(log.quaternion)]))
+
+
+def _changed(rows: NDArray[np.intp], values: Array) -> NDArray[np.intp]:
+    """Return the rows whose values (N, k) are not those of the row before among them."""
+    new = np.any(np.diff(values[rows], axis=0, prepend=np.inf) != 0.0, axis=1)
+    return np.asarray(rows[new])
 
 
 def _dense(t: Array, gyro: Array, fused: FusedMotion) -> Array:

@@ -13,6 +13,7 @@ from ..logs.flight_log import FlightLog
 from ..motion.sensor_noise import sensor_noise
 from .effect_settings import effect_of, estimate_name
 from .geometry import USUAL, Geometry
+from .model import inertia_of
 from .motors import MotorResponse
 from .result import ASSUMED, IDENTIFIED, NOTHING, Estimate
 from .solve import VehicleFit
@@ -43,14 +44,12 @@ def vehicle_of(
     """Return the vehicle, ready for estimate, diagnose and the environment. Where its logs hold
     measured speeds the lag is behind them, and no effect of the model.
     """
-    arm = estimates["arm_l"].value
-    reach = estimates["p/k"].value
+    arm, reach = estimates["arm_l"].value, estimates["p/k"].value
     effects = list(_effects(estimates))
     curve = None
     if fit.drive.commands:
         curve = _curve(fit)
-        weight = fit.model.mass * gravity
-        k = weight / (4.0 * USUAL.hover_speed**2)
+        k = fit.model.mass * gravity / (4.0 * USUAL.hover_speed**2)
     else:
         k = estimates["k"].value
         if motors is not None:  # thrust against command by way of the speed
@@ -61,15 +60,13 @@ def vehicle_of(
     if late:
         value = estimates[of_lag].value
         effects.append(EffectSetting(of_lag, {get(of_lag).coefficients[0].name: value}))
-    inertia = np.diag([estimates[f"J{a}{a}"].value for a in "xyz"])
-    for i, j, product in ((0, 1, "Jxy"), (0, 2, "Jxz"), (1, 2, "Jyz")):
-        if product in estimates:
-            inertia[i, j] = inertia[j, i] = estimates[product].value
+    moments = {f"J{a}": estimates[f"J{a}{a}"].value for a in "xyz"}
+    products = {n: estimates[n].value for n in ("Jxy", "Jxz", "Jyz") if n in estimates}
     com = np.array([_shown(estimates.get(f"com {a}")) for a in "xyz"])
     vehicle = Vehicle(
         name=name,
         mass=fit.model.mass,
-        inertia=inertia,
+        inertia=inertia_of({**moments, **products}),
         arm_l=arm,
         k=np.full(4, k),
         p=np.full(4, reach * k),

@@ -20,37 +20,19 @@ either axis, ``rotor_dyn_coef`` 1/s, ``drag_matrix`` N/(m/s) along body axes, ne
 
 import math
 from collections.abc import Callable
-from functools import cache, partial
-from typing import TYPE_CHECKING
+from functools import partial
 
 import numpy as np
 
 from ...dynamics.effects import Role
+from ...runtime.page_files import page_template
 from .effect_settings import coefficient_of, effect_of, linear_drag
 from .result import ASSUMED, IDENTIFIED, Identified
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
 
 AIR_DENSITY = 1.225  # kg/m3, at sea level, as both autopilots take it
 NO_BLUFF_BODY = 0.0  # of BCOEF: both leave that part out then
 _PER_RPM = (2.0 * math.pi / 60.0) ** 2  # (rad/s)^2 in one rpm^2
 _CRAZYFLIE = [3, 2, 1, 0]  # front-right, rear-right, rear-left, front-left
-
-
-@cache
-def _templates() -> "Environment":
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    made = Environment(
-        loader=PackageLoader(__package__),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    made.filters["g6"] = lambda x: f"{x:.6g}"
-    made.filters["toml_float"] = lambda x: repr(float(f"{x:.6g}") + 0.0)
-    return made
 
 
 def _autopilot(
@@ -88,7 +70,7 @@ def _autopilot(
         doubts.append(
             f"# {parameters[3]} and {parameters[4]}: the full thrust was not flown; {full.how}"
         )
-    text = _templates().get_template(f"{name}.j2")
+    text = page_template(__package__, f"templates/{name}.j2", html=False)
     return text.render(
         known=[(p, x) for p, x in zip(parameters, values, strict=True) if x is not None],
         doubts="".join(f"{line}\n" for line in doubts),
@@ -113,7 +95,7 @@ def _simulator(found: Identified, name: str) -> str:
         )
     assumed = [e.name for e in found.estimates if e.status == ASSUMED]
     notes += f"# assumed, not identified: {', '.join(assumed)}\n" if assumed else ""
-    text = _templates().get_template(f"{name}.j2")
+    text = page_template(__package__, f"templates/{name}.j2", html=False)
     return text.render(
         v=v,
         notes=notes,
