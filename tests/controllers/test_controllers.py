@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from windwrench.controllers import CONTROLLERS, Admittance, Oracle, Ratio, make_controller
+from windwrench.controllers import (
+    CONTROLLERS,
+    Admittance,
+    AdmittancePID,
+    Lead,
+    Oracle,
+    Ratio,
+    make_controller,
+)
 from windwrench.controllers.flight import flight_record, fly, move_setpoint
 from windwrench.controllers.observation import FORCE_X, MAX_COMMAND, OBSERVATION_SIZE, TORQUE_Z
 from windwrench.dynamics import InputError, load_vehicle
@@ -150,3 +158,36 @@ def test_a_set_point_at_rest_is_not_dragged_along():
     for _ in range(400):
         move_setpoint(c, np.array([3.0, -2.0, 1.0]), 0.005)
     np.testing.assert_array_equal(c["setpoint"], np.zeros(len(c["setpoint"])))
+
+
+def test_lead_is_the_ratio_law_plus_the_rate_of_the_ratio():
+    lead = Lead(gain=10.0, lead=2.0, least_force=0.2)
+    ratio = Ratio(gain=10.0, least_force=0.2)
+    first = observation(0.01)
+    assert lead(first)[0] == pytest.approx(ratio(first)[0])  # no rate yet
+    second = observation(0.012)
+    rate = (0.012 - 0.01) / 0.5 / 0.08
+    assert lead(second)[0] == pytest.approx(ratio(second)[0] - 2.0 * rate, rel=1e-4)
+    lead.reset()
+    assert lead(second)[0] == pytest.approx(ratio(second)[0])
+
+
+def test_the_pid_law_without_its_terms_is_the_admittance_law():
+    pid, plain = AdmittancePID(gain=18.0, integral=0.0, lead=0.0), Admittance(gain=18.0)
+    for torque in (0.01, -0.02, 0.03):
+        assert pid(observation(torque)) == plain(observation(torque))
+
+
+def test_the_integral_follows_and_does_not_wind_up():
+    pid = AdmittancePID(gain=1.0, integral=10.0, lead=0.0)
+    for _ in range(10):
+        command = pid(observation(0.02))[0]
+    assert command == pytest.approx(-(0.02 + 10.0 * 10 * 0.08 * 0.02), rel=1e-4)
+    for _ in range(1000):
+        pid(observation(0.2))
+    assert -MAX_COMMAND <= pid(observation(0.2))[0] <= -0.8
+    # a torque of the other sign takes it off the bound at once, not after as long a time
+    turned = [pid(observation(-0.2))[0] for _ in range(12)]
+    assert turned[-1] > 0.0
+    pid.reset()
+    assert pid(observation(0.0))[0] == 0.0

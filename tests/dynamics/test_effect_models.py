@@ -5,21 +5,18 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from numba import cfunc
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import compile_effects
 from windwrench.dynamics.effects.base import (
-    EFFECT_MODEL,
     ROTOR_ACCELERATION,
     ROTOR_TIME,
     ROTORS_SIZE,
     SAMPLE_SIZE,
     STATE_SIZE,
     STEP,
-    VELOCITY,
 )
 from windwrench.dynamics.effects.call import add_wrenches, advance, deliver, report
 from windwrench.dynamics.motion import body_record, effect_wrench, fill_state
@@ -488,12 +485,6 @@ def test_motor_lag_does_not_depend_on_how_a_time_is_cut_up():
     )
 
 
-def test_no_motor_lag_changes_nothing():
-    rotors = Rotors(setting("motor_lag", tau=0.0))
-    rotors([400.0] * 4)
-    np.testing.assert_array_equal(rotors(W), W)
-
-
 def test_battery_sag_takes_thrust_by_a_power_of_the_voltage():
     rotors = Rotors(setting("battery_sag", n=1.5))
     voltage = 10.2
@@ -695,24 +686,3 @@ def test_mass_and_centre_of_mass_change_the_body_and_nothing_else():
     assert vehicle.mass == pytest.approx(VEHICLE.mass + 0.05)
     np.testing.assert_array_equal(vehicle.com, [0.01, 0, 0])
     np.testing.assert_array_equal(vehicle.inertia, VEHICLE.inertia)
-
-
-def test_a_vehicle_cannot_lose_more_than_its_mass():
-    with pytest.raises(InputError, match="dm"):
-        compile_effects(setting("mass", dm=-1.0))
-
-
-@cfunc(EFFECT_MODEL)
-def _users_model(c, vehicle, state, wrench):
-    wrench[0] -= c[0] * state[VELOCITY]
-    wrench[5] += c[1]
-
-
-def test_a_user_s_own_model_is_called_by_its_address():
-    state, out = np.zeros(STATE_SIZE), np.ones(6)
-    state[VELOCITY] = 2.0
-    coefficients = np.zeros((2, 8))
-    coefficients[0, :2], coefficients[1, :2] = (0.5, 0.25), (0.0, 1.0)
-    models = np.array([_users_model.address, _users_model.address])
-    add_wrenches(models, coefficients, compile_effects(VEHICLE).constants, state, out)
-    np.testing.assert_array_equal(out, [0.0, 1, 1, 1, 1, 2.25])

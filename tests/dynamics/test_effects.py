@@ -139,12 +139,6 @@ def test_a_slung_payload_explains_a_load_that_hangs_in_mujoco():
     )
 
 
-def test_the_same_flight_comes_out_twice():
-    again = record_flight(VEHICLE, (), "excite", 12.0, 1, QUIET)
-    np.testing.assert_array_equal(again["position"], flight(None, "excite").position)
-    np.testing.assert_array_equal(again["rotor_speeds"], flight(None, "excite").rotor_speeds)
-
-
 def test_a_bare_name_takes_the_sizes_of_the_vehicle():
     small = parse_setting("rotor_drag", load_vehicle("crazyflie"))
     assert small.coefficients["kdx"] == get("rotor_drag").coefficients[0].typical[1]

@@ -57,17 +57,12 @@ def test_a_full_inertia_matrix_loads(tmp_path):
     ("changes", "words"),
     [
         ({"mass": -0.5}, ["mass", "positive", "-0.5"]),
-        ({"mass": 0}, ["mass", "positive"]),
         ({"mass": "heavy"}, ["mass", "positive number", "heavy"]),
         ({"mass": float("nan")}, ["mass", "positive number", "nan"]),
-        ({"mass": float("inf")}, ["mass", "positive number", "inf"]),
         ({"mass": True}, ["mass", "positive number", "True"]),
-        ({"mass": [0.5]}, ["mass", "positive number"]),
         ({"arm_l": 0}, ["arm_l", "positive"]),
         ({"k": [8e-6] * 3}, ["k", "4 finite numbers"]),
         ({"k": [8e-6] * 3 + [-8e-6]}, ["k", "four positive"]),
-        ({"k": [8e-6] * 3 + [float("nan")]}, ["k", "4 finite numbers"]),
-        ({"p": [2e-7] * 5}, ["p", "4 finite numbers"]),
         ({"p": 2e-7}, ["p", "4 finite numbers"]),
         ({"inertia": [0.002, 0.003]}, ["inertia", "3 x 3"]),
         ({"inertia": [[0.002, 0, 0], [0, 0.003, 0]]}, ["inertia", "3 x 3"]),
@@ -143,22 +138,16 @@ def test_a_file_of_another_form_is_named(tmp_path, text, word):
     assert str(path) in str(caught.value)
 
 
-def test_bytes_that_are_no_text_are_named(tmp_path):
+def test_what_is_no_vehicle_file_is_named(tmp_path):
     path = tmp_path / "bad.yaml"
     path.write_bytes(b"\xff\xfe\x00\x01")
-    with pytest.raises(InputError, match="cannot be read") as caught:
-        load_vehicle(path)
-    assert str(path) in str(caught.value)
-
-
-def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(InputError, match=r"nowhere\.yaml: cannot be read"):
-        load_vehicle(tmp_path / "nowhere.yaml")
-
-
-def test_an_unknown_preset_names_the_nearest():
-    with pytest.raises(InputError, match="Did you mean 'ardrone2'"):
-        load_vehicle("ardrone")
+    for wrong, words in (
+        (path, r"bad\.yaml: cannot be read"),
+        (tmp_path / "nowhere.yaml", r"nowhere\.yaml: cannot be read"),
+        ("ardrone", "Did you mean 'ardrone2'"),
+    ):
+        with pytest.raises(InputError, match=words):
+            load_vehicle(wrong)
 
 
 def test_the_measured_flights_vehicle_loads():

@@ -82,13 +82,10 @@ def test_a_picture_has_the_size_asked_for_and_shows_something(pictures):
     assert picture.std() > 10
 
 
-def test_a_picture_is_the_same_while_nothing_changes(pictures):
+def test_a_picture_shows_the_vehicle_where_it_is_and_the_fan(pictures):
     assert changed(pictures["still"], pictures["again"]) == 0.0
-
-
-@pytest.mark.parametrize("other", ["without vehicle", "without fan", "moved"])
-def test_a_picture_shows_the_vehicle_where_it_is_and_the_fan(pictures, other):
-    assert changed(pictures["still"], pictures[other]) > 0.005
+    for other in ("without vehicle", "without fan", "moved"):
+        assert changed(pictures["still"], pictures[other]) > 0.005, other
 
 
 def test_a_picture_shows_the_jet_in_blue(pictures):
