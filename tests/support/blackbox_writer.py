@@ -9,33 +9,17 @@ FIELDS = {
     "loopIteration": (0, 1, 6, 9),
     "time": (0, 1, 2, 0),
     "axisP[0]": (0, 0, 1, 0),
-    "axisI[0]": (0, 0, 1, 7),
-    "axisI[1]": (0, 0, 1, 7),
-    "axisI[2]": (0, 0, 1, 7),
-    "axisD[0]": (0, 0, 1, 10),
-    "axisD[1]": (0, 0, 1, 10),
-    "axisD[2]": (0, 0, 1, 10),
-    "rcCommand[0]": (0, 0, 1, 8),
-    "rcCommand[1]": (0, 0, 1, 8),
-    "rcCommand[2]": (0, 0, 1, 8),
+    **{f"axisI[{i}]": (0, 0, 1, 7) for i in range(3)},
+    **{f"axisD[{i}]": (0, 0, 1, 10) for i in range(3)},
+    **{f"rcCommand[{i}]": (0, 0, 1, 8) for i in range(3)},
     "rcCommand[3]": (4, 1, 1, 8),
     "vbatLatest": (9, 3, 1, 6),
     "amperageLatest": (0, 0, 1, 6),
     "rssi": (0, 1, 1, 6),
-    "gyroADC[0]": (0, 0, 3, 0),
-    "gyroADC[1]": (0, 0, 3, 0),
-    "gyroADC[2]": (0, 0, 3, 0),
-    "accSmooth[0]": (0, 0, 3, 0),
-    "accSmooth[1]": (0, 0, 3, 0),
-    "accSmooth[2]": (0, 0, 3, 0),
+    **{f"{name}[{i}]": (0, 0, 3, 0) for name in ("gyroADC", "accSmooth") for i in range(3)},
     "motor[0]": (11, 1, 3, 0),
-    "motor[1]": (5, 0, 3, 0),
-    "motor[2]": (5, 0, 3, 0),
-    "motor[3]": (5, 0, 3, 0),
-    "eRPM[0]": (0, 1, 1, 0),
-    "eRPM[1]": (0, 1, 1, 0),
-    "eRPM[2]": (0, 1, 1, 0),
-    "eRPM[3]": (0, 1, 1, 0),
+    **{f"motor[{i}]": (5, 0, 3, 0) for i in range(1, 4)},
+    **{f"eRPM[{i}]": (0, 1, 1, 0) for i in range(4)},
 }
 VBATREF, MINTHROTTLE, LEAST_MOTOR = 2520, 1070, 158
 HEADERS = {
@@ -71,12 +55,8 @@ def blackbox(
         "P predictor": [f[2] for f in fields.values()],
         "P encoding": [f[3] for f in fields.values()],
     }
-    lists |= {
-        "S name": ["flightModeFlags", "stateFlags"],
-        "S signed": [0, 0],
-        "S predictor": [0, 0],
-        "S encoding": [1, 1],
-    }
+    lists |= {"S name": ["flightModeFlags", "stateFlags"], "S encoding": [1, 1]}
+    lists |= {"S signed": [0, 0], "S predictor": [0, 0]}
     lines = [
         "H Product:Blackbox flight data recorder by Nicholas Sherlock",
         *(f"H Field {key}:{','.join(map(str, values))}" for key, values in lists.items()),

@@ -119,26 +119,20 @@ def simulate_model(
         measured,
         imu,
     )
+    parts = {"position": POSITION, "quaternion": QUATERNION, "velocity": VELOCITY}
+    parts |= {"angular_velocity": RATE, "torque": TORQUE, "force": FORCE}
     return ModelRun(
-        start[POSITION],
-        start[QUATERNION],
-        start[VELOCITY],
-        start[RATE],
-        P,
-        speeds,
-        measured[:, :3],
-        measured[:, 3:],
-        states,
-        states[:, POSITION],
-        states[:, QUATERNION],
-        states[:, VELOCITY],
-        states[:, RATE],
-        states[:, TORQUE],
-        states[:, FORCE],
-        imu[:, :3],
-        imu[:, 3:],
-        biases[:, :3],
-        biases[:, 3:],
+        **{f"initial_{name}": start[part] for name, part in list(parts.items())[:4]},
+        initial_covariance=P,
+        rotor_speeds=speeds,
+        measured_position=measured[:, :3],
+        measured_quaternion=measured[:, 3:],
+        state=states,
+        **{name: states[:, part] for name, part in parts.items()},
+        gyro=imu[:, :3],
+        accelerometer=imu[:, 3:],
+        gyro_bias=biases[:, :3],
+        accelerometer_bias=biases[:, 3:],
     )
 
 

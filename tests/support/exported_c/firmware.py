@@ -13,14 +13,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.support.exported_c.compiled import missing, run, write
+from tests.support.exported_c.compiled import run, write
 from windwrench.live.export_c import Exported
 from windwrench.live.export_c.c_numbers import table
 
 Array = NDArray[np.float64]
 _FOLDER = Path(__file__).parent / "board"
 _CPU = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
-CLOCK = 168e6  # Hz, of the microcontrollers that fly (STM32F405)
 TOOLS = ("arm-none-eabi-gcc", "arm-none-eabi-size", "qemu-system-arm")
 _COLUMNS = ("dt", "rotor_speeds", "position", "quaternion", "gyro", "accelerometer")
 
@@ -40,12 +39,6 @@ class Measured:
     estimates: Array  # (n, 19)
     loop: int  # instructions that the timer saw in the loop of 2,000
     policy: int = 0  # instructions of the longest ww_policy, where there is one
-    policy_ram: int = 0  # bytes, of one ww_policy_memory
-
-
-def tools_missing() -> list[str]:
-    """Return which of the tools are not installed."""
-    return missing(*TOOLS)
 
 
 def object_size(exported: Exported, folder: Path, optimise: str = "-O2") -> tuple[int, int]:
@@ -122,5 +115,4 @@ def _read(said: str, code: int, tables: int) -> Measured:
         numbers[:, 4:].copy().view(np.float32).astype(float),
         round(words["loop"] * 5 / 8),
         words.get("policy", 0),
-        words.get("policysize", 0),
     )
