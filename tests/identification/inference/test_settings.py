@@ -1,4 +1,4 @@
-"""Every threshold of the diagnosis is a documented field of its module's settings."""
+"""Every threshold of the inference is a documented field of its module's settings."""
 
 import ast
 from pathlib import Path
@@ -10,7 +10,6 @@ import windwrench.identification as room
 ROOT = Path(room.__file__).parent
 MODULES = [
     *sorted((ROOT / "inference").glob("*.py")),
-    *sorted((ROOT / "motion").glob("*.py")),
     ROOT / "diagnosis.py",
     ROOT / "findings.py",
     ROOT / "prediction.py",
