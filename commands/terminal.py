@@ -131,8 +131,8 @@ MapOption = Annotated[
     typer.Option(
         "--map",
         help="What the columns of another table mean: a YAML file, or a map that comes with the "
-        "kit (betaflight, cflib, crazypad, euler-pwm, neurobem, rpm). windwrench check proposes "
-        "one.",
+        "kit (cflib, crazypad, crazyswarm2, euler-pwm, nanobench, racer, rpm). windwrench check "
+        "proposes one.",
         autocompletion=offering("identification.logs.log_map:map_names"),
     ),
 ]

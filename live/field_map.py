@@ -1,5 +1,5 @@
 """What the fields of a message mean, by the same map as the columns of a log
-(``identification.logs.log_map``): one message at a time.
+(``identification.logs.log_map``): one message is a table of one row.
 """
 
 import math
@@ -8,24 +8,20 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ..dynamics.vehicle import Vehicle
+from ..identification.logs.channels import in_kit_axes, in_kit_units, quaternions, scaled
 from ..identification.logs.log_map import (
-    ACCELERATION_UNITS,
-    ANGLE_UNITS,
-    LENGTH_UNITS,
-    RATE_UNITS,
-    ROTOR_UNITS,
+    OWN_MAP,
     TIME_UNITS,
-    VOLTAGE_UNITS,
+    Attitude,
     Columns,
     LogMap,
-    Sensor,
+    constant,
     load_map,
 )
 from ..identification.logs.magnitudes import Magnitudes
-from ..identification.logs.mapped_log import BODY_TURNS, WORLD_TURNS
+from ..identification.logs.map_fit import ways, with_range
 from ..runtime.errors import InputError
 from .messages import Array, Sample
 
@@ -33,6 +29,7 @@ _SECOND = 1_000_000_000  # ns
 _NORM_TOLERANCE = 0.02  # of a quaternion's length, as in a log
 _OUTSIDE = 0.01  # of a command's range, beyond which it is none of that range
 _LARGEST = Magnitudes().largest
+_FIELDS = {"rotors": "rotor_speeds", "commands": "command"}  # of a sample; others as the section
 
 
 class Malformed(ValueError):  # noqa: N818 - of one message, not of the request
@@ -49,24 +46,17 @@ class FieldMap:
     """
 
     def __init__(self, log_map: LogMap | None, vehicle: Vehicle, where: str) -> None:
-        own = log_map is None
-        given = load_map("windwrench") if log_map is None else log_map
-        if own and given.rotors is not None:  # a log of commands alone has no rotor speeds
-            given = replace(given, rotors=replace(given.rotors, optional=True))
-        commands = given.commands
-        if commands is not None and commands.range is None:
-            if vehicle.motor_curve is None:
-                raise InputError(
-                    f"{where}: map {given.name}: commands: unit counts without a range; expected "
-                    "what stands for no and for full command, such as range: [0, 65535], or a "
-                    "vehicle whose motor_curve states it"
-                )
-            given = replace(given, commands=replace(commands, range=vehicle.motor_curve.command))
-        self.map, self.where = given, where
+        given = log_map or load_map(OWN_MAP)
+        if log_map is None and given.position is not None and given.attitude is not None:
+            given = replace(  # the filter needs a pose
+                given,
+                position=replace(given.position, optional=False),
+                attitude=replace(given.attitude, optional=False),
+            )
+        self.map, self.where = with_range(given, vehicle, where), where
         self._rows = 0
-        self._world, self._body = WORLD_TURNS[given.world], BODY_TURNS[given.body]
-        self._turned = given.world != "enu" or given.body != "flu"
-        self._sections = given.sections
+        self._sections = {name: ways(self.map, name) for name in self.map.sections}
+        self._clocks = ways(self.map, "time")
 
     def check(self, names: Iterable[str]) -> None:
         """Check that the fields of all messages are there.
@@ -75,15 +65,15 @@ class FieldMap:
             InputError: one is missing.
         """
         there = set(names)
-        needed = [self.map.time.column] if self.map.time.column else []
+        clock = self.map.time.column
+        missing = [] if any(c.column in {*there, ""} for c in self._clocks) else [clock]
         motors = False
-        for section, part in self._sections.items():
-            wanted = [name for name in part.columns if not name.startswith("=")]
-            if part.optional and not there & set(wanted):
+        for section, parts in self._sections.items():
+            part = next((part for part in parts if there & set(part.named)), parts[0])
+            if part.optional and not there & set(part.named):
                 continue
             motors |= section in ("rotors", "commands")
-            needed += wanted
-        missing = [name for name in needed if name not in there]
+            missing += [name for name in part.named if name not in there]
         if not motors:
             rotors = self.map.rotors or self.map.commands
             missing += [] if rotors is None else rotors.columns
@@ -94,7 +84,7 @@ class FieldMap:
                 + (
                     "this kit's columns t, px, py, pz, qw, qx, qy, qz, omega1 ... omega4 (or "
                     "cmd1 ... cmd4), or --map, a file that says what the fields mean"
-                    if self.map.name == "windwrench"
+                    if self.map.is_own
                     else f"those of the map {self.map.name}"
                 )
             )
@@ -110,47 +100,44 @@ class FieldMap:
         Raises:
             Malformed: a part of it is there by halves, or is no number that a flight has.
         """
-        given = self.map
         found = Sample(kind, self._stamp(fields), arrival)
-        for name, part in self._sections.items():
-            values = _values(part, name, fields)
-            if values is None:
-                continue
-            if name == "position":
-                found.position = values * LENGTH_UNITS[part.unit]
-            elif name == "attitude":
-                found.quaternion = self._attitude(values)
-            elif name == "rotors":
-                assert given.rotors is not None
-                unit = ROTOR_UNITS[part.unit] / given.rotors.pole_pairs
-                order = [motor - 1 for motor in given.rotors.order]
-                found.rotor_speeds = np.abs(values[order] * unit)
-            elif name == "commands":
-                found.command = self._commands(values)
-            elif name == "battery":
-                assert given.battery is not None
-                volts = float(values[0]) * VOLTAGE_UNITS[part.unit] * given.battery.cells
-                found.voltage = volts if volts > 0.0 else None
-            elif isinstance(part, Sensor):
-                units = ACCELERATION_UNITS if name == "accelerometer" else RATE_UNITS
-                turn = BODY_TURNS[part.body or given.body]
-                setattr(found, name, turn @ (values * units[part.unit]))
-            else:  # the true force or torque
-                setattr(found, name, values * (1e-3 if part.unit.startswith("m") else 1.0))
-        if self._turned:
-            for name in ("position", "force", "torque"):
-                if (value := getattr(found, name)) is not None:
-                    setattr(found, name, self._world @ value)
+        for section, parts in self._sections.items():
+            for part in parts:
+                values = _values(part, section, fields)
+                if values is not None:
+                    self._take(found, section, part, values)
+                    break
         if (found.position is None) != (found.quaternion is None):
             missing = "attitude" if found.quaternion is None else "position"
             raise Malformed(f"a pose without {missing}")
-        motors = found.has_motors
-        named = given.position is not None and any(x in fields for x in given.position.columns)
-        found.whole = motors and (found.has_pose or named)  # named: the pose was lost
+        poses = self._sections.get("position", ())
+        named = any(name in fields for part in poses for name in part.columns)
+        found.whole = found.has_motors and (found.has_pose or named)  # named: the pose was lost
         return found
 
+    def _take(self, found: Sample, section: str, part: Columns, values: Array) -> None:
+        """Put a section's numbers (k,) into a sample, in the kit's units and axes."""
+        if isinstance(part, Attitude):
+            found.quaternion = self._attitude(part, values)
+            return
+        kit = in_kit_units(self.map, section, part, values[None])[0]
+        if section == "battery":
+            found.voltage = float(kit[0]) if kit[0] > 0.0 else None
+            return
+        if section == "rotors":
+            kit = np.abs(kit)
+        elif section == "commands":
+            if np.all((kit < -_OUTSIDE) | (kit > 1.0 + _OUTSIDE)):
+                low, high = part.range  # type: ignore[attr-defined]
+                raise Malformed(
+                    f"motor commands {', '.join(f'{x:g}' for x in values)}; expected {low:g} to "
+                    f"{high:g}"
+                )
+            kit = np.clip(kit, 0.0, 1.0)
+        setattr(found, _FIELDS.get(section, section), kit)
+
     def _stamp(self, fields: Mapping[str, Any]) -> int:
-        clock = self.map.time
+        clock = next((c for c in self._clocks if c.column in fields), self.map.time)
         if not clock.column:
             self._rows += 1
             return round((self._rows - 1) * _SECOND / clock.rate_hz)
@@ -162,42 +149,16 @@ class FieldMap:
             return round(value * (TIME_UNITS[clock.unit] * _SECOND))
         raise Malformed(f"field {clock.column}: {_shown(value)}; expected a time")
 
-    def _attitude(self, values: Array) -> Array:
-        part = self.map.attitude
-        assert part is not None
-        if part.euler:
-            about = {"x": 0, "y": 1, "z": 2}
-            angles = values[[about[axis] for axis in part.euler]] * ANGLE_UNITS[part.unit]
-            turn = Rotation.from_euler(part.euler.upper(), angles)
-            quaternion = np.asarray(turn.as_quat(scalar_first=True))
-        else:
-            quaternion = values[[3, 0, 1, 2]] if part.order == "xyzw" else values
+    def _attitude(self, part: Attitude, values: Array) -> Array:
+        quaternion = quaternions(part, values[None])
+        if not part.euler:
             length = float(np.linalg.norm(quaternion))
             if not abs(length - 1.0) <= _NORM_TOLERANCE:
                 raise Malformed(
                     f"a quaternion of length {length:.4g}; expected 1 within {_NORM_TOLERANCE:g}"
                 )
             quaternion = quaternion / length
-        if part.sense == "world_to_body":
-            quaternion = quaternion * np.array([1.0, -1.0, -1.0, -1.0])
-        if self._turned:
-            matrix = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
-            turn = Rotation.from_matrix(self._world @ matrix @ self._body.T)
-            quaternion = np.asarray(turn.as_quat(scalar_first=True))
-        return quaternion
-
-    def _commands(self, values: Array) -> Array:
-        part = self.map.commands
-        assert part is not None
-        assert part.range is not None
-        low, high = part.range
-        u = (values[[motor - 1 for motor in part.order]] - low) / (high - low)
-        if np.all((u < -_OUTSIDE) | (u > 1.0 + _OUTSIDE)):
-            raise Malformed(
-                f"motor commands {', '.join(f'{x:g}' for x in values)}; expected {low:g} to "
-                f"{high:g}"
-            )
-        return np.clip(u, 0.0, 1.0)
+        return np.asarray(in_kit_axes(self.map, part, quaternion)[0])
 
 
 def _values(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | None:
@@ -206,47 +167,35 @@ def _values(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | N
     if all(type(value) is float for value in given):  # nearly always, and quick
         total = sum(given)
         if total == total and max(given) <= _LARGEST and min(given) >= -_LARGEST:
-            return _scaled(np.array(given), part)
-    elif not any(value is not None for value in given) and not any(
-        name[0] == "=" for name in part.columns
-    ):
+            return scaled(part, np.array(given))
+    elif all(value is None for value in given) and len(part.named) == len(given):
         return None
     return _checked(part, section, fields)
 
 
-def _scaled(values: Array, part: Columns) -> Array:
-    if part.signs:
-        values = values * np.array(part.signs, dtype=np.float64)
-    return values * part.scale if part.scale != 1.0 else values
-
-
 def _checked(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | None:
     """Return the same of numbers that may be none; say what is wrong with them."""
-    numbers = []
+    numbers = {}
     for name in part.columns:
-        value = float(name[1:]) if name.startswith("=") else fields.get(name)
+        fixed = constant(name)
+        value = fields.get(name) if fixed is None else fixed
         if value is None:
-            numbers.append(math.nan)
+            numbers[name] = math.nan
         elif isinstance(value, int | float) and not isinstance(value, bool):
             try:
-                numbers.append(float(value))
+                numbers[name] = float(value)
             except OverflowError:
-                numbers.append(math.inf)
+                numbers[name] = math.inf
         else:
             raise Malformed(f"field {name}: {_shown(value)}; expected a number")
-    missing = [
-        name
-        for name, value in zip(part.columns, numbers, strict=True)
-        if math.isnan(value) and not name.startswith("=")
-    ]
+    missing = [name for name in part.named if math.isnan(numbers[name])]
     if missing:
-        named = [name for name in part.columns if not name.startswith("=")]
-        if len(missing) == len(named):
+        if len(missing) == len(part.named):
             return None
         raise Malformed(
-            f"no field {', '.join(missing)}; expected all of {', '.join(named)} ({section})"
+            f"no field {', '.join(missing)}; expected all of {', '.join(part.named)} ({section})"
         )
-    values = _scaled(np.array(numbers), part)
+    values = scaled(part, np.array([numbers[name] for name in part.columns]))
     if not np.all(np.abs(values) <= _LARGEST):
         raise Malformed(
             f"{section}: {', '.join(f'{x:.3g}' for x in values)}; expected numbers of a flight"

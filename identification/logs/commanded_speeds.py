@@ -16,24 +16,26 @@ from numpy.typing import NDArray
 from ...dynamics.vehicle import Vehicle
 from .flight_log import FlightLog
 from .flight_phases import flying
+from .log_map import Commands
 
 Array = NDArray[np.float64]
 
 # s, up to which less is a dip in flight: without thrust a vehicle falls 5 m meanwhile. Without the
 # dips high thrusts alone would remain, whose mean is above the weight
 _DIP = 1.0
+_SATURATED = 0.9995  # of the full command
 
 
 def with_commanded_speeds(
-    log: FlightLog, vehicle: Vehicle | None, factor: float = 1.0
+    log: FlightLog, vehicle: Vehicle | None, model: Commands | None = None
 ) -> FlightLog:
     """Return a log whose rotor speeds are worked out from its commands, where it has no others.
 
     Args:
         log: the flight.
         vehicle: that flew; None: nothing is worked out.
-        factor: f of the assumed relative thrust, 0 (thrust is linear in the command) to 1 (rotor
-            speed is).
+        model: what a command is assumed to give where the vehicle states no motor curve; None: a
+            thrust that grows with its square.
     """
     if log.command is None or log.has_rotor_speeds:
         return log
@@ -52,6 +54,9 @@ def with_commanded_speeds(
         )
         speeds = vehicle.commanded_speeds(log.command, log.voltage)
         return replace(log, rotor_speeds=speeds, commanded=True, notes=(*log.notes, note))
+    if model is not None and model.thrust:
+        return _with_stated_thrust(log, log.command, vehicle, model)
+    factor = 1.0 if model is None else model.thrust_factor
     relative = factor * np.square(log.command) + (1.0 - factor) * log.command
     if log.has_pose:
         scale, where = _scale_by_weight(log, relative, vehicle), "a pose"
@@ -83,6 +88,50 @@ def with_commanded_speeds(
     )
     speeds = np.sqrt(scale * relative / vehicle.k)
     return replace(log, rotor_speeds=speeds, commanded=True, notes=(*log.notes, note))
+
+
+def _with_stated_thrust(
+    log: FlightLog, command: Array, vehicle: Vehicle, model: Commands
+) -> FlightLog:
+    """Return a log with the rotor speeds of commands (N, 4) by the thrust that a map states."""
+    low, high = model.range or (0.0, 1.0)
+    reference = vehicle.voltage_ref if vehicle.voltage_ref > 0.0 else model.full_voltage
+    counts = low + command * (high - low)
+    thrust = np.polynomial.polynomial.polyval(
+        counts * (reference / model.full_voltage), model.thrust
+    )
+    speeds = np.sqrt(np.where(command > 0.0, thrust, 0.0) / vehicle.k)
+    terms = " + ".join(f"{c:.4g} u^{i}" if i else f"{c:.4g}" for i, c in enumerate(model.thrust))
+    notes = [
+        f"thrust model: no rotor speeds in the log; a motor is assumed to give {terms} N at "
+        f"u = command * {reference:g} V / {model.full_voltage:g} V, and rotor speeds are "
+        f"sqrt(thrust / k) with the k of {vehicle.name}, at {reference:g} V whatever the "
+        "battery's voltage. A constant factor on thrust and the mass cannot be found from this log"
+    ]
+    saturated = float(np.mean(command.max(axis=1) >= _SATURATED))
+    if saturated > 0.0:
+        notes.append(f"a motor is at full command in {100.0 * saturated:.1f} % of the samples")
+    return replace(log, rotor_speeds=speeds, commanded=True, notes=(*log.notes, *notes))
+
+
+def speeds_of_wrench(wrench: Array, vehicle: Vehicle) -> tuple[Array, list[str]]:
+    """Return rotor speeds (N, 4) in rad/s of commanded collective thrusts and torques (N, 4), and
+    notes.
+    """
+    square = np.linalg.solve(vehicle.mixing, wrench.T).T
+    limit = vehicle.omega_max**2
+    notes = [
+        "no rotor speeds in the log: commanded thrust and torques were converted into rotor speeds "
+        f"by the inverse of the rotor mixing of {vehicle.name}, clipped at zero and at omega_max. "
+        "What the firmware's thrust curve, the battery and the motors made of the command is not "
+        "in the log; a constant factor on thrust remains unknown"
+    ]
+    clipped = int(np.sum(np.any((square < 0.0) | (square > limit), axis=1)))
+    if clipped:
+        notes.append(
+            f"the commands of {clipped} sample(s) were out of the rotors' reach and were clipped"
+        )
+    return np.sqrt(np.clip(square, 0.0, limit)), notes
 
 
 def _words(factor: float) -> str:

@@ -130,26 +130,40 @@ def log_name(path: Path) -> str:
     return path.name[: -len(file_kind(path))]
 
 
-def check_finite(table: Table, name: str, column: Array, where: Mask | None = None) -> None:
-    """Raise InputError at the first number of a column (N,) that is not finite; ``where`` limits
-    the rows.
+def check_finite(
+    table: Table, name: str, column: Array, where: Mask | None = None, more: str = ""
+) -> None:
+    """Raise InputError at the first number of a column (N,) that is not finite.
+
+    Args:
+        table: of the column.
+        name: of the column.
+        column: (N,).
+        where: (N,) rows that are looked at; None: all.
+        more: said of what else may be empty.
     """
     bad = ~np.isfinite(column) if where is None else ~np.isfinite(column) & where
     if bad.any():
         i = int(np.flatnonzero(bad)[0])
         found = "empty or NaN" if np.isnan(column[i]) else "infinite"
-        sensor = next((names for names in (ACCELEROMETER, GYRO) if name in names), None)
-        more = (
-            "; only all seven pose columns together may be empty (pose lost)"
-            if name in POSE
-            else f"; only {', '.join(sensor)} together may be empty (not measured)"
-            if sensor
-            else ""
-        )
         raise InputError(
             f"{table.path}: column {name}, {table.row(i)} is {found}; expected a finite "
-            f"number{more}"
+            f"number{more and f'; {more}'}"
         )
+
+
+def vehicle_of_columns(table: Table) -> str:
+    """Return the name of the vehicle that a column's name gives, or nothing.
+
+    Raises:
+        InputError: two columns name one each.
+    """
+    found = [match[1] for name in table.header if (match := VEHICLE.fullmatch(name))]
+    if len(found) > 1:
+        raise InputError(
+            f"{table.path}: the columns name the vehicles {' and '.join(found)}; expected one"
+        )
+    return found[0] if found else ""
 
 
 def check_times(table: Table, t: Array) -> None:
@@ -183,24 +197,6 @@ def unit_quaternions(table: Table, quaternions: Array, where: Mask, columns: str
         )
     unit: Array = quaternions / length[:, None]
     return unit
-
-
-def sensor_columns(
-    table: Table, columns: Mapping[str, Array], names: tuple[str, ...]
-) -> Array | None:
-    """Return what an inertial sensor's three columns hold (N, 3), NaN in rows where it was not
-    read; None where ``names`` is empty or it was never read.
-
-    Raises:
-        InputError: a row has one or two of the three, or a number that is not finite.
-    """
-    if not names:
-        return None
-    values = np.column_stack([columns[name] for name in names])
-    read: Mask = ~np.all(np.isnan(values), axis=1)
-    for name in names:
-        check_finite(table, name, columns[name], read)
-    return values if read.any() else None
 
 
 def time_notes(t: Array) -> tuple[str, ...]:

@@ -1,18 +1,27 @@
-"""What the columns of somebody's table mean: a map from them to a flight log, in a YAML file.
+"""What the columns of a log mean: a map from them to a flight log, in a YAML file.
 
 Every section but ``time`` may be left out; the log must come to have a pose or an IMU, and rotor
 speeds or motor commands. ``optional: true`` in a section skips it where none of its columns is
 there. ``signs: [1, -1, 1]`` in a section of several columns turns single ones over; ``scale``
-multiplies what the column holds before its unit is applied.
+multiplies what the column holds before its unit is applied; ``note`` is said of a log in which the
+section is used. A list of sections in place of one states alternatives: the first is taken whose
+columns the log has, with numbers in them.
 
 * ``about``: what kind of table it is, for people
 * ``vehicle``: name of the vehicle that flew
 * ``recognise``: columns by which a table of this kind is known without being told
+* ``notes``: said of every log
 * ``world``: enu (z up; also nwu, flu), ned (z down; also frd), y_up (motion capture)
 * ``body``: flu (forward, left, up) or frd (forward, right, down)
+* ``rows``: mixed (default: fields may be empty where a channel has no sample), whole (every field
+  of a pose is filled, or all are empty; times strictly increase) or streams (each channel has
+  samples of its own, as in a log of messages; commands become rotor speeds where the vehicle is
+  given)
+* ``stray_rows``: how many rows at the start are dropped, at most, where a gap follows them
 * ``time``: column, unit (s, ms, us, ns, min), offset (s; default: the flight begins at 0); or
   rate_hz alone, where the table has no time
-* ``position``: columns (x, y, z), unit (m, mm, cm, ft)
+* ``position``: columns (x, y, z), unit (m, mm, cm, ft), held (true: a position that repeats the one
+  before is no measurement)
 * ``attitude``: columns, and order (wxyz or xyzw); or columns (roll, pitch, yaw: about x, y, z),
   euler (order of the turns, each about the axis that the last has moved: zyx is yaw, pitch, roll)
   and unit (deg, rad). A column ``=0`` stands for an angle that is not in the table. sense:
@@ -21,26 +30,36 @@ multiplies what the column holds before its unit is applied.
   those at front-left, rear-left, rear-right, front-right), unit (rad/s, rpm, Hz, eRPM with
   pole_pairs)
 * ``commands``: columns, order, unit (us, normalised, duty, percent, dshot, counts), range (what
-  stands for 0 and for full command), thrust_factor (f of the relative thrust f u^2 + (1 - f) u that
-  is assumed where the vehicle states no motor curve)
-* ``battery``: column, unit (V, mV, cV), cells (where the voltage is that of one cell)
+  stands for 0 and for full command), clip (true: a command beyond the range is set to its end);
+  what a vehicle without a motor curve is assumed to make of them: thrust_factor (f of the relative
+  thrust f u^2 + (1 - f) u) or thrust (N a motor, the coefficients of the count's powers 0, 1, 2, at
+  full_voltage)
+* ``wrench``: commanded collective thrust (N) and torque about x, y, z (Nm): columns
+* ``battery``: column, unit (V, mV, cV), cells (where the voltage is that of one cell), late (s, by
+  which the voltage is logged late)
 * ``accelerometer``: columns, unit (m/s2, g, raw with scale in m/s2), body (where another than
   above)
 * ``gyro``: columns, unit (rad/s, deg/s, raw with scale in rad/s), body
 * ``force, torque``: true external wrench in the world, N and Nm
+* ``extra``: what else is kept, by name: columns and scale
 """
 
+import dataclasses
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BeforeValidator, ConfigDict, Field
 
 from ...runtime.errors import InputError, unknown_name
+from ...runtime.forms import STRICT, checked
 from ...runtime.yaml_file import read_yaml
 from .rotor_orders import ORDERS, Order, rotor_order
 
 MAPS = Path(__file__).parent / "maps"  # those that ship with the kit
+OWN_MAP = "windwrench"  # of this kit's own columns
 
 WORLDS = {"enu": "enu", "nwu": "enu", "flu": "enu", "ned": "ned", "frd": "ned", "y_up": "y_up"}
 BODIES = {"flu": "flu", "frd": "frd"}
@@ -90,87 +109,172 @@ _SPELLINGS = {
 }
 
 
+def _is(wanted: str, test: Callable[[Any], bool]) -> BeforeValidator:
+    """Return a validator that refuses what fails a test, in the words of what was wanted."""
+
+    def check(value: Any, info: Any) -> Any:
+        if not test(value):
+            raise InputError(f"{info.field_name}: {_shown(value)}; expected {wanted}")
+        return tuple(value) if isinstance(value, list) else value
+
+    return BeforeValidator(check)
+
+
+def _choice(known: Collection[str]) -> BeforeValidator:
+    """Return a validator that takes one of some words, whatever its case, and other spellings."""
+    lower = {name.lower(): name for name in known}
+
+    def check(value: Any, info: Any) -> str:
+        text = str(value).lower()
+        found = lower.get(text) or lower.get(_SPELLINGS.get(text, "").lower())
+        if found is None:
+            raise unknown_name(info.field_name, str(value), known)
+        return found
+
+    return BeforeValidator(check)
+
+
+def _finite(value: Any) -> bool:
+    return type(value) in (int, float) and abs(value) <= 1e300
+
+
+def _two_numbers(value: Any) -> bool:
+    two = isinstance(value, list | tuple) and len(value) == 2 and all(map(_finite, value))
+    return value is None or (two and value[0] != value[1])
+
+
+_Text = Annotated[str, _is("a text", lambda x: isinstance(x, str))]
+_Number = Annotated[float, _is("a finite number", _finite)]
+_Truth = Annotated[bool, _is("true or false", lambda x: isinstance(x, bool))]
+_Count = Annotated[int, _is("a whole number from 1", lambda x: type(x) is int and 1 <= x <= 1000)]
+_Names = Annotated[
+    tuple[str, ...],
+    _is(
+        "a list of columns",
+        lambda x: isinstance(x, list | tuple) and all(isinstance(name, str) for name in x),
+    ),
+]
+_Range = Annotated[
+    tuple[float, float] | None,
+    _is("two numbers, what stands for no and for full command, such as [1000, 2000]", _two_numbers),
+]
+_Order = Annotated[Order, BeforeValidator(lambda value: rotor_order(value, "order"))]
+
+
 @dataclass(frozen=True)
 class Columns:
     """Columns of one kind, and what they are in."""
 
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
+
     columns: tuple[str, ...]
     unit: str = ""
-    scale: float = 1.0
+    scale: Annotated[_Number, _is("a factor that is not zero", lambda x: x != 0)] = 1.0
     signs: tuple[int, ...] = ()  # one a column; empty: all as they stand
-    optional: bool = False
+    optional: _Truth = False
+    note: _Text = ""
+
+    @property
+    def named(self) -> list[str]:
+        """The columns that stand in the table: those that are no constant such as ``=0``."""
+        return [name for name in self.columns if constant(name) is None]
 
 
 @dataclass(frozen=True)
 class TimeColumn:
     """The clock."""
 
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
+
     column: str = ""
-    unit: str = "s"
-    offset: float | None = None  # s, added; None: so that the flight begins at 0
-    rate_hz: float = 0.0  # of rows, where there is no column
+    unit: Annotated[str, _choice(TIME_UNITS)] = "s"
+    offset: Annotated[float | None, _is("a finite number", lambda x: x is None or _finite(x))] = (
+        None  # s, added; None: so that the flight begins at 0
+    )
+    rate_hz: _Number = 0.0  # of rows, where there is no column
+    note: _Text = ""
+
+
+@dataclass(frozen=True)
+class Position(Columns):
+    """A position."""
+
+    held: _Truth = False  # a value that repeats the one before is no measurement
 
 
 @dataclass(frozen=True)
 class Attitude(Columns):
     """A quaternion, or Euler angles about x, y and z."""
 
-    order: str = "wxyz"  # of the columns of a quaternion
-    euler: str = ""  # order of turns; empty: a quaternion
-    sense: str = "body_to_world"
+    order: Annotated[str, _choice(QUATERNIONS)] = "wxyz"  # of the columns of a quaternion
+    euler: Annotated[str, _choice(EULER_ORDERS)] = ""  # of turns; empty: a quaternion
+    sense: Annotated[str, _choice(SENSES)] = "body_to_world"
 
 
 @dataclass(frozen=True)
 class Rotors(Columns):
     """Measured rotor speeds."""
 
-    order: Order = ORDERS["windwrench"]
-    pole_pairs: int = 1
+    order: _Order = ORDERS["windwrench"]
+    pole_pairs: _Count = 1
 
 
 @dataclass(frozen=True)
 class Commands(Columns):
     """Motor commands."""
 
-    order: Order = ORDERS["windwrench"]
-    range: tuple[float, float] | None = None  # None: the vehicle's motor curve states it
-    thrust_factor: float = 1.0
+    order: _Order = ORDERS["windwrench"]
+    range: _Range = None  # None: the vehicle's motor curve states it
+    thrust_factor: Annotated[float, _is("0 to 1", lambda x: _finite(x) and 0 <= x <= 1)] = 1.0
+    clip: _Truth = False
+    thrust: tuple[_Number, ...] = ()  # N a motor, of the count's powers 0, 1, 2
+    full_voltage: Annotated[_Number, Field(gt=0.0)] = 1.0  # V, at which ``thrust`` holds
 
 
 @dataclass(frozen=True)
 class Battery(Columns):
     """The battery's voltage."""
 
-    cells: int = 1
+    cells: _Count = 1
+    late: _Number = 0.0  # s, by which the voltage is logged late
 
 
 @dataclass(frozen=True)
 class Sensor(Columns):
     """An inertial sensor of three axes."""
 
-    body: str = ""  # empty: the map's
+    body: Annotated[str, _choice(BODIES)] = ""  # empty: the map's
 
 
 @dataclass(frozen=True)
 class LogMap:
     """What the columns of a table mean."""
 
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
+
     time: TimeColumn
-    world: str = "enu"
-    body: str = "flu"
+    world: Annotated[str, _choice(WORLDS)] = "enu"
+    body: Annotated[str, _choice(BODIES)] = "flu"
     position: Columns | None = None
     attitude: Attitude | None = None
     rotors: Rotors | None = None
     commands: Commands | None = None
+    wrench: Columns | None = None
     battery: Battery | None = None
     accelerometer: Sensor | None = None
     gyro: Sensor | None = None
     force: Columns | None = None
     torque: Columns | None = None
-    about: str = ""
-    vehicle: str = ""
-    recognise: tuple[str, ...] = ()
+    about: _Text = ""
+    vehicle: _Text = ""
+    recognise: _Names = ()
     name: str = ""  # where it comes from: a shipped map's name or a file
+    notes: _Names = ()
+    rows: Literal["mixed", "whole", "streams"] = "mixed"
+    stray_rows: Annotated[int, Field(ge=0)] = 0
+    extra: Mapping[str, Columns] = field(default_factory=dict)
+    # further ways to fill a section (``time`` among them), in their order
+    alternatives: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
 
     @property
     def sections(self) -> dict[str, Columns]:
@@ -178,18 +282,37 @@ class LogMap:
         found = {name: getattr(self, name) for name in SECTIONS}
         return {name: part for name, part in found.items() if part is not None}
 
+    @property
+    def is_own(self) -> bool:
+        """Are the columns this kit's own?"""
+        return self.name == OWN_MAP
 
-SECTIONS = (
-    "position",
-    "attitude",
-    "rotors",
-    "commands",
-    "battery",
-    "accelerometer",
-    "gyro",
-    "force",
-    "torque",
-)
+
+# sections: their class, how many columns they have, and their units
+_FORMS: dict[str, tuple[type[Columns], int, Collection[str]]] = {
+    "position": (Position, 3, LENGTH_UNITS),
+    "attitude": (Attitude, 4, ANGLE_UNITS),
+    "rotors": (Rotors, 4, ROTOR_UNITS),
+    "commands": (Commands, 4, COMMAND_UNITS),
+    "wrench": (Columns, 4, ("N",)),
+    "battery": (Battery, 1, VOLTAGE_UNITS),
+    "accelerometer": (Sensor, 3, ACCELERATION_UNITS),
+    "gyro": (Sensor, 3, RATE_UNITS),
+    "force": (Columns, 3, ("N", "mN")),
+    "torque": (Columns, 3, ("Nm", "mNm")),
+}
+_DEFAULT_UNITS = {"attitude": "deg", "commands": "normalised"}  # of others the first
+SECTIONS = tuple(_FORMS)
+
+
+def constant(name: str) -> float | None:
+    """Return the constant that a column's name stands for, such as ``=0``."""
+    if not name.startswith("="):
+        return None
+    try:
+        return float(name[1:])
+    except ValueError:
+        return None
 
 
 def map_names() -> list[str]:
@@ -213,112 +336,6 @@ def load_map(name: str | Path) -> LogMap:
     return parse_map(read_yaml(path, "a map file"), str(path), str(path))
 
 
-class _Section:
-    """A mapping of the file, whose fields are taken one by one."""
-
-    def __init__(self, value: object, where: str) -> None:
-        if not isinstance(value, dict):
-            raise InputError(f"{where}: {_shown(value)}; expected a mapping of fields")
-        self.fields: dict[str, Any] = {str(key): item for key, item in value.items()}
-        self.where, self.known = where, list[str]()
-
-    def take(self, name: str, default: object = None) -> Any:
-        self.known.append(name)
-        value = self.fields.get(name)
-        return default if value is None else value
-
-    def end(self) -> None:
-        for name in self.fields:
-            if name not in self.known:
-                raise unknown_name("field", name, self.known, self.where)
-
-    def text(self, name: str, default: str = "") -> str:
-        value = self.take(name, default)
-        if not isinstance(value, str):
-            raise InputError(f"{self.where}: {name}: {_shown(value)}; expected a text")
-        return value
-
-    def number(self, name: str, default: float | None) -> float | None:
-        value = self.take(name, default)
-        if value is None:
-            return None
-        if isinstance(value, bool) or not isinstance(value, int | float) or not _finite(value):
-            raise InputError(f"{self.where}: {name}: {_shown(value)}; expected a finite number")
-        return float(value)
-
-    def factor(self, name: str, default: float) -> float:
-        value = self.number(name, default)
-        if value is None or value == 0.0:
-            raise InputError(f"{self.where}: {name}: 0; expected a factor that is not zero")
-        return value
-
-    def count(self, name: str, default: int) -> int:
-        value = self.take(name, default)
-        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 1000:
-            raise InputError(
-                f"{self.where}: {name}: {_shown(value)}; expected a whole number from 1"
-            )
-        return value
-
-    def truth(self, name: str) -> bool:
-        value = self.take(name, False)
-        if not isinstance(value, bool):
-            raise InputError(f"{self.where}: {name}: {_shown(value)}; expected true or false")
-        return value
-
-    def choice(self, name: str, known: Mapping[str, object] | tuple[str, ...], default: str) -> str:
-        value = self.take(name, default)
-        text = str(value)
-        lower = {str(key).lower(): str(key) for key in known}
-        found = lower.get(text.lower()) or lower.get(_SPELLINGS.get(text.lower(), "").lower())
-        if found is None:
-            raise unknown_name(name, text, known, self.where)
-        return found
-
-    def columns(self, name: str, count: int) -> tuple[str, ...]:
-        value = self.take(name)
-        items = [value] if count == 1 and isinstance(value, str | int) else value
-        if not isinstance(items, list) or len(items) != count:
-            what = "one column" if count == 1 else f"a list of {count} columns"
-            raise InputError(f"{self.where}: {name}: {_shown(value)}; expected {what} of the table")
-        for item in items:
-            if isinstance(item, bool) or not isinstance(item, str | int) or item == "":
-                raise InputError(
-                    f"{self.where}: {name}: {_shown(item)}; expected the name of a column"
-                )
-        return tuple(str(item).strip() for item in items)
-
-    def shared(self, count: int, name: str = "columns") -> dict[str, Any]:
-        """Take what every section has: columns, scale, signs and whether it is optional."""
-        signs = self.take("signs", [])
-        if signs and (
-            not isinstance(signs, list)
-            or len(signs) != count
-            or any(s not in (1, -1) or isinstance(s, bool) for s in signs)
-        ):
-            raise InputError(
-                f"{self.where}: signs: {_shown(signs)}; expected {count} times 1 or -1, such as "
-                f"{[1, -1, 1, 1][:count]}"
-            )
-        return {
-            "columns": self.columns(name, count),
-            "scale": self.factor("scale", 1.0),
-            "signs": tuple(int(s) for s in signs),
-            "optional": self.truth("optional"),
-        }
-
-
-def _finite(value: int | float) -> bool:
-    try:
-        return math.isfinite(float(value))
-    except OverflowError:
-        return False
-
-
-def _shown(value: object) -> str:
-    return "missing" if value is None else repr(value)[:100]
-
-
 def parse_map(value: object, where: str, name: str = "") -> LogMap:
     """Return the map that a YAML file's value states.
 
@@ -330,32 +347,27 @@ def parse_map(value: object, where: str, name: str = "") -> LogMap:
     Raises:
         InputError: a field is unknown, missing, or of another kind.
     """
-    top = _Section(value, where)
-    about, vehicle = top.text("about"), top.text("vehicle")
-    recognise = top.take("recognise", [])
-    if not isinstance(recognise, list) or not all(isinstance(x, str) for x in recognise):
-        raise InputError(f"{where}: recognise: {_shown(recognise)}; expected a list of columns")
-    world = WORLDS[top.choice("world", WORLDS, "enu")]
-    body = top.choice("body", BODIES, "flu")
-    time = _time(top)
-    parts: dict[str, Any] = {}
-    for section in SECTIONS:
-        given = top.take(section)
-        if given is not None:
-            part = _Section(given, f"{where}: {section}")
-            parts[section] = _PARSERS[section](part)
-            part.end()
-    top.end()
-    found = LogMap(
-        time=time,
-        world=world,
-        body=body,
-        about=about,
-        vehicle=vehicle,
-        recognise=tuple(recognise),
-        name=name or where,
-        **parts,
-    )
+    if not isinstance(value, dict):
+        raise InputError(f"{where}: {_shown(value)}; expected a mapping of fields")
+    given: dict[str, Any] = {str(key): item for key, item in value.items() if item is not None}
+    others: dict[str, tuple[Any, ...]] = {}
+    for section in ("time", *SECTIONS):
+        ways = given.get(section, {} if section == "time" else None)
+        if ways is None:
+            continue
+        read = _time if section == "time" else _section
+        ways = ways if isinstance(ways, list) and ways else [ways]
+        given[section], *more = [read(way, where, section) for way in ways]
+        others[section] = tuple(more)
+    extra = given.pop("extra", {})
+    if not isinstance(extra, dict):
+        raise InputError(f"{where}: extra: {_shown(extra)}; expected a mapping of names")
+    given["extra"] = {
+        str(key): checked(Columns, _filled(part, f"{where}: extra"), f"{where}: extra: {key}")
+        for key, part in extra.items()
+    }
+    _check_names(given, LogMap, where)
+    found = checked(LogMap, given | {"name": name or where, "alternatives": others}, where)
     _check_whole(found, where)
     return found
 
@@ -368,113 +380,99 @@ def _check_whole(found: LogMap, where: str) -> None:
             f"{where}: no section {missing}; expected position and attitude, or neither where "
             "accelerometer and gyro are there"
         )
-    if found.position is None and (found.accelerometer is None or found.gyro is None):
+    has_imu = found.accelerometer is not None and found.gyro is not None
+    if found.position is None and not has_imu and not found.extra:
         raise InputError(
             f"{where}: no pose and no IMU; expected the sections position and attitude, or "
             "accelerometer and gyro"
         )
-    if found.rotors is None and found.commands is None:
+    if found.rotors is None and found.commands is None and found.wrench is None:
         raise InputError(f"{where}: no motors; expected a section rotors or commands")
     if (found.force is None) != (found.torque is None):
         raise InputError(f"{where}: force and torque come together; expected both or neither")
 
 
-def _time(top: _Section) -> TimeColumn:
-    part = _Section(top.take("time", {}), f"{top.where}: time")
-    rate, offset = part.number("rate_hz", 0.0), part.number("offset", None)
-    unit = part.choice("unit", TIME_UNITS, "s")
-    if rate:
-        part.take("column")
-        if rate <= 0.0 or part.fields.get("column") is not None:
-            raise InputError(f"{part.where}: expected a column, or rate_hz above 0 without one")
-        column = ""
-    else:
-        (column,) = part.columns("column", 1)
-    part.end()
-    return TimeColumn(column, unit, offset, rate or 0.0)
+def _filled(given: object, where: str) -> dict[str, Any]:
+    """Return a section's fields that are stated, its columns as texts."""
+    if not isinstance(given, dict):
+        raise InputError(f"{where}: {_shown(given)}; expected a mapping of fields")
+    fields = {str(key): item for key, item in given.items() if item is not None}
+    if isinstance(columns := fields.get("columns"), list):
+        for name in columns:
+            if isinstance(name, bool) or not isinstance(name, str | int) or name == "":
+                raise InputError(f"{where}: columns: {_shown(name)}; expected the name of a column")
+        fields["columns"] = tuple(str(name).strip() for name in columns)
+    return fields
 
 
-def _position(part: _Section) -> Columns:
-    return Columns(unit=part.choice("unit", LENGTH_UNITS, "m"), **part.shared(3))
+def _time(given: object, where: str, section: str) -> TimeColumn:
+    where = f"{where}: {section}"
+    fields = _filled(given, where)
+    _check_names(fields, TimeColumn, where)
+    rate = fields.get("rate_hz")
+    column = fields.get("column")
+    if not rate and (isinstance(column, bool) or not isinstance(column, str | int)):
+        raise InputError(f"{where}: column: {_shown(column)}; expected one column of the table")
+    found = checked(TimeColumn, fields | ({} if rate else {"column": str(column).strip()}), where)
+    if rate and (found.rate_hz <= 0.0 or column is not None):
+        raise InputError(f"{where}: expected a column, or rate_hz above 0 without one")
+    return found
 
 
-def _attitude(part: _Section) -> Attitude:
-    sense = part.choice("sense", SENSES, "body_to_world")
-    if part.take("euler") is None:
-        order = part.choice("order", QUATERNIONS, "wxyz")
-        part.known += ["euler"]
-        return Attitude(order=order, sense=sense, **part.shared(4))
-    euler = part.choice("euler", EULER_ORDERS, "zyx")
-    unit = part.choice("unit", ANGLE_UNITS, "deg")
-    return Attitude(euler=euler, sense=sense, unit=unit, **part.shared(3))
-
-
-def _rotors(part: _Section) -> Rotors:
-    unit = part.choice("unit", ROTOR_UNITS, "rad/s")
-    if unit == "eRPM" and part.fields.get("pole_pairs") is None:
+def _section(given: object, where: str, section: str) -> Columns:
+    kind, count, units = _FORMS[section]
+    where = f"{where}: {section}"
+    fields = _filled(given, where)
+    _check_names(fields, kind, where, *(["column"] if count == 1 else []))
+    named = "columns"
+    if count == 1:
+        named = "column"
+        column = fields.pop("column", None)
+        fields["columns"] = [column] if isinstance(column, str | int) else column
+        fields = _filled(fields, where)
+    if "euler" in fields:
+        count = 3
+    if not isinstance(fields.get("columns"), tuple) or len(fields["columns"]) != count:
+        what = "one column" if count == 1 else f"a list of {count} columns"
+        found = fields.get("columns", given.get(named) if isinstance(given, dict) else None)
+        found = list(found) if isinstance(found, tuple) else found
+        raise InputError(f"{where}: {named}: {_shown(found)}; expected {what} of the table")
+    lower = {name.lower(): name for name in units}
+    default = "" if section == "attitude" and count == 4 else _DEFAULT_UNITS.get(section)
+    unit = str(fields.get("unit", next(iter(units)) if default is None else default))
+    spelt = lower.get(unit.lower()) or lower.get(_SPELLINGS.get(unit.lower(), "").lower())
+    if unit and spelt is None:
+        raise unknown_name("unit", unit, units, where)
+    fields["unit"] = spelt or ""
+    if spelt == "raw" and "scale" not in fields:
+        raise InputError(f"{where}: unit raw without a scale; expected the scale to SI units")
+    if spelt == "eRPM" and "pole_pairs" not in fields:
         raise InputError(
-            f"{part.where}: unit eRPM without pole_pairs; expected the motors' pairs of poles (7 "
+            f"{where}: unit eRPM without pole_pairs; expected the motors' pairs of poles (7 "
             "on most motors of 5-inch racers, 6 on smaller ones)"
         )
-    pairs = part.count("pole_pairs", 1)
-    return Rotors(
-        unit=unit,
-        pole_pairs=pairs,
-        order=rotor_order(part.take("order", "windwrench"), f"{part.where}: order"),
-        **part.shared(4),
-    )
-
-
-def _commands(part: _Section) -> Commands:
-    unit = part.choice("unit", COMMAND_UNITS, "normalised")
-    limits = part.take("range")
-    if limits is not None:
-        good = (
-            isinstance(limits, list)
-            and len(limits) == 2
-            and all(isinstance(x, int | float) and not isinstance(x, bool) for x in limits)
-            and all(map(_finite, limits))
-            and limits[0] != limits[1]
+    if section == "commands":
+        fields.setdefault("range", COMMAND_UNITS[fields["unit"]])
+    signs = fields.get("signs", [])
+    if signs and not (
+        isinstance(signs, list)
+        and len(signs) == count
+        and all(s in (1, -1) and not isinstance(s, bool) for s in signs)
+    ):
+        raise InputError(
+            f"{where}: signs: {_shown(signs)}; expected {count} times 1 or -1, such as "
+            f"{[1, -1, 1, 1][:count]}"
         )
-        if not good:
-            raise InputError(
-                f"{part.where}: range: {_shown(limits)}; expected two numbers, what stands for no "
-                "and for full command, such as [1000, 2000]"
-            )
-    factor = part.number("thrust_factor", 1.0)
-    if factor is None or not 0.0 <= factor <= 1.0:
-        raise InputError(f"{part.where}: thrust_factor: {factor:g}; expected 0 to 1")
-    return Commands(
-        unit=unit,
-        range=(float(limits[0]), float(limits[1])) if limits is not None else COMMAND_UNITS[unit],
-        thrust_factor=factor,
-        order=rotor_order(part.take("order", "windwrench"), f"{part.where}: order"),
-        **part.shared(4),
-    )
+    return checked(kind, fields, where)
 
 
-def _battery(part: _Section) -> Battery:
-    unit = part.choice("unit", VOLTAGE_UNITS, "V")
-    return Battery(unit=unit, cells=part.count("cells", 1), **part.shared(1, "column"))
+def _check_names(fields: Mapping[str, Any], form: Any, where: str, *more: str) -> None:
+    """Raise InputError at a field that no file states."""
+    known = {field.name for field in dataclasses.fields(form)} - {"alternatives", "name"} | {*more}
+    for name in fields:
+        if name not in known:
+            raise unknown_name("field", name, known, where)
 
 
-def _sensor(part: _Section, units: Mapping[str, float]) -> Sensor:
-    unit = part.choice("unit", units, next(iter(units)))
-    if unit == "raw" and "scale" not in part.fields:
-        raise InputError(f"{part.where}: unit raw without a scale; expected the scale to SI units")
-    body = part.choice("body", BODIES, "flu") if part.fields.get("body") is not None else ""
-    part.known.append("body")
-    return Sensor(unit=unit, body=body, **part.shared(3))
-
-
-_PARSERS: dict[str, Any] = {
-    "position": _position,
-    "attitude": _attitude,
-    "rotors": _rotors,
-    "commands": _commands,
-    "battery": _battery,
-    "accelerometer": lambda part: _sensor(part, ACCELERATION_UNITS),
-    "gyro": lambda part: _sensor(part, RATE_UNITS),
-    "force": lambda part: Columns(unit=part.choice("unit", ("N", "mN"), "N"), **part.shared(3)),
-    "torque": lambda part: Columns(unit=part.choice("unit", ("Nm", "mNm"), "Nm"), **part.shared(3)),
-}
+def _shown(value: object) -> str:
+    return "missing" if value is None else repr(value)[:100]

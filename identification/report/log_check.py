@@ -14,13 +14,11 @@ from ...dynamics.vehicle import Vehicle
 from ...dynamics.vehicle_file import load_vehicle, preset_names
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
-from ..logs.known_tables import known_map
 from ..logs.layout_guess import is_parquet, is_text_table, open_any_table
 from ..logs.log_map import MAPS, map_names
 from ..logs.map_guess import Guess, guess_map, map_yaml
 from ..logs.mapped_log import map_table
-from ..logs.readers import READERS
-from ..logs.reading import finished, missing_columns, read_log
+from ..logs.reading import finished, is_known_table, read_log
 from ..logs.screening import screen_log
 from ..motion.noise_spectrum import noise_spectra
 from .log_channels import Channel, log_channels
@@ -126,19 +124,13 @@ def _read_by(path: Path, log: FlightLog) -> tuple[str, str]:
     """Return in words what read a log, and the text of the map where that was one."""
     if named := re.search(r"\(reader ([^()]+)\)$", log.source):
         return f"the reader {named[1]}", ""
-    if is_text_table(path):
-        known = known_map(open_any_table(path)[0].header)
-        if known is not None and known.name != "windwrench":
-            return f"the map {known.name}, known by its columns", _map_text(known.name)
     return "this kit's own format", ""
 
 
 def _guessed(path: Path, vehicle: Vehicle | None, error: InputError) -> tuple[FlightLog, Guess]:
     table, layout = open_any_table(path)
-    if known_map(table.header) is not None or not missing_columns(table):
+    if is_known_table(table):
         raise error  # it is known what the columns mean: the fault is in what they hold
-    if any(r.signature and set(r.signature) <= set(table.header) for r in READERS.values()):
-        raise error
     guess = guess_map(table, layout, vehicle)
     if vehicle is not None:
         guess = replace(guess, log_map=replace(guess.log_map, vehicle=vehicle.name))

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.vehicle import Vehicle
-from ...identification.logs.readers.streams import from_ned
 from ...identification.logs.rotor_orders import ORDERS
+from ...identification.logs.streams import from_ned
 from ..messages import Array, Measured, Sample
 from ..tallies import Tallies
 from .base import LARGEST_SHARE, command_of, unwrapped

@@ -93,8 +93,8 @@ def test_the_wheel_holds_code_and_data_and_nothing_else(installed):
         "envs/quadrotor.xml",
         "dynamics/vehicles/ardrone2.yaml",
         "dynamics/effects/rotor_drag.py",
-        "identification/logs/readers/nanobench.py",
-        "identification/logs/maps/betaflight.yaml",
+        "identification/logs/readers/px4_ulog.py",
+        "identification/logs/maps/nanobench.yaml",
     ):
         assert (package / name).is_file(), name
     assert not (package / "tests").exists()

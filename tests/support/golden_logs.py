@@ -37,7 +37,7 @@ VEHICLES = {  # by folder; a path is that of a file beside the logs
     "flights": "vehicle.yaml",
     "racer": "vehicle.yaml",
 }
-MAPS = {"crazypad": "crazypad", "racer": "neurobem", "idsia": "written"}  # a second way to read
+MAPS = {"crazypad": "crazypad", "racer": "racer", "idsia": "written"}  # a second way to read
 # a map as a user writes one, of a table whose columns no reader knows
 WRITTEN = """
 time: {column: t, unit: s}
@@ -48,7 +48,7 @@ battery: {column: Vbat, unit: V}
 accelerometer: {columns: [ax, ay, az], unit: m/s2}
 gyro: {columns: [wx, wy, wz], unit: rad/s}
 """
-FORM_MAPS = {"betaflight_csv": "betaflight", "crazyflie_csv": "cflib", "racer": "neurobem"}
+FORM_MAPS = {"crazyflie_csv": "cflib", "racer": "racer"}
 
 
 def cases():

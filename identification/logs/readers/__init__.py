@@ -1,29 +1,22 @@
 """Readers of flight logs of other forms. Each states what it assumed, the thrust model above all,
 in the log's notes.
 
-To add one: a file in this folder with a function ``read(path, vehicle)`` that returns a FlightLog,
-and a line in ``READERS``.
+A table needs no code: a file in ``identification/logs/maps/`` that says what its columns mean, and
+its name in ``TABLES``. A reader of another form is a file in this folder with a function
+``read(path, vehicle)`` that returns a FlightLog, and a line in ``READERS``.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
+from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError, unknown_name
 from ..flight_log import FlightLog
-from . import (
-    ardupilot_bin,
-    betaflight_bbl,
-    betaflight_csv,
-    crazyflie_csv,
-    crazyflie_sd,
-    crazypad,
-    crazyswarm2,
-    nanobench,
-    px4_ulog,
-    racer,
-    rosbag,
-)
+from ..log_map import load_map
+from ..mapped_log import read_mapped
+from . import ardupilot_bin, betaflight_bbl, betaflight_csv, crazyflie_sd, px4_ulog, rosbag
 
 
 @dataclass(frozen=True)
@@ -40,25 +33,35 @@ class Reader:
     takes_option: bool = False  # ``read`` takes ``option``: the words behind the name's colon
 
 
+# maps of tables that are known by their columns
+TABLES = {
+    "nanobench": "nanobench",
+    "crazyswarm2": "crazyswarm2",
+    "crazyflie_csv": "cflib",
+    "crazypad": "crazypad",
+    "racer": "racer",
+}
+
+
+def _read_table(path: Path, vehicle: Vehicle | None, name: str) -> FlightLog:
+    return read_mapped(path, load_map(TABLES[name]), vehicle, name)
+
+
+def _table(name: str) -> Reader:
+    found = load_map(TABLES[name])
+    return Reader(name, found.about, partial(_read_table, name=name), found.recognise)
+
+
 READERS = {
     reader.name: reader
     for reader in (
-        Reader("nanobench", "a NanoBench table", nanobench.read, nanobench.SIGNATURE),
-        Reader("crazyswarm2", "a crazyswarm2 table", crazyswarm2.read, crazyswarm2.SIGNATURE),
+        *map(_table, TABLES),
         Reader(
             "crazyflie_sd",
             "a Crazyflie's SD-card log",
             crazyflie_sd.read,
             begins=crazyflie_sd.BEGINS,
         ),
-        Reader(
-            "crazyflie_csv",
-            "a table of a Crazyflie's log variables",
-            crazyflie_csv.read,
-            crazyflie_csv.SIGNATURE,
-        ),
-        Reader("crazypad", "a CrazyPAD table", crazypad.read, crazypad.SIGNATURE),
-        Reader("racer", "a table of the racer", racer.read, racer.SIGNATURE),
         Reader(
             "betaflight",
             "a blackbox of Betaflight or INAV",

@@ -31,10 +31,10 @@ from ....runtime.errors import InputError
 from ..flight_log import FlightLog
 from ..flight_phases import flying
 from ..rotor_orders import ORDERS, Order, order_words
+from ..streams import Stream, flight_log, from_ned, slerp
 from .balanced_thrust import balanced_speeds
 from .dataflash import BEGINS as BEGINS
 from .dataflash import DataFlash, Messages, read_dataflash
-from .streams import Stream, flight_log, from_ned, slerp
 
 Array = NDArray[np.float64]
 

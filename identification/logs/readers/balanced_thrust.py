@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
-from .streams import Stream
+from ..streams import Stream
 
 Array = NDArray[np.float64]
 

@@ -1,7 +1,7 @@
 """Blackboxes of Betaflight and INAV (``.bbl``, ``.bfl``, ``.txt``) as they are.
 
 A file may hold several logs, one for each time that the vehicle was armed: the longest is read, and
-a note says so. ``blackbox_frames`` decodes it, ``betaflight_units`` says what its fields become.
+a note says so. ``blackbox_frames`` decodes it, ``betaflight_csv`` says what its fields become.
 orangebox, the library for these logs, is under the GPL, lacks an encoding that Betaflight's logs
 have (10) and decodes in Python; it serves the tests as a second opinion.
 """
@@ -18,7 +18,7 @@ from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS
 from ....runtime.regular_files import read_bytes
 from ..flight_log import FlightLog
-from .betaflight_units import FIELDS, betaflight_log, magnet_poles
+from .betaflight_csv import FIELDS, betaflight_log, magnet_poles
 from .blackbox_frames import ENCODINGS, PREDICTORS, Layout, decode
 
 _START = b"H Product:Blackbox"

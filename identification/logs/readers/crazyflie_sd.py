@@ -7,7 +7,7 @@ brackets as in Python's ``struct`` (``acc.x(f)``), all texts ended by a zero byt
 number, time (version 1: 32 bits of milliseconds, version 2: 64 bits of microseconds), variables.
 The last four bytes are a CRC-32 of all before them.
 
-``crazyflie_variables`` says what the variables become.
+The map ``cflib`` says what the variables become.
 """
 
 import struct
@@ -24,8 +24,10 @@ from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS
 from ....runtime.regular_files import read_bytes
+from ..channels import Samples
 from ..flight_log import FlightLog
-from .crazyflie_variables import Event, crazyflie_log
+from ..log_map import load_map
+from ..mapped_log import map_recording
 
 BEGINS = (b"\xbc\x01\x00", b"\xbc\x02\x00")
 
@@ -61,7 +63,7 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
             f"the file is damaged or was cut {end} bytes from its start ({len(data) - end} bytes "
             "are left); what stands before was used"
         )
-    events: list[Event] = []
+    events: list[Samples] = []
     for number, kind in kinds.items():
         rows = found.get(number)
         if rows is None or len(rows) < 2:
@@ -69,12 +71,12 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         t = _TIMES[version][1] * rows["time"].astype(np.float64)
         with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
             columns = {name: rows[name].astype(np.float64) for name in kind.variables}
-        events.append((kind.name, t, columns))
+        events.append(Samples(t, columns, np.arange(len(t))))
     if not events:
         raise InputError(f"{path}: no event twice; expected at least two samples")
-    first = min(float(t[0]) for _, t, _ in events)
+    first = min(float(samples.t[0]) for samples in events)
     notes.append(f"times: the vehicle's clock, which stood at {first:.6g} s at the first event")
-    return crazyflie_log(path, "crazyflie_sd", events, vehicle, tuple(notes))
+    return map_recording(path, events, load_map("cflib"), vehicle, "crazyflie_sd", tuple(notes))
 
 
 def _whole(data: bytes, end: int) -> bool:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....runtime.errors import InputError
+from ..streams import Stream
 from .px4_ulog import _inertial, _motor_order, _open, _output_slots, _times
-from .streams import Stream
 
 Array = NDArray[np.float64]
 

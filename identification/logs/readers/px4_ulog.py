@@ -45,8 +45,8 @@ from ....runtime.file_limits import LIMITS
 from ....runtime.regular_files import check_regular, open_regular
 from ..flight_log import FlightLog
 from ..flight_phases import flying as by_thrust
+from ..streams import Stream, flight_log, from_ned, slerp
 from .balanced_thrust import balanced_speeds
-from .streams import Stream, flight_log, from_ned, slerp
 from .ulog_counting import counting
 
 Array = NDArray[np.float64]

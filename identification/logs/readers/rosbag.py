@@ -55,6 +55,7 @@ from ....runtime.errors import InputError, unknown_name
 from ....runtime.file_limits import LIMITS
 from ....runtime.regular_files import check_regular, open_regular
 from ..flight_log import FlightLog
+from ..streams import Stream, flight_log
 from .ros_messages import (
     ARRAYS,
     COMMAND_UNITS,
@@ -64,7 +65,6 @@ from .ros_messages import (
     definitions,
     stamp,
 )
-from .streams import Stream, flight_log
 from .topic_map import Topic, topic_map
 from .unpacking import check_bag_files, limited_unpacking, refuse_packed_files
 

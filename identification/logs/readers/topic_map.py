@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ....runtime.errors import InputError, unknown_name
 from ....runtime.yaml_file import read_yaml
 from ..rotor_orders import ORDERS
+from ..streams import from_ned
 from .ros_messages import COMMAND_UNITS, SPEED_UNITS, Kind
-from .streams import from_ned
 
 Array = NDArray[np.float64]
 

@@ -117,7 +117,7 @@ def test_the_scale_of_commands_counts_the_dips_between_high_thrusts() -> None:
         np.full((len(t), 4), np.nan),
         command=command,
     )
-    read = with_commanded_speeds(log, vehicle, 1.0)
+    read = with_commanded_speeds(log, vehicle)
     full = vehicle.k[0] * np.square(read.rotor_speeds[:, 0] / command[:, 0])
     np.testing.assert_allclose(full, 3.0, rtol=0.01)  # N of a motor at full command
 

@@ -13,7 +13,6 @@ from scipy.spatial.transform import Rotation
 from tests.support.data_paths import NANOBENCH, data_file
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.logs.flight_log import POSE, REQUIRED, ROTORS, FlightLog, write_log
-from windwrench.identification.logs.readers.nanobench import motor_thrust
 from windwrench.identification.logs.reading import read_log
 
 SUFFIXES = (".csv", ".csv.gz", ".parquet")
@@ -419,23 +418,17 @@ def test_nanobench_conventions(path):
     assert any("thrust model" in note for note in log.notes)
 
 
-def test_nanobench_thrust_goes_with_duty_times_voltage():
-    one = motor_thrust(np.full((1, 4), 50000.0), np.array([3.5]))
-    other = motor_thrust(np.full((1, 4), 43750.0), np.array([4.0]))
-    np.testing.assert_allclose(one, other)
-
-
 def test_nanobench_bad_numbers_are_named(path):
     with pytest.raises(
-        InputError, match=r"column pwr_pm_vbat, row 1 .line 2.: 0 V; expected a positive voltage"
+        InputError, match=r"column pwr_pm_vbat, row 1 .line 2.: -1 is negative; expected a voltage"
     ):
-        read_log(write_text(path, nanobench_rows(pwr_pm_vbat="0")), reader="nanobench")
+        read_log(write_text(path, nanobench_rows(pwr_pm_vbat="-1")), reader="nanobench")
     with pytest.raises(InputError, match=r"column motor_motor_m2, row 1 .line 2. is empty or NaN"):
         read_log(write_text(path, nanobench_rows(motor_motor_m2="")), reader="nanobench")
-    with pytest.raises(InputError, match="expected those of a nanobench log"):
+    with pytest.raises(InputError, match="expected those of a NanoBench table"):
         read_log(write_text(path, hover_rows()), reader="nanobench")
     log = read_log(write_text(path, nanobench_rows(motor_motor_m2="70000")), reader="nanobench")
-    assert any("3 PWM value(s) outside 0 to 65535" in note for note in log.notes)
+    assert any("3 motor command(s) beyond that range" in note for note in log.notes)
 
 
 def banded(log, signal, band, kind):

@@ -15,7 +15,6 @@ from tests.support.data_paths import data_file
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.logs.readers import crazyflie_sd
-from windwrench.identification.logs.readers.nanobench import motor_thrust
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.report.log_check import check_log
 from windwrench.runtime.file_limits import LIMITS
@@ -104,8 +103,8 @@ def test_set_points_become_rotor_speeds_by_a_curve(write):
     path, vehicle = write(sd_card({"imu": (T, fast(T))})), load_vehicle("crazyflie")
     assert not read_log(path).has_rotor_speeds
     log = read_log(path, None, replace(vehicle, motor_curve=None))
-    reference = np.array([vehicle.voltage_ref or 4.2])
-    thrust = motor_thrust(OURS[None].astype(float), reference)[0]
+    counts = OURS * vehicle.voltage_ref / 4.2
+    thrust = (2.130295e-11 * counts + 1.032633e-6) * counts + 5.484560e-4
     np.testing.assert_allclose(vehicle.k * log.rotor_speeds[5] ** 2, thrust, rtol=1e-9)
     assert log.commanded
     curve = MotorCurve(thrust=(0.0, 0.0, 0.2), voltage_exponent=0.0, command=(0.0, 65535.0))
@@ -150,7 +149,7 @@ def test_a_log_that_was_cut_or_spoiled(write):
         (sd_card({"imu": (T[:1], fast(T[:1]))}), "no event twice"),
         (
             sd_card({"pose": (SLOW, slow(SLOW))}),
-            "no motors; expected motor.m1 to m4, .* found stateEstimate.x",
+            "no motors; expected rpm.m1 .*motor.m1 .* found stateEstimate.x",
         ),
     ],
 )

@@ -49,7 +49,10 @@ def test_a_motor_curve_turns_requests_into_speeds(write):
 
 
 def test_what_is_no_request_is_refused(write):
-    with pytest.raises(InputError, match=r"motor_m2_0to65535, row 1 .*70000; expected 0 to 65535"):
+    with pytest.raises(
+        InputError,
+        match=r"motor_m2_0to65535, row 1 .*70000; expected a motor command from 0 to 65535",
+    ):
         read_log(write(motor_m2_0to65535=np.full(50, 7e4)), "crazypad")
     with pytest.raises(InputError, match=r"missing column.s. motor_m3_0to65535; expected those of"):
         read_log(write(motor_m3_0to65535=None), "crazypad")

@@ -114,7 +114,7 @@ def test_held_positions_are_no_measurements(write, vehicle):
     assert np.isnan(log.position[1]).all()
     assert any("26 of 40 rows repeat" in note for note in log.notes)
     # the attitude of the rows between is not lost
-    assert np.isfinite(log.extra["onboard_quaternion"]).all()
+    assert np.isfinite(log.extra["onboard_angles"]).all()
     np.testing.assert_array_equal(log.extra["payload_position"], np.tile([0, 0, 0.5], (40, 1)))
     np.testing.assert_array_equal(log.extra["payload_velocity"][:, 0], 0.1)
     assert log.extra["commanded_thrust"].shape == (40,)
@@ -173,9 +173,9 @@ def test_measured_flights_read(number, vehicle):
     assert 70 < rate < 100 if number in LOADED else log.valid.all()
     # torque commanded turns the vehicle, 50 ms later, and thrust pushes it where its z axis points:
     # signs and axes
-    attitude = Rotation.from_quat(log.extra["onboard_quaternion"][:, [1, 2, 3, 0]])
+    attitude = Rotation.from_euler("ZYX", log.extra["onboard_angles"][:, ::-1])
     b, a = butter(2, np.array([0.5, 10.0]) * 2 * log.period, "band")
-    turning = np.gradient(filtfilt(b, a, log.extra["angular_velocity"], axis=0), log.period, axis=0)
+    turning = np.gradient(filtfilt(b, a, log.gyro, axis=0), log.period, axis=0)
     torque = filtfilt(b, a, vehicle.rotor_wrench(log.rotor_speeds)[:, 1:], axis=0)
     b, a = butter(2, 3.0 * 2 * log.period)
     push = (

@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
-from ....dynamics.vehicle import Vehicle
-from ....runtime.errors import InputError
-from ..commanded_speeds import with_commanded_speeds
-from ..flight_log import FlightLog, Mask, time_notes
+from ...dynamics.vehicle import Vehicle
+from ...runtime.errors import InputError
+from .commanded_speeds import with_commanded_speeds
+from .flight_log import FlightLog, Mask, time_notes
+from .log_map import Commands
 
 Array = NDArray[np.float64]
 
@@ -91,8 +92,8 @@ def slerp(t: Array, attitude: Stream) -> Array:
     if len(times) < 2:
         return out
     inside = (t >= times[0]) & (t <= times[-1])
-    turn = Slerp(times, Rotation.from_quat(attitude.values[good][:, [1, 2, 3, 0]]))(t[inside])
-    out[inside] = turn.as_quat()[:, [3, 0, 1, 2]]
+    turn = Slerp(times, Rotation.from_quat(attitude.values[good], scalar_first=True))(t[inside])
+    out[inside] = turn.as_quat(scalar_first=True)
     return out
 
 
@@ -110,6 +111,7 @@ def flight_log(
     commanded: bool = False,
     extra: Mapping[str, Stream] | None = None,
     vehicle_name: str = "",
+    model: Commands | None = None,
 ) -> FlightLog:
     """Return the log of a pose (position and scalar-first quaternion), rotor speeds (rad/s) or
     motor commands (0 to 1), and where they are there a voltage (V), an accelerometer (m/s2) and a
@@ -136,6 +138,7 @@ def flight_log(
         commanded: ``rotors`` were computed from commands.
         extra: what else was read, by name.
         vehicle_name: the vehicle that flew, where the reader knows it.
+        model: what commands are assumed to give where the vehicle states no motor curve.
 
     Raises:
         InputError: too few samples, a rotor speed that is not finite, a quaternion that is none,
@@ -215,7 +218,7 @@ def flight_log(
         command=commands,
         vehicle=vehicle_name,
     )
-    return with_commanded_speeds(log, vehicle)
+    return with_commanded_speeds(log, vehicle, model)
 
 
 def _rows(

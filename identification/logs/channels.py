@@ -1,0 +1,118 @@
+"""Columns that were sampled together, and what they hold in the kit's units, axes and order of
+rotors.
+
+With W from the log's world and B from its body axes to this kit's, positions become W p, attitudes
+W R B' and what a sensor measures B v.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from .flight_log import Mask
+from .log_map import (
+    ACCELERATION_UNITS,
+    ANGLE_UNITS,
+    LENGTH_UNITS,
+    RATE_UNITS,
+    ROTOR_UNITS,
+    VOLTAGE_UNITS,
+    Attitude,
+    Battery,
+    Columns,
+    Commands,
+    LogMap,
+    Rotors,
+    Sensor,
+    constant,
+)
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+_HALF_TURN = np.diag([1.0, -1.0, -1.0])
+# from the log's world, or its body axes, to the kit's
+_WORLD_TURNS: dict[str, Array] = {
+    "enu": np.eye(3),
+    "ned": _HALF_TURN,
+    "y_up": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
+}
+_BODY_TURNS: dict[str, Array] = {"flu": np.eye(3), "frd": _HALF_TURN}
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Columns that were sampled together: rows in the order of time."""
+
+    t: Array  # (N,) s
+    columns: Mapping[str, Array]  # by name (N,); NaN where there is no value
+    rows: Rows  # (N,) of the file's table
+
+    def values(self, part: Columns) -> Array:
+        """Return a section's columns (N, k), with their signs and scale."""
+        return scaled(part, np.column_stack([self._column(name) for name in part.columns]))
+
+    def has(self, part: Columns) -> bool:
+        """Return whether a section's columns are there."""
+        return set(part.named) <= set(self.columns)
+
+    def cut(self, keep: slice | Mask | Rows) -> "Samples":
+        """Return some of the rows."""
+        columns = {name: column[keep] for name, column in self.columns.items()}
+        return Samples(self.t[keep], columns, self.rows[keep])
+
+    def _column(self, name: str) -> Array:
+        """Return a column (N,), or the constant that ``=0`` stands for."""
+        value = constant(name)
+        return self.columns[name] if value is None else np.full(len(self.t), value)
+
+
+def scaled(part: Columns, values: Array) -> Array:
+    """Return what columns (N, k) hold, with the section's signs and scale."""
+    signs = np.array(part.signs, dtype=np.float64) if part.signs else 1.0
+    return np.asarray(values * signs * part.scale)
+
+
+def in_kit_units(log_map: LogMap, section: str, part: Columns, values: Array) -> Array:
+    """Return a section's scaled values (N, k), but no attitude's, in SI units, and in the kit's
+    axes and order of rotors; commands as 0 to 1.
+    """
+    if isinstance(part, Rotors):
+        order = [motor - 1 for motor in part.order]
+        return np.asarray(values[:, order] * (ROTOR_UNITS[part.unit] / part.pole_pairs))
+    if isinstance(part, Commands):
+        assert part.range is not None
+        low, high = part.range
+        return np.asarray((values[:, [m - 1 for m in part.order]] - low) / (high - low))
+    if isinstance(part, Battery):
+        return np.asarray(values * VOLTAGE_UNITS[part.unit] * part.cells)
+    if isinstance(part, Sensor):
+        units = ACCELERATION_UNITS if section == "accelerometer" else RATE_UNITS
+        return np.asarray(values * units[part.unit] @ _BODY_TURNS[part.body or log_map.body].T)
+    unit = LENGTH_UNITS.get(part.unit, 1e-3 if part.unit in ("mN", "mNm") else 1.0)
+    return np.asarray(values * unit @ _WORLD_TURNS[log_map.world].T)
+
+
+def quaternions(part: Attitude, values: Array) -> Array:
+    """Return the quaternions (N, 4), scalar first, that an attitude's columns (N, k) stand for, in
+    their own axes and of the length that they have.
+    """
+    if not part.euler:
+        return values[:, [3, 0, 1, 2]] if part.order == "xyzw" else values
+    order = ["xyz".index(axis) for axis in part.euler]
+    turn = Rotation.from_euler(part.euler.upper(), values[:, order] * ANGLE_UNITS[part.unit])
+    return np.asarray(turn.as_quat(scalar_first=True))
+
+
+def in_kit_axes(log_map: LogMap, part: Attitude, attitude: Array) -> Array:
+    """Return quaternions (N, 4) of length 1 as turns from the kit's body axes to its world."""
+    if part.sense == "world_to_body":
+        attitude = attitude * np.array([1.0, -1.0, -1.0, -1.0])
+    if log_map.world == "enu" and log_map.body == "flu":
+        return attitude
+    matrix = Rotation.from_quat(attitude, scalar_first=True).as_matrix()
+    turn = Rotation.from_matrix(_WORLD_TURNS[log_map.world] @ matrix @ _BODY_TURNS[log_map.body].T)
+    return np.asarray(turn.as_quat(scalar_first=True))

@@ -1,0 +1,161 @@
+"""Which sections of a map a log fills: the columns that are there, and of several ways to fill a
+section the first that holds measurements.
+"""
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+
+from ...dynamics.vehicle import Vehicle
+from ...runtime.errors import InputError
+from .channels import Samples
+from .log_map import Attitude, Columns, LogMap, TimeColumn
+from .table import Table
+
+_SHOWN = 30  # columns that an error lists
+NO_QUATERNION = 0.5  # length; shorter stands for one that is not there
+
+
+def fitted(table: Table, log_map: LogMap, vehicle: Vehicle | None, reader: str) -> LogMap:
+    """Return a map with the ways to fill a section for which a table has the columns, without the
+    optional sections that the table lacks, and with the range of its commands.
+
+    Raises:
+        InputError: it does not fit the table.
+    """
+    header = set(table.header)
+    where = f"{table.path}: map {log_map.name}"
+    moves = log_map.position is not None or log_map.gyro is not None
+    clocks: list[TimeColumn] = [c for c in ways(log_map, "time") if c.column in {*header, ""}]
+    missing = [] if clocks else [(log_map.time.column, "time")]
+    kept: dict[str, Any] = {"time": clocks[0] if clocks else log_map.time}
+    others: dict[str, tuple[Columns, ...]] = {}
+    for section, part in log_map.sections.items():
+        fitting = [way for way in ways(log_map, section) if set(way.named) <= header]
+        wanted = part.named
+        if log_map.is_own and log_map.force and log_map.torque and section in ("force", "torque"):
+            wanted = [*log_map.force.named, *log_map.torque.named]
+        absent = [name for name in wanted if name not in header]
+        none_there = len(absent) == len(wanted)
+        if fitting and not (log_map.is_own and absent):
+            kept[section], others[section] = fitting[0], tuple(fitting[1:])
+        elif part.optional and (none_there or reader):
+            kept[section] = None
+        elif part.optional and log_map.is_own:
+            raise InputError(
+                f"{table.path}: missing column(s) {', '.join(absent)}; expected all of "
+                f"{', '.join(wanted)} or none"
+            )
+        else:
+            missing += [(name, section) for name in absent]
+    if missing and reader:
+        names = ", ".join(name for name, _ in missing)
+        raise InputError(
+            f"{table.path}: missing column(s) {names}; expected those of {log_map.about}"
+        )
+    if missing:
+        raise InputError(f"{where} does not fit: {_missing_words(missing, table.header)}")
+    extra = {name: part for name, part in log_map.extra.items() if set(part.named) <= header}
+    log_map = replace(log_map, **kept, alternatives=others, extra=extra)
+    repeated = {name for name, count in Counter(table.header).items() if count > 1}
+    for section, part in log_map.sections.items():
+        for name in part.columns:
+            if name in repeated:
+                raise InputError(
+                    f"{where}: {section}: column {name!r} stands in the table more than once; "
+                    "expected it once"
+                )
+    if not (log_map.rotors or log_map.commands or log_map.wrench):
+        raise InputError(f"{where} does not fit: no columns of rotors or of commands")
+    has_imu = log_map.accelerometer is not None and log_map.gyro is not None
+    if moves and not (log_map.position and log_map.attitude) and not has_imu:
+        raise InputError(f"{where} does not fit: no columns of a pose or of an IMU")
+    return with_range(log_map, vehicle, where)
+
+
+def with_range(log_map: LogMap, vehicle: Vehicle | None, where: str) -> LogMap:
+    """Return a map that states the range of its commands: its own, or that of the vehicle.
+
+    Raises:
+        InputError: neither states one.
+    """
+    commands = log_map.commands
+    if commands is None or commands.range is not None:
+        return log_map
+    curve = vehicle.motor_curve if vehicle is not None else None
+    if curve is None:
+        raise InputError(
+            f"{where}: commands: unit counts without a range; expected what stands for no and "
+            "for full command, such as range: [0, 65535], or a vehicle whose motor_curve "
+            "states it"
+        )
+    return replace(log_map, commands=replace(commands, range=curve.command))
+
+
+def _missing_words(missing: list[tuple[str, str]], header: tuple[str, ...]) -> str:
+    lower = {name.lower(): name for name in header}
+    parts = []
+    for name, section in missing[:8]:
+        near = get_close_matches(name.lower(), lower, n=2, cutoff=0.6)
+        hint = f" (like {' or '.join(lower[x] for x in near)})" if near else ""
+        parts.append(f"{name!r} of {section}{hint}")
+    more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
+    found = ", ".join(header[:_SHOWN]) + (", ..." if len(header) > _SHOWN else "")
+    return f"no column {', '.join(parts)}{more}; found {found}"
+
+
+def wanted_columns(log_map: LogMap) -> list[str]:
+    """Return the columns that a map asks for, each once."""
+    parts = [way for section in log_map.sections for way in ways(log_map, section)]
+    names = [name for part in (*parts, *log_map.extra.values()) for name in part.named]
+    return [name for name in dict.fromkeys([*names, log_map.time.column]) if name]
+
+
+def ways(log_map: LogMap, section: str) -> tuple[Any, ...]:
+    """Return the ways to fill a section, in their order."""
+    first = getattr(log_map, section)
+    return () if first is None else (first, *log_map.alternatives.get(section, ()))
+
+
+def samples_of(recorded: Iterable[Samples], part: Columns) -> Samples:
+    """Return the samples in which a section's columns stand."""
+    return next(samples for samples in recorded if samples.has(part))
+
+
+def chosen(recorded: Sequence[Samples], log_map: LogMap) -> LogMap:
+    """Return a map with one way to fill each section: the first whose columns are there, and hold
+    numbers; without the optional sections of which there are none.
+    """
+    found: dict[str, Any] = {"alternatives": {}}
+    for section in log_map.sections:
+        there = [w for w in ways(log_map, section) if any(s.has(w) for s in recorded)]
+        if len(there) == 1 and (log_map.rows == "whole" or not there[0].optional):
+            found[section] = there[0]
+            continue
+        streams = log_map.rows == "streams"
+        full = [w for w in there if _is_measured(section, w, samples_of(recorded, w), streams)]
+        found[section] = full[0] if full else None
+    if found.get("position", log_map.position) is None or (
+        found.get("attitude", log_map.attitude) is None and log_map.rows == "streams"
+    ):
+        found |= {"position": None, "attitude": None}
+    return replace(log_map, **found)
+
+
+def _is_measured(section: str, way: Columns, samples: Samples, streams: bool) -> bool:
+    """Return whether a section's columns hold measurements: in ``streams`` rotors that turn, and a
+    position that changes.
+    """
+    values = samples.values(way)
+    values = values[np.isfinite(values).all(axis=1)]
+    if section == "rotors" and streams:
+        return bool(np.any(values != 0.0))
+    if isinstance(way, Attitude) and not way.euler:
+        return bool(np.any(np.linalg.norm(values, axis=1) > NO_QUATERNION))
+    if section == "position" and streams and len(values):
+        return bool(np.any(np.ptp(values, axis=0) > 0.0))
+    return len(values) > 0
