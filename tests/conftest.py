@@ -6,8 +6,8 @@ import subprocess
 import sys
 
 COMPILED = (
-    "from tests.support.compiled_estimates import compile_estimates; compile_estimates()",
-    "from tests.support.compiled_environments import compile_environments; compile_environments()",
+    "from tests.support.compiling import compile_estimates; compile_estimates()",
+    "from tests.support.compiling import compile_environments; compile_environments()",
 )
 
 

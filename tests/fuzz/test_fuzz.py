@@ -23,7 +23,7 @@ from pyarrow import table as arrow_table
 
 from tests.fuzz.forms import Form, forms, lay_out
 from tests.fuzz.spoiling import LAUGHS, TOKENS
-from tests.support.compiled_estimates import compile_estimates
+from tests.support.compiling import compile_estimates
 from tests.support.paths import ROOT
 from windwrench.cli import main
 from windwrench.controllers.trained_policy import load_policy

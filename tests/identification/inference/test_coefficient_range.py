@@ -44,67 +44,47 @@ def search(columns, pulls, precision=1e8):
     )
 
 
-@pytest.mark.parametrize(
-    ("pull", "doubtful"), [(-6.0, True), (-2.0, False), (0.0, False), (6.0, False)]
-)
-def test_a_coefficient_that_would_leave_its_range_is_a_doubt(pull, doubtful):
-    columns = [("body_drag", "dx"), ("body_drag", "cx")]
-    fit = FittedEffects({"body_drag": {"dx": 1e-4, "dy": 1e-4, "dz": 1e-4, "cx": 0.0}})
-    found = implausible_coefficients(search(columns, [1.0, pull]), fit)
-    assert bool(found) == doubtful
-    assert not doubtful or "cx" in found[0]
+DRAG = {"dx": 1e-4, "dy": 1e-4, "dz": 1e-4, "cx": 0.0}
+LARGE_DRAG = {"dx": 0.1, "dy": 0.1, "dz": 0.1, "cx": 0.0}
+FLAT = {"dx": 0.0, "dy": 0.05, "dz": 0.1, "cx": 0.0}
+WEAK_WIND = {"wx": 6.0, "cd": 1e-3}
 
 
 @pytest.mark.parametrize(
-    ("dx", "dz", "doubtful"), [(0.0, 1e-3, True), (1e-3, 1e-3, False), (1e-3, 0.0, False)]
-)
-def test_air_that_damps_yaw_alone_is_a_doubt(dx, dz, doubtful):
-    fit = FittedEffects({"rate_damping": {"dx": dx, "dy": dx, "dz": dz}})
-    assert bool(implausible_coefficients(search([("rate_damping", "dz")], [1.0]), fit)) == doubtful
-
-
-def test_what_is_small_beside_the_effect_itself_is_no_doubt():
-    columns = [("body_drag", "dx"), ("body_drag", "cx")]
-    fit = FittedEffects({"body_drag": {"dx": 0.1, "dy": 0.1, "dz": 0.1, "cx": 0.0}})
-    assert not implausible_coefficients(search(columns, [1.0, -6.0]), fit)
-
-
-@pytest.mark.parametrize(
-    ("dx", "cx", "std", "doubtful"),
+    ("setting", "pulls", "std", "word"),
     [
-        (0.0, 0.0, 0.003, True),
-        (0.0, 0.0, 0.01, False),
-        (0.02, 0.0, 0.001, False),
-        (0.0, 0.02, 0.001, False),
+        # a coefficient that would leave its range
+        ({"body_drag": DRAG}, {"dx": 1.0, "cx": -6.0}, {}, "cx"),
+        ({"body_drag": DRAG}, {"dx": 1.0, "cx": -2.0}, {}, None),
+        ({"body_drag": DRAG}, {"dx": 1.0, "cx": 0.0}, {}, None),
+        ({"body_drag": DRAG}, {"dx": 1.0, "cx": 6.0}, {}, None),
+        # which is small beside the effect itself
+        ({"body_drag": LARGE_DRAG}, {"dx": 1.0, "cx": -6.0}, {}, None),
+        # air that damps yaw alone
+        ({"rate_damping": {"dx": 0.0, "dy": 0.0, "dz": 1e-3}}, {"dz": 1.0}, {}, "rate_damping"),
+        ({"rate_damping": {"dx": 1e-3, "dy": 1e-3, "dz": 1e-3}}, {"dz": 1.0}, {}, None),
+        ({"rate_damping": {"dx": 1e-3, "dy": 1e-3, "dz": 0.0}}, {"dz": 1.0}, {}, None),
+        # a body that air drags along some axes alone
+        ({"body_drag": FLAT}, {"dx": 0.0}, {"dx": 0.003}, "body_drag"),
+        ({"body_drag": FLAT}, {"dx": 0.0}, {"dx": 0.01}, None),
+        ({"body_drag": FLAT | {"dx": 0.02}}, {"dx": 0.0}, {"dx": 0.001}, None),
+        ({"body_drag": FLAT | {"cx": 0.02}}, {"dx": 0.0}, {"dx": 0.001}, None),
+        # a wind that no room has, and any mass
+        ({"wind": {"wx": 30.0, "cd": 1e-5}}, {"wx": 0.0}, {}, "wind"),
+        ({"wind": {"wx": 2.0, "cd": 0.04}}, {"wx": 0.0}, {}, None),
+        ({"mass": {"dm": 1.0}}, {"dm": 0.0}, {}, None),
+        # a wind on hardly any drag is a steady force, unless another drag feels it
+        ({"wind": WEAK_WIND}, {"wx": 0.0}, {}, "hardly any drag"),
+        ({"wind": WEAK_WIND, "rotor_drag": {"kdx": 1e-4}}, {"wx": 0.0}, {}, None),
     ],
 )
-def test_a_body_that_air_drags_along_some_axes_alone_is_a_doubt(dx, cx, std, doubtful):
-    fit = FittedEffects(
-        {"body_drag": {"dx": dx, "dy": 0.05, "dz": 0.1, "cx": cx}}, {("body_drag", "dx"): std}
-    )
-    assert bool(implausible_coefficients(search([("body_drag", "dx")], [0.0]), fit)) == doubtful
-
-
-def test_a_wind_that_no_room_has_is_a_doubt_and_any_mass_is_none():
-    columns = [("wind", "wx"), ("mass", "dm")]
-    assert implausible_coefficients(
-        search(columns, [0.0, 0.0]), FittedEffects({"wind": {"wx": 30.0, "cd": 1e-5}})
-    )
-    assert not implausible_coefficients(
-        search(columns, [0.0, 0.0]), FittedEffects({"wind": {"wx": 2.0, "cd": 0.04}})
-    )
-    assert not implausible_coefficients(
-        search(columns, [0.0, 0.0]), FittedEffects({"mass": {"dm": 1.0}})
-    )
-
-
-def test_a_wind_on_hardly_any_drag_is_a_steady_force_unless_another_drag_feels_it():
-    columns, wind = [("wind", "wx")], {"wx": 6.0, "cd": 1e-3}
-    (doubt,) = implausible_coefficients(search(columns, [0.0]), FittedEffects({"wind": wind}))
-    assert "hardly any drag" in doubt
-    assert not implausible_coefficients(
-        search(columns, [0.0]), FittedEffects({"wind": wind, "rotor_drag": {"kdx": 1e-4}})
-    )
+def test_coefficients_beyond_what_is_plausible_are_doubts(setting, pulls, std, word):
+    effect = next(iter(setting))
+    columns = [(effect, name) for name in pulls]
+    fit = FittedEffects(setting, {(effect, name): value for name, value in std.items()})
+    doubts = implausible_coefficients(search(columns, list(pulls.values())), fit)
+    assert bool(doubts) == (word is not None)
+    assert word is None or any(word in doubt for doubt in doubts)
 
 
 def test_a_dry_friction_is_no_sure_drag():

@@ -1,0 +1,75 @@
+"""Steps of each kind of filter and environment, and estimates on logs of every mix of sensors: they
+compile what most tests need. Compiled code is kept, so that a second call takes no time.
+"""
+
+from dataclasses import replace
+
+import gymnasium as gym
+import numpy as np
+
+import windwrench  # noqa: F401  registers the environments
+from windwrench.dynamics import load_vehicle
+from windwrench.envs.recording import record_flight
+from windwrench.estimator import WrenchEKF, ukf_lanes
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.prediction import nis_without_wrench_state, rollout_error
+from windwrench.identification.wrench_series import estimate_log
+
+
+def compile_environments():
+    """Step filters in lanes, the linearised filter, single environments and vectors of them.
+
+    What shares no code with ``compile_estimates``, which another process compiles meanwhile, comes
+    first: the rest then finds on disk what that one has compiled.
+    """
+    ukf_lanes.step_address()
+    pose = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+    estimator = WrenchEKF(load_vehicle("ardrone2"))
+    estimator.reset(*pose)
+    estimator.step(np.full(4, 300.0), *pose)
+    for name in ("FanTracking", "FanTracking2D", "WindHover"):
+        step_one(name)
+    for estimator in ("constant-gain", "ukf"):
+        step_one("FanTracking", estimator=estimator)
+        step_many(estimator=estimator)
+    step_many(plant="lanes")
+
+
+def step_one(name, **given):
+    env = gym.make(f"windwrench/{name}-v0", **given)
+    env.reset(seed=0)
+    env.step(np.zeros(env.action_space.shape, dtype=np.float32))
+    env.close()
+
+
+def step_many(**given):
+    envs = gym.make_vec(
+        "windwrench/FanTracking-v0",
+        num_envs=9,
+        vectorization_mode="vector_entry_point",
+        **given,
+    )
+    envs.reset(seed=0)
+    envs.step(np.zeros(envs.action_space.shape, dtype=np.float32))
+    envs.close()
+
+
+def compile_estimates():
+    """Estimate with a pose, with an IMU beside it, smoothed with it and without, and with a pose
+    five times a second; fly a model along.
+    """
+    vehicle = load_vehicle("ardrone2")
+    log = FlightLog(**record_flight(vehicle, (), "hover", 12.0, seed=0, imu=True))
+    alone = replace(log, accelerometer=None, gyro=None)
+    estimate_log(alone, vehicle)
+    estimate_log(log, vehicle)
+    estimate_log(log, vehicle, smooth=True)
+    estimate_log(alone, vehicle, smooth=True)
+    flown = ((2.0, 10.0),)
+    nis_without_wrench_state(alone, vehicle, flown)
+    rollout_error(alone, vehicle, flown)
+    rows = np.arange(len(log.t))
+    for seen in (rows % 40 == 0, rows < 0):
+        position = np.where(seen[:, None], log.position, np.nan)
+        quaternion = np.where(seen[:, None], log.quaternion, np.nan)
+        estimate_log(replace(log, position=position, quaternion=quaternion, valid=seen), vehicle)
