@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
@@ -22,8 +21,9 @@ from ..dynamics.vehicle_file import load_vehicle
 from ..envs.plant import PlantSettings
 from ..envs.suspended_load import SuspendedLoad
 from ..runtime.errors import InputError
+from .drawing import COLOURS, styled
 from .hanging_mass import CALM, CENTRE_LOAD, FORCE, ROTOR_LOAD, TORQUE, hover
-from .result import Comparison, Progress, Result, remarks
+from .result import Progress, Result, compared, table
 
 TITLE = "Fig. 3: calibration with a known mass"
 SEEDS = 2
@@ -52,7 +52,7 @@ SOURCES = {
     "without 8-bit rotor speeds": (True, False, True),
     "without actuator noise": (True, True, False),
 }
-_COLOURS = ("#6f6f6f", "#30638e", "#d1495b")
+_LOAD_COLOURS = ("#6f6f6f", COLOURS[1], COLOURS[0])
 
 
 @dataclass(frozen=True)
@@ -84,21 +84,34 @@ def run(seeds: int, progress: Progress, seconds: float = _COUNTED) -> Result:
     main = estimates["everything"]
     clusters = fit_clusters(main)
     spread = {name: _spread(flown) for name, flown in estimates.items()}
-    labels = np.broadcast_to(np.array(list(LOADS))[:, None, None], main.shape[:3])
-    data: dict[str, NDArray[np.generic]] = {
-        "load": labels.ravel(),
-        "seed": np.broadcast_to(np.arange(seeds)[None, :, None], main.shape[:3]).ravel(),
-        "force_z_N": main[..., 0].ravel(),
-        "torque_pitch_Nm": main[..., 1].ravel(),
-    }
-    figures = _figures(clusters, spread, offset)
-    return Result(
-        figures,
-        data,
-        _draw(main, clusters, spread),
-        _compare(clusters),
-        _remarks(clusters, spread, offset),
+    data = table(
+        [
+            {
+                "load": load,
+                "seed": seed,
+                "force_z_N": main[i, seed, :, 0],
+                "torque_pitch_Nm": main[i, seed, :, 1],
+            }
+            for i, load in enumerate(LOADS)
+            for seed in range(seeds)
+        ]
     )
+    figures = _figures(clusters, spread, offset)
+    off = np.array([cluster.mean for cluster in clusters]) - TARGETS
+    alone = {
+        name: 1e3 * spread[f"{name} alone"]
+        for name in ("sensor noise", "8-bit rotor speeds", "actuator noise")
+    }
+    comparison, remarks = compared(
+        "fig3",
+        clusters=figures["clusters"],
+        alone=alone,
+        most=[list(alone)[i] for i in np.argmax(list(alone.values()), axis=0)],
+        calm=1e3 * spread["without actuator noise"],
+        plain=1e3 * np.abs(off).max(axis=0),
+        rest=1e3 * np.abs(off - offset).max(axis=0),
+    )
+    return Result(figures, data, draw(main, clusters, spread), comparison, remarks)
 
 
 def fly_loads(
@@ -194,70 +207,24 @@ def _figures(clusters: Sequence[Cluster], spread: dict[str, Array], added: Array
     return {"clusters": rows, "limits": limits}
 
 
-def _compare(clusters: Sequence[Cluster]) -> list[Comparison]:
-    rows = []
-    for name, target, cluster in zip(LOADS, TARGETS, clusters, strict=True):
-        rows.append(
-            Comparison(
-                f"{name}: force z (N), pitch torque (Nm)",
-                f"{target[0]:.2f}, {target[1]:.3f}",
-                f"{cluster.mean[0]:+.3f}, {cluster.mean[1]:+.4f}",
-            )
-        )
-    worst = np.max([cluster.std for cluster in clusters], axis=0)
-    rows.append(
-        Comparison(
-            "largest standard deviation (N, Nm)",
-            "0.05, 0.02 allowed",
-            f"{worst[0]:.3f}, {worst[1]:.4f}",
-        )
-    )
-    return rows
-
-
-def _remarks(clusters: Sequence[Cluster], spread: dict[str, Array], added: Array) -> list[str]:
-    off = np.array([cluster.mean for cluster in clusters]) - TARGETS
-    plain, rest = np.abs(off).max(axis=0), np.abs(off - added).max(axis=0)
-    alone = {
-        name: 1e3 * spread[f"{name} alone"]
-        for name in ("sensor noise", "8-bit rotor speeds", "actuator noise")
-    }
-    return remarks(
-        "fig3",
-        alone=alone,
-        most=[max(alone, key=lambda name, axis=axis: float(alone[name][axis])) for axis in (0, 1)],  # type: ignore[misc]
-        calm=1e3 * spread["without actuator noise"],
-        plain=1e3 * plain,
-        rest=1e3 * rest,
-    )
-
-
-def _draw(estimates: Array, clusters: Sequence[Cluster], spread: dict[str, Array]) -> Figure:
-    figure = Figure(figsize=(13, 5.6), layout="constrained")
-    plane, force, torque = figure.subplots(1, 3, width_ratios=[2.1, 1, 1])
+@styled
+def draw(estimates: Array, clusters: Sequence[Cluster], spread: dict[str, Array]) -> Figure:
+    """Draw the estimates (3 loads, seeds, n, 2) with the mixture, and the parts of the spread."""
+    figure = Figure(figsize=(13, 5.6))
+    plane, *panels = figure.subplots(1, 3, width_ratios=[2.1, 1, 1])
     _draw_plane(plane, estimates, clusters)
-    names = list(spread)
-    for axis, (axes, label, scale, unit) in enumerate(
-        ((force, "force z", 1e3, "mN"), (torque, "pitch torque", 1e3, "mNm"))
+    colours = ["#222222"] + [COLOURS[1]] * 3 + ["#b8c9d9"] * 3
+    for i, (axes, label, unit) in enumerate(
+        zip(panels, ("force z", "pitch torque"), ("mN", "mNm"), strict=True)
     ):
-        values = [spread[name][axis] * scale for name in names]
-        colours = ["#222222"] + [_COLOURS[1]] * 3 + ["#b8c9d9"] * 3
-        axes.barh(range(len(names)), values, 0.62, color=colours)
-        for y, value in enumerate(values):
-            axes.annotate(
-                f"{value:.{1 + axis}f} {unit}",
-                (value, y),
-                (3, 0),
-                textcoords="offset points",
-                va="center",
-                fontsize=9,
-            )
-        axes.set_yticks(range(len(names)), names if axis == 0 else [""] * len(names))
+        values = [1e3 * std[i] for std in spread.values()]
+        bars = axes.barh(list(spread), values, 0.62, color=colours)
+        axes.bar_label(bars, fmt=f"%.{1 + i}f {unit}", padding=3, fontsize=9)
         axes.invert_yaxis()
         axes.margins(x=0.4)
         axes.set_xlabel(f"std of {label} ({unit})")
-        axes.spines[["top", "right"]].set_visible(False)
-    force.set_title("what the spread is made of", loc="left", fontsize=10)
+    panels[0].set_title("what the spread is made of")
+    panels[1].tick_params(labelleft=False)
     return figure
 
 
@@ -265,83 +232,35 @@ def _draw_plane(axes: Any, estimates: Array, clusters: Sequence[Cluster]) -> Non
     """Draw estimates, the mixture's ellipses and the targets in the plane of force (N) and torque
     (mNm).
     """
+    scale, tops = np.array([1.0, 1e3]), []
     thin = max(1, estimates[0].size // 2 // 1000)
-    for i, (load, colour, cluster) in enumerate(zip(LOADS, _COLOURS, clusters, strict=True)):
-        some, (x, y) = estimates[i].reshape(-1, 2)[::thin], TARGETS[i]
-        axes.scatter(
-            some[:, 0],
-            some[:, 1] * 1e3,
-            s=6,
-            color=colour,
-            alpha=0.35,
-            lw=0,
-            label="estimates" if i == 0 else None,
-        )
-        _ellipses(axes, cluster, colour)
-        axes.plot(
-            x,
-            y * 1e3,
-            "+",
-            color="black",
-            ms=17,
-            mew=1.8,
-            ls="none",
-            zorder=6,
-            label="target" if i == 0 else None,
-        )
-        axes.plot(
-            cluster.mean[0],
-            cluster.mean[1] * 1e3,
-            "o",
-            color="white",
-            mec="black",
-            ms=5,
-            ls="none",
-            zorder=7,
-            label="mixture: mean, 1 and 2 standard deviations" if i == 0 else None,
-        )
-        text = (
-            f"{cluster.mean[0]:+.3f} ± {cluster.std[0]:.3f} N\n"
-            f"{cluster.mean[1] * 1e3:+.1f} ± {cluster.std[1] * 1e3:.1f} mNm"
-        )
-        # above its cloud
-        axes.annotate(
-            load,
-            (x, (y + 4.2 * cluster.std[1]) * 1e3),
-            (0, 26),
-            textcoords="offset points",
-            ha="center",
-            fontsize=10,
-            color=colour,
-            weight="bold",
-        )
-        axes.annotate(text, (x, (y + 4.2 * cluster.std[1]) * 1e3), ha="center", fontsize=9)
+    angle = np.linspace(0.0, 2.0 * np.pi, 100)
+    for i, (load, colour, cluster) in enumerate(zip(LOADS, _LOAD_COLOURS, clusters, strict=True)):
+        some = estimates[i].reshape(-1, 2)[::thin] * scale
+        label = None if i else "estimates"
+        axes.scatter(*some.T, s=6, color=colour, alpha=0.35, lw=0, label=label)
+        circle = np.linalg.cholesky(cluster.covariance) @ [np.cos(angle), np.sin(angle)]
+        for sigmas in (1, 2):
+            ellipse = (cluster.mean + sigmas * circle.T) * scale
+            axes.plot(*ellipse.T, color=colour, lw=1.6, zorder=5)
+        (force, torque), (std_force, std_torque) = cluster.mean * scale, cluster.std * scale
+        text = f"{force:+.3f} ± {std_force:.3f} N\n{torque:+.1f} ± {std_torque:.1f} mNm"
+        above = {"ha": "center", "textcoords": "offset points"}
+        top = TARGETS[i] * scale + [0.0, 4.2 * std_torque]  # above its cloud
+        axes.annotate(text, top, (0, 0), fontsize=9, **above)
+        axes.annotate(load, top, (0, 26), color=colour, weight="bold", **above)
+        tops.append(top[1])
+    axes.plot(*(TARGETS * scale).T, "k+", ms=17, mew=1.8, zorder=6, label="target")
+    means = np.array([cluster.mean for cluster in clusters]) * scale
+    label = "mixture: mean, 1 and 2 standard deviations"
+    axes.plot(*means.T, "o", color="white", mec="black", ms=5, zorder=7, label=label)
     axes.margins(x=0.16)
-    low, top = axes.get_ylim()[0], (TARGETS[2, 1] + 4.2 * clusters[2].std[1]) * 1e3
-    axes.set_ylim(low, top + 0.16 * (top - low))  # room for the topmost name
+    low = axes.get_ylim()[0]
+    axes.set_ylim(low, tops[-1] + 0.16 * (tops[-1] - low))  # room for the topmost name
     axes.axhline(0.0, color="#cccccc", lw=0.8, zorder=0)
-    axes.set_xlabel("estimated force along z (N)")
-    axes.set_ylabel("estimated pitch torque (mNm)")
-    axes.set_title("53 g on a thread: the estimates of three flights", loc="left", fontsize=10)
-    axes.legend(loc="upper right", frameon=False, fontsize=9)
-    axes.spines[["top", "right"]].set_visible(False)
-
-
-def _ellipses(axes: Any, cluster: Cluster, colour: str) -> None:
-    """Draw the lines of one and two standard deviations, torque in mNm."""
-    scale = np.diag([1.0, 1e3])
-    moments, directions = np.linalg.eigh(scale @ cluster.covariance @ scale)
-    angle = np.degrees(np.arctan2(directions[1, 1], directions[0, 1]))
-    for sigmas in (1, 2):
-        axes.add_patch(
-            Ellipse(
-                (cluster.mean[0], cluster.mean[1] * 1e3),
-                2 * sigmas * np.sqrt(moments[1]),
-                2 * sigmas * np.sqrt(moments[0]),
-                angle=angle,
-                fill=False,
-                ec=colour,
-                lw=1.6,
-                zorder=5,
-            )
-        )
+    axes.set(
+        xlabel="estimated force along z (N)",
+        ylabel="estimated pitch torque (mNm)",
+        title="53 g on a thread: the estimates of three flights",
+    )
+    axes.legend(loc="upper right")

@@ -11,17 +11,19 @@ lateral force that the filter makes up.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ..dynamics.vehicle import Vehicle
 from ..dynamics.vehicle_file import load_vehicle
 from ..envs.plant import PlantSettings
-from .fig4_picture import Step, draw
+from .drawing import COLOURS, only_ticks, styled
 from .hanging_mass import CALM, ROTOR_LOAD, THREAD, hover, with_noise
-from .result import Comparison, Progress, Result, remarks
+from .result import Progress, Result, compared, table
 
 TITLE = "Fig. 4: step response to a known mass"
 SEEDS = 6
@@ -35,6 +37,22 @@ NOISES = ((0.001, 0.005), (0.01, 0.05))  # m, rad: motion capture, and a vision 
 SWEEP = (0.25, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0)  # s, tuned rise times
 _SHOWN = (0.5, 1.0, 2.0)  # s, drawn over time and held against the requirement
 _RISE, _RISE_BOUND, _LATERAL_BOUND = 1.0, 0.2, 0.1  # s, s, N
+_SPAN = (5.5, 14.0)  # s, drawn
+
+
+@dataclass(frozen=True)
+class Step:
+    """The response at one tuning and one noise level, over all seeds."""
+
+    noise: tuple[float, float]  # m, rad
+    actuator: bool  # with the unmodelled actuator noise
+    tuned: float  # s, rise time
+    time: Array  # (n,) s
+    # (n, 3) mean of the flights: force along z (N), torque about the pitch axis (Nm), and size of
+    # the lateral force of the mass (N)
+    response: Array
+    pull: Array  # (n, 3) likewise, the thread's true pull
+    merits: dict[str, Any]  # the figures of merit, as JSON
 
 
 def run(seeds: int, progress: Progress, sweep: Sequence[float] = SWEEP) -> Result:
@@ -48,36 +66,45 @@ def run(seeds: int, progress: Progress, sweep: Sequence[float] = SWEEP) -> Resul
             for tuned in sweep:
                 steps.append(fly_step(vehicle, noise, actuator, tuned, seeds))
                 progress(len(steps) / (len(NOISES) * 2 * len(sweep)))
-    rows = [_row(step) for step in steps]
-    shown = [step for step in steps if step.actuator and step.tuned in _SHOWN]
-    held = [row for row in rows if row["actuator_noise"]]
+    rows = [step.merits for step in steps]
     figures = {
         "rise_within_bounds": all(
             abs(row[name] - _RISE) <= _RISE_BOUND
-            for row in held
-            if row["tuned_rise_s"] == _RISE
+            for row in rows
+            if row["actuator_noise"] and row["tuned_rise_s"] == _RISE
             for name in ("force_rise_s", "torque_rise_s")
         ),
         "lateral_within_bounds": all(row["lateral_N"] <= _LATERAL_BOUND for row in rows),
         "sweep": rows,
     }
-    columns = [_columns(step) for step in shown]
-    data = {name: np.concatenate([some[name] for some in columns]) for name in columns[0]}
-    return Result(
-        figures, data, draw(steps, _SHOWN, _LATERAL_BOUND), _compare(rows), _remarks(rows)
+    data = table([_columns(step) for step in steps if step.actuator and step.tuned in _SHOWN])
+    quiet = {
+        row["position_noise_m"]: row
+        for row in rows
+        if not row["actuator_noise"] and row["tuned_rise_s"] == _RISE
+    }
+    comparison, remarks = compared(
+        "fig4",
+        rows=rows,
+        thread=THREAD,
+        transient=_TRANSIENT,
+        rise=_RISE,
+        bound=_LATERAL_BOUND,
+        clean=quiet.get(NOISES[0][0]),
+        noisy=quiet.get(NOISES[1][0]),
     )
+    return Result(figures, data, draw(steps), comparison, remarks)
 
 
-def _columns(step: Step) -> dict[str, NDArray[np.generic]]:
-    same = np.ones(len(step.time))
+def _columns(step: Step) -> dict[str, Any]:
     return {
-        "noise_m": step.noise[0] * same,
-        "noise_rad": step.noise[1] * same,
-        "tuned_rise_s": step.tuned * same,
+        "noise_m": step.noise[0],
+        "noise_rad": step.noise[1],
+        "tuned_rise_s": step.tuned,
         "t_s": step.time,
-        "force_z_N": step.force,
-        "torque_pitch_Nm": step.torque,
-        "force_lateral_N": step.lateral,
+        "force_z_N": step.response[:, 0],
+        "torque_pitch_Nm": step.response[:, 1],
+        "force_lateral_N": step.response[:, 2],
         "true_force_z_N": step.pull[:, 0],
         "true_torque_pitch_Nm": step.pull[:, 1],
         "true_force_lateral_N": step.pull[:, 2],
@@ -97,42 +124,43 @@ def fly_step(
     time = hung[0].time
     force, torque = np.array([f.force for f in hung]), np.array([f.torque for f in hung])
     bare_force, bare_torque = np.array([f.force for f in bare]), np.array([f.torque for f in bare])
+    response, response_torque = force - bare_force, torque - bare_torque
     pull: Array = np.array([f.pull for f in hung]).mean(axis=0)
+    true = np.stack([pull[:, 2], pull[:, 4], _size(pull)], axis=1)
     settled, transient = time >= 3.0, (time >= HANG) & (time < HANG + _TRANSIENT)
-    rise, rise_error = zip(
-        *(
-            _with_error(lambda mean: rise_time(time, mean), response)
-            for response in (
-                force[..., 2] - bare_force[..., 2],
-                torque[..., 1] - bare_torque[..., 1],
-            )
-        ),
-        strict=True,
+    force_rise, force_rise_error = _with_error(lambda x: rise_time(time, x), response[..., 2])
+    torque_rise, torque_rise_error = _with_error(
+        lambda x: rise_time(time, x), response_torque[..., 1]
     )
-    response = force[..., :2] - bare_force[..., :2]
-    peak, peak_error = _with_error(lambda mean: float(_size(mean)[transient].max()), response)
-    made_up = response.mean(axis=0) - as_shown(
-        time, (force - bare_force)[..., 2].mean(axis=0), pull[:, :2]
+    lateral, lateral_error = _with_error(
+        lambda mean: float(_size(mean)[transient].max()), response[..., :2]
     )
-    return Step(
-        noise,
-        actuator,
-        tuned,
-        time,
-        force[..., 2].mean(axis=0),
-        torque[..., 1].mean(axis=0),
-        _size(response.mean(axis=0)),
-        np.stack([pull[:, 2], pull[:, 4], _size(pull)], axis=1),
-        (rise[0], rise[1]),
-        (rise_error[0], rise_error[1]),
-        peak,
-        peak_error,
-        float(_size(force.mean(axis=0))[transient].max()),
-        float(_size(made_up)[transient].max()),
-        (float(bare_force[:, settled, 2].std()), float(bare_torque[:, settled, 1].std())),
-        float(_size(force)[:, transient].max()),
-        float(_size(bare_force)[:, transient].max()),
-    )
+    mean = response.mean(axis=0)
+    made_up = mean[:, :2] - as_shown(time, mean[:, 2], pull[:, :2])
+    merits = {
+        "position_noise_m": noise[0],
+        "attitude_noise_rad": noise[1],
+        "actuator_noise": actuator,
+        "tuned_rise_s": tuned,
+        "force_rise_s": force_rise,
+        "force_rise_error_s": force_rise_error,
+        "torque_rise_s": torque_rise,
+        "torque_rise_error_s": torque_rise_error,
+        # of a hover without the mass
+        "force_std_N": float(bare_force[:, settled, 2].std()),
+        "torque_std_Nm": float(bare_torque[:, settled, 1].std()),
+        "lateral_N": lateral,
+        "lateral_error_N": lateral_error,
+        # of the mean of the flights with the mass, with the rest of their noise
+        "unpaired_lateral_N": float(_size(force.mean(axis=0))[transient].max()),
+        # beyond the thread's true pull as the filter would show it
+        "made_up_lateral_N": float(_size(made_up)[transient].max()),
+        "true_lateral_N": float(true[time >= HANG, 2].max()),
+        "worst_flight_lateral_N": float(_size(force)[:, transient].max()),
+        "worst_flight_lateral_without_mass_N": float(_size(bare_force)[:, transient].max()),
+    }
+    shown = np.stack([force[..., 2].mean(axis=0), torque[..., 1].mean(axis=0), _size(mean)], axis=1)
+    return Step(noise, actuator, tuned, time, shown, true, merits)
 
 
 def _size(vectors: Array) -> Array:
@@ -174,111 +202,119 @@ def _cross(time: Array, share: Array, i: int, level: float) -> float:
     )
 
 
-def _with_error(number: Callable[[Array], float], responses: Array) -> tuple[float, float]:
+def _with_error(number: Callable[[Array], float], responses: Array) -> tuple[float, float | None]:
     """Return a number of the mean of responses (seeds, n, ...), and its standard error by the
-    jackknife.
+    jackknife; None for one seed.
     """
     value, count = number(responses.mean(axis=0)), len(responses)
     if count == 1:
-        return value, float("nan")
+        return value, None
     left_out = [number(np.delete(responses, i, axis=0).mean(axis=0)) for i in range(count)]
     return value, float(np.sqrt((count - 1) * np.var(left_out)))
 
 
-def _row(step: Step) -> dict[str, Any]:
-    errors = [
-        None if np.isnan(error) else error for error in (*step.rise_error, step.peak_error)
-    ]  # JSON has no NaN
-    after = step.time >= HANG
-    return {
-        "position_noise_m": step.noise[0],
-        "attitude_noise_rad": step.noise[1],
-        "actuator_noise": step.actuator,
-        "tuned_rise_s": step.tuned,
-        "force_rise_s": step.rise[0],
-        "force_rise_error_s": errors[0],
-        "torque_rise_s": step.rise[1],
-        "torque_rise_error_s": errors[1],
-        "force_std_N": step.std[0],
-        "torque_std_Nm": step.std[1],
-        "lateral_N": step.peak,
-        "lateral_error_N": errors[2],
-        "unpaired_lateral_N": step.unpaired_peak,
-        "made_up_lateral_N": step.made_up,
-        "true_lateral_N": float(step.pull[after, 2].max()),
-        "worst_flight_lateral_N": step.worst_lateral,
-        "worst_flight_lateral_without_mass_N": step.calm_lateral,
-    }
+@styled
+def draw(steps: Sequence[Step]) -> Figure:
+    """Draw force, torque and lateral force (rows) over time at each noise level, and the sweep's
+    three curves beside.
+    """
+    figure = Figure(figsize=(13.5, 8.2))
+    grid = figure.subplots(3, 3, width_ratios=[1, 1, 1.05])
+    for column, noise in enumerate(NOISES):
+        shown = [step for step in steps if step.noise == noise and step.actuator]
+        shown = [step for step in shown if step.tuned in _SHOWN]
+        for row, axes in enumerate(grid[:, column]):
+            axes.sharey(grid[row, 0])
+            _draw_response(axes, row, shown)
+        grid[0, column].set_title(f"53 g hung on at {HANG:g} s; pose noise {_words(noise)}")
+    for row, name in enumerate(
+        ("force z (N)", "pitch torque (mNm)", "lateral force of the mass (N)")
+    ):
+        grid[row, 0].set_ylabel(name)
+    grid[2, 0].set_ylim(0, 1.55 * grid[2, 0].get_ylim()[1])  # room for the names above the bound
+    _draw_choice(grid[:, 2], steps)
+    return figure
 
 
-def _name(row: dict[str, Any]) -> str:
-    return f"{row['position_noise_m'] * 1e3:.0f} mm, {row['attitude_noise_rad'] * 1e3:.0f} mrad"
+def _words(noise: tuple[float, float]) -> str:
+    return f"{noise[0] * 1e3:g} mm, {noise[1] * 1e3:g} mrad"
 
 
-def _compare(rows: Sequence[dict[str, Any]]) -> list[Comparison]:
-    lines = []
-    held = [row for row in rows if row["actuator_noise"] and row["tuned_rise_s"] in _SHOWN]
-    for row in held:
-        if row["tuned_rise_s"] == _RISE:
-            lines.append(
-                Comparison(
-                    f"rise time of force, torque (s) at {_name(row)}",
-                    "about 1, 1",
-                    f"{row['force_rise_s']:.2f}, {row['torque_rise_s']:.2f}",
-                )
-            )
-            lines.append(
-                Comparison(
-                    f"standard deviation (N, Nm) at {_name(row)}",
-                    "-",
-                    f"{row['force_std_N']:.3f}, {row['torque_std_Nm']:.4f}",
-                )
-            )
-    if rows:
-        worst = max(rows, key=lambda row: float(row["lateral_N"]))
-        tuned = [float(row["tuned_rise_s"]) for row in rows]
-        lines.append(
-            Comparison(
-                f"largest lateral-force transient (N), tuned to {min(tuned):g} to {max(tuned):g} s",
-                "-",
-                f"{worst['lateral_N']:.3f} ({worst['tuned_rise_s']:g} s, {_name(worst)})",
-            )
-        )
-        lines.append(
-            Comparison(
-                "of it beyond the thread's true sideways pull, largest (N)",
-                "-",
-                f"{max(row['made_up_lateral_N'] for row in rows):.3f}",
-            )
-        )
-    return lines
-
-
-def _remarks(rows: Sequence[dict[str, Any]]) -> list[str]:
-    worst, lateral = (
-        max(rows, key=lambda row, name=name: float(row[name]))  # type: ignore[misc]
-        for name in ("worst_flight_lateral_N", "lateral_N")
+def _draw_response(axes: Any, row: int, shown: Sequence[Step]) -> None:
+    """Draw force, torque or lateral force (by ``row``) of one noise level over time."""
+    scale = 1e3 if row == 1 else 1.0
+    # the truth of the middle tuning: the flights differ a little
+    for step in shown[len(shown) // 2 :][:1]:
+        pull = step.pull[:, row] * scale
+        axes.plot(step.time, pull, color="#a0a0a0", lw=1, label="true pull of the thread")
+    for step, colour in zip(shown, (COLOURS[2], *COLOURS[:2]), strict=False):
+        label = f"tuned to {step.tuned:g} s"
+        if row < 2:
+            label += f": {step.merits[('force_rise_s', 'torque_rise_s')[row]]:.2f} s"
+        axes.plot(step.time, step.response[:, row] * scale, color=colour, lw=1.8, label=label)
+    axes.axvline(HANG, color="black", lw=0.6, ls=":")
+    axes.set_xlim(*_SPAN)
+    axes.legend(
+        loc="lower right" if row == 1 else "upper right", title="rise time" if row < 2 else None
     )
-    over = [
-        row
-        for row in rows
-        if row["lateral_N"] + 2 * (row["lateral_error_N"] or 0.0) > _LATERAL_BOUND
-    ]
-    quiet = {
-        (row["tuned_rise_s"], row["position_noise_m"]): row
-        for row in rows
-        if not row["actuator_noise"]
-    }
-    return remarks(
-        "fig4",
-        rows=rows,
-        name=_name,
-        worst=worst,
-        lateral=lateral,
-        over=over,
-        thread=THREAD,
-        transient=_TRANSIENT,
-        bound=_LATERAL_BOUND,
-        clean=quiet.get((_RISE, NOISES[0][0])),
-        noisy=quiet.get((_RISE, NOISES[1][0])),
+    if row < 2:
+        axes.tick_params(labelbottom=False)
+        return
+    axes.axhline(_LATERAL_BOUND, color="black", lw=0.8, ls="--")
+    axes.annotate(
+        "allowed", (_SPAN[0], _LATERAL_BOUND), (3, 3), textcoords="offset points", fontsize=8
     )
+    axes.set_xlabel("time (s)")
+
+
+def _draw_choice(column: Sequence[Any], steps: Sequence[Step]) -> None:
+    """Draw standard deviation of force and torque, and the lateral transient, over
+    the rise time.
+    """
+    panels = (
+        (
+            "force_rise_s",
+            "rise time of the force, measured (s)",
+            "force_std_N",
+            "std of force z (mN)",
+        ),
+        (
+            "torque_rise_s",
+            "rise time of the torque, measured (s)",
+            "torque_std_Nm",
+            "std of pitch torque (mNm)",
+        ),
+        ("tuned_rise_s", "rise time tuned for (s)", "lateral_N", "peak lateral force (N)"),
+    )
+    for axes, (x, x_label, y, y_label) in zip(column, panels, strict=True):
+        scale = 1.0 if y == "lateral_N" else 1e3
+        for colour, noise in zip(COLOURS[3:], NOISES, strict=True):
+            for actuator, style in (
+                (True, {"ls": "-", "lw": 1.6}),
+                (False, {"ls": "--", "lw": 1.2, "mfc": "white"}),
+            ):
+                some = [
+                    step.merits
+                    for step in steps
+                    if step.noise == noise and step.actuator == actuator
+                ]
+                label = _words(noise) + (", actuator noise" if actuator else ", rotors as told")
+                values = [row[y] * scale for row in some]
+                axes.plot(
+                    [row[x] for row in some],
+                    values,
+                    marker="o",
+                    ms=4,
+                    color=colour,
+                    label=label,
+                    **style,
+                )
+        axes.set(xscale="log", xlabel=x_label, ylabel=y_label)
+        only_ticks(axes.xaxis, (0.25, 0.5, 1.0, 2.0, 3.0))
+    for axes, ticks in zip(column, ((2, 5, 10, 20, 50), (0.1, 0.3, 1, 3, 10)), strict=False):
+        axes.set_yscale("log")
+        only_ticks(axes.yaxis, ticks)
+    column[0].set_title("choosing a tuning: noise against rise time")
+    column[0].legend()
+    column[2].axhline(_LATERAL_BOUND, color="black", lw=0.8, ls="--")
+    column[2].set_ylim(0, None)

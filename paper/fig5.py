@@ -30,7 +30,7 @@ from .fig5_estimators import (
 from .fig5_flights import FLIGHTS, NOISES, PLANTS, Array, Flight, fly, vehicle_at
 from .fig5_picture import draw
 from .observer import NonlinearObserver, ObserverTuning
-from .result import Comparison, Progress, Result, remarks
+from .result import Columns, Comparison, Progress, Result, compared, table
 
 TITLE = "Fig. 5: force and torque at two noise levels, against a nonlinear observer and an EKF"
 SEEDS = 20
@@ -46,7 +46,6 @@ PAIRS = (
 )
 _TUNING_SEEDS = (10_001, 10_002)
 _RESAMPLES = 4000
-_PAPER = {PAIRS[0][0]: "above 1 at high noise (shown, no number)"}
 
 # (plant, flight, noise, estimator) -> one row (seeds, 5) of the four errors and the NIS
 Scores = dict[tuple[str, str, str, str], Array]
@@ -96,11 +95,10 @@ def compare(seeds: int, progress: Progress, evaluations: int = 120) -> Result:
         seeds,
     )
     return Result(
-        figures=_figures(scores, ratios, tunings, seeds),
-        data=_columns(scores),
-        picture=picture,
-        comparison=_comparison(scores, ratios),
-        remarks=_remarks(ratios, seeds),
+        _figures(scores, ratios, tunings, seeds),
+        _columns(scores),
+        picture,
+        *_told(scores, ratios, seeds),
     )
 
 
@@ -206,52 +204,22 @@ def _figures(
     }
 
 
-def _columns(scores: Scores) -> dict[str, Any]:
-    keys = [key for key, rows in scores.items() for _ in rows]
-    values = np.concatenate(list(scores.values()))
-    columns: dict[str, Any] = {
-        name: np.array([key[i] for key in keys])
-        for i, name in enumerate(("plant", "flight", "noise", "estimator"))
-    }
-    columns["seed"] = np.concatenate([np.arange(len(rows)) for rows in scores.values()])
-    for i, name in enumerate((*ERRORS, "nis")):
-        unit = {"f": "_N", "t": "_Nm", "n": ""}[name[0]]
-        columns[name + unit] = values[:, i]
-    return columns
-
-
-def _comparison(scores: Scores, ratios: Ratios) -> list[Comparison]:
-    table = []
-    for label, _, _ in PAIRS:
-        for noise in NOISES:
-            for flight in FLIGHTS:
-                paper = _PAPER.get(label, "-") if noise == "high" and flight == "hover" else "-"
-                quantity = f"RMSE ratio {label}: {noise} noise, {flight}, standard plant"
-                some = [ratios["disturbed", flight, noise, label, error] for error in ERRORS]
-                words = [f"{v:.2f} [{a:.2f}, {b:.2f}]" for v, a, b in some]
-                here = (
-                    f"force {words[0]} transient, {words[1]} steady; torque {words[2]} transient, "
-                    f"{words[3]} steady"
-                )
-                table.append(Comparison(quantity, paper, here))
-    for name in ("UKF 1 s", "EKF 1 s", "UKF anew"):
-        values = [
-            f"{plant} plant, {noise} noise "
-            f"{np.mean([scores[plant, f, noise, name][:, 4] for f in FLIGHTS]):.2f}"
-            for plant in PLANTS
-            for noise in NOISES
+def _columns(scores: Scores) -> Columns:
+    units = {"f": "_N", "t": "_Nm", "n": ""}
+    names = [name + units[name[0]] for name in (*ERRORS, "nis")]
+    return table(
+        [
+            {
+                **dict(zip(("plant", "flight", "noise", "estimator"), key, strict=True)),
+                "seed": np.arange(len(rows)),
+                **dict(zip(names, rows.T, strict=True)),
+            }
+            for key, rows in scores.items()
         ]
-        table.append(
-            Comparison(
-                f"mean NIS of {name} in steady state (a pose has 6 numbers)",
-                "-",
-                "; ".join(values),
-            )
-        )
-    return table
+    )
 
 
-def _remarks(ratios: Ratios, seeds: int) -> list[str]:
+def _told(scores: Scores, ratios: Ratios, seeds: int) -> tuple[list[Comparison], list[str]]:
     low, anew, second, ekf, mixed, gain = (label for label, _, _ in PAIRS)
 
     def span(label: str, noise: str, errors: Sequence[str], plant: str | None = None) -> str:
@@ -263,9 +231,22 @@ def _remarks(ratios: Ratios, seeds: int) -> list[str]:
         ]
         return f"{min(values):.2f} to {max(values):.2f}"
 
-    return remarks(
+    def words(label: str, noise: str, flight: str) -> list[str]:
+        some = [ratios["disturbed", flight, noise, label, error] for error in ERRORS]
+        return [f"{v:.2f} [{a:.2f}, {b:.2f}]" for v, a, b in some]
+
+    def nis(name: str, plant: str, noise: str) -> float:
+        return float(np.mean([scores[plant, f, noise, name][:, 4] for f in FLIGHTS]))
+
+    return compared(
         "fig5",
         seeds=seeds,
+        labels=[label for label, _, _ in PAIRS],
+        flights=FLIGHTS,
+        noises=list(NOISES),
+        plants=list(PLANTS),
+        words=words,
+        nis=nis,
         span=span,
         low=low,
         anew=anew,

@@ -20,7 +20,7 @@ from ..envs.plant import NOISE, TICK
 from ..runtime.errors import InputError
 from .calm_jet import calm_jet, strongest_torque
 from .fig6_picture import draw_map
-from .result import Comparison, Progress, Result, remarks
+from .result import Columns, Progress, Result, compared, table
 
 TITLE = "The force and torque map of a fan's jet (Fig. 6)"
 SEEDS = 8
@@ -214,83 +214,49 @@ def run(seeds: int, progress: Progress) -> Result:
             np.concatenate([np.linalg.norm(m.position[:, :2] - m.points, axis=1) for m in maps])
         ),
     }
+    picture = draw_map(
+        GRID_X,
+        GRID_Y,
+        _as_maps(points, estimate),
+        _as_maps(points, truth),
+        PROFILE_Y,
+        profile,
+        profile_truth,
+        calm_line,
+        inside=as_map(points, inside.astype(np.float64)) > 0,
+        correlations=(figures["correlation_force_x"], figures["correlation_torque_z"]),
+    )
+    comparison, remarks = compared(
+        "fig6",
+        f=figures,
+        radius=fan.radius,
+        peaks=peaks,
+        hover=HOVER,
+        points=len(points),
+        transit=TRANSIT,
+        settle=SETTLE,
+        jet_force=JET_FORCE,
+    )
     return Result(
-        figures=figures,
-        data=_columns(maps, profiles, calm_map, calm_line),
-        picture=draw_map(
-            GRID_X,
-            GRID_Y,
-            _as_maps(points, estimate),
-            _as_maps(points, truth),
-            PROFILE_Y,
-            profile,
-            profile_truth,
-            calm_line,
-            inside=as_map(points, inside.astype(np.float64)) > 0,
-            correlations=(figures["correlation_force_x"], figures["correlation_torque_z"]),
-        ),
-        comparison=[
-            Comparison(
-                "tau_z across the jet (world frame)",
-                "antisymmetric about the axis",
-                f"{figures['torque_z_antisymmetry']:.1%} of the map's power is antisymmetric",
-            ),
-            Comparison(
-                "offset of the largest tau_z (m)",
-                "about 0.5",
-                f"{at:.2f} (true mean jet {calm_at:.2f}; follows from the chosen fan)",
-            ),
-            Comparison(
-                "largest tau_z at 2.3 m (Nm)", "-", f"{size:.4f} (true mean jet {calm_size:.4f})"
-            ),
-            Comparison(
-                "force along the axis",
-                "strong, away from the fan",
-                f"{figures['profile_force_x_on_axis_N']:.2f} N on the axis at 2.3 m",
-            ),
-            Comparison(
-                "correlation with the truth, f_x",
-                "- (no truth to compare with)",
-                f"{figures['correlation_force_x']:.4f}",
-            ),
-            Comparison(
-                "correlation with the truth, tau_z",
-                "- (no truth to compare with)",
-                f"{figures['correlation_torque_z']:.4f}",
-            ),
-        ],
-        remarks=remarks(
-            "fig6",
-            f=figures,
-            radius=fan.radius,
-            peaks=peaks,
-            hover=HOVER,
-            points=len(points),
-            transit=TRANSIT,
-            settle=SETTLE,
-            jet_force=JET_FORCE,
-        ),
+        figures, _columns(maps, profiles, calm_map, calm_line), picture, comparison, remarks
     )
 
 
 def _columns(
     maps: list[Hovers], profiles: list[Hovers], calm_map: Array, calm_line: Array
-) -> dict[str, NDArray[np.generic]]:
+) -> Columns:
     """Return one row for each hover."""
-    flights = [("map", seed, m, calm_map) for seed, m in enumerate(maps)]
-    flights += [("profile", seed, p, calm_line) for seed, p in enumerate(profiles)]
-    columns: dict[str, NDArray[np.generic]] = {
-        "flight": np.concatenate([np.full(len(h.points), kind) for kind, _, h, _ in flights]),
-        "seed": np.concatenate([np.full(len(h.points), seed) for _, seed, h, _ in flights]),
-    }
-    for i, name in enumerate(("x", "y")):
-        columns[name] = np.concatenate([h.points[:, i] for _, _, h, _ in flights])
-    for i, name in enumerate(("px", "py", "pz")):
-        columns[name] = np.concatenate([h.position[:, i] for _, _, h, _ in flights])
-    for i, name in enumerate(("fx", "fy", "fz", "tx", "ty", "tz")):
-        columns[f"{name}_estimate"] = np.concatenate([h.estimate[:, i] for _, _, h, _ in flights])
-        columns[f"{name}_spread"] = np.concatenate([h.spread[:, i] for _, _, h, _ in flights])
-        columns[f"{name}_true"] = np.concatenate([h.truth[:, i] for _, _, h, _ in flights])
-        columns[f"{name}_jet"] = np.concatenate([h.jet[:, i] for _, _, h, _ in flights])
-        columns[f"{name}_mean_jet"] = np.concatenate([calm[:, i] for _, _, _, calm in flights])
-    return columns
+    blocks = []
+    for kind, flights, calm in (("map", maps, calm_map), ("profile", profiles, calm_line)):
+        for seed, h in enumerate(flights):
+            block: dict[str, Any] = {"flight": kind, "seed": seed}
+            block |= dict(zip("xy", h.points.T, strict=True))
+            block |= dict(zip(("px", "py", "pz"), h.position.T, strict=True))
+            for i, name in enumerate(("fx", "fy", "fz", "tx", "ty", "tz")):
+                block[f"{name}_estimate"] = h.estimate[:, i]
+                block[f"{name}_spread"] = h.spread[:, i]
+                block[f"{name}_true"] = h.truth[:, i]
+                block[f"{name}_jet"] = h.jet[:, i]
+                block[f"{name}_mean_jet"] = calm[:, i]
+            blocks.append(block)
+    return table(blocks)

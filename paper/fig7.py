@@ -25,7 +25,7 @@ from ..evaluation.episodes import DECISIONS, Episode, fly_episode
 from ..runtime.errors import InputError
 from .calm_jet import strongest_torque
 from .fig7_picture import draw_tracking
-from .result import Comparison, Progress, Result, remarks
+from .result import Columns, Progress, Result, compared, table
 
 TITLE = "Staying in the jet of a moving fan by its torque (Fig. 7)"
 SEEDS = 10
@@ -315,85 +315,13 @@ def run(seeds: int, progress: Progress) -> Result:
             noise: interval(shares) for noise, shares in alone.items()
         },
     }
-    return Result(
-        figures=figures,
-        data=_traces(captures, tracks),
-        picture=draw_tracking(captures, tracks, fastest, largest, at, HELD_OFFSET),
-        comparison=_comparison(capture_rows, track_rows, fastest),
-        remarks=_remarks(seeds, largest, at, fastest, alone),
-    )
-
-
-def _comparison(
-    captures: list[dict[str, float | None]], tracks: list[dict[str, float]], fastest: list[Fastest]
-) -> list[Comparison]:
-    caught = float(np.mean([c["captured"] or 0.0 for c in captures]))
-    rows = [
-        Comparison(
-            "catches the jet of a still fan from 0.8 m off its axis",
-            "yes",
-            f"{caught:.0%} of flights",
-        )
-    ]
-    for c in captures:
-        median = "-" if c["median_time_s"] is None else f"{c['median_time_s']:.1f}"
-        rows.append(
-            Comparison(
-                f"time to come within {CAPTURED:g} m, gain {c['gain']:g}, rise "
-                f"{c['rise_time_s']:g} s (s)",
-                "-",
-                median,
-            )
-        )
-    # the paper's own claim: to stay in the wind field; the middle gain stands for its controller
-    middle = SHOWN_GAINS[len(SHOWN_GAINS) // 2]
-    inside = ", ".join(
-        f"{t['share_within_fan_radius']:.0%} ({t['fan_speed_m_s']:g} m/s)"
-        for t in tracks
-        if t["gain"] == middle
-    )
-    rows.append(
-        Comparison(
-            f"time within the radius of a fan that moves to and fro along y, gain {middle:g}",
-            "stays in its wind",
-            inside,
-        )
-    )
-    rows += [
-        Comparison(
-            f"RMSE behind a fan that moves to and fro at {t['fan_speed_m_s']:g} m/s, "
-            f"gain {t['gain']:g} (m)",
-            "-",
-            f"{t['rmse_m']:.2f}",
-        )
-        for t in tracks
-    ]
-    rows += [
-        Comparison(
-            f"fastest fan held, gain {f.gain:g}, rise {f.rise_time:g} s (m/s)",
-            "-",
-            f"{f.held:.2f}: {_share(f)} of the bound {f.bound:.2f} "
-            f"(calm air {f.calm:.2f}, and with a sudden start {f.sudden:.2f})",
-        )
-        for f in fastest
-    ]
-    return rows
-
-
-def _share(row: Fastest) -> str:
-    """Return the held share of the bound with its interval."""
-    low, high = row.held_interval
-    return f"{row.held / row.bound:.0%} [{low / row.bound:.0%}, {high / row.bound:.0%}]"
-
-
-def _remarks(
-    seeds: int, largest: float, at: float, fastest: list[Fastest], alone: dict[str, list[float]]
-) -> list[str]:
-    return remarks(
+    comparison, remarks = compared(
         "fig7",
         seeds=seeds,
         largest=largest,
         at=at,
+        captures=capture_rows,
+        tracks=track_rows,
         fastest=fastest,
         alone={noise: (float(np.mean(found)), *interval(found)) for noise, found in alone.items()},
         best=[
@@ -407,6 +335,10 @@ def _remarks(
         step=(BRACKET[1] - BRACKET[0]) / 2**HALVINGS,
         distance=DISTANCE,
         command=MAX_COMMAND,
+        caught=float(np.mean([row["captured"] or 0.0 for row in capture_rows])),
+        captured=CAPTURED,
+        # the middle gain stands for the paper's controller
+        middle=SHOWN_GAINS[len(SHOWN_GAINS) // 2],
         offset=HELD_OFFSET,
         share=HELD_SHARE,
         start=START,
@@ -415,42 +347,43 @@ def _remarks(
         rise_times=RISE_TIMES,
         noise_gain=NOISE_GAIN,
     )
+    picture = draw_tracking(captures, tracks, fastest, largest, at, HELD_OFFSET)
+    return Result(figures, _traces(captures, tracks), picture, comparison, remarks)
+
+
+def _share(row: Fastest) -> str:
+    """Return the held share of the bound with its interval."""
+    low, high = row.held_interval
+    return f"{row.held / row.bound:.0%} [{low / row.bound:.0%}, {high / row.bound:.0%}]"
 
 
 def _traces(
     captures: dict[tuple[float, float], list[Episode]],
     tracks: dict[tuple[float, float], list[Episode]],
-) -> dict[str, NDArray[np.generic]]:
+) -> Columns:
     """Return every flown sample of capture and tracking, a row a decision."""
-    flights = [
-        ("capture", 0.0, rise_time, gain, e)
-        for (rise_time, gain), episodes in captures.items()
-        for e in episodes
-    ]
+    flights = [("capture", 0.0, *key, some) for key, some in captures.items()]
     flights += [
-        ("tracking", speed, RISE_TIMES[0], gain, e)
-        for (speed, gain), episodes in tracks.items()
-        for e in episodes
+        ("tracking", speed, RISE_TIMES[0], gain, some) for (speed, gain), some in tracks.items()
     ]
-    columns: dict[str, list[NDArray[np.generic]]] = {}
-    for part, speed, rise_time, gain, e in flights:
-        for name, value in (
-            ("part", part),
-            ("fan_speed", speed),
-            ("rise_time", rise_time),
-            ("gain", gain),
-            ("seed", e.seed),
-        ):
-            columns.setdefault(name, []).append(np.full(len(e.time), value))
-        for name, values in (
-            ("t", e.time),
-            ("fan_y", e.fan_y),
-            ("y", e.y),
-            ("command", e.command),
-            ("fx_estimate", e.observation[:, 0]),
-            ("fx_true", e.force[:, 0]),
-            ("tz_estimate", e.observation[:, 5]),
-            ("tz_true", e.torque[:, 2]),
-        ):
-            columns.setdefault(name, []).append(values)
-    return {name: np.concatenate(parts) for name, parts in columns.items()}
+    return table(
+        [
+            {
+                "part": part,
+                "fan_speed": speed,
+                "rise_time": rise_time,
+                "gain": gain,
+                "seed": e.seed,
+                "t": e.time,
+                "fan_y": e.fan_y,
+                "y": e.y,
+                "command": e.command,
+                "fx_estimate": e.observation[:, 0],
+                "fx_true": e.force[:, 0],
+                "tz_estimate": e.observation[:, 5],
+                "tz_true": e.torque[:, 2],
+            }
+            for part, speed, rise_time, gain, some in flights
+            for e in some
+        ]
+    )

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import __version__
 from ..runtime.errors import InputError, unknown_name
@@ -22,7 +21,7 @@ from ..runtime.provenance import commit, made_by
 from ..runtime.regular_files import read_json
 from ..runtime.workers import shared_dict, workers
 from . import NAMES
-from .result import Result
+from .result import Columns, Result, template
 
 
 def chosen(name: str) -> list[str]:
@@ -124,8 +123,8 @@ def _run_and_write(name: str, seeds: int, folder: Path, shares: Any) -> None:
 
 
 def write_result(name: str, title: str, seeds: int, result: Result, folder: Path) -> None:
-    """Write NAME.png, NAME.svg, NAME.csv.gz and then NAME.json, the same bytes for the same result;
-    times go beside them.
+    """Write NAME.png, NAME.svg, NAME.csv.gz and then NAME.json, the same bytes for the same
+    result.
     """
     folder.mkdir(parents=True, exist_ok=True)
     (folder / f"{name}.json").unlink(missing_ok=True)
@@ -141,25 +140,17 @@ def write_result(name: str, title: str, seeds: int, result: Result, folder: Path
         "comparison": [asdict(row) for row in result.comparison],
         "remarks": result.remarks,
     }
-    if result.timing:
-        write_json([asdict(row) for row in result.timing], folder / f"{name}.timing.json")
     write_json(summary, folder / f"{name}.json")
 
 
-def _csv(columns: Mapping[str, NDArray[np.generic]]) -> str:
+def _csv(columns: Columns) -> str:
+    """Return a table as CSV, with the six digits that a picture's data need."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(columns)
-    writer.writerows(zip(*([_cell(v) for v in column] for column in columns.values()), strict=True))
+    for row in zip(*(_plain(column) for column in columns.values()), strict=True):
+        writer.writerow([float(f"{v:.6g}") if isinstance(v, float) else v for v in row])
     return buffer.getvalue()
-
-
-def _cell(value: Any) -> Any:
-    """Return a number with the six digits that a picture's data need, and anything
-    else as it is.
-    """
-    plain = _plain(value)
-    return float(f"{plain:.6g}") if isinstance(plain, float) else plain
 
 
 def _plain(value: Any) -> Any:
@@ -174,47 +165,19 @@ def _plain(value: Any) -> Any:
 
 
 def write_page(names: Sequence[str], folder: Path, page: Path) -> None:
-    """Write the page "the paper / this kit" from the experiments' JSON files in a folder."""
-    parts = [
-        "# The paper, reproduced figure by figure",
-        "",
-        "C. D. McKinnon and A. P. Schoellig, *Unscented External Force and Torque Estimation for "
-        "Quadrotors*, IROS 2016.",
-        "Every number and picture on this page was written by the command beside it, which also "
-        "writes the picture as SVG.",
-        "",
-    ]
-    where = Path(os.path.relpath(folder, page.parent)).as_posix()
+    """Write the page "the paper / this kit" from the experiments' JSON files in a folder.
+
+    The running times in NAME.timing.json, which an earlier version wrote, end a figure's table.
+    """
+    figures = {}
     for name in names:
         try:
-            kept = read_json(folder / f"{name}.json", "a figure's results")
+            figures[name] = read_json(folder / f"{name}.json", "a figure's results")
         except InputError:
             continue
-        parts += [
-            f"## {kept['title']}",
-            "",
-            made_by(
-                f"windwrench reproduce {name} --seeds {kept['seeds']}",
-                [kept.get("commit")],
-                kept["version"],
-            ),
-            "",
-            f"![{kept['title']}]({where}/{name}.png)",
-            "",
-            "| quantity | the paper | this kit |",
-            "| --- | --- | --- |",
-        ]
         timing = folder / f"{name}.timing.json"
-        rows = kept["comparison"] + (
-            read_json(timing, "a figure's timing") if timing.is_file() else []
-        )
-        parts += [f"| {row['quantity']} | {row['paper']} | {row['here']} |" for row in rows]
-        for remark in kept["remarks"]:
-            parts += ["", remark]
-        parts += [
-            "",
-            f"Data: [{name}.csv.gz]({where}/{name}.csv.gz), figures of merit: "
-            f"[{name}.json]({where}/{name}.json).",
-            "",
-        ]
-    write_text("\n".join(parts), page)
+        if timing.is_file():
+            figures[name]["comparison"] += read_json(timing, "a figure's timing")
+    where = Path(os.path.relpath(folder, page.parent)).as_posix()
+    text = template("page").render(figures=figures, where=where, made_by=made_by)
+    write_text(text, page)

@@ -1,16 +1,18 @@
-"""What an experiment gives: numbers, data, a picture, and how it compares with the paper."""
+"""The outcome of an experiment: numbers, data, a picture, and a comparison with the paper."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 # An experiment calls it with the share of its work that is done, 0 to 1.
 Progress = Callable[[float], None]
+Columns = Mapping[str, NDArray[np.generic]]  # of a table, each (rows,), numbers or text
 
 
 @dataclass(frozen=True)
@@ -18,7 +20,7 @@ class Comparison:
     """One line of the table "the paper / this kit"."""
 
     quantity: str  # with its unit
-    paper: str  # what the paper reports, or "-" where it says nothing
+    paper: str  # the paper's value, or "-" where the paper says nothing
     here: str
 
 
@@ -29,20 +31,43 @@ class Result:
     """
 
     figures: Mapping[str, Any]  # figures of merit, as JSON
-    data: Mapping[str, NDArray[np.generic]]  # columns (rows,) of the table, numbers or text
+    data: Columns
     picture: Figure
     comparison: list[Comparison]
-    remarks: list[str] = field(
-        default_factory=list
-    )  # what the reader should know, one paragraph each
-    timing: list[Comparison] = field(
-        default_factory=list
-    )  # what differs from run to run, and is kept apart for that
+    remarks: list[str]  # for the reader of the page, one paragraph each
 
 
-def remarks(name: str, /, **values: Any) -> list[str]:
-    """Return the paragraphs of a figure's template, ``remarks/NAME.md.j2``, with these values."""
-    loader = PackageLoader(__package__, "remarks")
-    template = Environment(loader=loader, undefined=StrictUndefined).get_template(f"{name}.md.j2")
-    paragraphs = template.render(values).split("\n\n")
-    return [" ".join(text.split()) for text in paragraphs if text.strip()]
+def table(blocks: Sequence[Mapping[str, Any]]) -> Columns:
+    """Return the columns of blocks of rows, one below the other; a block's single values stand in
+    each of its rows.
+    """
+    whole = [np.broadcast_arrays(*block.values()) for block in blocks]
+    return {
+        name: np.concatenate([np.atleast_1d(block[i]) for block in whole])
+        for i, name in enumerate(blocks[0])
+    }
+
+
+@cache
+def template(name: str) -> Template:
+    """Return the template ``templates/NAME.md.j2``; a name without a value is an error."""
+    loader = PackageLoader(__package__, "templates")
+    return Environment(
+        loader=loader,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    ).get_template(f"{name}.md.j2")
+
+
+def compared(name: str, /, **values: Any) -> tuple[list[Comparison], list[str]]:
+    """Return the table and the remarks of a figure's template, filled with values.
+
+    A line ``| quantity | the paper | this kit |`` is a row of the table. Empty lines separate
+    the remarks.
+    """
+    lines = template(name).render(values).splitlines()
+    rows = [Comparison(*line.strip("| ").split(" | ")) for line in lines if line.startswith("|")]
+    text = "\n".join(line for line in lines if not line.startswith("|"))
+    return rows, [" ".join(part.split()) for part in text.split("\n\n") if part.strip()]

@@ -1,13 +1,8 @@
 """How this kit's inner loops are compiled: one decorator for each purpose."""
 
 import multiprocessing
-import os
-import subprocess
-import sys
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 from numba import NumbaExperimentalFeatureWarning, njit, typeof
@@ -77,51 +72,3 @@ def specialised(function: Callable[..., Any], *arguments: object) -> Callable[..
     """
     entry: Callable[..., Any] = function.compile(tuple(typeof(argument) for argument in arguments))  # type: ignore[attr-defined]
     return entry
-
-
-def is_compiled(function: Callable[..., Any]) -> bool:
-    """Return whether a compiled function's machine code is in memory already."""
-    return bool(cast(Any, function).signatures)
-
-
-def is_on_disk(function: Callable[..., Any]) -> bool:
-    """Return whether machine code of a compiled function is in memory or on disk."""
-    code = cast(Any, function)
-    return is_compiled(function) or any(
-        Path(code.stats.cache_path).glob(f"*.{code.__name__}-*.nbi")
-    )
-
-
-@contextmanager
-def compiled_meanwhile(
-    function: Callable[..., Any], compile_it: Callable[[], None]
-) -> Iterator[None]:
-    """Have another process compile ``function`` while the block compiles something else, and wait
-    for it.
-
-    Only where there is no machine code of it on disk and a second core: this one then finds it
-    there. Numba compiles one function at a time in a process, in threads or not.
-
-    Args:
-        function: a compiled one.
-        compile_it: compiles it; a function without arguments, found by its module and name.
-    """
-    if is_on_disk(function) or len(os.sched_getaffinity(0)) < 2:
-        yield
-        return
-    module, name = compile_it.__module__, compile_it.__name__
-    with subprocess.Popen(
-        [sys.executable, "-c", f"from {module} import {name}; {name}()"],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-    ) as other:
-        try:
-            yield
-        except BaseException:
-            other.kill()
-            raise
-        notice.begin()
-        other.wait()
-        notice.end()

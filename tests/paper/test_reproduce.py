@@ -21,11 +21,14 @@ def small_result(value=1.0):
     figure.subplots().plot([0, value])
     return Result(
         {"value": np.float64(value), "gone": float("nan")},
-        {"x": np.arange(3), "name": np.array(["a", "b", "c"])},
+        {
+            "x": np.array([1, 2, 3]),
+            "y": np.array([0.1234567, np.nan, 2.0]),
+            "name": np.array(list("abc")),
+        },
         figure,
         [Comparison("a value (m)", "about 1", f"{value:.2f}")],
         ["A remark."],
-        timing=[Comparison("time (us)", "-", "5")],
     )
 
 
@@ -41,7 +44,7 @@ def test_the_same_result_gives_the_same_bytes(tmp_path):
     for folder in ("one", "two"):
         write_result("fig0", "A title", 3, small_result(), tmp_path / folder)
     names = sorted(p.name for p in (tmp_path / "one").iterdir())
-    assert names == ["fig0.csv.gz", "fig0.json", "fig0.png", "fig0.svg", "fig0.timing.json"]
+    assert names == ["fig0.csv.gz", "fig0.json", "fig0.png", "fig0.svg"]
     for name in names:
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), (
             name
@@ -50,7 +53,7 @@ def test_the_same_result_gives_the_same_bytes(tmp_path):
     assert kept["figures"] == {"value": 1.0, "gone": None}
     assert kept["commit"] == commit()
     table = gzip.decompress((tmp_path / "one" / "fig0.csv.gz").read_bytes())
-    assert table == b"x,name\n0,a\n1,b\n2,c\n"
+    assert table == b"x,y,name\n1,0.123457,a\n2,,b\n3,2.0,c\n"
 
 
 def test_the_page_shows_the_table_and_the_picture(tmp_path):
