@@ -5,7 +5,6 @@ Rows are the pose's samples. Where an inertial sensor is much faster than the po
 is no pose, they are the sensor's: the kit's form has room for rows without a pose.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -109,7 +108,6 @@ def flight_log(
     command: Stream | None = None,
     vehicle: Vehicle | None = None,
     commanded: bool = False,
-    extra: Mapping[str, Stream] | None = None,
     vehicle_name: str = "",
     model: Commands | None = None,
 ) -> FlightLog:
@@ -136,7 +134,6 @@ def flight_log(
         vehicle: turns commands into rotor speeds where none are known, by its motor curve or by an
             assumption that the notes state; None: they stay unknown.
         commanded: ``rotors`` were computed from commands.
-        extra: what else was read, by name.
         vehicle_name: the vehicle that flew, where the reader knows it.
         model: what commands are assumed to give where the vehicle states no motor curve.
 
@@ -213,7 +210,6 @@ def flight_log(
         source=f"{path} (reader {reader})",
         notes=(*notes, *time_notes(t - t[0])),
         valid=valid,
-        extra={name: stream.at(t) for name, stream in (extra or {}).items()},
         commanded=commanded,
         command=commands,
         vehicle=vehicle_name,

@@ -1,17 +1,13 @@
 """CrazyPAD flights: what is read, and what is refused."""
 
-import gzip
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from tests.support.data_paths import excerpt
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.logs.reading import read_log
-
-NORMAL = "crazypad/normal_flight__E9_log00.csv.gz"
 
 
 @pytest.fixture
@@ -58,16 +54,3 @@ def test_what_is_no_request_is_refused(write):
         read_log(write(motor_m3_0to65535=None), "crazypad")
     with pytest.raises(InputError, match=r"vbat_V, row 1 .* is empty or NaN"):
         read_log(write(vbat_V=np.full(50, np.nan)), "crazypad")
-
-
-@pytest.mark.measured
-def test_a_measured_flight_is_read_digit_by_digit():
-    log = read_log(excerpt(NORMAL), "crazypad")
-    with gzip.open(excerpt(NORMAL), "rt") as file:
-        header, first = (file.readline().strip().split(",") for _ in range(2))
-    cells = dict(zip(header, map(float, first), strict=True))
-    np.testing.assert_allclose(
-        log.command[0] * 65535.0, [cells[f"motor_m{i}_0to65535"] for i in (4, 3, 2, 1)]
-    )
-    assert log.voltage[0] == cells["vbat_V"]
-    assert 0.25 < np.median(log.command[500:]) < 0.9

@@ -1,15 +1,10 @@
 import numpy as np
 import pytest
-from scipy.signal import butter, filtfilt
 from scipy.spatial.transform import Rotation
 
-from tests.support.data_paths import crazyswarm2_file
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.logs.reading import read_log
-from windwrench.identification.wrench_series import estimate_log
 
-FLIGHTS = (100, 130, 140, 146, 160, 165, 170, 172, 176, 178, 201, 202, 204)
-LOADED = (201, 202, 204)
 ONBOARD = (
     "est_x_m",
     "est_y_m",
@@ -149,62 +144,3 @@ def test_bad_logs_are_named(write, tmp_path, vehicle):
     assert "reader crazyswarm2" in read_log(write()).source  # known by its columns
     with pytest.raises(InputError, match=r"absent.csv: cannot be read"):
         read_log(tmp_path / "absent.csv", "crazyswarm2")
-
-
-def test_an_unknown_reader_is_told_all():
-    with pytest.raises(
-        InputError,
-        match=r"unknown reader 'ros'; expected one of ardupilot_bin, .*px4_ulog, racer, rosbag",
-    ):
-        read_log("flight.bag", "ros")
-
-
-# measured flights
-
-
-@pytest.mark.measured
-@pytest.mark.parametrize("number", FLIGHTS)
-def test_measured_flights_read(number, vehicle):
-    log = read_log(crazyswarm2_file(number), "crazyswarm2", vehicle)
-    assert np.diff(log.t).max() < 0.025
-    assert log.period == pytest.approx(0.004, rel=0.02)
-    assert ("payload_position" in log.extra) == (number in LOADED)
-    rate = log.valid.sum() / log.t[-1]
-    assert 70 < rate < 100 if number in LOADED else log.valid.all()
-    # torque commanded turns the vehicle, 50 ms later, and thrust pushes it where its z axis points:
-    # signs and axes
-    attitude = Rotation.from_euler("ZYX", log.extra["onboard_angles"][:, ::-1])
-    b, a = butter(2, np.array([0.5, 10.0]) * 2 * log.period, "band")
-    turning = np.gradient(filtfilt(b, a, log.gyro, axis=0), log.period, axis=0)
-    torque = filtfilt(b, a, vehicle.rotor_wrench(log.rotor_speeds)[:, 1:], axis=0)
-    b, a = butter(2, 3.0 * 2 * log.period)
-    push = (
-        filtfilt(b, a, vehicle.rotor_wrench(log.rotor_speeds)[:, :1], axis=0)
-        * attitude.as_matrix()[:, :, 2]
-    )
-    acceleration = np.gradient(
-        filtfilt(b, a, log.extra["onboard_velocity"], axis=0), log.period, axis=0
-    )
-    for axis, (lag, least) in enumerate(((12, 0.65), (12, 0.65), (7, 0.35))):
-        assert np.corrcoef(turning[lag:, axis], torque[:-lag, axis])[0, 1] > least
-        assert np.corrcoef(acceleration[50:-50, axis], push[50:-50, axis])[0, 1] > (
-            0.7 if axis < 2 else 0.25
-        )
-
-
-@pytest.mark.measured
-def test_a_measured_flight_has_a_sane_wrench(vehicle):
-    log = read_log(crazyswarm2_file(201), "crazyswarm2", vehicle)
-    series = estimate_log(log, vehicle)
-    flying = series.t > 2.0
-    # the controller lifts a vehicle of 0.0419 kg, payload and all; the preset's has 0.027 kg
-    force = series.force[flying]
-    assert force[:, 2].mean() == pytest.approx(-(0.0406 - vehicle.mass) * 9.81, abs=0.005)
-    assert np.abs(force[:, :2]).max() < 0.02
-    assert np.abs(series.torque[flying]).max() < 1e-3
-    # the cable pulls towards the payload: the smoothed force goes with where that hangs, without a
-    # delay
-    force = estimate_log(log, vehicle, smooth=True).force[flying]
-    lean = (log.extra["payload_position"] - log.extra["onboard_position"])[flying]
-    for axis in range(2):
-        assert np.corrcoef(lean[:, axis], force[:, axis])[0, 1] > 0.8
