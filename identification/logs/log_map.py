@@ -48,6 +48,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -329,11 +330,15 @@ def load_map(name: str | Path) -> LogMap:
     """
     path = Path(name)
     if str(name) in map_names():
-        path = MAPS / f"{name}.yaml"
-        return parse_map(read_yaml(path, "a map"), f"map {name}", str(name))
+        return _shipped_map(str(name))
     if path.suffix.lower() not in (".yaml", ".yml") and not path.exists():
         raise unknown_name("map", str(name), [*map_names(), "the path of a YAML file"])
     return parse_map(read_yaml(path, "a map file"), str(path), str(path))
+
+
+@cache
+def _shipped_map(name: str) -> LogMap:
+    return parse_map(read_yaml(MAPS / f"{name}.yaml", "a map"), f"map {name}", name)
 
 
 def parse_map(value: object, where: str, name: str = "") -> LogMap:
