@@ -9,77 +9,48 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-# a name's unit, by how it is written in brackets, at its end, or in a line of units
-_UNIT_WORDS = {
-    "s": "s",
-    "sec": "s",
-    "seconds": "s",
-    "ms": "ms",
-    "msec": "ms",
-    "us": "us",
-    "usec": "us",
-    "µs": "us",
-    "ns": "ns",
-    "nsec": "ns",
+# a unit, and how it is written in brackets, at the end of a name, or in a line of units
+_SPELLINGS = {
+    "s": "s sec seconds",
+    "ms": "ms msec",
+    "us": "us usec µs",
+    "ns": "ns nsec",
     "m": "m",
     "mm": "mm",
     "cm": "cm",
-    "deg": "deg",
-    "degrees": "deg",
-    "°": "deg",
-    "rad": "rad",
-    "radians": "rad",
-    "rad/s": "rad/s",
-    "radps": "rad/s",
-    "rads": "rad/s",
-    "rad_s": "rad/s",
-    "deg/s": "deg/s",
-    "°/s": "deg/s",
-    "degps": "deg/s",
-    "dps": "deg/s",
-    "deg_s": "deg/s",
-    "m/s2": "m/s2",
-    "m/s^2": "m/s2",
-    "m/s²": "m/s2",
-    "mps2": "m/s2",
-    "ms2": "m/s2",
-    "m_s2": "m/s2",
+    "deg": "deg degrees °",
+    "rad": "rad radians",
+    "rad/s": "rad/s radps rads rad_s",
+    "deg/s": "deg/s °/s degps dps deg_s",
+    "m/s2": "m/s2 m/s^2 m/s² mps2 ms2 m_s2",
     "g": "g",
     "rpm": "rpm",
-    "erpm": "eRPM",
-    "hz": "Hz",
-    "v": "V",
-    "mv": "mV",
-    "cv": "cV",
-    "%": "percent",
-    "percent": "percent",
+    "eRPM": "erpm",
+    "Hz": "hz",
+    "V": "v",
+    "mV": "mv",
+    "cV": "cv",
+    "percent": "% percent",
 }
+_UNITS = {word: unit for unit, words in _SPELLINGS.items() for word in words.split()}
+_OTHER_UNITS = ("", "-", "1", "m/s", "n", "nm")  # of columns that no map uses
 _BRACKETS = re.compile(r"\s*[\[(]\s*([^\[\]()\d][^\[\]()]*?)\s*[\])]\s*$")
 _ENDING = re.compile(
-    r"[_ ](rad_s|deg_s|m_s2|radps|degps|mps2|dps|rads|sec|msec|usec|deg|rad|erpm|rpm|mm|cm|ms2|us"
-    r"|ms|ns|mv|cv|hz|m|s|g|v)$",
+    rf"[_ ]({'|'.join(word for word in _UNITS if re.fullmatch('[a-z0-9_]+', word))})$",
     re.IGNORECASE,
 )
 
 PLACES = {
-    "front_left": 0,
-    "frontleft": 0,
-    "fl": 0,
-    "rear_left": 1,
-    "back_left": 1,
-    "rearleft": 1,
-    "backleft": 1,
-    "rl": 1,
-    "bl": 1,
-    "rear_right": 2,
-    "back_right": 2,
-    "rearright": 2,
-    "backright": 2,
-    "rr": 2,
-    "br": 2,
-    "front_right": 3,
-    "frontright": 3,
-    "fr": 3,
+    name: rotor
+    for rotor, names in enumerate(
+        (
+            "front_left frontleft fl",
+            "rear_left back_left rearleft backleft rl bl",
+            "rear_right back_right rearright backright rr br",
+            "front_right frontright fr",
+        )
+    )
+    for name in names.split()
 }
 _NOT_MEASURED = re.compile(r"(^|_)(set|sp|setpoint|target|des|desired|ref|goal)(_|$)|setpoint")
 
@@ -110,13 +81,22 @@ def take_apart(header: Sequence[str], units: Sequence[str] = ()) -> list[Name]:
         text, unit = column.strip(), ""
         found = _BRACKETS.search(text) or _ENDING.search(text)
         if found and found.start() > 0:
-            unit = _UNIT_WORDS.get(found[1].lower(), "")
+            unit = _UNITS.get(found[1].lower(), "")
             text = text[: found.start()]
         if not unit and i < len(units):
-            unit = _UNIT_WORDS.get(units[i].strip(" []()").lower(), "")
+            unit = _UNITS.get(_bare(units[i]), "")
         base = re.sub(r"[^0-9a-zA-Z]+", "_", text).strip("_").lower()
         out.append(Name(column, base or column.lower(), unit))
     return out
+
+
+def is_unit(text: str) -> bool:
+    """Return whether a field is a unit, as one stands in a line of units."""
+    return _bare(text) in _UNITS or _bare(text) in _OTHER_UNITS
+
+
+def _bare(text: str) -> str:
+    return text.strip(" []()").lower()
 
 
 def groups_of(names: Iterable[Name], endings: Sequence[str], numbered: bool = False) -> list[Group]:

@@ -26,7 +26,15 @@ from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import CUTOFFS, continuous, derivative, low_pass, resampled, unbroken
 from .flight_log import FlightLog
 from .log_map import LENGTH_UNITS
-from .readings import DECLARED, Reading, as_written, pose_readings, rotor_readings
+from .readings import (
+    AS_DECLARED,
+    DECLARED,
+    Reading,
+    as_written,
+    gyro_readings,
+    pose_readings,
+    rotor_readings,
+)
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -240,6 +248,11 @@ class Evidence:
         ]
 
     @property
+    def has_pose(self) -> bool:
+        """Whether the motion is that of a pose."""
+        return self._attitude is not None
+
+    @property
     def samples(self) -> int:
         """Number of samples in flight."""
         return sum(len(p.compared) for p in self._pieces)
@@ -275,7 +288,8 @@ class Evidence:
 
     def score(self, reading: Reading, fit: Fit) -> float:
         """Return a fit's log-likelihood less what is unusual: of the reading, of its height."""
-        below = (reading.frames.position @ self._middle)[2] < 0.0
+        placed = self._position is not None
+        below = placed and (reading.frames.position @ self._middle)[2] < 0.0
         unusual = EVIDENCE.unusual * reading.unusual + EVIDENCE.below * below
         return fit.log_likelihood - float(unusual)
 
@@ -332,7 +346,9 @@ class Evidence:
         return force
 
     def fit(self, reading: Reading, torques: bool = True) -> Fit:
-        """Return how well a reading explains the flight."""
+        """Return how well a reading explains the flight; without an attitude, by torques alone."""
+        if self._attitude is None:
+            return Fit(0.0, 0.0, self.torques(reading), 1.0)
         push, force = self._push(reading), self._force(reading)
         mean = push.mean(axis=0)
         vertical = EVIDENCE.torque_gain if self._vehicle is None else EVIDENCE.force_gain
@@ -361,20 +377,16 @@ class Evidence:
         band[:, 2:] = low_pass(x[:, 2:], yaw, period) - low_pass(x[:, 2:], low, period)
         return band
 
-    def needed_torques(self, reading: Reading, turn: Array | None = None) -> Array:
+    def _needed_torques(self, reading: Reading) -> Array:
         """Return the torques (n, 3) in Nm that the motion needs, in the band of turning; without a
         vehicle, the angular accelerations (n, 2) about x and y.
-
-        Args:
-            reading: of the attitude.
-            turn: (3, 3) by which a gyro's readings are multiplied; None: none.
         """
-        key = reading.attitude, reading.sense, id(reading.frames.body), id(turn)
+        key = reading.attitude, reading.sense, id(reading.frames.body), id(reading.gyro)
         if key in self._needed:
             return self._needed[key]
         parts = []
         for p, rate in zip(self._pieces, self._rates(reading), strict=True):
-            w = rate if turn is None else rate @ turn.T
+            w = rate if reading.gyro is AS_DECLARED else rate @ reading.gyro.turn.T
             alpha = derivative(w, p.period)
             if self._vehicle is None:
                 torque = alpha[:, :2]
@@ -414,16 +426,16 @@ class Evidence:
             out.append([np.interp(at, p.t, column, np.nan, np.nan) for column in filtered[kind].T])
         return np.concatenate([np.column_stack(columns) for columns in out])
 
-    def torques(self, reading: Reading, turn: Array | None = None) -> tuple[float, ...]:
+    def torques(self, reading: Reading) -> tuple[float, ...]:
         """Return the shares of the torques that the rotors leave, at the delay that suits them
         best.
         """
         key = (
             *(reading.attitude, reading.sense, id(reading.frames.body)),
-            *(reading.rotors, reading.mirrored, id(turn)),
+            *(reading.rotors, reading.mirrored, id(reading.gyro)),
         )
         if key not in self._torques:
-            needed = self.needed_torques(reading, turn)
+            needed = self._needed_torques(reading)
             self._torques[key] = min(
                 (self._shares(needed, pushes, reading) for pushes in self._delayed), key=sum
             )
@@ -442,30 +454,6 @@ class Evidence:
             sign = -1.0 if i == 2 and reading.mirrored else 1.0
             out.append(share(needed[there, i : i + 1], sign * given[:, None], gain))
         return tuple(out)
-
-    def likelier(self, fits: Sequence[tuple[tuple[float, ...], str]]) -> list[str]:
-        """Return the words of the shares of torques that are clearly likelier than those as
-        declared: the likeliest, and what is nearly as likely.
-        """
-
-        def log_likelihood(torques: tuple[float, ...]) -> float:
-            return Fit(1.0, 1.0, torques, 1.0).log_likelihood
-
-        least = log_likelihood(self.torques(DECLARED)) + EVIDENCE.refused
-        good = [
-            (log_likelihood(torques), words)
-            for torques, words in fits
-            if np.mean(torques) <= EVIDENCE.good and log_likelihood(torques) >= least
-        ]
-        good.sort(reverse=True)
-        return [words for score, words in good if score >= good[0][0] - EVIDENCE.certain]
-
-    def orders(self, reading: Reading) -> list[tuple[Fit, Reading]]:
-        """Return the orders of rotors with what each leaves of the torques, the likeliest first."""
-        ways = [r for r in (DECLARED, *rotor_readings()) if not r.mirrored]
-        found = [replace(reading, rotors=way.rotors) for way in ways]
-        fits = [(Fit(1.0, 1.0, self.torques(way), 1.0), way) for way in found]
-        return sorted(fits, key=lambda item: -item[0].log_likelihood)
 
     def turns(self, reading: Reading) -> float:
         """Return the root mean square of roll and pitch rates in the band of turning, rad/s."""
@@ -493,7 +481,7 @@ class Evidence:
             along = self._at(lambda p: p.even(self._t, force))
         count = round(EVIDENCE.longest_shift / EVIDENCE.shift_step)
         shifts = EVIDENCE.shift_step * np.arange(-count, count + 1)
-        needed = self.needed_torques(DECLARED)
+        needed = self._needed_torques(DECLARED)
         fits = [self._shifted(-shift, needed, along) for shift in shifts]
         scores = np.array([fit.log_likelihood for fit in fits])
         near = np.flatnonzero(np.abs(shifts) <= EVIDENCE.longest_delay + 1e-9)
@@ -522,12 +510,14 @@ class Ranking:
     ranked: Sequence[tuple[float, Reading, Fit]]
 
     @classmethod
-    def of(cls, evidence: Evidence, readings: Sequence[Reading]) -> "Ranking":
+    def of(
+        cls, evidence: Evidence, readings: Sequence[Reading], torques: bool = False
+    ) -> "Ranking":
         """Return the ranking of readings; where a flight does not tell, the usual come first."""
         if not evidence.enough:
             nothing = Fit(1.0, 1.0, (), 1.0)
             return cls([(0.0, r, nothing) for r in sorted(readings, key=lambda r: r.unusual)])
-        fits = [(r, evidence.fit(r, torques=False)) for r in readings]
+        fits = [(r, evidence.fit(r, torques)) for r in readings]
         ranked = [(evidence.score(reading, fit), reading, fit) for reading, fit in fits]
         ranked.sort(key=lambda item: -item[0])
         if ranked[0][2].horizontal > EVIDENCE.good:
@@ -567,12 +557,10 @@ def recognise(evidence: Evidence) -> tuple[Reading, ...]:
     if not evidence.enough:
         return ()
     declared = evidence.fit(DECLARED)
-    fits = [(reading, evidence.fit(reading)) for reading in pose_readings()]
+    readings = pose_readings() if evidence.has_pose else gyro_readings()
     if contradicted(declared.torques):
-        fits += [
-            (reading, replace(declared, torques=evidence.torques(reading)))
-            for reading in rotor_readings()
-        ]
+        readings += rotor_readings()
+    fits = [(reading, evidence.fit(reading)) for reading in readings]
     winners = [(evidence.score(r, fit), r, fit) for r, fit in fits if _wins(fit, declared)]
     if any(r.turns_rotors for _, r, _ in winners) and evidence.shift is not None:
         # a shift by half a period of the motion looks like exchanged rotors

@@ -6,7 +6,7 @@ attitude, ``log(q(t)^-1 q(t + T)) / T``, but for a bias; and the accelerometer t
 world, averaged twice over ``T``, is the second difference of the position, plus gravity:
 ``(p(t + T) - 2 p(t) + p(t - T)) / T^2 + g e3``. Both hold whatever the vehicle's model lacks, on
 logs of any length. A sensor that contradicts them is left out, with a note: the pose and the rotors
-are enough for everything.
+are enough for everything. Without a pose, gravity alone is left to show the accelerometer.
 """
 
 from collections.abc import Sequence
@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation, Slerp
 
+from ..motion.smoothing import resampled
 from .evidence import EVIDENCE, ratio
 from .flight_log import ACCELEROMETER, GYRO, FlightLog
+from .readings import ACCELEROMETER_READINGS, AS_DECLARED, GYRO_READINGS, SensorReading
 
 Array = NDArray[np.float64]
 
@@ -36,31 +38,6 @@ class InertialSettings:
 
 
 INERTIAL = InertialSettings()
-AXES = {"flu": np.eye(3), "frd": np.diag([1.0, -1.0, -1.0])}  # by which readings are multiplied
-_G = 9.80665  # m/s2 in one g
-_DEGREES = np.pi / 180.0
-_FRD_WORDS = "those of body axes forward, right, down; expected forward, left, up: negate y and z"
-
-
-def _readings(unit: float, unit_words: str, inverted: str) -> tuple[tuple[Array, str], ...]:
-    """Return other readings of a sensor: by what columns are multiplied, and in words."""
-    frd = AXES["frd"]
-    return (
-        (unit * np.eye(3), f"look like {unit_words}"),
-        (frd, f"look like {_FRD_WORDS}"),
-        (unit * frd, f"look like {unit_words}, and like {_FRD_WORDS}"),
-        (-np.eye(3), f"look inverted{inverted}: negate all three"),
-    )
-
-
-GYRO_READINGS = _readings(_DEGREES, "degrees per second; expected rad/s: multiply by 0.0174533", "")
-_ACCELEROMETER_READINGS = _readings(
-    _G, "g; expected m/s2: multiply by 9.80665", " (gravity, not specific force)"
-)
-_GRAVITY_LEFT_OUT = (
-    "look like an acceleration without gravity; expected the specific force that an accelerometer "
-    "measures, 9.81 m/s2 along z in a hover"
-)
 
 
 def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, tuple[str, ...]]:
@@ -71,38 +48,62 @@ def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, tu
         gravity: m/s2, of the vehicle that flew.
     """
     notes = []
-    if log.gyro is not None and (doubt := _gyro_doubt(log, log.gyro)):
-        notes.append(f"{', '.join(GYRO)} {doubt}. They were left out")
-        log = replace(log, gyro=None)
-    if log.accelerometer is not None:
-        doubt = _accelerometer_doubt(log, log.accelerometer, gravity)
+    seen = np.flatnonzero(log.valid)
+    pose = log.t[seen], Rotation.from_quat(log.quaternion[seen], scalar_first=True)
+    for field, names in (("gyro", GYRO), ("accelerometer", ACCELEROMETER)):
+        values = getattr(log, field)
+        if values is None:
+            continue
+        t, measured = (x[np.isfinite(values[:, 0])] for x in (log.t, values))
+        if field == "gyro":
+            turns = [reading.turn for reading in (AS_DECLARED, *GYRO_READINGS)]
+            shares, readings = gyro_shares(t, measured, *pose, turns), GYRO_READINGS
+            otherwise = "contradict the attitude's rate"
+        else:
+            shares = _force_shares(t, measured, *pose, log.position[seen], gravity)
+            readings = ACCELEROMETER_READINGS
+            otherwise = "contradict the position's acceleration and gravity"
+        doubt = sensor_doubt(shares, readings, otherwise)
+        if is_stuck(measured):
+            doubt = f"never change: the {field} was not read"
         if doubt:
-            notes.append(f"{', '.join(ACCELEROMETER)} {doubt}. They were left out")
-            log = replace(log, accelerometer=None)
+            notes.append(f"{', '.join(names)} {doubt}. They were left out")
+            log = replace(log, **{field: None})
     return log, tuple(notes)
 
 
-def _gyro_doubt(log: FlightLog, gyro: Array) -> str:
-    """Return what is wrong with a gyro (N, 3), or nothing."""
-    read = np.isfinite(gyro[:, 0])
-    t, measured = log.t[read], gyro[read]
-    if _stuck(measured):
-        return "never change: the gyro was not read"
-    turns = [np.eye(3), *(A for A, _ in GYRO_READINGS)]
-    seen = np.flatnonzero(log.valid)
-    rotation = Rotation.from_quat(log.quaternion[seen], scalar_first=True)
-    shares = gyro_shares(t, measured, log.t[seen], rotation, turns)
+def is_stuck(measured: Array) -> bool:
+    """Return whether the readings (N, 3) of a sensor are all the same."""
+    return len(measured) >= INERTIAL.samples and bool(np.all(np.ptp(measured, axis=0) == 0.0))
+
+
+def sensor_doubt(
+    shares: Sequence[float] | None, readings: Sequence[SensorReading], otherwise: str
+) -> str:
+    """Return what is wrong with a sensor, or nothing.
+
+    Args:
+        shares: of the variance that the sensor leaves: as declared, then by each reading; None:
+            unknown.
+        readings: the other ones.
+        otherwise: what to say where no reading explains the sensor.
+    """
     if shares is None or shares[0] <= EVIDENCE.good:
         return ""
-    readings = [
-        (float(left), words) for left, (_, words) in zip(shares[1:], GYRO_READINGS, strict=True)
+    best = min(shares[1:])
+    if best > EVIDENCE.good or ratio(shares[0], best, 3) < EVIDENCE.refused:
+        return otherwise
+    alike = [
+        reading.says
+        for share, reading in zip(shares[1:], readings, strict=True)
+        if ratio(share, best, 3) < EVIDENCE.unusual
     ]
-    return _words(float(shares[0]), readings, "contradict the attitude's rate")
+    return "; or ".join(alike[:3])
 
 
 def gyro_shares(
     t: Array, gyro: Array, pose_times: Array, attitude: Rotation, turns: Sequence[Array]
-) -> Array | None:
+) -> list[float] | None:
     """Return which share of the attitude's rate a gyro leaves, by each of several readings; None
     where too little is measured.
 
@@ -121,57 +122,68 @@ def gyro_shares(
     at, ends = Slerp(pose_times, attitude), begins + INERTIAL.window
     turned = (at(begins).inv() * at(ends)).as_rotvec() / INERTIAL.window
     sum_of = cumulative_trapezoid(gyro, t, axis=0, initial=0.0)
-    mean = (_at(t, sum_of, ends) - _at(t, sum_of, begins)) / INERTIAL.window
+    mean = (resampled(ends, t, sum_of) - resampled(begins, t, sum_of)) / INERTIAL.window
     motion, seen = turned - np.median(turned, axis=0), mean - np.median(mean, axis=0)  # a bias
     size = _middle(motion) + INERTIAL.still**2
-    return np.array([_middle(motion - seen @ A.T) / size for A in turns])
+    return [_middle(motion - seen @ turn.T) / size for turn in turns]
 
 
-def _accelerometer_doubt(log: FlightLog, accelerometer: Array, gravity: float) -> str:
-    """Return what is wrong with an accelerometer (N, 3), or nothing."""
-    read = np.isfinite(accelerometer[:, 0])
-    t, measured = log.t[read], accelerometer[read]
-    if _stuck(measured):
-        return "never change: the accelerometer was not read"
-    middles = _windows(log.t[log.valid], t, before=INERTIAL.window)
+def _force_shares(
+    t: Array,
+    measured: Array,
+    pose_times: Array,
+    attitude: Rotation,
+    position: Array,
+    gravity: float,
+) -> list[float] | None:
+    """Return which share of acceleration and gravity an accelerometer leaves, as declared and by
+    each reading; None where too little is measured.
+    """
+    middles = _windows(pose_times, t, before=INERTIAL.window)
     if len(middles) < INERTIAL.fewest:
-        return ""
-    seen, T = np.flatnonzero(log.valid), INERTIAL.window
-    place = [_at(log.t[seen], log.position[seen], middles + k * T) for k in (-1, 0, 1)]
-    needed = (place[2] - 2.0 * place[1] + place[0]) / T**2 + np.array([0.0, 0.0, gravity])
-    inside = (t >= log.t[seen[0]]) & (t <= log.t[seen[-1]])
+        return None
+    inside = (t >= pose_times[0]) & (t <= pose_times[-1])
     t, measured = t[inside], measured[inside]
-    attitude = _attitude(log)(t)
+    turned, g = Slerp(pose_times, attitude)(t), np.array([0.0, 0.0, gravity])
 
-    def mean(readings: Array) -> Array:
-        world = attitude.apply(readings)
-        speed = cumulative_trapezoid(world, t, axis=0, initial=0.0)
+    def second_difference(times: Array, values: Array) -> Array:
+        before, at, after = (
+            resampled(middles + k * INERTIAL.window, times, values) for k in (-1, 0, 1)
+        )
+        difference: Array = (after - 2.0 * at + before) / INERTIAL.window**2
+        return difference
+
+    def mean(reading: SensorReading) -> Array:
+        speed = cumulative_trapezoid(
+            turned.apply(measured @ reading.turn.T), t, axis=0, initial=0.0
+        )
         way = cumulative_trapezoid(speed, t, axis=0, initial=0.0)
-        a, b, c = (_at(t, way, middles + k * T) for k in (-1, 0, 1))
-        out: Array = (c - 2.0 * b + a) / T**2
-        return out
+        return second_difference(t, way) + reading.lacks_gravity * g
 
+    needed = second_difference(pose_times, position) + g
     size = _middle(needed)
-    left = _middle(needed - mean(measured)) / size
-    if left <= EVIDENCE.good:
-        return ""
-    readings = [
-        (_middle(needed - mean(measured @ A.T)) / size, words)
-        for A, words in _ACCELEROMETER_READINGS
+    return [
+        _middle(needed - mean(reading)) / size for reading in (AS_DECLARED, *ACCELEROMETER_READINGS)
     ]
-    without = mean(measured) + np.array([0.0, 0.0, gravity])
-    readings.append((_middle(needed - without) / size, _GRAVITY_LEFT_OUT))
-    return _words(left, readings, "contradict the position's acceleration and gravity")
 
 
-def _words(left: float, readings: list[tuple[float, str]], else_words: str) -> str:
-    best, words = min(readings)
-    clear = best <= EVIDENCE.good and ratio(left, best, 3) >= EVIDENCE.refused
-    return words if clear else else_words
-
-
-def _stuck(measured: Array) -> bool:
-    return len(measured) >= INERTIAL.samples and bool(np.all(np.ptp(measured, axis=0) == 0.0))
+def gravity_doubt(force: Array, gravity: float) -> str:
+    """Return what gravity says against the specific force (n, 3) of a flight, or nothing."""
+    middle, up = np.median(force, axis=0), np.array([0.0, 0.0, gravity])
+    readings = [reading for reading in ACCELEROMETER_READINGS if not reading.lacks_gravity]
+    shares = [
+        float(np.sum(np.square(up - reading.turn @ middle))) / gravity**2
+        for reading in (AS_DECLARED, *readings)
+    ]
+    size = float(np.linalg.norm(middle))
+    otherwise = (
+        f"are {size:.3g} m/s2 in the median of a flight, along a{'xyz'[np.argmax(np.abs(middle))]}"
+        f"; expected the specific force, which gravity makes about {gravity:.3g} along az: axes "
+        "forward, left, up, of the vehicle and not of the sensor's board"
+    )
+    if size < 0.5 * gravity:
+        otherwise += " (an acceleration without gravity is none)"
+    return sensor_doubt(shares, readings, otherwise)
 
 
 def _middle(vectors: Array) -> float:
@@ -196,12 +208,3 @@ def _windows(pose_times: Array, sensor_times: Array, before: float) -> Array:
         for a, b in ((clock[i], clock[i + 1]) for i in gaps[:1000]):
             times = times[(times - before >= b) | (times + INERTIAL.window <= a)]
     return times
-
-
-def _attitude(log: FlightLog) -> Slerp:
-    seen = np.flatnonzero(log.valid)
-    return Slerp(log.t[seen], Rotation.from_quat(log.quaternion[seen], scalar_first=True))
-
-
-def _at(t: Array, values: Array, times: Array) -> Array:
-    return np.column_stack([np.interp(times, t, column) for column in values.T])

@@ -6,7 +6,7 @@ line, in the longest run of lines that have as many fields as one another; that 
 and the line of names before it is its header.
 """
 
-import math
+import csv
 import re
 from collections import Counter
 from dataclasses import dataclass
@@ -14,6 +14,7 @@ from pathlib import Path
 
 from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS
+from .column_names import is_unit
 from .csv_table import open_csv, text_of
 from .parquet_table import open_parquet
 from .table import SUFFIXES, Table
@@ -127,8 +128,6 @@ def _first_lines(path: Path) -> tuple[list[str], str]:
 
 def _split(line: str, layout: TextLayout) -> list[str]:
     if layout.separator != " " and '"' in line:
-        import csv
-
         try:
             return [f.strip() for f in next(csv.reader([line], delimiter=layout.separator))]
         except (csv.Error, StopIteration):
@@ -191,7 +190,7 @@ def _with_header(path: Path, lines: list[str], layout: TextLayout, start: int) -
                 "the table with semicolons"
             )
         if len(fields) >= width - 1 and len(named) >= 0.8 * len(fields) and len(named) >= 2:
-            is_units_line = header is None and _are_units(fields)
+            is_units_line = header is None and sum(map(is_unit, fields)) >= 0.7 * len(fields)
             header = i
             if not is_units_line:
                 break
@@ -213,11 +212,3 @@ def _with_header(path: Path, lines: list[str], layout: TextLayout, start: int) -
         layout.separator, layout.decimal, header, True, between, encoding=layout.encoding
     )
     return FoundLayout(made, units, ", ".join(parts))
-
-
-def _are_units(fields: list[str]) -> bool:
-    """Return whether fields are units, as they stand in a line of their own behind the header."""
-    known = re.compile(
-        r"[\[(]?(s|ms|us|ns|m|mm|cm|m/s\S*|rad\S*|deg\S*|g|v|mv|rpm|hz|-|1|n|nm|%)?[\])]?", re.I
-    )
-    return sum(known.fullmatch(f) is not None for f in fields) >= math.ceil(0.7 * len(fields))

@@ -1,13 +1,20 @@
-"""Numbers that no flight has: they are refused where a log is read, because products of a few of
-them overflow.
+"""Sizes of a flight's numbers: the unit that they tell, and beyond which there is no flight.
+
+The guess of a map, the reading of a log and its screening ask here, so that all three decide alike
+and say the same sentence.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from .flight_log import ACCELEROMETER, GYRO, POSE, ROTORS, TRUTH, FlightLog
+from .log_map import ROTOR_UNITS, TIME_UNITS
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -19,33 +26,132 @@ class Magnitudes:
         longest_step: s, of any step; a log in nanoseconds has steps of 1e7, and more than a year
             between two rows is no flight.
         largest: of all other numbers, in SI units; logs in millimetres or rpm stay far below.
+        rates: Hz of rows, in which a unit of time is likely.
+        sure_rates: the same, in which the unit is certain.
+        widest: m, over which the positions of one flight spread.
+        carries: thrust by weight of rotors in their right unit; mass and thrust curve may be off.
+        flies: median thrust by weight beyond which a log is not of this vehicle.
+        doubtful: the same, beyond which it may not be.
+        gravity: specific force by 1 g in which one unit is certain.
     """
 
     shortest_period: float = 1e-5
     longest_step: float = 1e12
     largest: float = 1e9
+    rates: tuple[float, float] = (5.0, 5000.0)
+    sure_rates: tuple[float, float] = (15.0, 2500.0)
+    widest: float = 300.0
+    carries: tuple[float, float] = (0.55, 1.8)
+    flies: tuple[float, float] = (0.2, 5.0)
+    doubtful: tuple[float, float] = (0.5, 2.0)
+    gravity: tuple[float, float] = (0.85, 1.15)
 
 
-def check_magnitudes(log: FlightLog, limits: Magnitudes | None = None) -> None:
+MAGNITUDES = Magnitudes()
+_TIMES = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
+_SPEEDS = {
+    "rpm": ("revolutions per minute", ROTOR_UNITS["rpm"]),
+    "Hz": ("revolutions per second", ROTOR_UNITS["Hz"]),
+    "deg/s": ("degrees per second", np.pi / 180.0),
+}
+
+
+def within(value: float, limits: tuple[float, float]) -> bool:
+    """Return whether a value lies between two limits."""
+    return limits[0] <= value <= limits[1]
+
+
+def time_unit(step: float) -> tuple[str, bool]:
+    """Return the unit in which a median step (in the column's unit) is a flight's, and whether
+    that is certain.
+    """
+    rates = {unit: 1.0 / max(step * TIME_UNITS[unit], 1e-300) for unit in _TIMES}
+    unit = next((unit for unit in _TIMES if within(rates[unit], MAGNITUDES.rates)), "s")
+    return unit, within(rates[unit], MAGNITUDES.sure_rates)
+
+
+def time_doubt(step: float) -> str:
+    """Return what a median step (s) says against its unit, or nothing."""
+    unit, is_sure = time_unit(step)
+    if unit == "s" or not is_sure:
+        return ""
+    return (
+        f"t looks like {_TIMES[unit]}: its median step is {step:.4g}; expected seconds: divide t "
+        f"by {1.0 / TIME_UNITS[unit]:g}"
+    )
+
+
+def thrust_by_weight(rotor_speeds: Array, vehicle: Vehicle) -> float:
+    """Return the median thrust of turning rotors (N, 4) in rad/s, by the vehicle's weight; 1 where
+    none turns.
+    """
+    if not rotor_speeds.size:
+        return 1.0
+    with np.errstate(over="ignore"):
+        thrust = np.square(rotor_speeds) @ vehicle.k / vehicle.weight
+    turning = thrust[thrust > 0.3 * float(np.quantile(thrust, 0.95))]
+    return float(np.median(turning)) if turning.size else 1.0
+
+
+def carrying_units(thrust: float) -> list[str]:
+    """Return the units in which rotors carry the vehicle, whose numbers as rad/s make a median
+    thrust by weight.
+    """
+    factors = {"rad/s": 1.0} | {unit: factor for unit, (_, factor) in _SPEEDS.items()}
+    return [u for u, factor in factors.items() if within(thrust * factor**2, MAGNITUDES.carries)]
+
+
+def rotor_doubt(thrust: float, vehicle: Vehicle) -> str:
+    """Return what a median thrust by weight says against rotor speeds in rad/s, or nothing."""
+    if within(thrust, MAGNITUDES.flies):
+        return ""
+    for unit in carrying_units(thrust):
+        name, factor = _SPEEDS[unit]
+        what = f"divide by {1 / factor:.4g}" if factor < 1 else f"multiply by {factor:.4g}"
+        return (
+            f"omega1..omega4 look like {name}: read as rad/s they make {thrust:.3g} times the "
+            f"weight of {vehicle.name}; expected rad/s: {what}"
+        )
+    return (
+        f"the rotor speeds make a median thrust of {thrust:.3g} times the weight of "
+        f"{vehicle.name}; expected about 1: omega1..omega4 in rad/s, and the vehicle that flew"
+    )
+
+
+def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
+    """Return what the sizes of a log's numbers say against its units."""
+    doubts = [time_doubt(log.period)]
+    if log.valid.any():
+        spread = float(np.max(np.ptp(log.position[log.valid], axis=0)))
+        if spread > MAGNITUDES.widest:
+            doubts.append(
+                f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected "
+                f"metres"
+            )
+    if vehicle is not None and log.has_rotor_speeds:
+        doubts.append(rotor_doubt(thrust_by_weight(log.rotor_speeds, vehicle), vehicle))
+    return [doubt for doubt in doubts if doubt]
+
+
+def check_magnitudes(log: FlightLog) -> None:
     """Check that a log's numbers are in the range of a flight's.
 
     Raises:
         InputError: one is not; the message says which.
     """
-    limits = limits or Magnitudes()
     step = np.diff(log.t)
     if not len(step):
         return
-    if not log.period >= limits.shortest_period:
+    if not log.period >= MAGNITUDES.shortest_period:
         raise InputError(
             f"{log.source}: column t: the median time step is {log.period:.3g} s; expected at "
-            f"least {limits.shortest_period:g} s"
+            f"least {MAGNITUDES.shortest_period:g} s"
         )
     longest = int(np.argmax(step))
-    if not step[longest] <= limits.longest_step:
+    if not step[longest] <= MAGNITUDES.longest_step:
         raise InputError(
             f"{log.source}: column t, row {longest + 2}: {step[longest]:.3g} s after the row "
-            f"before; expected at most {limits.longest_step:g} s"
+            f"before; expected at most {MAGNITUDES.longest_step:g} s"
         )
     groups = (
         (POSE[:3], log.position),
@@ -57,12 +163,10 @@ def check_magnitudes(log: FlightLog, limits: Magnitudes | None = None) -> None:
         (GYRO, log.gyro),
     )
     for names, values in groups:
-        if values is None:
-            continue
-        beyond = np.argwhere(np.abs(values) > limits.largest)  # False where NaN
-        if beyond.size:
-            row, column = beyond[0]
+        beyond = [] if values is None else np.argwhere(np.abs(values) > MAGNITUDES.largest)
+        for row, column in beyond:
+            assert values is not None
             raise InputError(
                 f"{log.source}: column {names[column]}, row {row + 1}: "
-                f"{values[row, column]:.3g}; expected a number within {limits.largest:g}"
+                f"{values[row, column]:.3g}; expected a number within {MAGNITUDES.largest:g}"
             )

@@ -12,8 +12,8 @@ import io
 import re
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import product
+from dataclasses import dataclass, field, replace
+from itertools import permutations, product
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from .column_names import PLACES, Group, Name, best_group, groups_of, take_apart
 from .evidence import EVIDENCE, Evidence, Ranking, ratio
-from .inertial import AXES, gyro_shares
+from .inertial import gyro_shares
 from .layout_guess import FoundLayout
 from .log_map import (
     COMMAND_UNITS,
@@ -41,7 +41,8 @@ from .log_map import (
     Sensor,
     TimeColumn,
 )
-from .readings import DECLARED, rotations, table_readings
+from .magnitudes import MAGNITUDES, carrying_units, thrust_by_weight, time_unit, within
+from .readings import BODY_AXES, DECLARED, ROTORS, rotations, table_readings
 from .rotor_orders import ORDERS, Order, order_names, order_words
 from .table import Table
 
@@ -52,15 +53,10 @@ Array = NDArray[np.float64]
 class GuessSettings:
     """When a field is certain."""
 
-    rates: tuple[float, float] = (5.0, 5000.0)  # Hz of rows, in which one unit of time alone falls
-    # the same where it is beyond doubt
-    sure_rates: tuple[float, float] = (15.0, 2500.0)
     rpm: float = 4500.0  # median above which no unit but rpm is left: no propeller turns at that
     # rate in rad/s
     counts: float = 20_000.0  # median above which rpm may also be a command of 16 bits
-    gravity: float = 0.15  # relative difference of the median specific force from 1 g
     fast_gyro: float = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
-    carries: tuple[float, float] = (0.6, 1.7)  # thrust by weight of rotors in their right unit
     longest: float = 480.0  # s of the flight that are looked at, its middle
 
 
@@ -330,14 +326,12 @@ def _time(found: _Found, name: Name) -> tuple[Array, TimeColumn]:
         )
     step = float(np.median(steps))
     unit = name.unit if name.unit in TIME_UNITS else ""
-    rates = {u: 1.0 / max(step * TIME_UNITS[u], 1e-300) for u in ("s", "ms", "us", "ns")}
     if unit:
         found.say("time", "unit", True, f"{unit} by the name of the column")
     else:
-        low, high = GUESS.rates
-        unit = next((u for u, rate in rates.items() if low <= rate <= high), "s")
-        sure = GUESS.sure_rates[0] <= rates[unit] <= GUESS.sure_rates[1]
-        found.say("time", "unit", sure, f"in {unit} there are {rates[unit]:.4g} rows a second")
+        unit, sure = time_unit(step)
+        rate = 1.0 / max(step * TIME_UNITS[unit], 1e-300)
+        found.say("time", "unit", sure, f"in {unit} there are {rate:.4g} rows a second")
     t = (raw - raw[np.isfinite(raw)][0]) * TIME_UNITS[unit]
     middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
     t[~(np.abs(t - middle) <= 0.5 * GUESS.longest)] = np.nan
@@ -485,8 +479,8 @@ def _gyro_by_pose(t: Array, values: Array, pose: _Pose, named: str) -> tuple[str
     good, rotation = rotations(pose.attitude, pose.ranking.best)
     rows = np.flatnonzero(good)
     rows = rows[np.isfinite(t[rows])]
-    ways = list(product((named,) if named else ("rad/s", "deg/s"), AXES))
-    turns = [RATE_UNITS[unit] * AXES[body] for unit, body in ways]
+    ways = list(product((named,) if named else ("rad/s", "deg/s"), BODY_AXES))
+    turns = [RATE_UNITS[unit] * BODY_AXES[body] for unit, body in ways]
     shares = gyro_shares(t, values, t[rows], rotation[np.isfinite(t[good])], turns)
     if shares is None:
         return *ways[0], False, "the log is too short"
@@ -499,7 +493,7 @@ def _gyro_by_pose(t: Array, values: Array, pose: _Pose, named: str) -> tuple[str
 
 def _acceleration_unit(found: _Found, named: str, size: float) -> tuple[str, float]:
     for unit, one in (("m/s2", 9.80665), ("g", 1.0)):
-        if named == unit or (not named and abs(size / one - 1.0) < GUESS.gravity):
+        if named == unit or (not named and within(size / one, MAGNITUDES.gravity)):
             why = "by the columns' names" if named else f"its median size is {size:.3g}"
             found.say("accelerometer", "unit", True, f"{unit}: {why}")
             return unit, 1.0
@@ -580,11 +574,8 @@ def motor_unit(group: Group, values: Array, vehicle: Vehicle | None) -> tuple[st
     if is_command and high <= 65535.0 and middle > 4000.0:
         return "commands", "counts", False, f"values up to {high:.6g}"
     if vehicle is not None and not is_command:
-        fitting = []
-        for unit in ("rad/s", "rpm", "Hz"):
-            thrust = np.nanmedian(np.square(values * ROTOR_UNITS[unit]) @ vehicle.k)
-            if GUESS.carries[0] <= thrust / vehicle.weight <= GUESS.carries[1]:
-                fitting.append(unit)
+        there = values[np.isfinite(values).all(axis=1)]
+        fitting = [u for u in carrying_units(thrust_by_weight(there, vehicle)) if u in ROTOR_UNITS]
         if len(fitting) == 1:
             why = f"in it the rotors carry the weight of {vehicle.name}"
             # numbers of 1000 to 2000 may be pulses as well, whatever they would carry
@@ -629,30 +620,26 @@ def _order(
     gyro, thrusts = given.get("gyro"), np.square(values)
     evidence, best = None, DECLARED
     if isinstance(gyro, Sensor):
-        rates = found.values(gyro.columns) * RATE_UNITS[gyro.unit] @ AXES[gyro.body]
+        rates = found.values(gyro.columns) * RATE_UNITS[gyro.unit] @ BODY_AXES[gyro.body]
         evidence = Evidence(t, thrusts, gyro=rates)
     elif pose is not None and pose.is_sure:
         best = pose.ranking.best
         evidence = Evidence(t, thrusts, found.values(given["position"].columns), pose.attitude)
     if evidence is None or not evidence.enough:
         return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
-    ranked = evidence.orders(best)
-    (left, reading), (second, _) = ranked[0], ranked[1]
-    order = reading.motors
+    ways = [replace(best, rotors=rotors) for rotors in permutations(ROTORS)]
+    ranking = Ranking.of(evidence, ways, torques=True)
+    left, lead = ranking.fit.torque, ranking.other("rotors")[1]
+    order = ranking.best.motors
     names = order_names(order)
-    lead = left.log_likelihood - second.log_likelihood
     why = (
-        f"{names[0] if names else order_words(order)}: {left.torque:.0%} of the angular "
-        f"acceleration is left, and the next best is less likely by a log-likelihood ratio of "
-        f"{lead:.3g}"
+        f"{names[0] if names else order_words(order)}: {left:.0%} of the angular acceleration is "
+        f"left, and the next best is less likely by a log-likelihood ratio of {lead:.3g}"
     )
-    if (
-        left.torque <= EVIDENCE.good_torque
-        and lead >= EVIDENCE.certain
-        and evidence.turns(best) >= EVIDENCE.turning
-    ):
+    turns = evidence.turns(best) >= EVIDENCE.turning
+    if left <= EVIDENCE.good_torque and ranking.certain("rotors") and turns:
         return order, True, why
-    if names and left.torque <= 0.9 and lead >= EVIDENCE.unusual:
+    if names and left <= 0.9 and lead >= EVIDENCE.unusual:
         return order, False, why
     return ORDERS[hint], False, f"{hint}: no order is much likelier than all others"
 
@@ -709,29 +696,16 @@ def map_yaml(guess: Guess) -> str:
 
 
 def _fields(part: Columns) -> dict[str, Any]:
-    """Return a section as its fields stand in the file."""
+    """Return a section as its fields stand in the file: those that are not as usual."""
+    fields = {
+        name: list(value) if isinstance(value, tuple) else value
+        for name, value in vars(part).items()
+        if value not in ("", (), None, False, 1)
+    }
     if isinstance(part, Battery):
-        return {"column": part.columns[0], "unit": part.unit}
-    fields: dict[str, Any] = {"columns": list(part.columns)}
-    if isinstance(part, Attitude):
-        if part.euler:
-            fields |= {"euler": part.euler, "unit": part.unit}
-        else:
-            fields |= {"order": part.order}
-        fields["sense"] = part.sense
-    else:
-        fields["unit"] = part.unit
+        fields = {"column": fields.pop("columns")[0], **fields}
     if isinstance(part, Rotors | Commands):
-        names = order_names(part.order)
-        fields["order"] = names[0] if names else list(part.order)
-    if isinstance(part, Rotors) and part.pole_pairs != 1:
-        fields["pole_pairs"] = part.pole_pairs
-    if isinstance(part, Commands) and part.range is not None:
-        fields["range"] = list(part.range)
-    if isinstance(part, Sensor) and part.body:
-        fields["body"] = part.body
-    if part.scale != 1.0:
-        fields["scale"] = part.scale
-    if part.signs:
-        fields["signs"] = list(part.signs)
+        fields["order"] = [*order_names(part.order), list(part.order)][0]
+    if fields.get("euler"):
+        del fields["order"]  # of a quaternion
     return fields

@@ -14,7 +14,7 @@ from .flight_log import ACCELEROMETER, COMMANDS, GYRO, POSE, REQUIRED, ROTORS, F
 from .inertial import check_inertial
 from .layout_guess import FoundLayout, is_text_table, open_any_table
 from .log_map import OWN_MAP, load_map
-from .magnitudes import check_magnitudes
+from .magnitudes import check_magnitudes, unit_doubts
 from .mapped_log import map_table, read_mapped
 from .readers import find_reader
 from .readers.recognise import (
@@ -138,29 +138,7 @@ def _openings(path: Path) -> Iterator[tuple[Table, FoundLayout]]:
 
 def _with_doubts(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
     """Warn where numbers look as if they were in other units, and add the warnings to the notes."""
-    doubts = []
-    if log.period > 0.5:
-        doubts.append(
-            f"the median time step is {log.period:g} s: is t in milliseconds? Expected seconds"
-        )
-    if log.valid.any():
-        spread = float(np.max(np.ptp(log.position[log.valid], axis=0)))
-        if spread > 300.0:
-            doubts.append(
-                f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected "
-                f"metres"
-            )
-    if vehicle is not None and log.has_rotor_speeds:
-        with np.errstate(over="ignore"):
-            thrust = np.square(log.rotor_speeds) @ vehicle.k / vehicle.weight
-        turning = thrust[log.rotor_speeds.max(axis=1) > 0.0]
-        ratio = float(np.median(turning)) if turning.size else 1.0
-        unit = "rpm" if ratio > 10.0 else "revolutions per second" if ratio < 0.1 else ""
-        if unit:
-            doubts.append(
-                f"the rotor speeds make a median thrust of {ratio:.2g} times the weight of "
-                f"{vehicle.name}: are omega1..omega4 in {unit}? Expected rad/s"
-            )
+    doubts = unit_doubts(log, vehicle)
     log, wrong = check_inertial(log, 9.81 if vehicle is None else vehicle.gravity)
     doubts += wrong
     for doubt in doubts:

@@ -132,6 +132,56 @@ ROTORS: Order = ORDERS["windwrench"]
 
 
 @dataclass(frozen=True, eq=False)
+class SensorReading:
+    """One way to read an inertial sensor.
+
+    Attributes:
+        says: what the columns look like, what was expected, and what to do.
+        turn: (3, 3) by which the columns are multiplied.
+        lacks_gravity: the columns hold an acceleration in place of the specific force.
+    """
+
+    says: str = ""
+    turn: Array = field(default_factory=lambda: _I)
+    lacks_gravity: bool = False
+
+
+AS_DECLARED = SensorReading()
+BODY_AXES = {"flu": _I, "frd": _DOWN}  # by which the readings of a sensor are multiplied
+_FRD = "those of body axes forward, right, down; expected forward, left, up: negate y and z"
+
+
+def _sensor_readings(units: dict[str, float], inverted: str = "") -> tuple[SensorReading, ...]:
+    """Return the readings of a sensor in units of other sizes and in other axes."""
+    found = [SensorReading(f"look like {name}", size * _I) for name, size in units.items()]
+    found.append(SensorReading(f"look like {_FRD}", _DOWN))
+    found += [
+        SensorReading(f"look like {name}, and like {_FRD}", size * _DOWN)
+        for name, size in units.items()
+    ]
+    return (*found, SensorReading(f"look inverted{inverted}: negate all three", -_I))
+
+
+GYRO_READINGS = _sensor_readings(
+    {"degrees per second; expected rad/s: multiply by 0.0174533": ANGLE_UNITS["deg"]}
+)
+ACCELEROMETER_READINGS = (
+    *_sensor_readings(
+        {
+            "g; expected m/s2: multiply by 9.80665": 9.80665,
+            "milli-g; expected m/s2: multiply by 0.00980665": 9.80665e-3,
+        },
+        " (gravity, not specific force)",
+    ),
+    SensorReading(
+        "look like an acceleration without gravity; expected the specific force that an "
+        "accelerometer measures, 9.81 m/s2 along z in a hover",
+        lacks_gravity=True,
+    ),
+)
+
+
+@dataclass(frozen=True, eq=False)
 class Reading:
     """One way to read a flight's columns.
 
@@ -145,6 +195,7 @@ class Reading:
         length: unit of the position.
         rotors: the kit's rotor, from 1, in each column.
         mirrored: rotors turn against the declared spin.
+        gyro: reading of the gyro's columns.
         unusual: how many of these are less usual than their alternatives.
     """
 
@@ -157,6 +208,7 @@ class Reading:
     length: str = "m"
     rotors: Order = ROTORS
     mirrored: bool = False
+    gyro: SensorReading = AS_DECLARED
     unusual: int = 0
 
     @property
@@ -188,6 +240,8 @@ class Reading:
     @property
     def says(self) -> str:
         """What the columns look like, what was expected, and what to do."""
+        if self.gyro.says:
+            return f"gx, gy, gz {self.gyro.says}"
         if self.length != "m":
             name, divisor = {"mm": ("milli", 1000), "cm": ("centi", 100)}[self.length]
             return f"px, py, pz look like {name}metres; expected metres: divide them by {divisor}"
@@ -255,6 +309,11 @@ def _unusual(reading: Reading) -> int:
     departs = (reading.order != "wxyz") + (reading.sense != "body_to_world")
     other = "lie along other axes" in reading.frames.fact
     return departs + (reading.frames is not PLAIN) + other
+
+
+def gyro_readings() -> list[Reading]:
+    """Return the other readings of a gyro."""
+    return [Reading(gyro=reading) for reading in GYRO_READINGS]
 
 
 def rotor_readings() -> list[Reading]:

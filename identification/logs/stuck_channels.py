@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
+from ..motion.smoothing import runs_of
 from .flight_log import FlightLog
 
 Array = NDArray[np.float64]
@@ -79,20 +80,30 @@ def _note(
         for i, other in enumerate(sisters)
         if i != own
     ]
-    edges = np.flatnonzero(np.diff(still, prepend=False, append=False))
     found = []
-    for first, end in zip(edges[::2], edges[1::2], strict=True):
-        last = end - 1
-        seconds = float(t[last] - t[first])
-        if seconds < LEAST_SECONDS:
-            continue
-        if min(int(count[last] - count[first]) for count in changes) >= SISTERS_CHANGE:
+    for first, end in runs_of(still):
+        seconds = float(t[end - 1] - t[first])
+        changed = min(int(count[end - 1] - count[first]) for count in changes)
+        if seconds >= LEAST_SECONDS and changed >= SISTERS_CHANGE:
             found.append((seconds, float(t[first])))
     if not found:
         return []
-    seconds, begin = max(found)
     return [
-        f"warning: {name} stands still for {seconds:.3g} s from t = {begin:.6g} s "
-        f"({len(found)} such stretch(es)) while {others} change: "
-        "what depends on it there is wrong if its sensor hung"
+        f"warning: {name} stands still for {_longest(found)} while {others} change: what depends "
+        "on it there is wrong if its sensor hung"
     ]
+
+
+def stretches(rows: NDArray[np.bool_], t: Array, least: float) -> str:
+    """Return the longest run of rows (N,) that lasts more than ``least`` s, and how many do, in
+    words; nothing where none does.
+    """
+    runs = [(float(t[end - 1] - t[first]), float(t[first])) for first, end in runs_of(rows)]
+    found = [run for run in runs if run[0] > least]
+    return _longest(found) if found else ""
+
+
+def _longest(found: list[tuple[float, float]]) -> str:
+    """Return runs (s, and their beginnings) in words."""
+    seconds, begin = max(found, key=lambda run: run[0])
+    return f"{seconds:.3g} s from t = {begin:.6g} s ({len(found)} such stretch(es))"

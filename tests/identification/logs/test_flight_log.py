@@ -242,7 +242,7 @@ def test_a_gap_in_time_is_a_note(path, rows):
 @pytest.mark.parametrize(
     ("field", "factor", "expected"),
     [
-        ("omega", 60 / (2 * np.pi), "omega1..omega4 in rpm"),
+        ("omega", 60 / (2 * np.pi), "omega1..omega4 look like revolutions per minute"),
         ("omega", 1 / (2 * np.pi), "revolutions per second"),
         ("t", 1000.0, "milliseconds"),
     ],

@@ -36,7 +36,7 @@ def test_a_log_without_a_pose_passes(flown: FlightLog) -> None:
     ("fields", "words"),
     [
         ({"accelerometer": 1.0 / 9.80665}, "ax, ay, az look like g"),
-        ({"accelerometer": [1.0, -1.0, -1.0]}, "forward, right, down, or inverted"),
+        ({"accelerometer": [1.0, -1.0, -1.0]}, "forward, right, down.*; or look inverted"),
         ({"accelerometer": 0.1}, r"expected the specific force|look like"),
         ({"gyro": 180.0 / np.pi}, "degrees per second"),
         ({"gyro": [1.0, -1.0, -1.0]}, "negate y and z"),
@@ -57,7 +57,7 @@ def test_gravity_along_another_axis_is_refused(flown: FlightLog) -> None:
     """A board that is mounted on its side."""
     log = pose_removed(flown)
     assert log.accelerometer is not None
-    with pytest.raises(InputError, match="gravity lies along ax"):
+    with pytest.raises(InputError, match="in the median of a flight, along ax; expected the specific force"):
         screen_log(replace(log, accelerometer=log.accelerometer[:, [2, 1, 0]]), VEHICLE)
 
 
