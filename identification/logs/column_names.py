@@ -40,18 +40,18 @@ _ENDING = re.compile(
     re.IGNORECASE,
 )
 
-PLACES = {
-    name: rotor
-    for rotor, names in enumerate(
-        (
-            "front_left frontleft fl",
-            "rear_left back_left rearleft backleft rl bl",
-            "rear_right back_right rearright backright rr br",
-            "front_right frontright fr",
-        )
+# endings of the names of rotors at the front left, rear left, rear right and front right
+PLACES = [
+    (front + gap + left, rear + gap + left, rear + gap + right, front + gap + right)
+    for front, rear, gap, left, right in (
+        ("front", "rear", "_", "left", "right"),
+        ("front", "back", "_", "left", "right"),
+        ("front", "rear", "", "left", "right"),
+        ("front", "back", "", "left", "right"),
+        ("f", "r", "", "l", "r"),
+        ("f", "b", "", "l", "r"),
     )
-    for name in names.split()
-}
+]
 _NOT_MEASURED = re.compile(r"(^|_)(set|sp|setpoint|target|des|desired|ref|goal)(_|$)|setpoint")
 
 

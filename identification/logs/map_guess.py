@@ -11,7 +11,7 @@ the field is a guess.
 import io
 import re
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import permutations, product
 from typing import Any
@@ -27,11 +27,14 @@ from .evidence import EVIDENCE, Evidence, Ranking, ratio
 from .inertial import gyro_shares
 from .layout_guess import FoundLayout
 from .log_map import (
+    ACCELERATION_UNITS,
+    ANGLE_UNITS,
     COMMAND_UNITS,
     LENGTH_UNITS,
     RATE_UNITS,
     ROTOR_UNITS,
     TIME_UNITS,
+    VOLTAGE_UNITS,
     Attitude,
     Battery,
     Columns,
@@ -57,10 +60,13 @@ class GuessSettings:
     # rate in rad/s
     counts: float = 20_000.0  # median above which rpm may also be a command of 16 bits
     fast_gyro: float = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
+    slow_gyro: float = 6.0  # below which 99.5 % of a flight's angular velocities lie in rad/s
     longest: float = 480.0  # s of the flight that are looked at, its middle
 
 
 GUESS = GuessSettings()
+_Choice = tuple[str, bool, str]  # what is taken, whether it is certain, and why
+_G = ACCELERATION_UNITS["g"]
 
 
 @dataclass(frozen=True)
@@ -92,15 +98,23 @@ class _Found:
     """What was found so far."""
 
     table: Table
-    names: list[Name]
-    data: dict[str, Array]
+    vehicle: Vehicle | None
+    data: dict[str, Array] = field(default_factory=dict)
     reasons: list[Reason] = field(default_factory=list)
 
     def say(self, section: str, name: str, certain: bool, why: str) -> None:
         self.reasons.append(Reason(section, name, certain, why))
 
-    def values(self, columns: Sequence[str]) -> Array:
-        return np.column_stack([self.data[name] for name in columns])
+    def values(self, group: Group | Columns) -> Array:
+        return np.column_stack([self.data[name] for name in group.columns])
+
+    def unit(
+        self, section: str, named: str, known: Container[str], guess: Callable[[], _Choice]
+    ) -> str:
+        """Return a section's unit: as its columns' names say, or as guessed."""
+        unit, sure, why = (named, True, "by the columns' names") if named in known else guess()
+        self.say(section, "unit", sure, f"{unit}: {why}")
+        return unit
 
 
 _POSITION = (
@@ -176,14 +190,12 @@ def guess_map(
 
 def _guess(table: Table, names: list[Name], vehicle: Vehicle | None, name: str) -> Guess:
     clock = _time_column(table, names)
-    rest = [n for n in names if n.column != clock.column]
-    parts, rivals = _groups(rest)
+    parts, rivals = _groups([n for n in names if n.column != clock.column])
     if parts["position"] is None or not (parts["quaternion"] or parts["angles"]):
         parts["position"] = parts["quaternion"] = parts["angles"] = None
     _check_enough(table, parts)
     wanted = [clock.column, *(c for group in parts.values() if group for c in group.columns)]
-    data = table.read(list(dict.fromkeys(wanted)))
-    found = _Found(table, names, data)
+    found = _Found(table, vehicle, table.read(list(dict.fromkeys(wanted))))
     t, time = _time(found, clock)
     for part, (section, name_of_field) in _COLUMN_FIELDS.items():
         group = parts[part]
@@ -193,17 +205,15 @@ def _guess(table: Table, names: list[Name], vehicle: Vehicle | None, name: str) 
     given: dict[str, Any] = {"time": time, "name": name}
     pose = None
     if parts["position"] is not None:
-        pose_map, pose = _pose(found, parts, t)
-        given |= pose_map
-    given |= _imu(found, parts, t, pose, given.get("body", ""))
-    given |= _motors(found, parts, t, pose, given, vehicle)
+        pose = _pose(found, parts, t)
+        given |= pose.sections
+    given |= _imu(found, parts, t, pose)
+    for kind in ("motors", "commands"):
+        if parts[kind] is not None:
+            given |= _motors(found, parts[kind], t, pose, given)
     given |= _battery(found, parts["battery"])
-    used = set(wanted)
-    return Guess(
-        LogMap(**given),
-        tuple(found.reasons),
-        tuple(c for c in table.header if c not in used),
-    )
+    unused = tuple(c for c in table.header if c not in wanted)
+    return Guess(LogMap(**given), tuple(found.reasons), unused)
 
 
 def _time_column(table: Table, names: list[Name]) -> Name:
@@ -232,7 +242,7 @@ def _groups(names: list[Name]) -> tuple[dict[str, Group | None], dict[str, int]]
     rivals = dict.fromkeys(_COLUMN_FIELDS, 1)
     triples = [*groups_of(names, "xyz"), *groups_of(names, ("north", "east", "down"))]
     threes = groups_of(names, "012", numbered=True)
-    fours = [g for start in (1, 0) for g in _numbered(names, start)]
+    fours = [g for ends in ("1234", "0123") for g in groups_of(names, ends, numbered=True)]
     quaternion, rivals["quaternion"] = best_group(groups_of(names, "wxyz"), _QUATERNION)
     if quaternion is None:
         quaternion, _ = best_group(fours, _QUATERNION[:2])
@@ -245,12 +255,10 @@ def _groups(names: list[Name]) -> tuple[dict[str, Group | None], dict[str, int]]
     gyro, rivals["gyro"] = best_group([*triples, *threes], _GYRO)
     if gyro is None:
         gyro = next((g for g in groups_of(names, "pqr") if g.key in ("", "rate", "body")), None)
-    placed = _by_places(names)
+    placed = [group for endings in PLACES for group in groups_of(names, endings)]
     free = [g for g in fours if not taken & set(g.columns)]
     motors, _ = best_group(free, _ROTORS)
     commands, _ = best_group([g for g in free if g != motors], _COMMANDS)
-    if placed is not None:
-        motors = placed
     for sensor in (accelerometer, gyro):
         triples = [g for g in triples if sensor is None or g.columns != sensor.columns]
     position, rivals["position"] = best_group(triples, _POSITION)
@@ -269,35 +277,11 @@ def _groups(names: list[Name]) -> tuple[dict[str, Group | None], dict[str, int]]
         "angles": None if quaternion else angles,
         "accelerometer": accelerometer,
         "gyro": gyro,
-        "motors": motors,
+        "motors": placed[0] if placed else motors,
         "commands": commands,
         "battery": battery,
     }
     return parts, rivals
-
-
-def _numbered(names: list[Name], start: int) -> list[Group]:
-    endings = [str(start + i) for i in range(4)]
-    return groups_of(names, endings, numbered=True)
-
-
-def _by_places(names: list[Name]) -> Group | None:
-    """Return the columns of motors that are named by their places, front-left first."""
-    found: dict[str, dict[int, Name]] = {}
-    for name in names:
-        for word, place in PLACES.items():
-            if name.base.endswith(word):
-                key = name.base.removesuffix(word).strip("_")
-                found.setdefault(key, {}).setdefault(place, name)
-                break
-    for key, members in found.items():
-        if len(members) == 4:
-            units = {members[i].unit for i in range(4)}
-            unit = units.pop() if len(units) == 1 else ""
-            if not unit and "rpm" in key:
-                unit = "rpm"
-            return Group(tuple(members[i].column for i in range(4)), f"place:{key}", unit)
-    return None
 
 
 def _check_enough(table: Table, parts: Mapping[str, Group | None]) -> None:
@@ -325,13 +309,12 @@ def _time(found: _Found, name: Name) -> tuple[Array, TimeColumn]:
             f"{found.table.path}: column {name.column}: no increasing times; expected a time"
         )
     step = float(np.median(steps))
-    unit = name.unit if name.unit in TIME_UNITS else ""
-    if unit:
-        found.say("time", "unit", True, f"{unit} by the name of the column")
-    else:
+
+    def guess() -> _Choice:
         unit, sure = time_unit(step)
-        rate = 1.0 / max(step * TIME_UNITS[unit], 1e-300)
-        found.say("time", "unit", sure, f"in {unit} there are {rate:.4g} rows a second")
+        return unit, sure, f"{1.0 / max(step * TIME_UNITS[unit], 1e-300):.4g} rows a second"
+
+    unit = found.unit("time", name.unit, TIME_UNITS, guess)
     t = (raw - raw[np.isfinite(raw)][0]) * TIME_UNITS[unit]
     middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
     t[~(np.abs(t - middle) <= 0.5 * GUESS.longest)] = np.nan
@@ -340,208 +323,177 @@ def _time(found: _Found, name: Name) -> tuple[Array, TimeColumn]:
 
 @dataclass(frozen=True, eq=False)
 class _Pose:
-    """How a table's pose is read, and the evidence."""
+    """How a table's pose is read, the evidence, and the sections of the map."""
 
-    evidence: Evidence
     ranking: Ranking
+    position: Array  # columns (N, 3)
     attitude: Array  # columns (N, 3 or 4)
+    sections: dict[str, Any]
 
     @property
     def is_sure(self) -> bool:
         """Whether the body's turning is known."""
-        names = ("world", "body", "sense", "order", "pitch_sign", "unit")
-        return self.ranking.certain(*names)
+        return self.ranking.certain("world", "body", "sense", "order", "pitch_sign", "unit")
 
 
-def _pose(
-    found: _Found, parts: Mapping[str, Group | None], t: Array
-) -> tuple[dict[str, Any], _Pose]:
-    """Return the map's sections of the pose and what they make of the table."""
+def _pose(found: _Found, parts: Mapping[str, Group | None], t: Array) -> _Pose:
+    """Return what a table's pose makes of the map."""
     place, quaternion, angles = parts["position"], parts["quaternion"], parts["angles"]
     group, motors = quaternion or angles, parts["motors"] or parts["commands"]
     assert place is not None
     assert group is not None
     assert motors is not None
-    attitude = found.values(group.columns)
+    position, attitude = found.values(place), found.values(group)
     units: tuple[str, ...] = ("deg", "rad")
     if group.unit in units:
         units = (group.unit,)
     elif np.nanmax(np.abs(attitude[:, :2]), initial=0.0) > np.pi:
         units = ("deg",)
     orders = () if quaternion is None else ("wxyz", "xyzw") if quaternion.numbered else ("wxyz",)
-    named = place.unit in LENGTH_UNITS
     readings = table_readings(
         orders,
         units,
-        lengths=(place.unit,) if named else ("m", "cm", "mm"),
+        lengths=(place.unit,) if place.unit in LENGTH_UNITS else ("m", "cm", "mm"),
         hint="ned" if re.search("ned|down", "".join(place.columns).lower()) else "",
     )
-    thrusts = np.square(found.values(motors.columns))
-    evidence = Evidence(t, thrusts, found.values(place.columns), attitude)
+    evidence = Evidence(t, np.square(found.values(motors)), position, attitude)
     ranking = Ranking.of(evidence, readings)
     best = ranking.best
-    fit = f"{ranking.fit.horizontal:.0%} of the horizontal acceleration is left by the tilt"
 
-    def say(section: str, name: str, prop: str) -> None:
-        other, lead = ranking.other(prop)
-        why = f"{getattr(best, prop)}: {fit}"
+    def by_motion(prop: str) -> _Choice:
+        value, (other, lead) = getattr(best, prop), ranking.other(prop)
+        why = f"{ranking.fit.horizontal:.0%} of the horizontal acceleration is left by the tilt"
         if other is not None and lead > 0.0:
             why += f", and {other} is less likely by a log-likelihood ratio of {lead:.3g}"
-        found.say(section, name, ranking.certain(prop), why)
+        return value, ranking.certain(prop), why
 
-    say("world", "", "world")
-    say("body", "", "body")
-    if named:
-        found.say("position", "unit", True, f"{best.length} by the columns' names")
-    else:
-        say("position", "unit", "length")
-    say("attitude", "sense", "sense")
+    told = [("world", "", "world"), ("body", "", "body"), ("attitude", "sense", "sense")]
+    found.unit("position", place.unit, LENGTH_UNITS, lambda: by_motion("length"))
     if quaternion is None:
         signs = (1, best.pitch_sign, 1) if best.pitch_sign < 0 else ()
         made = Attitude(
             group.columns, unit=best.unit, euler=best.euler, sense=best.sense, signs=signs
         )
-        if len(units) == 1:
-            why = "by the columns' names" if group.unit else "angles beyond pi"
-            found.say("attitude", "unit", True, f"{best.unit}: {why}")
-        else:
-            say("attitude", "unit", "unit")
-        say("attitude", "euler", "euler")
-        say("attitude", "signs", "pitch_sign")
+        found.unit(
+            "attitude",
+            group.unit,
+            ANGLE_UNITS,
+            lambda: by_motion("unit") if len(units) > 1 else (best.unit, True, "angles beyond pi"),
+        )
+        told += [("attitude", "euler", "euler"), ("attitude", "signs", "pitch_sign")]
     else:
         made = Attitude(group.columns, order=best.order, sense=best.sense)
         if quaternion.numbered:
-            say("attitude", "order", "order")
+            told.append(("attitude", "order", "order"))
         else:
             found.say("attitude", "order", True, "by the columns' names")
+    for section, name, prop in told:
+        value, sure, why = by_motion(prop)
+        found.say(section, name, sure, f"{value}: {why}")
     sections = {
         "world": best.world,
         "body": best.body,
         "position": Columns(place.columns, best.length),
         "attitude": made,
     }
-    return sections, _Pose(evidence, ranking, attitude)
+    return _Pose(ranking, position, attitude, sections)
 
 
 def _imu(
-    found: _Found,
-    parts: Mapping[str, Group | None],
-    t: Array,
-    pose: _Pose | None,
-    body: str,
+    found: _Found, parts: Mapping[str, Group | None], t: Array, pose: _Pose | None
 ) -> dict[str, Any]:
     """Return the sections of the inertial sensors."""
     out: dict[str, Any] = {}
     acc, gyro = parts["accelerometer"], parts["gyro"]
-    axes, sure_axes = "", False
+    axes, sure_axes = "flu", False
     if acc is not None:
-        values = found.values(acc.columns)
+        values = found.values(acc)
         size = float(np.nanmedian(np.linalg.norm(values, axis=1)))
         z = float(np.nanmean(values[:, 2])) / max(size, 1e-12)
-        axes, sure_axes = ("flu" if z > 0.0 else "frd"), abs(z) > 0.8
-        if z < 0.0 and pose is None:  # turned over, or gravity in place of the specific force
-            sure_axes = False
+        axes = "flu" if z > 0.0 else "frd"
+        # without a pose, turned over may also be gravity in place of the specific force
+        sure_axes = abs(z) > 0.8 and (z > 0.0 or pose is not None)
         unit, scale = _acceleration_unit(found, acc.unit, size)
-        found.say(
-            "accelerometer",
-            "body",
-            sure_axes,
-            f"{axes}: along z it reads {'+' if z > 0 else '-'}{abs(z):.2f} of its size",
-        )
+        why = f"{axes}: along z it reads {'+' if z > 0 else '-'}{abs(z):.2f} of its size"
+        found.say("accelerometer", "body", sure_axes, why)
         out["accelerometer"] = Sensor(acc.columns, unit, scale=scale, body=axes)
+        if pose is None:
+            out["body"] = axes
     if gyro is not None:
-        values = found.values(gyro.columns)
-        unit = gyro.unit if gyro.unit in ("rad/s", "deg/s") else ""
-        if pose is not None:
-            unit2, axes2, sure, why = _gyro_by_pose(t, values, pose, unit)
-            found.say("gyro", "unit", bool(unit) or sure, unit or f"{unit2}: {why}")
-            found.say("gyro", "body", sure, f"{axes2}: {why}")
-            out["gyro"] = Sensor(gyro.columns, unit2, body=axes2)
-        else:
+        values = found.values(gyro)
+        units = (gyro.unit,) if gyro.unit in ("rad/s", "deg/s") else ("rad/s", "deg/s")
+        if pose is None:
             high = float(np.nanquantile(np.abs(values), 0.995))
-            guessed = "deg/s" if high > 6.0 else "rad/s"
-            found.say(
-                "gyro",
-                "unit",
-                bool(unit) or high > GUESS.fast_gyro,
-                f"{unit or guessed}: "
-                + ("by the columns' names" if unit else f"its fast values are {high:.3g}"),
-            )
+            guessed = "deg/s" if high > GUESS.slow_gyro else "rad/s"
+            by_size = guessed, high > GUESS.fast_gyro, f"its fast values are {high:.3g}"
             found.say("gyro", "body", sure_axes, "as the accelerometer's")
-            out["gyro"] = Sensor(gyro.columns, unit or guessed, body=axes or "flu")
-    if body == "" and axes:
-        out["body"] = axes
+        else:
+            guessed, axes, sure, why = _gyro_by_pose(t, values, pose, units)
+            by_size = guessed, sure, why
+            found.say("gyro", "body", sure, f"{axes}: {why}")
+        unit = found.unit("gyro", gyro.unit, RATE_UNITS, lambda: by_size)
+        out["gyro"] = Sensor(gyro.columns, unit, body=axes)
     return out
 
 
-def _gyro_by_pose(t: Array, values: Array, pose: _Pose, named: str) -> tuple[str, str, bool, str]:
+def _gyro_by_pose(
+    t: Array, values: Array, pose: _Pose, units: Sequence[str]
+) -> tuple[str, str, bool, str]:
     """Return a gyro's unit and body axes, whether they are sure, and why."""
     good, rotation = rotations(pose.attitude, pose.ranking.best)
     rows = np.flatnonzero(good)
     rows = rows[np.isfinite(t[rows])]
-    ways = list(product((named,) if named else ("rad/s", "deg/s"), BODY_AXES))
+    ways = list(product(units, BODY_AXES))
     turns = [RATE_UNITS[unit] * BODY_AXES[body] for unit, body in ways]
     shares = gyro_shares(t, values, t[rows], rotation[np.isfinite(t[good])], turns)
     if shares is None:
         return *ways[0], False, "the log is too short"
     first, second = np.argsort(shares)[:2]
-    left = float(shares[first])
-    clear = ratio(shares[second], left, 3) >= EVIDENCE.certain
-    sure = pose.is_sure and left <= EVIDENCE.good and clear
-    return *ways[first], sure, f"{left:.0%} of the attitude's rate is left unexplained"
+    clear = ratio(shares[second], shares[first], 3) >= EVIDENCE.certain
+    sure = pose.is_sure and shares[first] <= EVIDENCE.good and clear
+    return *ways[first], sure, f"{shares[first]:.0%} of the attitude's rate is left unexplained"
 
 
 def _acceleration_unit(found: _Found, named: str, size: float) -> tuple[str, float]:
-    for unit, one in (("m/s2", 9.80665), ("g", 1.0)):
-        if named == unit or (not named and within(size / one, MAGNITUDES.gravity)):
-            why = "by the columns' names" if named else f"its median size is {size:.3g}"
-            found.say("accelerometer", "unit", True, f"{unit}: {why}")
-            return unit, 1.0
-    scale = 9.80665 / max(size, 1e-12)
-    found.say(
-        "accelerometer",
-        "scale",
-        False,
-        f"raw: its median size is {size:.4g}, which is taken for the 9.81 m/s2 of a hover",
-    )
-    return "raw", float(f"{scale:.6g}")
+    """Return an accelerometer's unit, and its scale to m/s2 where the unit is raw."""
+    likely = [
+        u for u in ("m/s2", "g") if within(size * ACCELERATION_UNITS[u] / _G, MAGNITUDES.gravity)
+    ]
+    why = f"its median size is {size:.4g}"
+    if named in ("m/s2", "g") or likely:
+        return found.unit(
+            "accelerometer", named, ("m/s2", "g"), lambda: (likely[0], True, why)
+        ), 1.0
+    why = f"raw: {why}, which is taken for the 9.81 m/s2 of a hover"
+    found.say("accelerometer", "scale", False, why)
+    return "raw", float(f"{_G / max(size, 1e-12):.6g}")
 
 
 def _motors(
     found: _Found,
-    parts: Mapping[str, Group | None],
+    group: Group | None,
     t: Array,
     pose: _Pose | None,
     given: Mapping[str, Any],
-    vehicle: Vehicle | None,
 ) -> dict[str, Any]:
-    """Return the sections of rotor speeds and commands."""
-    out: dict[str, Any] = {}
-    for group in (parts["motors"], parts["commands"]):
-        if group is None:
-            continue
-        values = found.values(group.columns)
-        kind, unit, sure, why = motor_unit(group, values, vehicle)
-        if kind in out:
-            continue
-        found.say(kind, "unit", sure, f"{unit}: {why}")
-        made: Rotors | Commands
-        pairs = 7 if unit == "eRPM" else 1
-        limits: tuple[float, float] | None = None
+    """Return the section of rotor speeds or commands; nothing where the map has it already."""
+    assert group is not None
+    values = found.values(group)
+    kind, unit, sure, why = motor_unit(group, values, found.vehicle)
+    if kind in given:
+        return {}
+    found.say(kind, "unit", sure, f"{unit}: {why}")
+    order, sure, why = _order(found, group, values, t, pose, given.get("gyro"))
+    found.say(kind, "order", sure, why)
+    if kind == "rotors":
         if unit == "eRPM":
             found.say(kind, "pole_pairs", False, "7, of most motors of small racers")
-        if kind == "commands":
-            limits = COMMAND_UNITS[unit] or (0.0, 65535.0)
-            if unit in ("us", "counts", "dshot"):
-                found.say(kind, "range", False, f"{limits[0]:g} to {limits[1]:g}, the usual one")
-        order, sure, why = _order(found, group, values, t, pose, given)
-        found.say(kind, "order", sure, why)
-        if kind == "rotors":
-            made = Rotors(group.columns, unit, order=order, pole_pairs=pairs)
-        else:
-            made = Commands(group.columns, unit, order=order, range=limits)
-        out[kind] = made
-    return out
+        pairs = 7 if unit == "eRPM" else 1
+        return {kind: Rotors(group.columns, unit, order=order, pole_pairs=pairs)}
+    limits = COMMAND_UNITS[unit] or (0.0, 65535.0)
+    if unit in ("us", "counts", "dshot"):
+        found.say(kind, "range", False, f"{limits[0]:g} to {limits[1]:g}, the usual one")
+    return {kind: Commands(group.columns, unit, order=order, range=limits)}
 
 
 def motor_unit(group: Group, values: Array, vehicle: Vehicle | None) -> tuple[str, str, bool, str]:
@@ -610,21 +562,20 @@ def _order(
     values: Array,
     t: Array,
     pose: _Pose | None,
-    given: Mapping[str, Any],
+    gyro: Sensor | None,
 ) -> tuple[Order, bool, str]:
     """Return the order of the rotors, whether it is certain, and why."""
-    if group.key.startswith("place:"):
+    if not group.numbered:
         return ORDERS["windwrench"], True, "the columns are named by the rotors' places"
     text = " ".join(group.columns).lower()
     hint = next((name for word, name in _HINTS.items() if word in text), "windwrench")
-    gyro, thrusts = given.get("gyro"), np.square(values)
     evidence, best = None, DECLARED
-    if isinstance(gyro, Sensor):
-        rates = found.values(gyro.columns) * RATE_UNITS[gyro.unit] @ BODY_AXES[gyro.body]
-        evidence = Evidence(t, thrusts, gyro=rates)
+    if gyro is not None:
+        rates = found.values(gyro) * RATE_UNITS[gyro.unit] @ BODY_AXES[gyro.body]
+        evidence = Evidence(t, np.square(values), gyro=rates)
     elif pose is not None and pose.is_sure:
         best = pose.ranking.best
-        evidence = Evidence(t, thrusts, found.values(given["position"].columns), pose.attitude)
+        evidence = Evidence(t, np.square(values), pose.position, pose.attitude)
     if evidence is None or not evidence.enough:
         return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
     ways = [replace(best, rotors=rotors) for rotors in permutations(ROTORS)]
@@ -647,18 +598,15 @@ def _order(
 def _battery(found: _Found, group: Group | None) -> dict[str, Any]:
     if group is None:
         return {}
-    values = found.values(group.columns)
+    values = found.values(group)
     values = values[np.isfinite(values) & (values > 0.0)]
     if not values.size:
         return {}
     middle = float(np.median(values))
-    unit = group.unit if group.unit in ("V", "mV", "cV") else ""
-    if unit:
-        found.say("battery", "unit", True, f"{unit}: by the column's name")
-    else:
-        unit = "V" if middle < 100.0 else "cV" if middle < 2700.0 else "mV"
-        sure = middle < 60.0 or 2700.0 < middle < 60_000.0
-        found.say("battery", "unit", sure, f"{unit}: its median is {middle:.4g}")
+    guess = "V" if middle < 100.0 else "cV" if middle < 2700.0 else "mV"
+    sure = middle < 60.0 or 2700.0 < middle < 60_000.0
+    why = f"its median is {middle:.4g}"
+    unit = found.unit("battery", group.unit, VOLTAGE_UNITS, lambda: (guess, sure, why))
     return {"battery": Battery(group.columns, unit)}
 
 

@@ -57,7 +57,9 @@ def test_gravity_along_another_axis_is_refused(flown: FlightLog) -> None:
     """A board that is mounted on its side."""
     log = pose_removed(flown)
     assert log.accelerometer is not None
-    with pytest.raises(InputError, match="in the median of a flight, along ax; expected the specific force"):
+    with pytest.raises(
+        InputError, match="in the median of a flight, along ax; expected the specific force"
+    ):
         screen_log(replace(log, accelerometer=log.accelerometer[:, [2, 1, 0]]), VEHICLE)
 
 
