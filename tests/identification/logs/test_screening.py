@@ -12,13 +12,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.support.data_paths import crazyswarm2_file
-from tests.support.hostile_conventions import turned
 from tests.support.parameters import mostly_slow
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
 from windwrench.envs.recording import record_flight
 from windwrench.identification.logs.evidence import Evidence, recognise
-from windwrench.identification.logs.flight_log import FlightLog, write_log
+from windwrench.identification.logs.flight_log import FlightLog, with_rows, write_log
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.readings import DECLARED
 from windwrench.identification.logs.screening import screen_for_estimate, screen_log
@@ -80,34 +79,23 @@ def test_rotors_that_work_against_a_cord_turn_as_declared():
 
 
 @pytest.mark.parametrize(
-    ("columns", "expected"),
+    ("columns", "signs", "expected"),
     [
-        ((2, 1, 0), "px and pz are swapped"),
-        ((0, 2, 1), "py and pz are swapped"),
-        ((1, 0, 2), "px and py are swapped"),
-        ((1, 2, 0), r"p = \(pz, px, py\)"),
-        ((2, 0, 1), r"p = \(py, pz, px\)"),
+        ((2, 1, 0), (1, 1, 1), "px and pz are swapped"),
+        ((1, 2, 0), (1, 1, 1), r"p = \(pz, px, py\)"),
+        ((2, 0, 1), (1, 1, 1), r"p = \(py, pz, px\)"),
+        ((1, 0, 2), (-1, -1, 1), r"p = \(-py, -px, pz\)"),
+        ((0, 1, 2), (1, 1, -1), "position's z points down: negate pz; expected .* z up"),
     ],
 )
 @pytest.mark.parametrize("trajectory", EXCITED)
-def test_position_columns_in_any_order_are_named(trajectory, columns, expected):
+def test_position_columns_along_any_axes_are_named(trajectory, columns, signs, expected):
     """Brisk motion along x alone still agrees with thrust where the two other columns are
     exchanged.
     """
     log = flight(trajectory)
     with pytest.raises(InputError, match=expected):
-        screen_log(replace(log, position=log.position[:, list(columns)]), VEHICLE)
-
-
-def test_a_mirrored_turn_of_the_position_is_named():
-    log = flight(EXCITED[0])
-    with pytest.raises(InputError, match=r"p = \(-py, -px, pz\)"):
-        screen_log(replace(log, position=log.position[:, [1, 0, 2]] * [-1.0, -1.0, 1.0]), VEHICLE)
-
-
-def test_a_negated_height_is_named():
-    with pytest.raises(InputError, match=r"position's z points down: negate pz; expected .* z up"):
-        screen_log(turned(flight("excite"), np.diag([1.0, 1.0, -1.0])), VEHICLE)
+        screen_log(replace(log, position=log.position[:, list(columns)] * signs), VEHICLE)
 
 
 @pytest.mark.parametrize("effect", mostly_slow(names(), SHOWN.__contains__))
@@ -116,11 +104,6 @@ def test_an_undeclared_effect_is_no_wrong_convention(effect):
     size = 1.0 if effect in ("latency", "clock_offset") else 2.0
     trajectory = "ground" if effect == "ground_effect" else "excite"
     assert screen_log(flight(trajectory, effect, size), VEHICLE) == ()
-
-
-@pytest.mark.parametrize("trajectory", [*CLEAN, "hover", "ground"])
-def test_a_clean_flight_passes(trajectory):
-    assert screen_log(flight(trajectory), VEHICLE) == ()
 
 
 def test_a_quiet_hover_decides_nothing():
@@ -156,25 +139,6 @@ def test_short_measured_flights_pass_where_short_is_enough(number):
             screen_log(log, vehicle)
 
 
-def rows(log, keep):
-    return replace(
-        log,
-        **{
-            name: getattr(log, name)[keep]
-            for name in (
-                "t",
-                "position",
-                "quaternion",
-                "rotor_speeds",
-                "voltage",
-                "force",
-                "torque",
-                "valid",
-            )
-        },
-    )
-
-
 def without_pose(log, lost):
     pose = np.column_stack([log.position, log.quaternion])
     pose[lost] = np.nan
@@ -195,12 +159,15 @@ def uneven_clock(log):
 
 TORN = {
     "short": (
-        lambda log: rows(log, log.t < 6.0),
+        lambda log: with_rows(log, log.t < 6.0),
         r"6 s of flight in unbroken runs.*expected at least 10 s",
     ),
-    "very short": (lambda log: rows(log, log.t < 2.0), r"longest unbroken run of poses is 2 s"),
+    "very short": (
+        lambda log: with_rows(log, log.t < 2.0),
+        r"longest unbroken run of poses is 2 s",
+    ),
     "slow": (
-        lambda log: rows(log, np.arange(len(log.t)) % 8 == 0),
+        lambda log: with_rows(log, np.arange(len(log.t)) % 8 == 0),
         r"25 new poses a second; expected at least 50: acceler",
     ),
     "held": (
@@ -230,7 +197,7 @@ TORN = {
     ),
     "rows cut out": (
         lambda log: replace(
-            rows(log, (log.t < 5.0) | (log.t > 6.3)),
+            with_rows(log, (log.t < 5.0) | (log.t > 6.3)),
             t=log.t[: int(np.sum((log.t < 5.0) | (log.t > 6.3)))],
         ),
         r"pose leaps by .* m within 0.005 s at t = 5",
@@ -250,11 +217,23 @@ TORN = {
 }
 
 
+ENOUGH = ("short", "very short", "slow", "held", "lost often", "lost long", "uneven clock")
+PARTS = ("clock jump", "rows cut out")
+
+
 @pytest.mark.parametrize("kind", TORN)
-def test_a_torn_log_is_refused(kind):
+def test_a_torn_log_is_refused_and_an_estimate_needs_less(kind):
     make, expected = TORN[kind]
-    with pytest.raises(InputError, match=f"flight.csv: .*{expected}"):
-        screen_log(make(flight()), VEHICLE)
+    log, said = make(flight()), f"flight.csv: .*{expected}"
+    with pytest.raises(InputError, match=said):
+        screen_log(log, VEHICLE)
+    if kind in (*ENOUGH, *PARTS):
+        notes = screen_for_estimate(log, VEHICLE)[1]
+        assert len(notes) == (kind in PARTS)
+        assert all(re.match(f"warning: .*{expected}", note) for note in notes)
+    else:
+        with pytest.raises(InputError, match=said):
+            screen_for_estimate(log, VEHICLE)
 
 
 def test_a_gap_that_leaves_enough_is_a_note():
@@ -266,58 +245,32 @@ def test_a_gap_that_leaves_enough_is_a_note():
 
 def test_a_gap_in_which_the_vehicle_flew_on_is_no_jump_of_the_clock():
     log = flight(seconds=20.0)
-    screen_log(rows(log, np.abs(log.t - 10.0) > 0.5), VEHICLE)
+    screen_log(with_rows(log, np.abs(log.t - 10.0) > 0.5), VEHICLE)
 
 
-def test_a_file_cut_within_its_last_number_is_refused(tmp_path):
-    """As many fields as there should be, and the last one empty: no line that was left out."""
-    path = tmp_path / "flight.csv"
-    write_log(rows(flight(), flight().t < 0.1), path)
-    path.write_text(path.read_text()[:-20])
-    with pytest.raises(
-        InputError,
-        match=r"flight.csv: .*row 20 \(line 21\) (has \d+ field\(s\); expected 19|is empty)",
-    ):
-        read_log(path)
-
-
-@pytest.mark.parametrize("cut", [60, 150])
+@pytest.mark.parametrize("cut", [20, 60, 150])
 def test_a_file_cut_within_its_last_line_says_so(tmp_path, cut):
+    """A last number that is empty has as many fields as there should be: no line was left out."""
     path = tmp_path / "flight.csv"
-    write_log(rows(flight(), flight().t < 0.1), path)
+    write_log(with_rows(flight(), flight().t < 0.1), path)
     path.write_text(path.read_text()[:-cut])
-    log = read_log(path)
-    assert len(log.t) == 19
-    assert "the last line was cut off, and left out" in log.notes
-
-
-# for an estimate
-
-ENOUGH = ("short", "very short", "slow", "held", "lost often", "lost long", "uneven clock")
-PARTS = ("clock jump", "rows cut out")
-
-
-@pytest.mark.parametrize("kind", TORN)
-def test_an_estimate_needs_less_than_a_diagnosis(kind):
-    make, expected = TORN[kind]
-    log = make(flight())
-    if kind in ENOUGH:
-        assert screen_for_estimate(log, VEHICLE)[1] == ()
-    elif kind in PARTS:
-        (note,) = screen_for_estimate(log, VEHICLE)[1]
-        assert re.search(expected, note)
-        assert note.startswith("warning: ")
+    if cut == 20:
+        with pytest.raises(InputError, match=r"flight.csv: .*row 20 \(line 21\)"):
+            read_log(path)
     else:
-        with pytest.raises(InputError, match=f"flight.csv: .*{expected}"):
-            screen_for_estimate(log, VEHICLE)
+        log = read_log(path)
+        assert len(log.t) == 19
+        assert "the last line was cut off, and left out" in log.notes
 
 
 def test_two_seconds_and_a_hover_are_enough_for_an_estimate():
     log = flight("hover")
     for seconds in (2.0, 10.0):
-        assert screen_for_estimate(rows(log, log.t < seconds), VEHICLE)[1] == ()
+        assert screen_for_estimate(with_rows(log, log.t < seconds), VEHICLE)[1] == ()
     with pytest.raises(InputError, match="t looks like milliseconds"):
-        screen_for_estimate(replace(rows(log, log.t < 2.0), t=1e3 * log.t[log.t < 2.0]), VEHICLE)
+        screen_for_estimate(
+            replace(with_rows(log, log.t < 2.0), t=1e3 * log.t[log.t < 2.0]), VEHICLE
+        )
 
 
 def test_a_frozen_pose_counts_as_none():
@@ -363,7 +316,7 @@ def test_another_vehicle_than_the_log_names_is_doubted():
 
 
 def test_a_log_names_its_vehicle(tmp_path):
-    log = rows(flight(), flight().t < 0.1)
+    log = with_rows(flight(), flight().t < 0.1)
     for name, suffix in (("crazyflie", ".csv"), ("my own-1", ".parquet"), ("no,name\x1b", ".csv")):
         path = tmp_path / f"flight{suffix}"
         write_log(replace(log, vehicle=name), path)

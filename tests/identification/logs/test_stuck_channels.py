@@ -9,13 +9,11 @@ import pytest
 
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.envs.recording import record_flight
-from windwrench.identification.logs.flight_log import FlightLog
-from windwrench.identification.logs.screening import screen_log
+from windwrench.identification.logs.flight_log import FlightLog, with_rows
 from windwrench.identification.logs.stuck_channels import stuck_notes
 from windwrench.identification.wrench_series import estimate_log
 
 VEHICLE = load_vehicle("ardrone2")
-FIELDS = ("t", "position", "quaternion", "rotor_speeds", "force", "torque")
 
 
 @cache
@@ -23,10 +21,6 @@ def flight():
     return FlightLog(
         **record_flight(VEHICLE, trajectory="excite", seconds=14.0, seed=3), name="flight.csv"
     )
-
-
-def rows(log, keep):
-    return FlightLog(**{name: getattr(log, name)[keep] for name in FIELDS}, name=log.name)
 
 
 def late(log):
@@ -57,29 +51,18 @@ def outliers(log):
 
 
 TAMPERED = {
-    "a second of rows dropped": lambda log: rows(log, ~late(log) | (log.t > 6.0)),
-    "every other row": lambda log: rows(log, np.arange(len(log.t)) % 2 == 0),
+    "a second of rows dropped": lambda log: with_rows(log, ~late(log) | (log.t > 6.0)),
+    "every other row": lambda log: with_rows(log, np.arange(len(log.t)) % 2 == 0),
     "outliers": outliers,
     "a rotor speed stands still": column("rotor_speeds", 1, held),
     "a rotor speed is zero": column(
         "rotor_speeds", 1, lambda log, values: np.where(late(log), 0.0, values)
     ),
-    "revolutions per minute": lambda log: replace(log, rotor_speeds=9.549 * log.rotor_speeds),
-    "rotors swapped": lambda log: replace(log, rotor_speeds=log.rotor_speeds[:, [1, 0, 2, 3]]),
     "a rotor's column twice": lambda log: replace(
         log, rotor_speeds=log.rotor_speeds[:, [0, 0, 2, 3]]
     ),
-    "x the other way": column("position", 0, lambda _, values: -values),
     "x stands still": column("position", 0, held),
-    "x and y swapped": lambda log: replace(log, position=log.position[:, [1, 0, 2]]),
-    "z the other way": column("position", 2, lambda _, values: -values),
-    "millimetres": lambda log: replace(log, position=1000.0 * log.position),
     "the attitude stands still": held_attitude,
-    "the attitude the other way": lambda log: replace(
-        log, quaternion=log.quaternion * [1.0, -1.0, -1.0, -1.0]
-    ),
-    "scalar last": lambda log: replace(log, quaternion=log.quaternion[:, [1, 2, 3, 0]]),
-    "milliseconds": lambda log: replace(log, t=1000.0 * log.t),
     "moved for good": lambda log: replace(
         log, position=log.position + np.where(late(log)[:, None], [3.0, 0.0, 0.0], 0.0)
     ),
@@ -110,6 +93,11 @@ def test_rotors_that_are_alike_in_pairs_are_a_flight_in_a_plane():
 
 @pytest.mark.parametrize("name", TAMPERED)
 def test_a_tampered_log_is_refused_noted_or_answered_as_well_as_the_clean_one(name):
+    said = {
+        "a rotor speed stands still": "omega2 stands still for 9",
+        "x stands still": "px stands still",
+        "the attitude stands still": "the attitude stands still",
+    }
     force, torque, notes = wrench_errors(flight())
     assert not notes
     try:
@@ -121,22 +109,8 @@ def test_a_tampered_log_is_refused_noted_or_answered_as_well_as_the_clean_one(na
     if refusal:
         assert "flight.csv" in refusal
     else:
+        assert said.get(name, "") in " ".join(notes)
         assert notes or (spoiled_force < 1.3 * force and spoiled_torque < 1.3 * torque)
-
-
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        ("a rotor speed stands still", "omega2 stands still for 9"),
-        ("x stands still", "px stands still"),
-        ("the attitude stands still", "the attitude stands still"),
-    ],
-)
-def test_what_stands_still_is_named_to_the_diagnosis_too(name, said):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        notes = screen_log(TAMPERED[name](flight()), VEHICLE)
-    assert any(said in note for note in notes)
 
 
 def test_a_clean_flight_and_a_rotor_at_its_limit_are_not_noted():
