@@ -341,9 +341,9 @@ class _Screening:
         thrust = np.square(log.rotor_speeds) @ self.vehicle.k
         thrust = low_pass(thrust, CUTOFFS.flying_hz, log.period) if len(log.t) > 30 else 0 * thrust
         turning = thrust[thrust > 0.3 * float(np.quantile(thrust, 0.95))]
-        flying = thrust > 0.5 * float(np.median(turning))
+        aloft = thrust > 0.5 * float(np.median(turning))
         step = np.minimum(np.diff(log.t, append=log.t[-1] + log.period), max(0.1, 3.5 * log.period))
-        step = np.where(flying, step, 0.0)
+        step = np.where(aloft, step, 0.0)
         left = sum(float(step[piece[0] : piece[-1] + 1].sum()) for piece in pieces)
         whole = float(step.sum())
         if left < least - 1e-9:
