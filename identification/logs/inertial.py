@@ -68,7 +68,8 @@ def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, tu
             doubt = f"never change: the {field} was not read"
         if doubt:
             notes.append(f"{', '.join(names)} {doubt}. They were left out")
-            log = replace(log, **{field: None})
+            is_gyro = field == "gyro"
+            log = replace(log, gyro=None) if is_gyro else replace(log, accelerometer=None)
     return log, tuple(notes)
 
 
@@ -158,7 +159,8 @@ def _force_shares(
             turned.apply(measured @ reading.turn.T), t, axis=0, initial=0.0
         )
         way = cumulative_trapezoid(speed, t, axis=0, initial=0.0)
-        return second_difference(t, way) + reading.lacks_gravity * g
+        mean_force: Array = second_difference(t, way) + reading.lacks_gravity * g
+        return mean_force
 
     needed = second_difference(pose_times, position) + g
     size = _middle(needed)

@@ -163,9 +163,11 @@ def check_magnitudes(log: FlightLog) -> None:
         (GYRO, log.gyro),
     )
     for names, values in groups:
-        beyond = [] if values is None else np.argwhere(np.abs(values) > MAGNITUDES.largest)
-        for row, column in beyond:
-            assert values is not None
+        if values is None:
+            continue
+        beyond = np.argwhere(np.abs(values) > MAGNITUDES.largest)  # False where NaN
+        if beyond.size:
+            row, column = beyond[0]
             raise InputError(
                 f"{log.source}: column {names[column]}, row {row + 1}: "
                 f"{values[row, column]:.3g}; expected a number within {MAGNITUDES.largest:g}"

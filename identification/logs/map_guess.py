@@ -578,7 +578,7 @@ def _order(
         evidence = Evidence(t, np.square(values), pose.position, pose.attitude)
     if evidence is None or not evidence.enough:
         return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
-    ways = [replace(best, rotors=rotors) for rotors in permutations(ROTORS)]
+    ways = [replace(best, rotors=(a, b, c, d)) for a, b, c, d in permutations(ROTORS)]
     ranking = Ranking.of(evidence, ways, torques=True)
     left, lead = ranking.fit.torque, ranking.other("rotors")[1]
     order = ranking.best.motors
