@@ -139,19 +139,22 @@ def test_the_page_in_a_real_browser(watched, tmp_path):
     assert not [line for line in shown.stderr.splitlines() if "CONSOLE" in line]
 
 
-def fed(log, rows):
-    """A command that was fed rows of a flight, once it has printed as many estimates, their lines,
-    and the thread that reads them.
+def fed(log, *rows):
+    """A command that was fed a flight up to each of some rows, once it has printed as many
+    estimates; their lines, and the thread that reads them.
     """
     text = as_csv(flight()).splitlines(keepends=True)
     running = start("-", "--vehicle", "ardrone2", "--record", log)
     lines = []
     reader = threading.Thread(target=lambda: lines.extend(running.stdout))
     reader.start()
-    running.stdin.write("".join(text[: rows + 1]).encode())
-    running.stdin.flush()
-    while len(lines) < rows + 1 and running.poll() is None:
-        time.sleep(0.02)
+    fed_lines = 0
+    for end in rows:
+        running.stdin.write("".join(text[fed_lines : end + 1]).encode())
+        running.stdin.flush()
+        fed_lines = end + 1
+        while len(lines) < fed_lines and running.poll() is None:
+            time.sleep(0.02)
     return running, lines, reader
 
 
@@ -171,7 +174,7 @@ def test_its_user_ends_it_and_loses_nothing(tmp_path):
 
 def test_a_recording_that_is_killed_is_a_log_up_to_its_last_second(tmp_path):
     log = tmp_path / "flight.csv"
-    running, _, reader = fed(log, 1200)
+    running, _, reader = fed(log, 1200, 1210)  # what is printed is recorded before more is read
     os.kill(running.pid, signal.SIGKILL)
     running.wait()
     reader.join()
