@@ -1,10 +1,12 @@
 """Flight logs in other conventions than they declare, and the words by which each is named."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+ONE = np.eye(3)
 DOWN = np.diag([1.0, -1.0, -1.0])  # forward, left, up to forward, right, down
 Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # z up to y up
 
@@ -24,11 +26,34 @@ def turned(log, position=None, attitude=None):
     )
 
 
+def framed(log, position=ONE, world=ONE, body=ONE):
+    """The log with positions times a matrix, and attitudes seen from another world and body."""
+    if world is ONE and body is ONE:
+        return turned(log, position)
+    return turned(log, position, lambda R: world @ R @ body)
+
+
+def placed(log, order, signs=(1.0, 1.0, 1.0)):
+    """The log with the columns of its position in another order and of other signs."""
+    return replace(log, position=log.position[:, order] * signs)
+
+
+def scaled(log, **factors):
+    """The log with channels in other units."""
+    return replace(log, **{name: factor * getattr(log, name) for name, factor in factors.items()})
+
+
+def permuted(log, order):
+    return replace(log, rotor_speeds=log.rotor_speeds[:, order])
+
+
 def shifted(log, seconds):
-    rotors = np.column_stack(
-        [np.interp(log.t - seconds, log.t, column) for column in log.rotor_speeds.T]
-    )
-    return replace(log, rotor_speeds=rotors)
+    rotors = [np.interp(log.t - seconds, log.t, column) for column in log.rotor_speeds.T]
+    return replace(log, rotor_speeds=np.column_stack(rotors))
+
+
+def conjugate(log):
+    return replace(log, quaternion=log.quaternion * [1, -1, -1, -1])
 
 
 def scalar_last(log):
@@ -40,144 +65,92 @@ def scalar_first_as_last(log):
     return replace(log, quaternion=log.quaternion[:, [3, 0, 1, 2]])
 
 
-def conjugate(log):
-    return replace(log, quaternion=log.quaternion * [1, -1, -1, -1])
+def of_log(change, *arguments, then=None):
+    """Return a change of a log with its arguments, and another one after it."""
+    return lambda log: (then or (lambda same: same))(change(log, *arguments))
 
 
-def ned(log):
-    return turned(log, DOWN, lambda R: DOWN @ R @ DOWN)
-
+NED, Y_UP_WORLD, Y_UP_BODY = (DOWN, DOWN, DOWN), (Y_UP, Y_UP, ONE), (Y_UP, Y_UP, Y_UP.T)
+AS_LAST = "scalar first under the headers of scalar last.*"
+as_last = partial(of_log, then=scalar_first_as_last)
 
 HOSTILE = {
     "scalar last": (
         scalar_last,
         "quaternion is scalar last; expected scalar first.*reorder the columns",
     ),
-    "scalar first as last": (
-        scalar_first_as_last,
-        "quaternion is scalar first under the headers of scalar last.*rename the columns",
-    ),
-    "scalar first as last, conjugate": (
-        lambda log: scalar_first_as_last(conjugate(log)),
-        "scalar first under the headers of scalar last.*world to body",
-    ),
-    "scalar first as last, NED": (
-        lambda log: scalar_first_as_last(ned(log)),
-        "scalar first under the headers of scalar last.*world is z down",
-    ),
-    "scalar first as last, y up": (
-        lambda log: scalar_first_as_last(turned(log, Y_UP, lambda R: Y_UP @ R)),
-        "scalar first under the headers of scalar last.*world is y up",
-    ),
+    "scalar first as last": (scalar_first_as_last, f"quaternion is {AS_LAST}rename the columns"),
+    "scalar first as last, conjugate": (as_last(conjugate), f"{AS_LAST}world to body"),
+    "scalar first as last, NED": (as_last(framed, *NED), f"{AS_LAST}world is z down"),
+    "scalar first as last, y up": (as_last(framed, *Y_UP_WORLD), f"{AS_LAST}world is y up"),
     "scalar first as last, y up body": (
-        lambda log: scalar_first_as_last(turned(log, Y_UP, lambda R: Y_UP @ R @ Y_UP.T)),
-        "scalar first under the headers of scalar last.*world and the body are y up",
+        as_last(framed, *Y_UP_BODY),
+        f"{AS_LAST}world and the body are y up",
     ),
     "conjugate": (conjugate, "quaternion is world to body; expected body to world"),
     "scalar last, conjugate": (
-        lambda log: scalar_last(conjugate(log)),
+        of_log(conjugate, then=scalar_last),
         "quaternion is scalar last and world to body",
     ),
-    "NED": (ned, "world is z down .north, east, down. and the body z down"),
-    "z down": (
-        lambda log: turned(log, DOWN, lambda R: DOWN @ R),
-        "world is z down while the body axes",
-    ),
+    "NED": (of_log(framed, *NED), "world is z down .north, east, down. and the body z down"),
+    "z down": (of_log(framed, DOWN, DOWN), "world is z down while the body axes"),
     "FRD body": (
-        lambda log: turned(log, None, lambda R: R @ DOWN),
+        of_log(framed, ONE, ONE, DOWN),
         "body axes are forward, right, down in a world",
     ),
-    "NED position": (lambda log: turned(log, DOWN), "position is z down .* but the attitude z up"),
+    "NED position": (of_log(framed, DOWN), "position is z down .* but the attitude z up"),
     "NED attitude": (
-        lambda log: turned(log, None, lambda R: DOWN @ R @ DOWN),
+        of_log(framed, ONE, DOWN, DOWN),
         "attitude is z down .* but the position",
     ),
     "y up": (
-        lambda log: turned(log, Y_UP, lambda R: Y_UP @ R),
+        of_log(framed, *Y_UP_WORLD),
         "world is y up, .* with body axes forward, left, up",
     ),
-    "y up body": (
-        lambda log: turned(log, Y_UP, lambda R: Y_UP @ R @ Y_UP.T),
-        "world and the body are y up",
-    ),
-    "y, z swapped": (
-        lambda log: replace(log, position=log.position[:, [0, 2, 1]]),
-        "py and pz are swapped, the attitude",
-    ),
+    "y up body": (of_log(framed, *Y_UP_BODY), "world and the body are y up"),
+    "y, z swapped": (of_log(placed, [0, 2, 1]), "py and pz are swapped, the attitude"),
     "all y, z swapped": (
-        lambda log: replace(
-            log, position=log.position[:, [0, 2, 1]], quaternion=log.quaternion[:, [0, 1, 3, 2]]
-        ),
+        lambda log: replace(placed(log, [0, 2, 1]), quaternion=log.quaternion[:, [0, 1, 3, 2]]),
         "y and z are swapped, in posi",
     ),
-    "x, y swapped": (
-        lambda log: replace(log, position=log.position[:, [1, 0, 2]]),
-        "px and py are swapped",
-    ),
+    "x, y swapped": (of_log(placed, [1, 0, 2]), "px and py are swapped"),
     "px negated": (
-        lambda log: replace(log, position=log.position * [-1.0, 1.0, 1.0]),
+        of_log(placed, [0, 1, 2], (-1.0, 1.0, 1.0)),
         "px points the other way .* negate px",
     ),
     "py negated": (
-        lambda log: replace(log, position=log.position * [1.0, -1.0, 1.0]),
+        of_log(placed, [0, 1, 2], (1.0, -1.0, 1.0)),
         "py points the other way .* negate py",
     ),
     "position turned by 180": (
-        lambda log: replace(log, position=log.position * [-1.0, -1.0, 1.0]),
+        of_log(placed, [0, 1, 2], (-1.0, -1.0, 1.0)),
         "turned against the attitude's by 180 degrees",
     ),
     "position turned by 90": (
-        lambda log: replace(log, position=log.position[:, [1, 0, 2]] * [-1.0, 1.0, 1.0]),
+        of_log(placed, [1, 0, 2], (-1.0, 1.0, 1.0)),
         "turned against the attitude's by 90 degrees",
     ),
     "scalar last, NED": (
-        lambda log: scalar_last(ned(log)),
+        of_log(framed, *NED, then=scalar_last),
         "quaternion is scalar last and the world (is )?z down",
     ),
-    "millimetres": (
-        lambda log: replace(log, position=1e3 * log.position),
-        "px, py, pz look like millimetres",
-    ),
-    "centimetres": (
-        lambda log: replace(log, position=1e2 * log.position),
-        "px, py, pz look like centimetres",
-    ),
-    "deg/s": (
-        lambda log: replace(log, rotor_speeds=np.degrees(log.rotor_speeds)),
-        "look like degrees per second",
-    ),
-    "rpm": (
-        lambda log: replace(log, rotor_speeds=log.rotor_speeds * 30 / np.pi),
-        "look like revolutions per minute",
-    ),
-    "Hz": (
-        lambda log: replace(log, rotor_speeds=log.rotor_speeds / (2 * np.pi)),
-        "look like revolutions per second",
-    ),
-    "ms": (
-        lambda log: replace(log, t=1e3 * log.t),
-        "t looks like milliseconds: .*divide t by 1000",
-    ),
-    "us": (lambda log: replace(log, t=1e6 * log.t), "t looks like microseconds"),
+    "millimetres": (partial(scaled, position=1e3), "px, py, pz look like millimetres"),
+    "centimetres": (partial(scaled, position=1e2), "px, py, pz look like centimetres"),
+    "deg/s": (partial(scaled, rotor_speeds=180 / np.pi), "look like degrees per second"),
+    "rpm": (partial(scaled, rotor_speeds=30 / np.pi), "look like revolutions per minute"),
+    "Hz": (partial(scaled, rotor_speeds=0.5 / np.pi), "look like revolutions per second"),
+    "ms": (partial(scaled, t=1e3), "t looks like milliseconds: .*divide t by 1000"),
+    "us": (partial(scaled, t=1e6), "t looks like microseconds"),
     "rotors late": (
-        lambda log: shifted(log, 0.3),
+        of_log(shifted, 0.3),
         r"rotor speeds come 0\.[23]\d s too late .* put omega1..omega4 .* earlier",
     ),
-    "rotors early": (
-        lambda log: shifted(log, -0.5),
-        r"rotor speeds come 0\.[45]\d s too early .* later",
-    ),
+    "rotors early": (of_log(shifted, -0.5), r"rotor speeds come 0\.[45]\d s too early .* later"),
     "Betaflight": (
-        lambda log: replace(log, rotor_speeds=log.rotor_speeds[:, [2, 3, 1, 0]]),
+        of_log(permuted, [2, 3, 1, 0]),
         "rotors look permuted: omega1..omega4 are rotors 3,4,2,1 of this vehicle .Betaflight's "
         "order",
     ),
-    "PX4": (
-        lambda log: replace(log, rotor_speeds=log.rotor_speeds[:, [3, 1, 0, 2]]),
-        "rotors 4,2,1,3 .* PX4",
-    ),
-    "Crazyflie": (
-        lambda log: replace(log, rotor_speeds=log.rotor_speeds[:, ::-1]),
-        "rotors 4,3,2,1 .* Crazyflie's",
-    ),
+    "PX4": (of_log(permuted, [3, 1, 0, 2]), "rotors 4,2,1,3 .* PX4"),
+    "Crazyflie": (of_log(permuted, [3, 2, 1, 0]), "rotors 4,3,2,1 .* Crazyflie's"),
 }
