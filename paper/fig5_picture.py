@@ -10,19 +10,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from ..envs.plant import TICK
+from .drawing import COLOURS, only_ticks, styled
 from .fig5_estimators import ERRORS
 from .fig5_flights import FLIGHTS, NOISES, Array
 
-_COLOURS = {"low": "#7fb0d8", "high": "#17375e"}
+_NOISE_COLOURS = {"low": "#7fb0d8", "high": "#17375e"}
 _MARKERS = {"hover": "o", "yawing": "^"}
 _LINES = {
-    "observer low": ("#d1495b", "observer, tuned at low noise"),
-    "observer anew": ("#edae49", "observer, re-tuned"),
-    "UKF low": ("#30638e", "UKF, tuned at low noise"),
+    "observer low": (COLOURS[0], "observer, tuned at low noise"),
+    "observer anew": (COLOURS[2], "observer, re-tuned"),
+    "UKF low": (COLOURS[1], "UKF, tuned at low noise"),
 }
 _PLANT_TITLES = {"exact": "exact plant", "disturbed": "standard plant (unmodelled disturbance)"}
 
 
+@styled
 def draw(
     ratios: Mapping[tuple[str, str, str, str, str], tuple[float, float, float]],
     labels: Sequence[str],
@@ -39,8 +41,8 @@ def draw(
         examples: (noise, estimator) -> states (n, 20) of the example flight.
         seeds: that the ratios are over.
     """
-    figure = Figure(figsize=(14, 13.5), layout="constrained")
-    parts: Any = figure.subfigures(3, 1, height_ratios=[1.0, 1.0, 1.0])
+    figure = Figure(figsize=(14, 13.5))
+    parts: Any = figure.subfigures(3, 1)
     top, middle, bottom = parts
     _draw_examples(top, truth, examples)
     for part, plant in ((middle, "disturbed"), (bottom, "exact")):
@@ -62,15 +64,12 @@ def _draw_examples(
             for name, (colour, text) in _LINES.items():
                 axes.plot(t, examples[noise, name][rows, state], color=colour, lw=1.3, label=text)
             axes.plot(t, truth[rows, true], color="black", lw=1.0, ls="--", label="true")
-            axes.spines[["top", "right"]].set_visible(False)
             if column == 0:
                 axes.set_ylabel(label)
         sizes = f"{1e3 * NOISES[noise].sigma_pos_m:g} mm, {NOISES[noise].sigma_att_rad:g} rad"
-        grid[0, column].set_title(
-            f"{noise} noise ({sizes}): one hovering flight, exact plant", loc="left", fontsize=11
-        )
+        grid[0, column].set_title(f"{noise} noise ({sizes}): one hovering flight, exact plant")
         grid[1, column].set_xlabel("time (s)")
-    grid[1, 0].legend(frameon=False, fontsize=9, loc="lower right")
+    grid[1, 0].legend(loc="lower right")
 
 
 def _draw_ratios(
@@ -86,7 +85,6 @@ def _draw_ratios(
     figure.suptitle(
         f"Ratio of RMSE, {_PLANT_TITLES[plant]}: in the green the first named errs less "
         f"(95 % intervals, {seeds} seeds)",
-        fontsize=11,
         x=0.01,
         ha="left",
     )
@@ -109,33 +107,31 @@ def _draw_ratios(
         ticks = [
             v for v in (0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10, 20) if lowest < v < highest
         ]
-        axes.set_xticks(ticks, [f"{v:g}" for v in ticks], fontsize=8)
-        axes.set_xticks([], minor=True)
-        axes.set_title(
-            error.replace("_", ", ") + (" state" if "steady" in error else ""), fontsize=10
-        )
+        only_ticks(axes.xaxis, ticks, fontsize=8)
+        title = error.replace("_", ", ") + (" state" if "steady" in error else "")
+        axes.set_title(title, loc="center")
         axes.grid(axis="x", color="0.9", lw=0.6)
         axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
         axes.set_xlabel("first better  |  second better", fontsize=8)
     panels[0].set_yticks(range(len(labels)), labels, fontsize=9)
     for noise in NOISES:
         for flight in FLIGHTS:
             panels[-1].plot(
-                [], [], _MARKERS[flight], color=_COLOURS[noise], label=f"{noise} noise, {flight}"
+                [],
+                [],
+                _MARKERS[flight],
+                color=_NOISE_COLOURS[noise],
+                label=f"{noise} noise, {flight}",
             )
-    panels[-1].legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    panels[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
 def _draw_pair(
     axes: Axes, row: int, values: Mapping[tuple[str, str], tuple[float, float, float]]
 ) -> None:
     """Draw a pair's four ratios, (flight, noise) -> ratio and interval, one below the other."""
-    if not values:
-        axes.text(1.02, row, "not compared", fontsize=8, va="center", color="0.5")
     for k, (noise, flight) in enumerate((n, f) for n in NOISES for f in FLIGHTS):
-        if (flight, noise) in values:
-            value, low, high = values[flight, noise]
-            y = row + 0.17 * (k - 1.5)
-            axes.plot([low, high], [y, y], color=_COLOURS[noise], lw=1.8)
-            axes.plot(value, y, _MARKERS[flight], color=_COLOURS[noise], ms=5)
+        value, low, high = values[flight, noise]
+        y = row + 0.17 * (k - 1.5)
+        axes.plot([low, high], [y, y], color=_NOISE_COLOURS[noise], lw=1.8)
+        axes.plot(value, y, _MARKERS[flight], color=_NOISE_COLOURS[noise], ms=5)
