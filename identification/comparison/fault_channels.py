@@ -104,8 +104,8 @@ def read_channels(
     Raises:
         InputError: the file cannot be read, or lacks one of the three.
     """
-    if log_map is None and reader in (None, "px4_ulog") and _is_ulog(path):
-        return _of_ulog(path)
+    if log_map is None and reader in (None, "px4_ulog") and (found := _of_ulog(path)):
+        return found
     log = read_log(path, reader, vehicle, log_map)
     return channels_of_log(log), log.notes
 
@@ -117,15 +117,15 @@ def channels_of(path: Path, log: FlightLog) -> Channels:
     Raises:
         InputError: gyro, accelerometer or commands are missing.
     """
-    return _of_ulog(path)[0] if _is_ulog(path) else channels_of_log(log)
+    found = _of_ulog(path)
+    return found[0] if found else channels_of_log(log)
 
 
-def _is_ulog(path: Path) -> bool:
+def _of_ulog(path: Path) -> tuple[Channels, tuple[str, ...]] | None:
+    """Return the streams of a PX4 log, and notes; None of another file."""
     reader = reader_by_content(path)
-    return reader is not None and reader.name == "px4_ulog"
-
-
-def _of_ulog(path: Path) -> tuple[Channels, tuple[str, ...]]:
+    if reader is None or reader.name != "px4_ulog":
+        return None
     streams, notes, motors = px4_channels.read_streams(path)
     first, second, third, fourth = (f"PX4 motor {motor}" for motor in motors)
     channels = Channels(

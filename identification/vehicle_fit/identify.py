@@ -127,7 +127,6 @@ def identify(
         vehicle,
         tuple(estimates),
         sources,
-        geometry,
         tuple(pieces),
         fit,
         tuple(notes),

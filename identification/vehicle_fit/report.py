@@ -4,6 +4,7 @@ against fitted force and torque.
 
 import json
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -35,12 +36,7 @@ def identified_data(found: Identified) -> dict[str, Any]:
         "mass_kg": found.vehicle.mass,
         "flight_s": found.seconds,
         "segments": found.segments,
-        "channels": {
-            "force": found.sources.force,
-            "rate": found.sources.rate,
-            "rotors": found.sources.rotors,
-            "velocity": found.sources.velocity,
-        },
+        "channels": asdict(found.sources),
         "estimates": [
             {
                 "name": e.name,

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
 from .channels import MotionPiece, Sources
-from .geometry import Geometry
 from .solve import VehicleFit
 
 Array = NDArray[np.float64]
@@ -48,7 +47,6 @@ class Identified:
     vehicle: Vehicle
     estimates: tuple[Estimate, ...]
     sources: Sources
-    geometry: Geometry
     pieces: tuple[MotionPiece, ...]
     fit: VehicleFit
     notes: tuple[str, ...]
