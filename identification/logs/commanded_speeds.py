@@ -100,7 +100,7 @@ def _with_stated_thrust(
     thrust = np.polynomial.polynomial.polyval(
         counts * (reference / model.full_voltage), model.thrust
     )
-    speeds = np.sqrt(np.where(command > 0.0, thrust, 0.0) / vehicle.k)
+    speeds = np.sqrt(np.where(command > 0.0, np.maximum(thrust, 0.0), 0.0) / vehicle.k)
     terms = " + ".join(f"{c:.4g} u^{i}" if i else f"{c:.4g}" for i, c in enumerate(model.thrust))
     notes = [
         f"thrust model: no rotor speeds in the log; a motor is assumed to give {terms} N at "

@@ -367,6 +367,9 @@ def parse_map(value: object, where: str, name: str = "") -> LogMap:
     extra = given.pop("extra", {})
     if not isinstance(extra, dict):
         raise InputError(f"{where}: extra: {_shown(extra)}; expected a mapping of names")
+    for key, part in extra.items():
+        if isinstance(part, dict) and not part.get("columns"):
+            raise InputError(f"{where}: extra: {key}: columns: missing; expected some of the table")
     given["extra"] = {
         str(key): checked(Columns, _filled(part, f"{where}: extra"), f"{where}: extra: {key}")
         for key, part in extra.items()
