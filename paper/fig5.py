@@ -51,12 +51,7 @@ _RESAMPLES = 4000
 Scores = dict[tuple[str, str, str, str], Array]
 
 
-def run(seeds: int, progress: Progress) -> Result:
-    """Fly, estimate and compare; see ``compare``."""
-    return compare(seeds, progress)
-
-
-def compare(seeds: int, progress: Progress, evaluations: int = 120) -> Result:
+def run(seeds: int, progress: Progress, evaluations: int = 120) -> Result:
     """Run every estimator over the same flights.
 
     Args:
@@ -82,7 +77,8 @@ def compare(seeds: int, progress: Progress, evaluations: int = 120) -> Result:
     for (plant, flight, noise), flown in flights.items():
         for name, run_over in _runners(plant, noise, tunings).items():
             states = [run_over(f.samples) for f in flown]
-            scores[plant, flight, noise, name] = _rows(states, flown)
+            scored = [score(s, f) for s, f in zip(states, flown, strict=True)]
+            scores[plant, flight, noise, name] = np.array(scored)
             if plant == "exact" and flight == "hover":
                 examples[noise, name] = states[0]
     progress(0.98)
@@ -125,11 +121,6 @@ def _runners(
         "UKF anew": runner(WrenchUKF(vehicle, ukf_anew, TICK)),
         "observer anew": runner(NonlinearObserver(vehicle, observer_anew, TICK)),
     }
-
-
-def _rows(states: Sequence[Array], flights: Sequence[Flight]) -> Array:
-    scored = [asdict(score(s, f)) for s, f in zip(states, flights, strict=True)]
-    return np.array([[row[name] for name in (*ERRORS, "nis")] for row in scored])
 
 
 def ratio(rows: Array, rival: Array) -> tuple[float, float, float]:

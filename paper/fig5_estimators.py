@@ -3,7 +3,7 @@ own.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,18 +28,8 @@ _WORST = 1e3  # cost of an estimate that is not finite
 Runner = Callable[[Array], Array]
 
 
-@dataclass(frozen=True)
-class Score:
-    """Errors of one estimator on one flight."""
-
-    force_transient: float  # N, root mean square of the error's length
-    force_steady: float
-    torque_transient: float  # Nm
-    torque_steady: float
-    nis: float  # mean over the steady state; NaN where there is none
-
-
 UKF_TUNED = ("motor_torque_noise", "torque_walk", "thrust_noise", "force_walk")
+# root mean squares of the error's length: N, N, Nm, Nm
 ERRORS = ("force_transient", "force_steady", "torque_transient", "torque_steady")
 
 
@@ -57,16 +47,18 @@ def runner(estimator: WrenchUKF | NonlinearObserver) -> Runner:
     return run
 
 
-def score(states: Array, flight: Flight) -> Score:
-    """Return the errors of the states (n, 20) against a flight's truth."""
+def score(states: Array, flight: Flight) -> list[float]:
+    """Return the four errors of the states (n, 20) against a flight's truth, and the mean NIS of
+    the steady state, NaN where there is none.
+    """
     force = np.sum(np.square(states[:, FORCE_STATE] - flight.wrench[:, :3]), axis=1)
     torque = np.sum(np.square(states[:, TORQUE_STATE] - flight.wrench[:, 3:]), axis=1)
-    a, b, c, d = (
+    errors = [
         float(np.sqrt(np.mean(square[window(limits)])))
         for square in (force, torque)
         for limits in (TRANSIENT, STEADY)
-    )
-    return Score(a, b, c, d, float(np.mean(states[window(STEADY), NIS])))
+    ]
+    return [*errors, float(np.mean(states[window(STEADY), NIS]))]
 
 
 def cost(run: Runner, flights: Sequence[Flight]) -> float:
@@ -75,10 +67,8 @@ def cost(run: Runner, flights: Sequence[Flight]) -> float:
     """
     total = 0.0
     for flight in flights:
-        s = score(run(flight.samples), flight)
-        total += (s.force_transient + s.force_steady) / _FORCE_SIZE + (
-            s.torque_transient + s.torque_steady
-        ) / _TORQUE_SIZE
+        force_1, force_2, torque_1, torque_2, _ = score(run(flight.samples), flight)
+        total += (force_1 + force_2) / _FORCE_SIZE + (torque_1 + torque_2) / _TORQUE_SIZE
     return total / len(flights) if np.isfinite(total) else _WORST
 
 
