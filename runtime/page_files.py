@@ -70,17 +70,11 @@ def write_png(figure: "Figure", path: Path) -> None:
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=_DPI)
     picture = Image.open(buffer).convert("RGB")
-    with replaced(path) as partial:
-        with_few_colours(picture).save(partial, format="png", optimize=True)
-
-
-def with_few_colours(picture: Any) -> Any:
-    """Return a picture (a PIL image, RGB) with the 128 colours that come nearest to its own."""
-    from PIL import Image
-
-    return picture.quantize(
+    few = picture.quantize(
         _COLOURS, method=Image.Quantize.MEDIANCUT, kmeans=3, dither=Image.Dither.NONE
     )
+    with replaced(path) as partial:
+        few.save(partial, format="png", optimize=True)
 
 
 def write_figure(figure: "Figure", folder: Path, name: str) -> Path:
