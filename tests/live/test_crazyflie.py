@@ -32,7 +32,8 @@ def run(play, vehicle=VEHICLE, text="crazyflie:fake://here"):
     """Run a session while ``play(link, taken)`` sends its log."""
     FakeLink.opened.clear()
     running = Running(text, vehicle)
-    running.until(lambda: FakeLink.opened and FakeLink.opened[0].started)
+    blocks = 2 if "imu=1" in text else 1
+    running.until(lambda: FakeLink.opened and len(FakeLink.opened[0].started) == blocks)
     if running.thread.is_alive():
         play(FakeLink.opened[0], lambda count, kind="row": running.taken(kind, count))
     return running.end()
