@@ -120,7 +120,6 @@ def _file(name):
     return {
         "read_by": found.read_by,
         "doubts": [_plain(text, path.parent) for text in said],
-        "notes": len(found.log.notes),
     }
 
 
