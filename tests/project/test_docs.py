@@ -3,8 +3,9 @@ empty folder.
 
 ``sh`` blocks run in a shell, ``python`` blocks in one namespace a page; a block with a ``title`` is
 written to a file of that name. Under the comment ``<!-- dry run -->`` commands are run with
-``--dry-run``: they would take minutes. ``pip`` and ``make`` are not run; what they name must exist.
-Blocks of other languages are not code to run, except that YAML must be YAML.
+``--dry-run``, and modules of Python with ``--help``: they would take minutes. ``pip`` and ``make``
+are not run; what they name must exist. Blocks of other languages are not code to run, except that
+YAML must be YAML.
 """
 
 import os
@@ -81,7 +82,7 @@ def run_shell(content, environment, dry, where):
             name, _, value = words[1].partition("=")
             environment[name] = value
         else:
-            words += ["--dry-run"] if dry else []
+            words += [] if not dry else ["--help" if words[0] == "python" else "--dry-run"]
             done = subprocess.run(words, env=environment, capture_output=True, text=True)
             said = f"{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
             assert done.returncode == 0, f"{where}: {shlex.join(words)}\n{said}"
