@@ -1,5 +1,5 @@
 /* The plots of a report: zoom, values under a cursor that all plots over time share, effects
-   switched off one by one. Without this script the page shows drawings of the same numbers. */
+   switched off one by one. Without this script the page shows tables of the same numbers. */
 (() => {
   "use strict";
   const data = JSON.parse(document.getElementById("plots").textContent);
@@ -19,15 +19,13 @@
   const announced = find("announced");
   let byKey = false;  // a screen reader hears the cursor only when a key moved it
 
-  /* one plot in place of its drawing */
+  /* one plot, and its table folded */
   function place(key, height, options, columns, say, idle) {
     const holder = find("plot-" + key), readout = find("readout-" + key);
-    const label = holder.querySelector("svg").getAttribute("aria-label");
-    holder.replaceChildren();
+    holder.closest("figure").querySelector("details.data").open = false;
     holder.tabIndex = 0;
     holder.setAttribute("role", "application");
     holder.setAttribute("aria-roledescription", "plot with a cursor");
-    holder.setAttribute("aria-label", label);
     holder.setAttribute("aria-describedby", "keys");
     const axis = more => ({
       stroke: () => colour("muted"), font: "12px " + getComputedStyle(document.body).fontFamily,

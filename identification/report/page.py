@@ -1,7 +1,7 @@
 """The page of a diagnosis's report: one HTML file that needs nothing else.
 
-Its plots are still drawings (SVG). A script and a small library (``uplot/``) replace them by plots
-with zoom and cursor where a browser runs scripts. The page's policy allows no other script, and
+A script and a small library (``uplot/``) draw its plots, with zoom and cursor. Where a browser runs
+no scripts, a table stands in place of each plot. The page's policy allows no other script, and
 nothing from elsewhere.
 """
 

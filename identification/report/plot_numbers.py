@@ -1,9 +1,9 @@
-"""The plots of a diagnosis's page: one object each, from which its three forms come.
+"""The plots of a diagnosis's page: one object each, from which its two forms come.
 
-``packed`` is what ``page.js`` draws with uPlot, ``drawing`` the still picture of the same numbers
-for pages without scripts, and ``table`` the same numbers for readers who do not see them. A plot
-over time keeps, in each column of the window, the samples with the lowest and the highest residual
-before and after: peaks stay, and every value is one of the log.
+``packed`` is what ``page.js`` draws with uPlot. ``table`` holds the same numbers for pages without
+scripts and for readers who do not see a plot. A plot over time keeps, in each column of the window,
+the samples with the lowest and the highest residual before and after: peaks stay, and every value
+is one of the log.
 """
 
 import base64
@@ -17,7 +17,6 @@ from scipy.signal import welch
 
 from ..findings import CHANNELS, Diagnosis, NamedEffect, Signature, Trace
 from ..motion.smoothing import runs_of
-from .drawing import Drawing, DrawnLine, draw
 from .words import percent, rounded, scale_of
 
 Array = NDArray[np.float64]
@@ -28,13 +27,12 @@ Index = NDArray[np.intp]
 class PlotSettings:
     """How much of a flight the page carries."""
 
-    # all series over time together, packed: beside library, text and pictures a page of 60 s of
-    # flight stays below 600 kB
+    # all series over time together, packed: beside library and text a page of 60 s of flight stays
+    # below 600 kB
     most_bytes: int = 170_000
     least_columns: int = 150  # of a plot over time, however many effects share the bytes
     steps: int = 32_000  # of a packed series, between zero and its largest value
     tick: float = 1e-4  # s, of packed times
-    still_columns: int = 110  # of a still picture, of four samples each
     rows: int = 16  # of a table over time or frequency
     points: int = 360  # of a signature
     spectrum_seconds: float = 8.0  # of the segments of a spectrum
@@ -62,7 +60,6 @@ class Plot:
     """One plot of the page."""
 
     packed: dict[str, Any]  # its ``key`` is its name in the page
-    drawing: Drawing
     table: PlotTable
     title: str  # what is drawn, with its unit
     axis: str  # what it is drawn over
@@ -178,22 +175,8 @@ def _plot_over_time(joined: _Joined, i: int) -> Plot:
     limit = factor * (1.08 * largest or 1.0 / factor)
     before, after = (rounded(factor * _rms(x[:, i]), 2) for x in sides.values())
     change = f"rms {before} → {after}"
-    still = joined.kept(i, PLOTS.still_columns)
-    drawing = draw(
-        [DrawnLine(n, joined.x[k], factor * x[k, i]) for n, x in sides.items() for k in still],
-        height=170,
-        x_range=(joined.starts[0], joined.end),
-        y_range=(-limit, limit),
-        blocks=joined.held_out(),
-        marks=[
-            (start, str(number) if len(traces) <= 12 else "")
-            for number, start in enumerate(joined.starts, 1)
-            if len(traces) > 1
-        ],
-    )
     return Plot(
         _packed_channel(joined, i, factor, unit, limit),
-        drawing,
         _table_over_time(traces, i, factor, unit),
         f"{_SYMBOLS[i]} ({unit})",
         "time (s)" if len(traces) == 1 else "pieces of flight, side by side (s)",
@@ -222,13 +205,6 @@ def _plot_of_spectrum(
             "before": _digits(before),
             "after": _digits(after),
         },
-        draw(
-            [DrawnLine("before", x, before), DrawnLine("after", x, after)],
-            height=200,
-            x_range=(0.0, float(x[-1])),
-            y_range=(0.8 * min(before.min(), after.min()), 1.2 * max(before.max(), after.max())),
-            logarithmic=True,
-        ),
         PlotTable(
             f"Amplitude of the residual {name}",
             ("Frequency (Hz)", "Before", "After"),
@@ -274,11 +250,6 @@ def _plot_of_signature(signature: Signature, number: int) -> Plot:
         if len(x) > 2 and residual.std() > 0 and fitted.std() > 0
         else ""
     )
-    lines = [
-        DrawnLine("before dots", x[kept], residual[kept]),
-        DrawnLine("after dots", x[kept], fitted[kept]),
-        DrawnLine("ink", middle, mean),
-    ]
     return Plot(
         {
             "key": f"signature-{number}",
@@ -292,7 +263,6 @@ def _plot_of_signature(signature: Signature, number: int) -> Plot:
             "middle": _digits(middle),
             "mean": _digits(mean),
         },
-        draw(lines, height=230),
         PlotTable(
             f"{signature.effect}: {symbol} ({unit}) over {signature.regressor}, means of "
             f"{len(middle)} groups of equally many points",

@@ -28,17 +28,12 @@ addEventListener("load", async () => {
   const page = document.getElementById("page").contentDocument, root = page.documentElement;
   const box = element => element.getBoundingClientRect();
   const name = element => element.tagName + " " + element.textContent.trim().slice(0, 40);
-  const svgs = [...page.querySelectorAll("svg")], canvases = [...page.querySelectorAll("canvas")];
   const label = element => element.closest("[aria-label]")?.getAttribute("aria-label");
   document.getElementById("found").textContent = JSON.stringify({
     width: root.clientWidth, scroll_width: root.scrollWidth, height: root.scrollHeight,
     wide: [...page.body.querySelectorAll("*")].filter(e => box(e).right > root.clientWidth + 1).map(name),
     missing: [...page.images].filter(i => !i.naturalWidth).map(i => i.src),
-    pictures: [...svgs, ...canvases].map(s => ({alt: label(s), width: box(s).width, height: box(s).height})),
-    canvases: canvases.length,
-    cut: svgs.flatMap(s => [...s.querySelectorAll("text")].filter(t => box(t).width > 0 && (box(t).left < box(s).left - 1 ||
-      box(t).right > box(s).right + 1 || box(t).top < box(s).top - 1 || box(t).bottom > box(s).bottom + 1)).map(name)),
-    small: svgs.flatMap(s => [...s.querySelectorAll("text")].filter(t => box(t).height < 8).map(name)),
+    pictures: [...page.querySelectorAll("canvas")].map(s => ({alt: label(s), width: box(s).width, height: box(s).height})),
     background: getComputedStyle(page.body).backgroundColor, ink: getComputedStyle(page.body).color,
     text: page.body.innerText,
     done: await (async (page, view) => { ACT })(page, document.getElementById("page").contentWindow),

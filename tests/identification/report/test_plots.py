@@ -62,8 +62,7 @@ def test_a_spike_of_any_channel_stays():
     before, after = trace.before.copy(), trace.after.copy()
     before[12_345, 0], before[100_001, 4], after[170_000, 2] = 7.0, -8.0, 9.0
     trace = replace(trace, before=before, after=after)
-    plots = page_plots(made_diagnosis(trace)).time
-    channels = [plot.packed for plot in plots]
+    channels = [plot.packed for plot in page_plots(made_diagnosis(trace)).time]
     assert unpacked(channels[0]["before"]).max() == pytest.approx(7.0, rel=1e-4)
     assert unpacked(channels[4]["before"]).min() * {"Nm": 1, "mNm": 1e-3}[
         channels[4]["unit"]
@@ -73,12 +72,6 @@ def test_a_spike_of_any_channel_stays():
     assert 12_345 in kept
     assert (kept[0], kept[-1]) == (0, len(trace.t) - 1)
     assert len(kept) <= 4 * 150 + 2
-    # in the still picture, the spike stands by half of the axis above the middle
-    still = plots[0].drawing
-    heights = [float(y) for y in re.findall(r" ([\d.]+)", still.lines[0][1])]
-    middle, half = (still.bottom + still.top) / 2, (still.bottom - still.top) / 2
-    largest = max(9.0, np.abs(before[:, :3]).max(), np.abs(after[:, :3]).max())
-    assert min(heights) == pytest.approx(middle - half * 7.0 / (1.08 * largest), abs=0.2)
 
 
 def test_the_rms_of_any_choice_of_effects_is_exact():
@@ -107,7 +100,6 @@ def test_pieces_of_several_logs_stand_side_by_side():
     assert x[-1] == pytest.approx(time["end"], abs=1e-3)
     assert len(time["held"]) == 2 * 3
     (plot, *_) = page_plots(made_diagnosis(*traces)).time
-    assert [text for _, text in plot.drawing.marks] == ["1", "2", "3"]
     assert plot.table.head == ("Piece", "Time (s)", "Held out", "Before", "After")
 
 
@@ -155,20 +147,6 @@ def test_a_torque_that_the_logs_do_not_tell_is_not_drawn():
     page = report_page(made, "command")
     assert 'id="plot-time-Fz"' in page
     assert "plot-time-tau_x" not in page
-
-
-@pytest.mark.parametrize("decades", [0.3, 4.0])
-def test_an_axis_of_powers_of_ten_has_plain_numbers(decades):
-    trace = made_trace(80.0)
-    sine = np.tile(np.sin(2.0 * np.pi * trace.t)[:, None], (1, 6))
-    noise = 10.0**-decades * np.random.default_rng(0).standard_normal((len(trace.t), 6))
-    made = made_diagnosis(replace(trace, before=sine + noise, after=noise))
-    for plot in page_plots(made).frequency:
-        assert len(plot.drawing.x_ticks) >= 4
-        assert len(plot.drawing.y_ticks) >= 2
-        for place, text in plot.drawing.y_ticks:
-            assert plot.drawing.top <= place <= plot.drawing.bottom
-            assert re.fullmatch(r"[\d.]+(e−?\d+)?", text)
 
 
 ACT = """
