@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from ..controllers.registry import STANDARD_TASK
 from ..runtime.errors import InputError, unknown_name
-from ..runtime.workers import workers
+from ..runtime.workers import every
 from .episodes import Episode, benchmark_seeds, fly_episode
 from .tasks import TASKS, make_environment, make_pilot, task_of
 
@@ -13,7 +13,7 @@ _CHUNK = 5  # episodes that a worker flies at a time
 _SEEDS = 2**32  # of a benchmark
 
 Results = dict[tuple[str, str], list[Episode]]  # by controller and scenario
-Chunk = tuple[str, str, str, list[int]]  # task, controller, scenario, seeds
+Chunk = tuple[str, str, str, tuple[int, ...]]  # task, controller, scenario, seeds
 
 
 def check_request(
@@ -75,7 +75,7 @@ def fly_all(
     """
     check_request(controllers, scenarios, episodes, seed, task)
     wanted, worlds = task_of(task).references(controllers), dict.fromkeys(scenarios)
-    seeds = benchmark_seeds(seed, episodes)
+    seeds = tuple(benchmark_seeds(seed, episodes))
     chunks = [
         (task, controller, scenario, seeds[i : i + _CHUNK])
         for scenario in worlds
@@ -85,27 +85,27 @@ def fly_all(
     # one episode first, so that soon there is something to count
     first = chunks[0]
     chunks[:1] = [(*first[:3], part) for part in (first[3][:1], first[3][1:]) if part]
+    flown: dict[Chunk, list[Episode]] = {}
+    for chunk, some in _flown(chunks, jobs, cluster):
+        flown[chunk] = some
+        advance(len(some))
     results: Results = {(name, scenario): [] for scenario in worlds for name in wanted}
-    for (_, name, scenario, _), flown in zip(chunks, _flown(chunks, jobs, cluster), strict=True):
-        results[name, scenario].extend(flown)
-        advance(len(flown))
+    for chunk in chunks:
+        results[chunk[1], chunk[2]].extend(flown[chunk])
     return results
 
 
-def _flown(chunks: list[Chunk], jobs: int | None, cluster: str | None) -> Iterable[list[Episode]]:
-    """Yield the episodes of every chunk, in order."""
+def _flown(
+    chunks: list[Chunk], jobs: int | None, cluster: str | None
+) -> Iterable[tuple[Chunk, list[Episode]]]:
+    """Yield each chunk with its episodes, as they come."""
     jobs = min(jobs or os.cpu_count() or 1, len(chunks))
-    if cluster is not None:
-        from ..runtime.cluster import spread
-
-        yield from spread(_fly_chunk, chunks, cluster)
-    elif jobs == 1:
-        yield from map(_fly_chunk, chunks)
-    else:
+    if jobs == 1 and cluster is None:
+        return ((chunk, _fly_chunk(chunk)) for chunk in chunks)
+    if cluster is None:
         task, _, scenario, _ = chunks[0]
         make_environment(task, scenario).reset(seed=0)  # compiles, once for all processes
-        with workers(jobs) as pool:
-            yield from pool.map(_fly_chunk, chunks)
+    return every(_fly_chunk, chunks, None if cluster else jobs, cluster)
 
 
 def _fly_chunk(chunk: Chunk) -> list[Episode]:

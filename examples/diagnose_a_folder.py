@@ -16,7 +16,7 @@ from pathlib import Path
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.logs.reading import read_log
-from windwrench.runtime.workers import workers
+from windwrench.runtime.workers import every
 
 COLUMNS = ("log", "verdict", "effects", "force_before_N", "force_after_N", "error")
 
@@ -57,8 +57,9 @@ def main(folder="results/logs", vehicle="ardrone2", out=None):
     if not logs:
         raise InputError(f"{folder}: holds no .csv file; expected a folder of flight logs")
     load_vehicle(vehicle)  # a mistake in the vehicle is no log's
-    with workers(min(len(logs), len(os.sched_getaffinity(0)))) as pool:
-        rows = list(pool.map(partial(diagnose_one, vehicle=vehicle), logs))
+    work = partial(diagnose_one, vehicle=vehicle)
+    found = dict(every(work, logs, min(len(logs), len(os.sched_getaffinity(0)))))
+    rows = [found[log] for log in logs]
     table = Path(out) if out else Path(folder) / "diagnoses" / "summary.csv"
     table.parent.mkdir(parents=True, exist_ok=True)
     with open(table, "w", newline="", encoding="utf-8") as file:

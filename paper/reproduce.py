@@ -6,8 +6,8 @@ import csv
 import io
 import os
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import asdict
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from ..runtime.errors import InputError, unknown_name
 from ..runtime.page_files import write_figure, write_json, write_text
 from ..runtime.provenance import commit, made_by
 from ..runtime.regular_files import read_json
-from ..runtime.workers import shared_dict, workers
+from ..runtime.workers import every, shared_dict
 from . import NAMES
 from .result import Columns, Result, template
 
@@ -63,16 +63,11 @@ def reproduce(
     wanted = numbers_of_seeds(names, seeds)
     done = {name: is_done(folder, name, count) for name, count in wanted.items()}
     pending = [name for name in names if not done[name]]
-    count = min(jobs or os.cpu_count() or 1, max(len(pending), 1))
-    with shared_dict({name: float(done[name]) for name in names}) as shares, workers(count) as pool:
-        waiting = {
-            pool.submit(_run_and_write, name, wanted[name], folder, shares) for name in pending
-        }
-        while waiting:
-            finished, waiting = wait(waiting, timeout=0.3, return_when=FIRST_COMPLETED)
-            report(dict(shares))
-            for future in finished:
-                future.result()
+    with shared_dict({name: float(done[name]) for name in names}) as shares:
+        work = partial(_run_and_write, seeds=wanted, folder=folder, shares=shares)
+        jobs = min(jobs or os.cpu_count() or 1, max(len(pending), 1))
+        for _ in every(work, pending, jobs, idle=lambda: report(dict(shares))):
+            pass
         report(dict(shares))
     return {name: name in pending for name in names}
 
@@ -109,16 +104,16 @@ def is_done(folder: Path, name: str, seeds: int) -> bool:
     )
 
 
-def _run_and_write(name: str, seeds: int, folder: Path, shares: Any) -> None:
+def _run_and_write(name: str, seeds: Mapping[str, int], folder: Path, shares: Any) -> None:
     """Run one experiment and write its files; the JSON comes last and says that the others are
     whole.
     """
     commit()  # asked before the run: it is the code that runs
     module = _module(name)
     result: Result = module.run(
-        seeds, lambda share: shares.__setitem__(name, min(float(share), 0.99))
+        seeds[name], lambda share: shares.__setitem__(name, min(float(share), 0.99))
     )
-    write_result(name, module.TITLE, seeds, result, folder)
+    write_result(name, module.TITLE, seeds[name], result, folder)
     shares[name] = 1.0
 
 

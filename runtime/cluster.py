@@ -1,16 +1,12 @@
-"""Beyond one machine: a Ray cluster, and work spread over it."""
+"""Beyond one machine: a Ray cluster."""
 
 import socket
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from typing import Any
 
 from .errors import InputError
 from .extras import need
-
-T = TypeVar("T")
-R = TypeVar("R")
-RETRIES = 3  # of a run or task whose process is lost
 
 
 @contextmanager
@@ -30,7 +26,7 @@ def connected(address: str) -> Iterator[Any]:
             _reach(address)
         try:
             ray.init(
-                address=None if address == "local" else address,
+                address=address,  # Ray's own word for a new cluster is "local", too
                 include_dashboard=False,
                 log_to_driver=False,
                 logging_level="error",
@@ -53,20 +49,3 @@ def _reach(address: str) -> None:
         raise InputError(
             f"--cluster {address}: no Ray cluster there: {error}; expected HOST:PORT or local"
         ) from error
-
-
-def spread(work: Callable[[T], R], tasks: Sequence[T], address: str) -> Iterator[R]:
-    """Yield ``work`` of each task, in order, done on a Ray cluster; what is lost with a process is
-    done again.
-
-    Raises:
-        InputError: as ``connected``, or a task failed for good.
-    """
-    with connected(address) as ray:
-        remote = ray.remote(num_cpus=1, max_retries=RETRIES)(work)
-        for reference in [remote.remote(task) for task in tasks]:
-            try:
-                yield ray.get(reference)
-            except ray.exceptions.RayError as error:
-                reason = str(getattr(error, "cause", error)).partition("\n")[0]
-                raise InputError(f"--cluster {address}: a task failed: {reason}") from error

@@ -2,6 +2,7 @@
 that started them. A worker that dies, or takes too long, costs its own task alone.
 """
 
+import math
 import multiprocessing
 import os
 import signal
@@ -15,19 +16,29 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.managers import DictProxy, SyncManager
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, TypeVar
 
 from .cluster import connected
+from .errors import InputError
 
-P = ParamSpec("P")
 T = TypeVar("T")
+R = TypeVar("R")
 
 # forked workers would share the locks of compiled code and of linear algebra
 _CONTEXT = multiprocessing.get_context("spawn")
 # one process a core: further threads of linear algebra would only wait for each other
 SINGLE_THREADED = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 _FIRST_TO_GO = 500  # of 1000: where memory runs out, the system ends a worker before its parent
-_LOOK = 0.2  # s, after which a task that a cluster has is looked at again
+_LOOK = 0.2  # s, after which tasks are looked at again
+_ATTEMPTS = 4  # at a task of ``every``
+# errors of Ray for a process, a machine or a result that is gone
+_RAY_DEATHS = {
+    "RayActorError",
+    "WorkerCrashedError",
+    "OutOfMemoryError",
+    "NodeDiedError",
+    "ObjectLostError",
+}
 
 
 def end_with_parent() -> None:
@@ -49,71 +60,6 @@ def end_with_parent() -> None:
         Path("/proc/self/oom_score_adj").write_text(str(_FIRST_TO_GO), encoding="ascii")
 
 
-class Workers:
-    """A pool of processes of this machine; a process that is gone is replaced."""
-
-    def __init__(self, count: int) -> None:
-        self._count = count
-        self._before = {child.pid for child in multiprocessing.active_children()}
-        self._begin()
-
-    def _begin(self) -> None:
-        from pebble import ProcessPool  # most of the kit starts no process
-
-        self._pool: Any = ProcessPool(self._count, initializer=end_with_parent, context=_CONTEXT)
-        # threads and processes that start in the block see no interrupt: a key press in the
-        # terminal is the parent's to answer
-        with _interrupts_blocked():
-            assert self._pool.active
-
-    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Return the future of a call in a worker."""
-        return self.limited(None, fn, *args, **kwargs)
-
-    def limited(
-        self, seconds: float | None, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs
-    ) -> Future[T]:
-        """Return the future of a call that is ended with TimeoutError after some seconds."""
-        if not self._pool.active:  # a worker died while no worker had a task
-            self._pool.stop()
-            self._pool.join()
-            self._begin()
-        future: Future[T] = self._pool.schedule(fn, args=args, kwargs=kwargs, timeout=seconds)
-        return future
-
-    def map(self, fn: Callable[..., T], *iterables: Iterable[Any]) -> Iterator[T]:
-        """Yield the results of calls in workers, in order."""
-        futures = [self.submit(fn, *arguments) for arguments in zip(*iterables, strict=False)]
-        return (future.result() for future in futures)
-
-    def close(self) -> None:
-        """Wait for all work, and end the processes."""
-        self._pool.close()
-        self._pool.join()
-
-    def end(self) -> None:
-        """End the processes at once, whatever they do."""
-        self._pool.stop()
-        for child in multiprocessing.active_children():
-            if child.pid not in self._before:
-                child.kill()
-        self._pool.join()
-
-
-@contextmanager
-def workers(count: int) -> Iterator[Workers]:
-    """Give a pool of ``count`` processes; an error or an interrupt in the block ends them at once,
-    work or no work.
-    """
-    pool = Workers(count)
-    try:
-        yield pool
-    except BaseException:
-        pool.end()
-        raise
-    pool.close()
-
-
 @dataclass(frozen=True)
 class Lost:
     """Why a task has no result: its process died, or was ended since it took too long."""
@@ -123,20 +69,44 @@ class Lost:
 
 
 class _Local:
-    """Tasks on the processes of this machine, whose linear algebra has one thread each."""
+    """Tasks on processes of this machine, whose linear algebra has one thread each; a process that
+    is gone is replaced.
+    """
 
-    def __init__(self, work: Callable[[Any], Any], count: int, most_seconds: float) -> None:
+    def __init__(self, work: Callable[[Any], Any], count: int, most_seconds: float | None) -> None:
         self.count = count
         self._work, self._most_seconds = work, most_seconds
+        self._before = {child.pid for child in multiprocessing.active_children()}
         self._set = {k: value for k, value in SINGLE_THREADED.items() if k not in os.environ}
         os.environ.update(self._set)  # read by the libraries as a worker imports them
-        self._pool = Workers(count)
+        self._begin()
+
+    def _begin(self) -> None:
+        from pebble import ProcessPool  # most of the kit starts no process
+
+        self._pool: Any = ProcessPool(self.count, initializer=end_with_parent, context=_CONTEXT)
+        # threads and processes that start in the block see no interrupt: a key press in the
+        # terminal is the parent's to answer
+        with _interrupts_blocked():
+            assert self._pool.active
 
     def start(self, task: Any) -> Future[Any]:
-        return self._pool.limited(self._most_seconds, self._work, task)
+        if not self._pool.active:  # a worker died while no worker had a task
+            self._pool.stop()
+            self._pool.join()
+            self._begin()
+        future: Future[Any] = self._pool.schedule(
+            self._work, args=(task,), timeout=self._most_seconds
+        )
+        return future
 
     def end(self) -> None:
-        self._pool.end()
+        """End the processes at once, whatever they do."""
+        self._pool.stop()
+        for child in multiprocessing.active_children():
+            if child.pid not in self._before:
+                child.kill()
+        self._pool.join()
         for name in self._set:
             os.environ.pop(name, None)
 
@@ -145,43 +115,61 @@ class _OnCluster:
     """Tasks on a Ray cluster, one a core."""
 
     def __init__(
-        self, ray: Any, work: Callable[[Any], Any], jobs: int | None, most_seconds: float
+        self,
+        ray: Any,
+        address: str,
+        work: Callable[[Any], Any],
+        jobs: int | None,
+        most_seconds: float | None,
     ) -> None:
         cores = int(ray.cluster_resources().get("CPU", 1))
         self.count = min(jobs or cores, cores)
-        self._ray, self._most_seconds = ray, most_seconds
+        self._ray, self._address, self._most_seconds = ray, address, most_seconds
+        self._over = threading.Event()
+
+        def task_of_windwrench(task: Any) -> Any:  # Ray takes no partial function
+            return work(task)
+
         # Ray gives a worker's linear algebra as many threads as the worker has cores
-        self._work = ray.remote(num_cpus=1, max_retries=0)(work)
+        self._work = ray.remote(num_cpus=1, max_retries=0)(task_of_windwrench)
 
     def start(self, task: Any) -> Future[Any]:
         reference, late = self._work.remote(task), Future[Any]()
-        inner, until = reference.future(), time.monotonic() + self._most_seconds
+        inner = reference.future()
+        until = math.inf if self._most_seconds is None else time.monotonic() + self._most_seconds
 
         def watch() -> None:
             while not inner.done() and time.monotonic() < until:
-                time.sleep(_LOOK)
+                if self._over.wait(_LOOK):
+                    return
             if not inner.done():
                 self._ray.cancel(reference, force=True)
                 late.set_exception(TimeoutError("Task timeout"))
-            elif (error := inner.exception()) is not None:
-                late.set_exception(error)
-            else:
+            elif (error := inner.exception()) is None:
                 late.set_result(inner.result())
+            elif isinstance(error, self._ray.exceptions.RayTaskError):
+                reason = str(error.cause).partition("\n")[0]
+                words = f"--cluster {self._address}: a task failed: {reason}"
+                late.set_exception(InputError(words))
+            else:
+                late.set_exception(error)
 
         threading.Thread(target=watch, daemon=True).start()
         return late
 
     def end(self) -> None:
         """Leave the rest to Ray, which ends a task with the program that asked for it."""
+        self._over.set()
 
 
 def each(
     work: Callable[[T], Any],
     tasks: Iterable[T],
-    most_seconds: float,
+    most_seconds: float | None = None,
     jobs: int | None = None,
     cluster: str | None = None,
     attempts: int = 2,
+    idle: Callable[[], None] | None = None,
 ) -> Iterator[tuple[T, Any]]:
     """Yield each task with its result, or with ``Lost``, as they come; tasks are taken when a
     worker is free, so that no more than one a worker are held.
@@ -189,28 +177,51 @@ def each(
     Args:
         work: what is done with a task; importable by its name.
         tasks: what is given to the work.
-        most_seconds: that a task may take.
+        most_seconds: that a task may take; None: any time.
         jobs: number of processes; default: one a core.
         cluster: a Ray cluster's address, or ``local`` for one on this machine; None: no Ray.
         attempts: at a task whose process dies, which may be its neighbour's fault; the further
             ones come last, one at a time.
+        idle: called a few times a second while all wait.
 
     Raises:
-        InputError: as ``runtime.cluster.connected``.
+        InputError: as ``runtime.cluster.connected``, or the work fails on a cluster.
         Exception: what the work itself raises.
     """
     if cluster is None:
-        yield from _each(
-            _Local(work, jobs or os.cpu_count() or 1, most_seconds), tasks, most_seconds, attempts
-        )
+        local = _Local(work, jobs or os.cpu_count() or 1, most_seconds)
+        yield from _each(local, tasks, most_seconds, attempts, idle)
         return
     with connected(cluster) as ray:
-        crew = _OnCluster(ray, work, jobs, most_seconds)
-        yield from _each(crew, tasks, most_seconds, attempts)
+        crew = _OnCluster(ray, cluster, work, jobs, most_seconds)
+        yield from _each(crew, tasks, most_seconds, attempts, idle)
+
+
+def every(
+    work: Callable[[T], R],
+    tasks: Iterable[T],
+    jobs: int | None = None,
+    cluster: str | None = None,
+    idle: Callable[[], None] | None = None,
+) -> Iterator[tuple[T, R]]:
+    """Yield each task with its result, as they come, as ``each`` without a limit of time.
+
+    Raises:
+        InputError: as ``each``, or the process of one task died four times.
+    """
+    for task, result in each(work, tasks, None, jobs, cluster, _ATTEMPTS, idle):
+        if isinstance(result, Lost):
+            where = "this machine" if cluster is None else f"--cluster {cluster}"
+            raise InputError(f"{where}: a task failed: {result.words}")
+        yield task, result
 
 
 def _each(
-    crew: _Local | _OnCluster, tasks: Iterable[T], most_seconds: float, attempts: int
+    crew: _Local | _OnCluster,
+    tasks: Iterable[T],
+    most_seconds: float | None,
+    attempts: int,
+    idle: Callable[[], None] | None,
 ) -> Iterator[tuple[T, Any]]:
     coming = iter(tasks)
     again: deque[tuple[T, int]] = deque()
@@ -224,7 +235,7 @@ def _each(
                     return
                 task, attempt = again.popleft()
                 running[crew.start(task)] = task, attempt + 1
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
+            for future in wait(running, _LOOK if idle else None, FIRST_COMPLETED).done:
                 task, attempt = running.pop(future)
                 error = future.exception()
                 if error is None:
@@ -237,6 +248,8 @@ def _each(
                     again.append((task, attempt))
                 else:
                     yield task, Lost("died", words)
+            if idle:
+                idle()
     finally:
         crew.end()
 
@@ -244,7 +257,7 @@ def _each(
 def _death(error: BaseException) -> str | None:
     """Return how a process ended, in words; None for what the work raised."""
     names = {kind.__name__ for kind in type(error).__mro__}
-    if names & {"RayActorError", "WorkerCrashedError", "OutOfMemoryError", "NodeDiedError"}:
+    if names & _RAY_DEATHS:
         return "its process on the cluster died"
     if isinstance(error, BrokenProcessPool):
         return "its process died"

@@ -9,11 +9,12 @@ import itertools
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..runtime.cluster import spread
 from ..runtime.errors import InputError
+from ..runtime.workers import every
 from .configuration import Config, load_config
 
 
@@ -92,7 +93,7 @@ def run_jobs(
     jobs: Sequence[Job],
     folder: Path,
     address: str,
-    work: Callable[[Job, Path], dict[str, Any]] = run_job,
+    work: Callable[..., dict[str, Any]] = run_job,
 ) -> list[dict[str, Any]]:
     """Do the runs of a sweep on a Ray cluster; return the result of each, in their order.
 
@@ -102,14 +103,13 @@ def run_jobs(
         jobs: of ``jobs_of``.
         folder: of the results, which every machine sees.
         address: of the cluster.
-        work: does one run in a worker process.
+        work: does one run in a worker process; called with the run and ``folder``.
 
     Raises:
-        InputError: as ``spread``, or a run failed for good.
+        InputError: as ``runtime.workers.every``.
     """
-    root = folder.resolve()
-
-    def trial(job: Job) -> dict[str, Any]:
-        return work(job, root)
-
-    return list(spread(trial, jobs, address))
+    found = {
+        job.name: one
+        for job, one in every(partial(work, folder=folder.resolve()), jobs, cluster=address)
+    }
+    return [found[job.name] for job in jobs]

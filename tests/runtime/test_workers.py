@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from windwrench.runtime.workers import Lost, each, workers
+from windwrench.runtime.errors import InputError
+from windwrench.runtime.workers import Lost, each, every
 
 
 def work(task):
@@ -105,18 +106,19 @@ def test_what_the_work_raises_is_raised():
         outcomes([0, "raises", 1])
 
 
-def test_a_pool_maps_in_order_and_ends_at_once_where_its_block_fails():
-    with workers(2) as pool:
-        processes = {process for process, _ in pool.map(work, range(6))}
-    assert len(processes) <= 2
-    processes.clear()
+def test_an_interrupt_ends_the_processes_at_once():
+    processes = set()
+
+    def interrupt():
+        processes.update(child.pid for child in multiprocessing.active_children())
+        raise KeyboardInterrupt
+
     with pytest.raises(KeyboardInterrupt):
-        interrupted(processes)
+        list(every(work, ["sleeps"], 1, idle=interrupt))
+    assert processes
     assert not any(map(lives, processes))
 
 
-def interrupted(processes):
-    with workers(1) as pool:
-        processes.add(pool.submit(work, 0).result()[0])
-        pool.submit(work, "sleeps")
-        raise KeyboardInterrupt
+def test_a_task_that_dies_each_time_ends_all():
+    with pytest.raises(InputError, match=r"this machine: a task failed: .* SIGKILL"):
+        list(every(work, [0, "dies"], 1))

@@ -6,15 +6,13 @@ import os
 import signal
 import threading
 import time
-from pathlib import Path
 
 import pytest
 
 from tests.support.cluster_runs import TINY, assert_same_flights, assert_same_runs
 from windwrench.dynamics import InputError
 from windwrench.evaluation.benchmark import fly_all
-from windwrench.runtime.cluster import spread
-from windwrench.runtime.workers import each
+from windwrench.runtime.workers import each, every
 from windwrench.training.rllib import register_with_rllib
 from windwrench.training.sweep import jobs_of, run_job, run_jobs
 
@@ -43,53 +41,39 @@ def cluster():
     ray = pytest.importorskip(
         "ray", reason="Ray is not installed: pip install 'windwrench[cluster]'"
     )
-    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False, logging_level="error")
+    # "local": a cluster of its own, whatever else runs on this machine
+    ray.init("local", num_cpus=2, include_dashboard=False, log_to_driver=False)
     yield "local"  # the one that is connected already
     ray.shutdown()
 
 
-def processes_of(word):
-    """Processes of this machine with ``word`` in their title."""
-    found = []
-    for name in os.listdir("/proc"):
-        if name.isdigit():
-            try:
-                title = open(f"/proc/{name}/cmdline", "rb").read().decode(errors="replace")  # noqa: SIM115
-            except OSError:
-                continue
-            if word in title and int(name) != os.getpid():
-                found.append(int(name))
-    return found
-
-
-@pytest.mark.skipif(
-    not os.path.exists("/proc/self/stat"), reason="looks for processes in Linux's /proc"
-)
 def test_runs_on_a_cluster_are_the_local_ones_though_a_worker_is_killed(cluster, tmp_path):
     pytest.importorskip(
         "stable_baselines3",
         reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'",
     )
     jobs = jobs_of("sac", "base", range(2), TINY, [])
-    killed = []
+    process, killed = tmp_path / "process", []
+
+    def run_noted(job, folder):
+        if job.name == jobs[0].name:
+            process.write_text(str(os.getpid()))
+        return run_job(job, folder)
 
     def kill_one():
         deadline = time.monotonic() + 300
         while not killed and time.monotonic() < deadline:
             if (tmp_path / "there" / jobs[0].name / "checkpoint.pt").exists():
-                for process in processes_of("ray::"):
-                    words = Path(f"/proc/{process}/cmdline").read_text()
-                    if "trial" in words or "ImplicitFunc" in words:
-                        os.kill(process, signal.SIGKILL)
-                        killed.append(process)
-                        break
+                killed.append(int(process.read_text()))
+                os.kill(killed[0], signal.SIGKILL)
             time.sleep(0.02)
 
     killer = threading.Thread(target=kill_one)
     killer.start()
-    there = run_jobs(jobs, tmp_path / "there", cluster)
+    there = run_jobs(jobs, tmp_path / "there", cluster, run_noted)
     killer.join()
     assert killed
+    assert int(process.read_text()) != killed[0]  # another process went on
     here = [run_job(job, tmp_path / "here") for job in jobs]
     assert_same_runs(jobs, there, here, tmp_path)
 
@@ -105,14 +89,14 @@ def test_a_task_whose_worker_is_killed_is_done_again(cluster, tmp_path):
             os.kill(os.getpid(), signal.SIGKILL)
         return os.getpid()
 
-    done_by = list(spread(die_once, [str(tmp_path / "killed")], cluster))
+    ((_, done_by),) = every(die_once, [str(tmp_path / "killed")], cluster=cluster)
     assert (tmp_path / "killed").exists()
-    assert done_by[0] != os.getpid()
+    assert done_by != os.getpid()
 
 
 def test_a_task_that_fails_is_named(cluster):
     with pytest.raises(InputError, match=r"--cluster local: a task failed: not a number: \[\]$"):
-        list(spread(refuse, [[]], cluster))
+        list(every(refuse, [[]], cluster=cluster))
 
 
 def test_flights_on_a_cluster_are_the_local_ones(cluster):
@@ -146,7 +130,7 @@ def test_a_cluster_that_is_not_there_is_named():
     if ray.is_initialized():
         ray.shutdown()
     with pytest.raises(InputError, match=r"127\.0\.0\.1:1: no Ray cluster there"):
-        next(spread(len, [[1]], "127.0.0.1:1"))
+        next(every(len, [[1]], cluster="127.0.0.1:1"))
 
 
 def fleet_work(task):
