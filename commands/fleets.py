@@ -61,7 +61,7 @@ def fleet(
     from ..dynamics.effects import names
     from ..identification.fleet.drift import fleet_of
     from ..identification.fleet.files import fleet_data, write_fleet
-    from ..identification.fleet.manifest import find_logs, read_manifest
+    from ..identification.fleet.manifest import find_logs
     from ..identification.fleet.outcomes import Outcomes
     from ..identification.fleet.page import change_in_words, changes, headline
     from ..identification.fleet.running import LIMIT_S, OUTCOMES, rows, run_fleet
@@ -79,8 +79,7 @@ def fleet(
         load_map(map)
     if cluster is not None:
         need("ray", "cluster")
-    described = None if manifest is None else read_manifest(manifest)
-    found, doubts = find_logs(logs, described, vehicle, reader, out, map)
+    found, doubts = find_logs(logs, manifest, vehicle, reader, out, map)
     folder = results_folder(out, logs=len(found), jobs=jobs, cluster=cluster)
     for text in doubts:
         note(text)
@@ -94,19 +93,17 @@ def fleet(
             done = run_fleet(
                 found, outcomes, tuple(without or ()), limit or LIMIT_S, jobs, cluster, report
             )
-        flown = fleet_of(rows(done, outcomes))
-        command = shlex.join(["windwrench", *sys.argv[1:]])
-        written = write_fleet(flown, lambda: rows(done, outcomes), folder, command)
+        flights = rows(done, outcomes)
+    flown = fleet_of(flights)
+    written = write_fleet(flown, flights, folder, shlex.join(["windwrench", *sys.argv[1:]]))
     for sentence in (headline(flown), *(change_in_words(one) for one in changes(flown))):
         console.print(sentence)
     table = [
         (
-            trend.series.id,
-            trend.series.effect,
-            trend.series.coefficient,
-            f"{len(trend.series.flights)} of {trend.among}",
-            str(sum(trend.series.sure)),
-            f"{trend.mean:.3g} {'' if trend.series.unit == '1' else trend.series.unit}",
+            *trend.of[:3],
+            f"{len(trend.points)} of {trend.among}",
+            str(trend.sure_in),
+            f"{trend.mean:.3g} {'' if trend.of.unit == '1' else trend.of.unit}",
         )
         for trend in flown.trends
     ]

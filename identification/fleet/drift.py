@@ -13,8 +13,8 @@ effect was named; whether flights name it earlier or later than others do is a s
 import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,6 @@ from scipy.optimize import brentq
 from scipy.stats import false_discovery_control, mannwhitneyu, t
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -39,67 +38,69 @@ class DriftSettings:
 DRIFT = DriftSettings()
 
 
-@dataclass
-class Series:
-    """What the flights of one individual say about one coefficient of one effect."""
+class Coefficient(NamedTuple):
+    """A coefficient of an effect of one individual."""
 
     id: str
     effect: str
     coefficient: str
     unit: str
-    flights: list[int] = field(default_factory=list)  # their numbers, in order
-    values: list[float] = field(default_factory=list)
-    stds: list[float] = field(default_factory=list)
+
+
+@dataclass(kw_only=True)
+class _Tested:
+    """A test of no change from flight to flight."""
+
+    p: float | None = None  # None: too few flights for a test
+    adjusted_p: float | None = None
+
+    @property
+    def told(self) -> bool:
+        """Whether chance does not explain the change, as the fleet's tests together say."""
+        return self.adjusted_p is not None and self.adjusted_p < DRIFT.false_discoveries
+
+
+@dataclass
+class Trend(_Tested):
+    """A coefficient over the flights of an individual that name its effect."""
+
+    of: Coefficient
+    # (n, 4) number of the flight, value, its standard deviation, and 1 where the flight is sure:
     # neither tentative nor indistinguishable from another effect
-    sure: list[bool] = field(default_factory=list)
-
-    def arrays(self) -> tuple[Array, Array, Array, Mask]:
-        """Return numbers of flights, values, their standard deviations and which are sure, (n,)
-        each.
-        """
-        x, y, s = (np.asarray(v, dtype=float) for v in (self.flights, self.values, self.stds))
-        return x, y, s, np.asarray(self.sure, dtype=bool)
-
-
-@dataclass(frozen=True)
-class Trend:
-    """A coefficient over the flights of an individual."""
-
-    series: Series
-    among: int  # flights that were diagnosed
+    points: Array
+    among: int  # flights of the individual that were diagnosed
     mean: float  # pooled over flights
     mean_ci95: tuple[float, float]
     between_std: float | None  # by which flights differ beyond their own deviations
     per_flight: float | None = None
     per_flight_ci95: tuple[float, float] | None = None
-    p: float | None = None  # of no trend
-    adjusted_p: float | None = None
-    drifts: bool = False
     tentative: bool = False  # too few flights that are sure of the name
     # fitted at the first and the last flight that names the effect
     ends: tuple[float, float] | None = None
 
+    @property
+    def sure_in(self) -> int:
+        """Count of the flights that are sure."""
+        return int(self.points[:, 3].sum())
 
-@dataclass(frozen=True)
-class Appearance:
+
+@dataclass
+class Appearance(_Tested):
     """Whether an effect is named rather in later or in earlier flights of an individual."""
 
     id: str
     effect: str
     named: tuple[int, ...]  # numbers of flights
     among: int
-    p: float
-    adjusted_p: float | None = None
-    later: bool = True
-    changed: bool = False
+    later: bool
 
 
 @dataclass(frozen=True)
 class Fleet:
-    """What the flights say together."""
+    """What the flights say together; the changes that are told come first."""
 
-    trends: tuple[Trend, ...]
-    appearances: tuple[Appearance, ...]
+    trends: Sequence[Trend]
+    appearances: Sequence[Appearance]
     individuals: Mapping[str, Mapping[str, int]]  # flights: diagnosed, refused
     refused: Mapping[str, int]  # by kind
     verdicts: Mapping[str, int]
@@ -143,46 +144,38 @@ def meta_regression(
     return scale * coefficients, spread, scale * math.sqrt(variance)
 
 
-def trend_of(series: Series, among: int) -> Trend:
+def trend_of(of: Coefficient, points: Array, among: int) -> Trend:
     """Return the pooled coefficient and, with enough flights, its trend per flight.
 
     Flights that are sure of the effect's name count alone where there are enough of them.
     """
-    x, y, s, sure = series.arrays()
-    tentative = int(sure.sum()) < DRIFT.least_flights
-    good = np.isfinite(y) & np.isfinite(s) & (s > 0.0)
-    if not tentative:
-        good &= sure
+    x, y, s, sure = points.T
+    few_sure = bool(sure.sum() < DRIFT.least_flights)
+    good = np.isfinite(y) & np.isfinite(s) & (s > 0.0) & (few_sure | (sure > 0.0))
     x, y, s = x[good], y[good], s[good]
     if len(y) < 2:
-        value = float(np.median(series.values))
-        spread = 1.96 * float(s[0]) if len(y) else math.nan
-        ends = (value - spread, value + spread)
-        return Trend(series, among, value, ends, None, tentative=not sure.all())
-    mean, covariance, between = meta_regression(np.ones((len(y), 1)), y, s, True)
-    half = float(t.ppf(0.975, len(y) - 1) * math.sqrt(covariance[0, 0]))
-    pooled = float(mean[0])
-    interval = (pooled - half, pooled + half)
+        pooled, between = float(np.median(points[:, 1])), None
+        half = 1.96 * float(s[0]) if len(y) else math.nan
+    else:
+        (mean,), covariance, between = meta_regression(np.ones((len(y), 1)), y, s, True)
+        pooled = float(mean)
+        half = float(t.ppf(0.975, len(y) - 1) * math.sqrt(covariance[0, 0]))
+    trend = Trend(of, points, among, pooled, (pooled - half, pooled + half), between)
+    trend.tentative = not sure.all()
     if len(y) < DRIFT.least_flights:
-        return Trend(series, among, pooled, interval, between, tentative=not sure.all())
+        return trend
     middle = float(np.mean(x))
     design = np.column_stack([np.ones(len(y)), x - middle])
-    line, covariance, _ = meta_regression(design, y, s, False)
-    slope, error = float(line[1]), math.sqrt(covariance[1, 1])
-    first, last = (float(line[0]) + slope * (series.flights[k] - middle) for k in (0, -1))
+    (level, slope), covariance, _ = meta_regression(design, y, s, False)
+    error = math.sqrt(covariance[1, 1])
     half = float(t.ppf(0.975, len(y) - 2) * error)
-    return Trend(
-        series,
-        among,
-        pooled,
-        interval,
-        between,
-        slope,
-        (slope - half, slope + half),
-        float(2.0 * t.sf(abs(slope) / error, len(y) - 2)) if error > 0.0 else 1.0,
-        tentative=tentative,
-        ends=(first, last),
-    )
+    trend.per_flight = float(slope)
+    trend.per_flight_ci95 = (float(slope) - half, float(slope) + half)
+    trend.p = float(2.0 * t.sf(abs(slope) / error, len(y) - 2)) if error > 0.0 else 1.0
+    trend.tentative = few_sure
+    first, last = level + slope * (points[[0, -1], 0] - middle)
+    trend.ends = float(first), float(last)
+    return trend
 
 
 def appearance_of(
@@ -195,27 +188,27 @@ def appearance_of(
     if min(len(named), len(without)) < DRIFT.least_each:
         return None
     test = mannwhitneyu(named, without)
-    later = test.statistic > 0.5 * len(named) * len(without)
-    return Appearance(
-        name, effect, tuple(named), len(diagnosed), float(test.pvalue), later=bool(later)
-    )
+    later = bool(test.statistic > 0.5 * len(named) * len(without))
+    return Appearance(name, effect, tuple(named), len(diagnosed), later, p=float(test.pvalue))
 
 
 def fleet_of(rows: Iterable[Mapping[str, Any]]) -> Fleet:
-    """Return what all flights say together; of each only the coefficients are kept.
+    """Return what all flights say together.
 
     Args:
-        rows: as ``running.rows`` yields them.
+        rows: as ``running.rows`` returns them.
     """
-    series: dict[tuple[str, str, str], Series] = {}
+    points: defaultdict[Coefficient, list[tuple[float, ...]]] = defaultdict(list)
     named: defaultdict[tuple[str, str], list[int]] = defaultdict(list)
     diagnosed: defaultdict[str, list[int]] = defaultdict(list)
-    individuals: dict[str, dict[str, int]] = {}
+    individuals: defaultdict[str, dict[str, int]] = defaultdict(
+        lambda: {"diagnosed": 0, "refused": 0}
+    )
     refused: Counter[str] = Counter()
     verdicts: Counter[str] = Counter()
     for row in rows:
         who, flight = row["id"], row["flight"]
-        individuals.setdefault(who, {"diagnosed": 0, "refused": 0})[row["status"]] += 1
+        individuals[who][row["status"]] += 1
         if row["status"] == "refused":
             refused[row["kind"]] += 1
             continue
@@ -225,47 +218,27 @@ def fleet_of(rows: Iterable[Mapping[str, Any]]) -> Fleet:
         for effect in row["effects"]:
             name, rivals = effect["name"], effect["indistinguishable_from"]
             possible |= {name, *rivals}
+            sure = not effect["tentative"] and not rivals
             for coefficient, value in effect["coefficients"].items():
-                unit = effect["units"].get(coefficient, "")
-                one = series.setdefault(
-                    (who, name, coefficient), Series(who, name, coefficient, unit)
+                of = Coefficient(who, name, coefficient, effect["units"].get(coefficient, ""))
+                known = (
+                    math.nan if x is None else x for x in (value, effect["std"].get(coefficient))
                 )
-                std = effect["std"].get(coefficient)
-                one.flights.append(flight)
-                one.values.append(math.nan if value is None else value)
-                one.stds.append(math.nan if std is None else std)
-                one.sure.append(not effect["tentative"] and not rivals)
+                points[of].append((flight, *known, sure))
         for name in possible:
             named[who, name].append(flight)
-    trends = [trend_of(one, len(diagnosed[one.id])) for one in series.values()]
-    told = {(one.id, one.effect) for one in series.values()}
-    appearances = [
-        appearance
+    trends = [trend_of(of, np.array(p, float), len(diagnosed[of.id])) for of, p in points.items()]
+    told = {(of.id, of.effect) for of in points}
+    tried = (
+        appearance_of(who, name, flights, diagnosed[who])
         for (who, name), flights in named.items()
         if (who, name) in told
-        and (appearance := appearance_of(who, name, flights, diagnosed[who])) is not None
-    ]
-    return Fleet(*_controlled(trends, appearances), individuals, refused, verdicts)
-
-
-def _controlled(
-    trends: Sequence[Trend], appearances: Sequence[Appearance]
-) -> tuple[tuple[Trend, ...], tuple[Appearance, ...]]:
-    """Return all tests with their p-values adjusted together, and what is told by them; those
-    first that are.
-    """
-    every: list[Trend | Appearance] = [*trends, *appearances]
-    tested = [one.p for one in every if one.p is not None]
-    adjusted = iter(false_discovery_control(tested) if tested else [])
-    changes: list[dict[str, Any]] = []
-    for one in every:
-        told = "drifts" if isinstance(one, Trend) else "changed"
-        p = None if one.p is None else float(next(adjusted))
-        changes.append({"adjusted_p": p, told: p is not None and p < DRIFT.false_discoveries})
-    controlled = [replace(one, **change) for one, change in zip(trends, changes, strict=False)]
-    others = changes[len(trends) :]
-    seen = [replace(one, **change) for one, change in zip(appearances, others, strict=True)]
-    return (
-        tuple(sorted(controlled, key=lambda one: not one.drifts)),
-        tuple(sorted(seen, key=lambda one: not one.changed)),
     )
+    appearances = [one for one in tried if one is not None]
+    tests = [one for one in (*trends, *appearances) if one.p is not None]
+    adjusted = false_discovery_control([one.p for one in tests]) if tests else ()
+    for one, p in zip(tests, adjusted, strict=True):
+        one.adjusted_p = float(p)
+    trends.sort(key=lambda one: not one.told)
+    appearances.sort(key=lambda one: not one.told)
+    return Fleet(trends, appearances, individuals, refused, verdicts)

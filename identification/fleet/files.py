@@ -1,19 +1,17 @@
-"""A fleet's results on the disk: ``fleet.json``, ``fleet.csv``, ``fleet.html`` and ``fleet.png``.
-Flights are written as they are read: none are held.
-"""
+"""A fleet's results on the disk: ``fleet.json``, ``.csv``, ``.html`` and ``.png``."""
 
 import csv
+import io
 import json
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ... import __version__
-from ...runtime.whole_files import replaced
+from ...runtime.page_files import write_text
 from ..report.files import plain
 from .drift import Fleet
-from .page import write_page
+from .page import fleet_page
 from .picture import draw_fleet
 
 FlightRow = Mapping[str, Any]
@@ -24,33 +22,28 @@ _COLUMNS = (
 )
 
 
-def write_fleet(
-    fleet: Fleet, rows: Callable[[], Iterable[FlightRow]], folder: Path, command: str
-) -> list[Path]:
+def write_fleet(fleet: Fleet, rows: Sequence[FlightRow], folder: Path, command: str) -> list[Path]:
     """Write the results of a fleet, each file whole or not at all; return their paths.
 
     Args:
         fleet: what the flights say together.
-        rows: gives the flights anew at each call, as ``running.rows`` does.
+        rows: the flights, as ``running.rows`` returns them.
         folder: it is there.
         command: the command line, for the page.
 
     Raises:
         InputError: a file cannot be written.
     """
-    table, numbers, page = folder / "fleet.csv", folder / "fleet.json", folder / "fleet.html"
-    with replaced(table) as partial, open(partial, "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, _COLUMNS)
-        writer.writeheader()
-        for row in rows():
-            writer.writerows(_lines(row))
-    with replaced(numbers) as partial, open(partial, "w", encoding="utf-8") as file:
-        head = json.dumps(fleet_data(fleet), indent=1, allow_nan=False)
-        file.write(head.removesuffix("\n}") + ',\n "flights": [')
-        for i, row in enumerate(rows()):
-            file.write(("," if i else "") + "\n  " + json.dumps(row, allow_nan=False))
-        file.write("\n ]\n}\n")
-    write_page(fleet, rows, page, command)
+    page, numbers, table = (folder / f"fleet.{end}" for end in ("html", "json", "csv"))
+    lines = io.StringIO()
+    writer = csv.DictWriter(lines, _COLUMNS)
+    writer.writeheader()
+    for row in rows:
+        writer.writerows(_lines(row))
+    write_text(lines.getvalue(), table)
+    data = {**fleet_data(fleet), "flights": rows}
+    write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", numbers)
+    write_text(fleet_page(fleet, rows, command), page)
     return [page, numbers, table, draw_fleet(fleet, folder)]
 
 
@@ -58,18 +51,6 @@ def fleet_data(fleet: Fleet) -> dict[str, Any]:
     """Return what ``fleet.json`` holds besides its flights, and what the command returns: plain
     values, None for what is not finite.
     """
-    trends = []
-    for one in fleet.trends:
-        data = asdict(one)
-        series = data.pop("series")
-        trends.append(
-            {
-                **{key: series[key] for key in ("id", "effect", "coefficient", "unit", "flights")},
-                "named_in": len(series["flights"]),
-                "sure_in": sum(series["sure"]),
-                **data,
-            }
-        )
     found: dict[str, Any] = plain(
         {
             "version": __version__,
@@ -77,8 +58,27 @@ def fleet_data(fleet: Fleet) -> dict[str, Any]:
             "individuals": fleet.individuals,
             "refused": fleet.refused,
             "verdicts": fleet.verdicts,
-            "trends": trends,
-            "appearances": [asdict(one) for one in fleet.appearances],
+            "trends": [
+                {
+                    **one.of._asdict(),
+                    "flights": one.points[:, 0].astype(int).tolist(),
+                    "named_in": len(one.points),
+                    "sure_in": one.sure_in,
+                    "among": one.among,
+                    "mean": one.mean,
+                    "mean_ci95": one.mean_ci95,
+                    "between_std": one.between_std,
+                    "per_flight": one.per_flight,
+                    "per_flight_ci95": one.per_flight_ci95,
+                    "p": one.p,
+                    "adjusted_p": one.adjusted_p,
+                    "drifts": one.told,
+                    "tentative": one.tentative,
+                    "ends": one.ends,
+                }
+                for one in fleet.trends
+            ],
+            "appearances": [{**vars(one), "changed": one.told} for one in fleet.appearances],
         }
     )
     return found
@@ -86,25 +86,18 @@ def fleet_data(fleet: Fleet) -> dict[str, Any]:
 
 def _lines(row: FlightRow) -> Iterable[dict[str, Any]]:
     """Yield a flight's lines of the table: one a coefficient, or one if there is none."""
-    line = {key: row.get(key) for key in _COLUMNS[:8]}
-    line["residual"] = row.get("remainder")
-    if row["status"] == "diagnosed":
-        for side in ("before", "after"):
-            error = row["error"][side]
-            line[f"force_{side}_N"] = error["force_rms_N"]
-            line[f"torque_{side}_Nm"] = error["torque_rms_Nm"]
+    line = {key: row.get(key) for key in _COLUMNS[:8]} | {"residual": row.get("remainder")}
+    for side in ("before", "after") if row["status"] == "diagnosed" else ():
+        line[f"force_{side}_N"] = row["error"][side]["force_rms_N"]
+        line[f"torque_{side}_Nm"] = row["error"][side]["torque_rms_Nm"]
     if not row.get("effects"):
         yield line
-        return
-    for effect in row["effects"]:
+    for effect in row.get("effects", ()):
+        line |= {
+            "effect": effect["name"],
+            "tentative": effect["tentative"],
+            "indistinguishable_from": " ".join(effect["indistinguishable_from"]),
+        }
         for name, value in effect["coefficients"].items():
-            yield {
-                **line,
-                "effect": effect["name"],
-                "coefficient": name,
-                "value": value,
-                "std": effect["std"].get(name),
-                "unit": effect["units"].get(name),
-                "tentative": effect["tentative"],
-                "indistinguishable_from": " ".join(effect["indistinguishable_from"]),
-            }
+            std, unit = effect["std"].get(name), effect["units"].get(name)
+            yield {**line, "coefficient": name, "value": value, "std": std, "unit": unit}

@@ -4,10 +4,8 @@ happens.
 
 import hashlib
 import os
-import time
 import traceback
 import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -98,7 +96,6 @@ def refusal(key: str, kind: str, reason: str) -> dict[str, Any]:
 
 def diagnose_one(job: LogTask) -> dict[str, Any]:
     """Return the outcome of a log: what was found, or why it was refused. Raises nothing."""
-    begun, busy = time.perf_counter(), time.process_time()
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # a log's notes say what matters
@@ -114,14 +111,7 @@ def diagnose_one(job: LogTask) -> dict[str, Any]:
         return refusal(
             job.key, "error", f"{job.log.path}: {type(error).__name__} ({where}): {error}"
         )
-    kept: Mapping[str, Any] = {name: data[name] for name in _KEPT}
-    cost = {
-        "took_s": round(time.perf_counter() - begun, 2),
-        "cpu_s": round(time.process_time() - busy, 2),
-        "peak_mb": _peak_mb(),
-        "process": os.getpid(),
-    }
-    return {"key": job.key, "status": "diagnosed", **kept, "cost": cost}
+    return {"key": job.key, "status": "diagnosed", **{name: data[name] for name in _KEPT}}
 
 
 def _read(log: FleetLog) -> tuple[FlightLog, Vehicle]:
@@ -141,12 +131,3 @@ def _read(log: FleetLog) -> tuple[FlightLog, Vehicle]:
             f"--vehicle, a manifest or a vehicle.yaml beside the log"
         )
     return flight, load_vehicle(flight.vehicle)
-
-
-def _peak_mb() -> int | None:
-    """Return the most memory that this process has had, where the system says."""
-    try:
-        import resource
-    except ImportError:
-        return None
-    return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)

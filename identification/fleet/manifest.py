@@ -18,22 +18,21 @@ counts.
 
 import csv
 import io
-import math
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
+from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter
 
 from ...dynamics.vehicle_file import load_vehicle
-from ...runtime.errors import InputError, unknown_name
+from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS
-from ...runtime.forms import STRICT, checked
+from ...runtime.forms import STRICT, checked, expected
 from ...runtime.regular_files import read_bytes
 from ...runtime.yaml_file import read_yaml
 from ..logs.log_map import load_map
@@ -44,8 +43,6 @@ MANIFEST = "fleet.yaml"  # is found by itself in a folder of logs
 VEHICLE_FILE = "vehicle.yaml"
 _TABLES = (".csv", ".csv.gz", ".parquet")
 _BAG_FOLDER = "metadata.yaml"  # marks a ROS 2 bag, a folder that is one log
-_COLUMNS = ("log", "vehicle", "id", "reader", "map", "time")  # of a manifest in CSV
-_ORDERS = ("name", "modified")
 _MOST_BYTES = LIMITS.table_line * 64  # of a manifest in CSV
 
 
@@ -62,124 +59,102 @@ class FleetLog:
     time: float | None = None  # s; orders the flights of an individual; None: their names do
 
 
-_MOMENT: TypeAdapter[float | datetime | None] = TypeAdapter(
-    Annotated[float | datetime | None, Field(union_mode="left_to_right")]
+_MOMENT: TypeAdapter[float | datetime] = TypeAdapter(
+    Annotated[float | datetime, Field(union_mode="left_to_right")]
 )
 
 
-def _seconds(value: Any) -> float | None:
-    """Return a time (a number, a date, or a text that is one) in seconds."""
-    try:
-        moment = _MOMENT.validate_python(value)
-    except ValidationError:
-        raise InputError(
-            f"time {value!r}: expected a number or a date such as 2026-03-01T10:00"
-        ) from None
+def _seconds(value: object) -> float:
+    moment = _MOMENT.validate_python(value)
     if isinstance(moment, datetime):
-        moment = (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
-    if moment is not None and not math.isfinite(moment):
-        raise InputError(f"time {value!r}: expected a finite number")
+        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
     return moment
 
 
-_Text = Annotated[str | None, BeforeValidator(lambda value: value if value is None else str(value))]
+_Moment = Annotated[
+    float,
+    BeforeValidator(_seconds),
+    Field(allow_inf_nan=False),
+    expected("a number or a date such as 2026-03-01T10:00"),
+]
 
 
 @dataclass(frozen=True)
 class ManifestEntry:
     """What a manifest says of the logs that fit a pattern."""
 
-    __pydantic_config__ = STRICT
+    __pydantic_config__ = ConfigDict(extra="forbid", coerce_numbers_to_str=True)
 
-    log: Annotated[str, BeforeValidator(str)]
-    vehicle: _Text = None
-    id: _Text = None
-    reader: _Text = None
-    map: _Text = None  # a map's name or file, in place of a reader
-    time: Annotated[float | None, BeforeValidator(_seconds)] = None
+    log: str
+    vehicle: str | None = None
+    id: str | None = None
+    reader: str | None = None
+    map: str | None = None  # a map's name or file, in place of a reader
+    time: _Moment | None = None  # s
 
 
 @dataclass(frozen=True)
 class Manifest:
     """What is said of logs below a folder."""
 
-    folder: Path
-    entries: tuple[ManifestEntry, ...] = ()
-    by_modified: bool = False
+    __pydantic_config__ = STRICT
+
+    logs: tuple[ManifestEntry, ...]
+    order: Literal["name", "modified"] = "name"
 
 
 def read_manifest(path: Path) -> Manifest:
-    """Read a manifest (.yaml, .yml or .csv).
+    """Return a manifest (.yaml, .yml or .csv) with its files' paths as this process finds them.
 
     Raises:
         InputError: it cannot be read, or a field is unknown, missing or malformed.
     """
-    order = _ORDERS[0]
-    if path.suffix.lower() in (".yaml", ".yml"):
-        given = read_yaml(path, "a fleet's manifest")
-        if not isinstance(given, dict) or not isinstance(given.get("logs"), list):
-            raise InputError(f"{path}: expected a mapping with a list named logs")
-        if unknown := given.keys() - {"logs", "order"}:
-            raise unknown_name("key", str(min(unknown, key=str)), ("logs", "order"), str(path))
-        order = str(given.get("order", order))
-        if order not in _ORDERS:
-            raise unknown_name("order", order, _ORDERS, str(path))
-        found = [(f"logs, entry {i}", entry) for i, entry in enumerate(given["logs"], 1)]
-    else:
-        found = list(_csv_entries(path))
-    entries = tuple(_entry(entry, f"{path}: {where}", path.parent) for where, entry in found)
-    return Manifest(path.parent, entries, by_modified=order == "modified")
+    in_yaml = path.suffix.lower() in (".yaml", ".yml")
+    data = read_yaml(path, "a fleet's manifest") if in_yaml else {"logs": _csv_entries(path)}
+    manifest = checked(Manifest, data, str(path))
+    entries = []
+    for entry in manifest.logs:
+        if entry.reader is not None:
+            find_reader(entry.reader)
+        vehicle, log_map = (
+            str(path.parent / name) if name and name.endswith((".yaml", ".yml")) else name
+            for name in (entry.vehicle, entry.map)
+        )
+        if log_map is not None:
+            load_map(log_map)
+        entries.append(replace(entry, vehicle=vehicle, map=log_map))
+    return replace(manifest, logs=tuple(entries))
 
 
-def _csv_entries(path: Path) -> Iterator[tuple[str, dict[str, str]]]:
+def _csv_entries(path: Path) -> list[dict[str, str]]:
     data = read_bytes(path, "a fleet's manifest", _MOST_BYTES)
+    entries = []
     try:
         rows = csv.DictReader(io.StringIO(data.decode("utf-8-sig")), strict=True)
-        if "log" not in (rows.fieldnames or ()):
-            raise InputError(f"{path}: missing column log; expected {', '.join(_COLUMNS)}")
         for row in rows:
             if None in row or None in row.values():
-                raise InputError(
-                    f"{path}: line {rows.line_num}: expected {len(rows.fieldnames or ())} fields"
-                )
-            yield f"line {rows.line_num}", {k: v.strip() for k, v in row.items() if v.strip()}
-    except (ValueError, csv.Error) as error:
-        if isinstance(error, InputError):
-            raise
+                count = len(rows.fieldnames or ())
+                raise InputError(f"{path}: line {rows.line_num}: expected {count} fields")
+            entries.append({key: text.strip() for key, text in row.items() if text.strip()})
+    except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read as a fleet's manifest: {error}") from error
-
-
-def _entry(given: Any, where: str, folder: Path) -> ManifestEntry:
-    if not isinstance(given, Mapping) or "log" not in given:
-        raise InputError(f"{where}: expected a mapping with a pattern named log")
-    entry = checked(ManifestEntry, given, where)
-    entry = replace(entry, vehicle=_beside(folder, entry.vehicle), map=_beside(folder, entry.map))
-    if entry.reader is not None:
-        find_reader(entry.reader)
-    if entry.map is not None:
-        load_map(entry.map)
-    return entry
-
-
-def _beside(folder: Path, name: str | None) -> str | None:
-    """Return a file's name as the manifest means it, below its folder."""
-    return str(folder / name) if name is not None and name.endswith((".yaml", ".yml")) else name
+    return entries
 
 
 def find_logs(
     given: Sequence[Path],
-    manifest: Manifest | None = None,
+    manifest: Path | None = None,
     vehicle: str | None = None,
     reader: str | None = None,
     without: Path | None = None,
     log_map: str | None = None,
 ) -> tuple[list[FleetLog], list[str]]:
-    """Return the logs among files and in folders, in the order of their names, and doubts: entries
-    of the manifest that fit none.
+    """Return all logs of a fleet, in the order of their names, and a warning of each entry of the
+    manifest that fits none.
 
     Args:
         given: files, and folders that are searched through.
-        manifest: default: ``fleet.yaml`` in the first folder that has one.
+        manifest: its file; default: ``fleet.yaml`` in the first folder that has one.
         vehicle: of the logs of which the manifest names none.
         reader: likewise.
         without: a folder that is left out, the results'.
@@ -188,37 +163,43 @@ def find_logs(
     Raises:
         InputError: there is no such file, there is no log, or a vehicle cannot be used.
     """
-    if manifest is None:
-        manifest = next(
-            (read_manifest(p / MANIFEST) for p in given if (p / MANIFEST).is_file()), None
-        )
-    used: set[int] = set()
+    beside = (folder / MANIFEST for folder in given)
+    manifest = manifest or next((path for path in beside if path.is_file()), None)
+    said = Manifest(()) if manifest is None else read_manifest(manifest)
+    above = Path() if manifest is None else manifest.parent
+    used: set[str] = set()
     logs: dict[str, FleetLog] = {}
     for root in given:
         for path in _logs_in(root, without):
             below = path.relative_to(root) if root.is_dir() and path != root else None
-            one = FleetLog(
+            log = FleetLog(
                 str(path),
                 below.as_posix() if below is not None and len(given) == 1 else str(path),
                 vehicle or _vehicle_beside(path, root),
                 below.parts[0] if below is not None and len(below.parts) > 1 else "",
                 reader,
                 log_map,
+                os.path.getmtime(path) if said.order == "modified" else None,
             )
-            logs.setdefault(os.path.realpath(path), _with_manifest(one, manifest, used))
+            name = os.path.relpath(path, above).replace(os.sep, "/")
+            for entry in said.logs:
+                if fnmatchcase(name, entry.log):
+                    used.add(entry.log)
+                    log = _with_entry(log, entry)
+                    break
+            logs.setdefault(os.path.realpath(path), log)
     if not logs:
         raise InputError(
             f"{', '.join(map(str, given))}: no flight log found; expected tables "
             f"({', '.join(_TABLES)}), or files that a reader knows: "
             f"{', '.join(reader.what for reader in READERS.values() if reader.begins)}"
         )
-    for name in dict.fromkeys(log.vehicle for log in logs.values() if log.vehicle):
-        load_vehicle(name)  # a mistake in the vehicle is no log's
-    entries = manifest.entries if manifest else ()
+    for named in dict.fromkeys(log.vehicle for log in logs.values() if log.vehicle):
+        load_vehicle(named)  # a mistake in the vehicle is no log's
     doubts = [
         f"warning: the manifest's entry {entry.log!r} fits no log"
-        for i, entry in enumerate(entries)
-        if i not in used
+        for entry in said.logs
+        if entry.log not in used
     ]
     return sorted(logs.values(), key=lambda log: natural(log.name)), doubts
 
@@ -271,22 +252,12 @@ def _vehicle_beside(path: Path, root: Path) -> str | None:
     return None
 
 
-def _with_manifest(log: FleetLog, manifest: Manifest | None, used: set[int]) -> FleetLog:
-    """Return a log with what the manifest says of it; note which entry was used."""
-    if manifest is None:
-        return log
-    if manifest.by_modified:
-        log = replace(log, time=os.path.getmtime(log.path))
-    path = os.path.relpath(log.path, manifest.folder).replace(os.sep, "/")
-    for i, entry in enumerate(manifest.entries):
-        if fnmatchcase(path, entry.log):
-            used.add(i)
-            return replace(
-                log,
-                vehicle=entry.vehicle or log.vehicle,
-                id=entry.id or log.id,
-                reader=entry.reader or (None if entry.map else log.reader),
-                map=entry.map or (None if entry.reader else log.map),
-                time=log.time if entry.time is None else entry.time,
-            )
-    return log
+def _with_entry(log: FleetLog, entry: ManifestEntry) -> FleetLog:
+    return replace(
+        log,
+        vehicle=entry.vehicle or log.vehicle,
+        id=entry.id or log.id,
+        reader=entry.reader or (None if entry.map else log.reader),
+        map=entry.map or (None if entry.reader else log.map),
+        time=log.time if entry.time is None else entry.time,
+    )

@@ -13,8 +13,8 @@ from ...runtime.errors import InputError
 Outcome = dict[str, Any]
 
 
-class Outcomes:
-    """A file of outcomes, each under a key; only the keys and places are held in memory."""
+class Outcomes(dict[str, Outcome]):
+    """Outcomes by their keys, and the file that holds them; a later line of a key counts."""
 
     def __init__(self, path: Path) -> None:
         """Open the file, or begin it.
@@ -22,35 +22,20 @@ class Outcomes:
         Raises:
             InputError: it cannot be read or written.
         """
+        super().__init__()
         self._path = path
-        self._places: dict[bytes, int] = {}
         try:
-            self._end = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
-            self._file = open(path, "rb")  # noqa: SIM115 - closed by ``close``
-            place, line = 0, b"\n"
-            for line in self._file:
-                outcome = _parsed(line)
-                if outcome is not None:
-                    self._places[bytes.fromhex(outcome["key"])] = place
-                place += len(line)
-            if not line.endswith(b"\n"):  # a killed run's
+            self._file = open(path, "a+b", buffering=0)  # noqa: SIM115 - closed by ``close``
+            self._file.seek(0)
+            *lines, torn = self._file.read().split(b"\n")
+            if torn:  # a killed run's
                 self._append(b"\n")
         except OSError as error:
-            raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
-
-    def __contains__(self, key: str) -> bool:
-        return bytes.fromhex(key) in self._places
-
-    def __len__(self) -> int:
-        return len(self._places)
-
-    def __getitem__(self, key: str) -> Outcome:
-        """Return an outcome; a later one under the same key counts."""
-        self._file.seek(self._places[bytes.fromhex(key)])
-        outcome = _parsed(self._file.readline())
-        if outcome is None or outcome["key"] != key:
-            raise InputError(f"{self._path}: was changed while it was in use")
-        return outcome
+            raise self._refused(error) from error
+        for line in (*lines, torn):
+            outcome = _parsed(line)
+            if outcome is not None:
+                self[outcome["key"]] = outcome
 
     def add(self, outcome: Outcome) -> None:
         """Append an outcome, which has its ``key``; it is on the disk when this returns.
@@ -60,26 +45,22 @@ class Outcomes:
         """
         line = json.dumps(outcome, separators=(",", ":"), allow_nan=False).encode() + b"\n"
         try:
-            place = self._append(line)
+            self._append(line)
         except OSError as error:
-            raise InputError(
-                f"{self._path}: cannot be written: {error.strerror or error}"
-            ) from error
-        self._places[bytes.fromhex(outcome["key"])] = place
+            raise self._refused(error) from error
+        self[outcome["key"]] = outcome
 
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-        os.close(self._end)
 
-    def _append(self, line: bytes) -> int:
-        """Append bytes in one write; return where they begin."""
-        written = os.write(self._end, line)
-        place = os.lseek(self._end, 0, os.SEEK_CUR) - written
-        if written < len(line):
+    def _append(self, line: bytes) -> None:
+        if self._file.write(line) < len(line):
             raise OSError("the disk is full")
-        os.fsync(self._end)
-        return place
+        os.fsync(self._file.fileno())
+
+    def _refused(self, error: OSError) -> InputError:
+        return InputError(f"{self._path}: cannot be written: {error.strerror or error}")
 
 
 def _parsed(line: bytes) -> Outcome | None:

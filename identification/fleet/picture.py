@@ -27,7 +27,7 @@ def draw_fleet(fleet: Fleet, folder: Path) -> Path:
 
     shown = sorted(
         fleet.trends,
-        key=lambda one: (not one.drifts, one.adjusted_p or 1.0, -len(one.series.values)),
+        key=lambda one: (not one.told, one.adjusted_p or 1.0, -len(one.points)),
     )[:_MOST_PANELS]
     down = max(1, -(-len(shown) // _ACROSS))
     # names of users may hold what mathematical text would choke on
@@ -51,17 +51,16 @@ def draw_fleet(fleet: Fleet, folder: Path) -> Path:
 def _draw(panel: "Axes", one: Trend) -> None:
     from matplotlib.ticker import MaxNLocator
 
-    series, colour = one.series, _ORANGE if one.drifts else _BLUE
-    x, y, s, sure = series.arrays()
+    of, colour = one.of, _ORANGE if one.told else _BLUE
+    x, y, s = one.points[:, :3].T
+    sure = one.points[:, 3] > 0.0
     panel.errorbar(x, y, 1.96 * np.nan_to_num(s), fmt="none", ecolor=_GREY, elinewidth=0.7)
     panel.plot(x[sure], y[sure], "o", color=colour, ms=3.5)
     panel.plot(x[~sure], y[~sure], "o", mfc="white", mec=colour, ms=3.5)
     if one.ends is not None:
         panel.plot([x[0], x[-1]], one.ends, color=colour, lw=1.2)
-    unit = "" if series.unit == "1" else f" ({series.unit})"
-    panel.set_title(
-        f"{series.id[:24]}: {series.effect}\n{series.coefficient}{unit}", fontsize=8, loc="left"
-    )
+    unit = "" if of.unit == "1" else f" ({of.unit})"
+    panel.set_title(f"{of.id[:24]}: {of.effect}\n{of.coefficient}{unit}", fontsize=8, loc="left")
     panel.spines[["top", "right"]].set_visible(False)
     panel.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4), useMathText=False)
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))

@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -52,7 +53,7 @@ def run_fleet(
     texts: dict[str, str] = {}
 
     def keep(outcome: Outcome) -> None:
-        if outcome["key"] not in outcomes or outcomes[outcome["key"]] != outcome:
+        if outcomes.get(outcome["key"]) != outcome:
             outcomes.add(outcome)
         counts[outcome["status"]] += 1
         report(counts)
@@ -109,12 +110,17 @@ def _absolute(log: FleetLog) -> FleetLog:
     return replace(log, path=path, vehicle=file(log.vehicle), reader=reader, map=file(log.map))
 
 
-def rows(done: Sequence[LogTask], outcomes: Outcomes) -> Iterator[dict[str, Any]]:
-    """Yield each flight: its log, the individual, its place among that one's flights, its outcome;
-    one at a time, in the order of individuals and flights.
+def rows(done: Sequence[LogTask], outcomes: Outcomes) -> list[dict[str, Any]]:
+    """Return each flight: its log, the individual, its place among that one's flights, its outcome;
+    in the order of individuals and flights.
     """
     models: dict[str, str] = {}
-    named = [(one.log.id or _vehicle_name(one, outcomes, models), one) for one in done]
+    for file in {one.log.vehicle for one in done if one.log.vehicle}:
+        models[file] = load_vehicle(file).name
+    named = []
+    for one in done:
+        flown = models.get(one.log.vehicle or "") or outcomes[one.key].get("vehicle", "unknown")
+        named.append((one.log.id or flown, one))
     untimed = {name for name, one in named if one.log.time is None}
 
     def place(pair: tuple[str, LogTask]) -> tuple[object, ...]:
@@ -122,25 +128,12 @@ def rows(done: Sequence[LogTask], outcomes: Outcomes) -> Iterator[dict[str, Any]
         time = 0.0 if name in untimed else one.log.time or 0.0
         return natural(name), time, natural(one.log.name)
 
-    named.sort(key=place)
-    number, last = 0, ""
-    for name, one in named:
-        number = number + 1 if name == last else 1
-        last = name
-        outcome = outcomes[one.key]
-        yield {
-            "id": printable(name),
-            "flight": number,
-            "log": printable(one.log.name),
-            "time": one.log.time,
-            **{k: v for k, v in outcome.items() if k not in ("key", "cost", "limit_s")},
-        }
-
-
-def _vehicle_name(one: LogTask, outcomes: Outcomes, models: dict[str, str]) -> str:
-    """Return the name of the vehicle that a log is diagnosed with."""
-    if one.log.vehicle is None:
-        return str(outcomes[one.key].get("vehicle", "unknown"))
-    if one.log.vehicle not in models:
-        models[one.log.vehicle] = load_vehicle(one.log.vehicle).name
-    return models[one.log.vehicle]
+    flights: Counter[str] = Counter()
+    found = []
+    for name, one in sorted(named, key=place):
+        flights[name] += 1
+        known = {"id": printable(name), "flight": flights[name], "log": printable(one.log.name)}
+        found.append({**known, "time": one.log.time, **outcomes[one.key]})
+        for key in ("key", "limit_s"):
+            found[-1].pop(key, None)
+    return found

@@ -160,7 +160,6 @@ def test_processes_find_what_one_diagnosis_finds(tmp_path, cluster):
     for one in done:
         alone = diagnose_one(LogTask(one.log, one.key))
         there = outcomes[one.key]
-        assert there.pop("cost", {}).keys() == alone.pop("cost", {}).keys()
         there["reason"] = there.get("reason", "").rpartition("/")[2]
         alone["reason"] = alone.get("reason", "").rpartition("/")[2]
         assert there == plain(alone)

@@ -6,7 +6,7 @@ from scipy.stats import linregress, t
 
 from windwrench.identification.fleet.drift import (
     DRIFT,
-    Series,
+    Coefficient,
     appearance_of,
     fleet_of,
     meta_regression,
@@ -14,18 +14,12 @@ from windwrench.identification.fleet.drift import (
 )
 
 
-def series(values, stds, sure=None, flights=None):
+def trend(values, stds, among, sure=None):
     n = len(values)
-    return Series(
-        "a",
-        "mass",
-        "dm",
-        "kg",
-        list(flights or range(1, n + 1)),
-        list(values),
-        list(stds),
-        list(sure if sure is not None else [True] * n),
+    points = np.column_stack(
+        [np.arange(1, n + 1), values, stds, np.ones(n) if sure is None else sure]
     )
+    return trend_of(Coefficient("a", "mass", "dm", "kg"), points, among)
 
 
 def row(who, flight, effects=(), status="diagnosed"):
@@ -49,7 +43,7 @@ def test_with_equal_deviations_it_is_ordinary_regression():
     rng = np.random.default_rng(0)
     y = 1.0 + 0.2 * np.arange(8) + rng.standard_normal(8)
     for std in (0.01, 1.0, 100.0):  # wrong deviations cancel
-        found = trend_of(series(y, [std] * 8), 8)
+        found = trend(y, [std] * 8, 8)
         line = linregress(np.arange(8), y)
         half = t.ppf(0.975, 6) * line.stderr
         assert found.per_flight == pytest.approx(line.slope)
@@ -77,33 +71,33 @@ def test_intervals_hold_the_truth(between):
         s = 10 ** rng.uniform(-0.5, 0.5, 9)
         y = 2.0 + 0.1 * np.arange(9) + s * rng.standard_normal(9)
         y += between * rng.standard_normal(9)
-        found = trend_of(series(y, s), 9)
+        found = trend(y, s, 9)
         held["slope"] += found.per_flight_ci95[0] <= 0.1 <= found.per_flight_ci95[1]
         y -= 0.1 * np.arange(9)
-        low, high = trend_of(series(y, s), 9).mean_ci95
+        low, high = trend(y, s, 9).mean_ci95
         held["mean"] += low <= 2.0 <= high
     assert 0.91 <= held["slope"] / 300 <= 0.99
     assert held["mean"] / 300 >= 0.91
 
 
 def test_few_flights_have_no_trend_and_bad_numbers_do_not_count():
-    few = trend_of(series([1.0] * (DRIFT.least_flights - 1), [0.1] * (DRIFT.least_flights - 1)), 9)
+    few = trend([1.0] * (DRIFT.least_flights - 1), [0.1] * (DRIFT.least_flights - 1), 9)
     assert (few.per_flight, few.p, few.mean) == (None, None, pytest.approx(1.0))
-    one = trend_of(series([1.0], [0.1]), 9)
+    one = trend([1.0], [0.1], 9)
     assert one.mean_ci95 == pytest.approx((0.804, 1.196))
-    spoiled = trend_of(series([1.0, np.nan, 2.0], [np.nan, 1.0, 0.0]), 9)
+    spoiled = trend([1.0, np.nan, 2.0], [np.nan, 1.0, 0.0], 9)
     assert spoiled.per_flight is None
-    same = trend_of(series([1.0] * 9, [0.1] * 9), 9)  # at a bound
+    same = trend([1.0] * 9, [0.1] * 9, 9)  # at a bound
     assert (same.p, same.per_flight) == (1.0, pytest.approx(0.0))
 
 
 def test_flights_that_are_sure_count_alone_where_they_are_enough():
     y, s = [1.0, 1.01, 0.99, 1.0, 1.02, 50.0], [0.01] * 6
-    sure = trend_of(series(y, s, [True] * 5 + [False]), 6)
+    sure = trend(y, s, 6, [True] * 5 + [False])
     assert sure.mean == pytest.approx(1.0, abs=0.02)
     assert not sure.tentative
-    assert trend_of(series(y, s, [True] * 4 + [False] * 2), 6).tentative
-    line = trend_of(series([1.0, 2.0, 3.0, 4.0, 5.0, 9.0], s, [True] * 5 + [False]), 6)
+    assert trend(y, s, 6, [True] * 4 + [False] * 2).tentative
+    line = trend([1.0, 2.0, 3.0, 4.0, 5.0, 9.0], s, 6, [True] * 5 + [False])
     assert line.ends == pytest.approx((1.0, 6.0))  # at the first and last flight that names it
 
 
@@ -112,7 +106,7 @@ def test_an_effect_that_comes_is_told_though_its_coefficient_is_constant():
     rows += [row("b", i, [("mass", 1.0, 0.1, False, [])] if i % 2 else []) for i in range(1, 17)]
     rows.append(row("b", 17, status="refused"))
     fleet = fleet_of(rows)
-    told = {one.id: one.changed for one in fleet.appearances}
+    told = {one.id: one.told for one in fleet.appearances}
     assert told == {"a": True, "b": False}
     assert next(one for one in fleet.appearances if one.id == "a").later
     assert fleet.individuals["b"] == {"diagnosed": 16, "refused": 1}
@@ -130,9 +124,7 @@ def test_drifts_are_told_and_chance_is_not():
             value = 1.0 + slope * flight + s * float(rng.standard_normal())
             rows.append(row(f"v{who}", flight, [("mass", value, s, False, [])]))
     fleet = fleet_of(rows)
-    told = [int(one.series.id[1:]) for one in fleet.trends if one.drifts]
+    told = [int(one.of.id[1:]) for one in fleet.trends if one.told]
     assert set(told) >= set(range(6))
     assert len(told) <= 8
-    assert [one.drifts for one in fleet.trends] == sorted(
-        (one.drifts for one in fleet.trends), reverse=True
-    )
+    assert [one.told for one in fleet.trends[: len(told)]] == [True] * len(told)

@@ -72,7 +72,7 @@ FLIGHTS = [
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fleet")
-    written = write_fleet(fleet_of(FLIGHTS), lambda: iter(FLIGHTS), folder, "windwrench diagnose")
+    written = write_fleet(fleet_of(FLIGHTS), FLIGHTS, folder, "windwrench diagnose")
     assert [path.name for path in written] == [
         "fleet.html",
         "fleet.json",
@@ -183,7 +183,9 @@ def test_flights_are_in_the_order_of_times_else_of_names(tmp_path):
         ]
     ):
         key = f"{i:032x}"
-        outcomes.add({"key": key, "status": "refused", "kind": "input", "reason": "?", "cost": 1})
+        outcomes.add(
+            {"key": key, "status": "refused", "kind": "input", "reason": "?", "limit_s": 1}
+        )
         done.append(LogTask(FleetLog(name, name, "ardrone2", who, time=time), key))
     found = [(row["id"], row["flight"], row["log"]) for row in rows(done, outcomes)]
     assert found == [
@@ -193,5 +195,5 @@ def test_flights_are_in_the_order_of_times_else_of_names(tmp_path):
         ("b", 1, "b9"),
         ("b", 2, "b10"),
     ]
-    assert "cost" not in next(rows(done, outcomes))
+    assert "limit_s" not in rows(done, outcomes)[0]
     outcomes.close()
