@@ -50,6 +50,7 @@ class Samples:
     t: Array  # (N,) s
     columns: Mapping[str, Array]  # by name (N,); NaN where there is no value
     rows: Rows  # (N,) of the file's table
+    topic: str = ""  # of the message in which they stood, where a log has several
 
     def values(self, part: Columns) -> Array:
         """Return a section's columns (N, k), with their signs and scale."""
@@ -57,12 +58,12 @@ class Samples:
 
     def has(self, part: Columns) -> bool:
         """Return whether a section's columns are there."""
-        return set(part.named) <= set(self.columns)
+        return part.topic in ("", self.topic) and set(part.named) <= set(self.columns)
 
     def cut(self, keep: slice | Mask | Rows) -> "Samples":
         """Return some of the rows."""
         columns = {name: column[keep] for name, column in self.columns.items()}
-        return Samples(self.t[keep], columns, self.rows[keep])
+        return Samples(self.t[keep], columns, self.rows[keep], self.topic)
 
     def _column(self, name: str) -> Array:
         """Return a column (N,), or the constant that ``=0`` stands for."""
@@ -113,6 +114,8 @@ def in_kit_axes(log_map: LogMap, part: Attitude, attitude: Array) -> Array:
         attitude = attitude * np.array([1.0, -1.0, -1.0, -1.0])
     if log_map.world == "enu" and log_map.body == "flu":
         return attitude
+    if log_map.world == "ned" and log_map.body == "frd":  # of any length, NaN included
+        return attitude * np.array([1.0, 1.0, -1.0, -1.0])
     matrix = Rotation.from_quat(attitude, scalar_first=True).as_matrix()
     turn = Rotation.from_matrix(_WORLD_TURNS[log_map.world] @ matrix @ _BODY_TURNS[log_map.body].T)
     return np.asarray(turn.as_quat(scalar_first=True))

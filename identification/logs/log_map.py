@@ -14,18 +14,19 @@ columns the log has, with numbers in them.
 * ``world``: enu (z up; also nwu, flu), ned (z down; also frd), y_up (motion capture)
 * ``body``: flu (forward, left, up) or frd (forward, right, down)
 * ``rows``: mixed (default: fields may be empty where a channel has no sample), whole (every field
-  of a pose is filled, or all are empty; times strictly increase) or streams (each channel has
-  samples of its own, as in a log of messages; commands become rotor speeds where the vehicle is
-  given)
+  of a pose is filled, or all are empty; times strictly increase), streams (each channel has
+  samples of its own, an empty field is none; commands become rotor speeds where the vehicle is
+  given) or messages (streams whose every row is a sample: a pose of NaN was lost)
 * ``stray_rows``: how many rows at the start are dropped, at most, where a gap follows them
 * ``time``: column, unit (s, ms, us, ns, min), offset (s; default: the flight begins at 0); or
   rate_hz alone, where the table has no time
+* ``topic`` of any section: the kind of message in which its columns stand, in a log of several
 * ``position``: columns (x, y, z), unit (m, mm, cm, ft), held (true: a position that repeats the one
   before is no measurement)
 * ``attitude``: columns, and order (wxyz or xyzw); or columns (roll, pitch, yaw: about x, y, z),
   euler (order of the turns, each about the axis that the last has moved: zyx is yaw, pitch, roll)
   and unit (deg, rad). A column ``=0`` stands for an angle that is not in the table. sense:
-  body_to_world or world_to_body
+  body_to_world or world_to_body. of: topics of the positions that it goes with (default: all)
 * ``rotors``: measured speeds: columns, order (a name of ``rotor_orders`` or four motors' numbers:
   those at front-left, rear-left, rear-right, front-right), unit (rad/s, rpm, Hz, eRPM with
   pole_pairs)
@@ -174,6 +175,13 @@ class Columns:
     signs: tuple[int, ...] = ()  # one a column; empty: all as they stand
     optional: _Truth = False
     note: _Text = ""
+    topic: _Text = ""  # of the messages in which the columns stand; empty: any
+
+    @property
+    def label(self) -> str:
+        """What the columns are called together: their topic, else the first of them."""
+        several = " ..." if len(self.columns) > 1 else ""
+        return self.topic or f"{self.columns[0]}{several}"
 
     @property
     def named(self) -> list[str]:
@@ -210,6 +218,7 @@ class Attitude(Columns):
     order: Annotated[str, _choice(QUATERNIONS)] = "wxyz"  # of the columns of a quaternion
     euler: Annotated[str, _choice(EULER_ORDERS)] = ""  # of turns; empty: a quaternion
     sense: Annotated[str, _choice(SENSES)] = "body_to_world"
+    of: _Names = ()  # topics of positions; empty: of all
 
 
 @dataclass(frozen=True)
@@ -271,7 +280,7 @@ class LogMap:
     recognise: _Names = ()
     name: str = ""  # where it comes from: a shipped map's name or a file
     notes: _Names = ()
-    rows: Literal["mixed", "whole", "streams"] = "mixed"
+    rows: Literal["mixed", "whole", "streams", "messages"] = "mixed"
     stray_rows: Annotated[int, Field(ge=0)] = 0
     extra: Mapping[str, Columns] = field(default_factory=dict)
     # further ways to fill a section (``time`` among them), in their order
@@ -282,6 +291,11 @@ class LogMap:
         """The sections that the map has, but the time."""
         found = {name: getattr(self, name) for name in SECTIONS}
         return {name: part for name, part in found.items() if part is not None}
+
+    @property
+    def has_clocks(self) -> bool:
+        """Does each channel have samples of its own?"""
+        return self.rows in ("streams", "messages")
 
     @property
     def is_own(self) -> bool:

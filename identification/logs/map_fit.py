@@ -3,7 +3,7 @@ section the first that holds measurements.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from typing import Any
@@ -121,41 +121,57 @@ def ways(log_map: LogMap, section: str) -> tuple[Any, ...]:
     return () if first is None else (first, *log_map.alternatives.get(section, ()))
 
 
-def samples_of(recorded: Iterable[Samples], part: Columns) -> Samples:
-    """Return the samples in which a section's columns stand."""
-    return next(samples for samples in recorded if samples.has(part))
-
-
-def chosen(recorded: Sequence[Samples], log_map: LogMap) -> LogMap:
-    """Return a map with one way to fill each section: the first whose columns are there, and hold
-    numbers; without the optional sections of which there are none.
+def chosen(recorded: Sequence[Samples], log_map: LogMap) -> tuple[LogMap, dict[str, Samples]]:
+    """Return a map with one way to fill each section, and the samples in which its columns stand:
+    the first way whose columns are there, and hold measurements; a position with an attitude that
+    goes with it. Optional sections of which there are none are left out.
     """
-    found: dict[str, Any] = {"alternatives": {}}
-    for section in log_map.sections:
-        there = [w for w in ways(log_map, section) if any(s.has(w) for s in recorded)]
-        if len(there) == 1 and (log_map.rows == "whole" or not there[0].optional):
-            found[section] = there[0]
-            continue
-        streams = log_map.rows == "streams"
-        full = [w for w in there if _is_measured(section, w, samples_of(recorded, w), streams)]
-        found[section] = full[0] if full else None
-    if found.get("position", log_map.position) is None or (
-        found.get("attitude", log_map.attitude) is None and log_map.rows == "streams"
-    ):
-        found |= {"position": None, "attitude": None}
-    return replace(log_map, **found)
+    usable = {section: _usable(recorded, log_map, section) for section in log_map.sections}
+    places, turns = usable.get("position", []), usable.get("attitude", [])
+    pairs = [
+        ([place], [turn])
+        for place in places
+        for turn in turns
+        if not turn[0].of or place[0].topic in turn[0].of
+    ]
+    if pairs:
+        usable["position"], usable["attitude"] = pairs[0]
+    elif log_map.has_clocks or not places:
+        usable["position"], usable["attitude"] = [], []
+    found: dict[str, Any] = {
+        section: ways[0][0] if ways else None for section, ways in usable.items()
+    }
+    samples = {section: ways[0][1] for section, ways in usable.items() if ways}
+    return replace(log_map, alternatives={}, **found), samples
 
 
-def _is_measured(section: str, way: Columns, samples: Samples, streams: bool) -> bool:
-    """Return whether a section's columns hold measurements: in ``streams`` rotors that turn, and a
-    position that changes.
+def _usable(
+    recorded: Sequence[Samples], log_map: LogMap, section: str
+) -> list[tuple[Any, Samples]]:
+    """Return the ways to fill a section that hold measurements, each with its samples; the only
+    way that is there, where the section must be filled.
+    """
+    there = [
+        (way, samples) for way in ways(log_map, section) for samples in recorded if samples.has(way)
+    ]
+    if len(there) == 1 and (log_map.rows == "whole" or not there[0][0].optional):
+        return there
+    return [one for one in there if _is_measured(section, *one, log_map.rows)]
+
+
+def _is_measured(section: str, way: Columns, samples: Samples, rows: str) -> bool:
+    """Return whether a section's columns hold measurements: of channels with clocks of their own
+    rotors that turn, of ``streams`` a position that changes, of ``messages`` two positions and a
+    voltage.
     """
     values = samples.values(way)
     values = values[np.isfinite(values).all(axis=1)]
-    if section == "rotors" and streams:
-        return bool(np.any(values != 0.0))
     if isinstance(way, Attitude) and not way.euler:
         return bool(np.any(np.linalg.norm(values, axis=1) > NO_QUATERNION))
-    if section == "position" and streams and len(values):
+    if section == "rotors" and rows in ("streams", "messages"):
+        return bool(np.any(values != 0.0))
+    if section == "position" and rows == "streams" and len(values):
         return bool(np.any(np.ptp(values, axis=0) > 0.0))
-    return len(values) > 0
+    if section == "battery" and rows == "messages":
+        return bool(np.any(values > 0.0))
+    return len(values) > (section == "position" and rows == "messages")

@@ -9,7 +9,7 @@ The log begins with the first sample of the rotors and ends with the last.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +29,7 @@ from .flight_log import (
 )
 from .layout_guess import FoundLayout, open_any_table, stem
 from .log_map import Attitude, Battery, Columns, Commands, LogMap, Position, constant
-from .map_fit import NO_QUATERNION, chosen, fitted, samples_of, wanted_columns, ways
+from .map_fit import NO_QUATERNION, chosen, fitted, wanted_columns, ways
 from .rotor_orders import order_names, order_words
 from .sample_gaps import GAPS, bridged
 from .streams import Stream, flight_log, slerp
@@ -70,7 +70,7 @@ def map_table(
 ) -> FlightLog:
     """Return the flight log that a map makes of a table; as ``read_mapped``."""
     vehicle_name = vehicle_of_columns(table) if log_map.is_own else log_map.vehicle
-    if vehicle is None and vehicle_name in preset_names() and log_map.rows != "streams":
+    if vehicle is None and vehicle_name in preset_names() and not log_map.has_clocks:
         vehicle = load_vehicle(vehicle_name)
     log_map = fitted(table, log_map, vehicle, reader)
     columns = table.read(wanted_columns(log_map))
@@ -83,8 +83,8 @@ def map_table(
         notes.append(f"layout: {found.words}")
     samples, time_words = rows_of(table, columns, log_map)
     notes += time_words
-    log_map = chosen([samples], log_map)
-    if log_map.rows == "streams":
+    log_map, _ = chosen([samples], log_map)
+    if log_map.has_clocks:
         return map_recording(table.path, [samples], log_map, vehicle, reader, tuple(notes))
     valid, position, quaternion, pose_notes = _pose(table, samples, log_map)
     sensors = {
@@ -135,6 +135,45 @@ def map_table(
     return with_commanded_speeds(log, vehicle, log_map.commands)
 
 
+@dataclass(frozen=True)
+class Recording:
+    """The channels of a recording in the kit's units, axes and order of rotors, each with its own
+    clock.
+    """
+
+    path: Path
+    reader: str  # its name
+    log_map: LogMap  # with the sections that are there
+    streams: dict[str, Stream]  # by section; that of the position has the attitude beside it
+    notes: list[str]
+
+    def log(self, vehicle: Vehicle | None, commanded: bool = False) -> FlightLog:
+        """Return the flight log.
+
+        Args:
+            vehicle: that flew, to turn commands into rotor speeds; None: they stay commands.
+            commanded: the rotor speeds were computed from commands.
+
+        Raises:
+            InputError: neither a pose nor gyro and accelerometer, or channels that do not overlap.
+        """
+        return flight_log(
+            self.path,
+            self.reader,
+            self.streams.get("position"),
+            self.streams.get("rotors"),
+            self.streams.get("battery"),
+            tuple(self.notes),
+            self.streams.get("accelerometer"),
+            self.streams.get("gyro"),
+            command=self.streams.get("commands"),
+            vehicle=vehicle,
+            commanded=commanded,
+            vehicle_name=self.log_map.vehicle,
+            model=self.log_map.commands,
+        )
+
+
 def map_recording(
     path: Path,
     recorded: Sequence[Samples],
@@ -143,64 +182,65 @@ def map_recording(
     reader: str,
     notes: tuple[str, ...],
 ) -> FlightLog:
-    """Return the flight log that a map makes of columns whose groups have a clock each.
+    """Return the flight log that a map makes of columns whose groups have a clock each; arguments
+    and errors as of ``channels_of_recording`` and ``Recording.log``.
+    """
+    return channels_of_recording(path, recorded, log_map, reader, notes).log(vehicle)
+
+
+def channels_of_recording(
+    path: Path, recorded: Sequence[Samples], log_map: LogMap, reader: str, notes: Sequence[str]
+) -> Recording:
+    """Return the channels that a map makes of columns whose groups have a clock each.
 
     Args:
         path: the file, for errors and the log's name.
         recorded: its groups of columns.
-        log_map: what the columns mean; sections without numbers are left out.
-        vehicle: that flew, to turn commands into rotor speeds; None: they stay commands.
+        log_map: what the columns mean; sections without measurements are left out.
         reader: the reader's name.
         notes: what the reader assumed.
 
     Raises:
-        InputError: no motors, or neither a pose nor gyro and accelerometer.
+        InputError: no motors.
     """
-    wanted = [way.columns[0] for way in (*ways(log_map, "rotors"), *ways(log_map, "commands"))]
+    motors = (*ways(log_map, "rotors"), *ways(log_map, "commands"))
     may_have_pose = log_map.position is not None
-    log_map = chosen(recorded, log_map)
+    log_map, sources = chosen(recorded, log_map)
     if log_map.rotors is None and log_map.commands is None:
-        names = [name for samples in recorded for name in samples.columns]
+        names = [s.topic for s in recorded if s.topic] or [x for s in recorded for x in s.columns]
         raise InputError(
-            f"{path}: no motors; expected {' or '.join(f'{name} ...' for name in wanted)}, found "
-            f"{', '.join(names[:20]) or 'nothing'}"
+            f"{path}: no motors; expected {' or '.join(dict.fromkeys(w.label for w in motors))}, "
+            f"found {', '.join(dict.fromkeys(names[:20])) or 'nothing'}"
         )
-    streams: dict[str, Stream] = {}
-    for name, part in log_map.sections.items():
-        samples = samples_of(recorded, part)
-        values = samples.values(part)
-        good = np.isfinite(values).all(axis=1)
-        values = values[good]
-        if isinstance(part, Attitude):
-            values = in_kit_axes(log_map, part, quaternions(part, values))
-        else:
-            values = in_kit_units(log_map, name, part, values)
-        label = part.columns[0] if len(part.columns) == 1 else f"{part.columns[0]} ..."
-        streams[name] = Stream(label, samples.t[good], values)
+    streams = {
+        name: _stream(log_map, name, part, sources[name]) for name, part in log_map.sections.items()
+    }
     said = [*notes, *section_notes(log_map)]
     for name in ("rotors", "commands"):
-        if (motors := getattr(log_map, name)) is not None:
-            said.append(f"{name}: {streams[name].name}, {_order_note(motors.order)}")
+        if (part := getattr(log_map, name)) is not None:
+            said.append(f"{name}: {streams[name].name}, {_order_note(part.order)}")
     if "position" in streams:
-        position, attitude = streams["position"], streams.pop("attitude").forward()[0]
-        pose = np.column_stack([position.values, slerp(position.t, attitude)])
+        position, attitude = streams["position"], streams.pop("attitude")
+        together = log_map.rows == "messages" and sources["position"] is sources["attitude"]
+        turns = attitude.values if together else slerp(position.t, attitude.forward()[0])
+        pose = np.column_stack([position.values, turns])
         streams["position"] = Stream(position.name, position.t, pose)
     elif may_have_pose:
         said.append("no pose: no position that changes, with an attitude beside it, was logged")
-    return flight_log(
-        path,
-        reader,
-        streams.get("position"),
-        streams.get("rotors"),
-        streams.get("battery"),
-        tuple(said),
-        streams.get("accelerometer"),
-        streams.get("gyro"),
-        command=streams.get("commands"),
-        vehicle=vehicle,
-        vehicle_name=log_map.vehicle,
-        model=log_map.commands,
-    )
+    return Recording(path, reader, log_map, streams, said)
+
+
+def _stream(log_map: LogMap, section: str, part: Columns, samples: Samples) -> Stream:
+    """Return a section's channel, in the kit's units and axes."""
+    values, t = samples.values(part), samples.t
+    if log_map.rows != "messages":
+        good = np.isfinite(values).all(axis=1)
+        values, t = values[good], t[good]
+    if isinstance(part, Attitude):
+        values = in_kit_axes(log_map, part, quaternions(part, values))
+    else:
+        values = in_kit_units(log_map, section, part, values)
+    return Stream(part.label, t, values)
 
 
 def section_notes(log_map: LogMap) -> list[str]:

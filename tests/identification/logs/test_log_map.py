@@ -96,7 +96,7 @@ def test_each_map_that_ships_is_a_map(name: str) -> None:
         ({"rotors": {**GOOD["rotors"], "signs": [1, 2, 1, 1]}}, "signs: .*4 times 1 or -1"),
         ({"rotors": None}, "no motors; expected a section rotors or commands"),
         ({"extra": {"sent": {"columns": []}}}, "extra: sent: columns: missing; expected some"),
-        ({"rows": "some"}, "rows must be mixed, whole or streams, got 'some'"),
+        ({"rows": "some"}, "rows must be mixed, whole, streams or messages, got 'some'"),
         ({"world": "esu"}, "unknown world 'esu'; expected one of enu"),
         ({"gyro": {"columns": ["a", "b", "c"], "unit": "raw"}}, "gyro: unit raw without a scale"),
         (
