@@ -17,14 +17,16 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
-from ..logs.readers import px4_channels
+from ..logs.readers import px4_ulog
 from ..logs.readers.recognise import reader_by_content
 from ..logs.reading import read_log
+from ..logs.streams import readable
 from ..motion.smoothing import lagged, resampled
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+_CHANNELS = ("gyro", "accelerometer", "commands")  # of a PX4 log that are needed
 STEP = 0.02  # s, of the grid: a rotor takes about that long to follow
 FINE = 0.004  # s, on which commands are filtered by the rotors' lag
 # of the largest command, above which the rotors are not idle; and of the median of what is: above
@@ -126,16 +128,25 @@ def _of_ulog(path: Path) -> tuple[Channels, tuple[str, ...]] | None:
     reader = reader_by_content(path)
     if reader is None or reader.name != "px4_ulog":
         return None
-    streams, notes, motors = px4_channels.read_streams(path)
-    first, second, third, fourth = (f"PX4 motor {motor}" for motor in motors)
-    channels = Channels(
+    recording = px4_ulog.channels(path)
+    streams = [readable(recording.streams.get(part)) for part in _CHANNELS]
+    gyro, accelerometer, command = streams
+    if gyro is None or accelerometer is None or command is None:
+        missing = [part for part, stream in zip(_CHANNELS, streams, strict=True) if stream is None]
+        raise InputError(f"{path}: no {' and no '.join(missing)}; expected all of them")
+    assert recording.log_map.commands is not None
+    first, second, third, fourth = (f"PX4 motor {i}" for i in recording.log_map.commands.order)
+    found = Channels(
         str(path),
-        *streams["gyro"],
-        *streams["accelerometer"],
-        *streams["command"],
+        gyro.t,
+        gyro.values,
+        accelerometer.t,
+        accelerometer.values,
+        command.t,
+        command.values,
         motor_names=(first, second, third, fourth),
     )
-    return channels, notes
+    return found, tuple(recording.notes)
 
 
 def channels_of_log(log: FlightLog) -> Channels:

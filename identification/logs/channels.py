@@ -115,7 +115,7 @@ def in_kit_axes(log_map: LogMap, part: Attitude, attitude: Array) -> Array:
     if log_map.world == "enu" and log_map.body == "flu":
         return attitude
     if log_map.world == "ned" and log_map.body == "frd":  # of any length, NaN included
-        return attitude * np.array([1.0, 1.0, -1.0, -1.0])
+        return np.asarray(attitude * np.array([1.0, 1.0, -1.0, -1.0]))
     matrix = Rotation.from_quat(attitude, scalar_first=True).as_matrix()
     turn = Rotation.from_matrix(_WORLD_TURNS[log_map.world] @ matrix @ _BODY_TURNS[log_map.body].T)
     return np.asarray(turn.as_quat(scalar_first=True))

@@ -236,6 +236,7 @@ class Commands(Columns):
     order: _Order = ORDERS["windwrench"]
     range: _Range = None  # None: the vehicle's motor curve states it
     thrust_factor: Annotated[float, _is("0 to 1", lambda x: _finite(x) and 0 <= x <= 1)] = 1.0
+    thrust_span: tuple[_Number, _Number] = (0.0, 1.0)  # commands at which u is 0 and 1
     clip: _Truth = False
     thrust: tuple[_Number, ...] = ()  # N a motor, of the count's powers 0, 1, 2
     full_voltage: Annotated[_Number, Field(gt=0.0)] = 1.0  # V, at which ``thrust`` holds

@@ -161,17 +161,17 @@ def _usable(
 
 def _is_measured(section: str, way: Columns, samples: Samples, rows: str) -> bool:
     """Return whether a section's columns hold measurements: of channels with clocks of their own
-    rotors that turn, of ``streams`` a position that changes, of ``messages`` two positions and a
-    voltage.
+    rotors that turn, a voltage, of ``streams`` a position that changes, and two samples of others.
     """
     values = samples.values(way)
     values = values[np.isfinite(values).all(axis=1)]
     if isinstance(way, Attitude) and not way.euler:
         return bool(np.any(np.linalg.norm(values, axis=1) > NO_QUATERNION))
-    if section == "rotors" and rows in ("streams", "messages"):
+    has_clocks = rows in ("streams", "messages")
+    if section == "rotors" and has_clocks:
         return bool(np.any(values != 0.0))
     if section == "position" and rows == "streams" and len(values):
         return bool(np.any(np.ptp(values, axis=0) > 0.0))
-    if section == "battery" and rows == "messages":
+    if section == "battery" and has_clocks:
         return bool(np.any(values > 0.0))
-    return len(values) > (section == "position" and rows == "messages")
+    return len(values) > has_clocks

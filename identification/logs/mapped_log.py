@@ -32,10 +32,11 @@ from .log_map import Attitude, Battery, Columns, Commands, LogMap, Position, con
 from .map_fit import NO_QUATERNION, chosen, fitted, wanted_columns, ways
 from .rotor_orders import order_names, order_words
 from .sample_gaps import GAPS, bridged
-from .streams import Stream, flight_log, slerp
+from .streams import Stream, flight_log, readable, slerp
 from .table import Table
 from .table_rows import has_several_rates, rows_of
 
+_IMU = ("accelerometer", "gyro")
 _ATTITUDE_GAP = 0.1  # s, across which an attitude is not interpolated
 _OUTSIDE = 0.5  # share of commands beyond their range from which on the range is wrong
 _SPECIFIC_FORCE = 6.0, 16.0  # m/s2: a flight's median is within; outside a scale is wrong
@@ -201,15 +202,15 @@ def channels_of_recording(
         notes: what the reader assumed.
 
     Raises:
-        InputError: no motors.
+        InputError: no motors, or neither a pose nor gyro and accelerometer.
     """
     motors = (*ways(log_map, "rotors"), *ways(log_map, "commands"))
-    may_have_pose = log_map.position is not None
+    poses = ways(log_map, "position")
     log_map, sources = chosen(recorded, log_map)
     if log_map.rotors is None and log_map.commands is None:
         names = [s.topic for s in recorded if s.topic] or [x for s in recorded for x in s.columns]
         raise InputError(
-            f"{path}: no motors; expected {' or '.join(dict.fromkeys(w.label for w in motors))}, "
+            f"{path}: no motors that turn; expected {' or '.join(map(_wanted, motors))}, "
             f"found {', '.join(dict.fromkeys(names[:20])) or 'nothing'}"
         )
     streams = {
@@ -225,9 +226,20 @@ def channels_of_recording(
         turns = attitude.values if together else slerp(position.t, attitude.forward()[0])
         pose = np.column_stack([position.values, turns])
         streams["position"] = Stream(position.name, position.t, pose)
-    elif may_have_pose:
+    elif poses:
+        absent = [name for name in _IMU if readable(streams.get(name)) is None]
+        if absent:
+            raise InputError(
+                f"{path}: no pose, and no {' and no '.join(absent)}; expected "
+                f"{' or '.join(way.label for way in poses)}, with an attitude beside it, or "
+                f"{' and '.join(_IMU)}"
+            )
         said.append("no pose: no position that changes, with an attitude beside it, was logged")
     return Recording(path, reader, log_map, streams, said)
+
+
+def _wanted(way: Columns) -> str:
+    return f"{way.topic} with {way.columns[0]} ..." if way.topic else way.label
 
 
 def _stream(log_map: LogMap, section: str, part: Columns, samples: Samples) -> Stream:

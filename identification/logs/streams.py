@@ -144,7 +144,7 @@ def flight_log(
     motors = rotors if rotors is not None else command
     if motors is None:
         raise InputError(f"{path}: no motors; expected rotor speeds or motor commands")
-    accelerometer, gyro = _readable(accelerometer), _readable(gyro)
+    accelerometer, gyro = readable(accelerometer), readable(gyro)
     if pose is None and (accelerometer is None or gyro is None):
         absent = " and no ".join(
             name for name, s in (("accelerometer", accelerometer), ("gyro", gyro)) if s is None
@@ -166,7 +166,7 @@ def flight_log(
         notes += rotor_notes
         _check_rotor_speeds(path, rotors)
     if command is not None:
-        command = _readable(command)
+        command = readable(command)
         if command is None or len(command.t) < 2:
             raise InputError(
                 f"{path}: {motors.name}: no two commands are finite numbers; expected some"
@@ -305,7 +305,7 @@ def _check_rotor_speeds(path: Path, rotors: Stream) -> None:
         )
 
 
-def _readable(sensor: Stream | None) -> Stream | None:
+def readable(sensor: Stream | None) -> Stream | None:
     """Return the samples (N, K) that are finite and in order of time; None where they are fewer
     than two.
     """

@@ -80,7 +80,7 @@ def test_a_px4_log_of_motors_that_stand_still_is_refused(vehicle):
     with pytest.raises(
         InputError,
         match=(
-            r"sample\.ulg: no motors: expected .* of four motors that turn, found "
+            r"sample\.ulg: no motors that turn; expected esc_status .*, found "
             "actuator_outputs, vehicle_attitude, vehicle_local_position"
         ),
     ):

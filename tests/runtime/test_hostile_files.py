@@ -170,7 +170,7 @@ def test_files_that_unpack_to_gigabytes_cost_little(tmp_path):
     (tmp_path / "empty.BIN").write_bytes(
         EMPTY_DATAFLASH + (b"\xa3\x95\x09" * 2**20) * 20 + bytes(7)
     )
-    expected["empty.BIN"] = "no motors; expected RCOU"
+    expected["empty.BIN"] = "no motors that turn; expected ESC"
     (tmp_path / "narrow_log00").write_bytes(NARROW_SD_CARD + (b"\x07\0" + bytes(408)) * 90_000)
     expected["narrow_log00"] = "more than 4000000 events or 33554432 numbers"
     (tmp_path / "few.bbl").write_bytes(EMPTY_FRAMES + b"IP" * 8)

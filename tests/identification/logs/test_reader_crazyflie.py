@@ -149,7 +149,7 @@ def test_a_log_that_was_cut_or_spoiled(write):
         (sd_card({"imu": (T[:1], fast(T[:1]))}), "no event twice"),
         (
             sd_card({"pose": (SLOW, slow(SLOW))}),
-            "no motors; expected rpm.m1 .*motor.m1 .* found stateEstimate.x",
+            "no motors that turn; expected rpm.m1 .*motor.m1 .* found stateEstimate.x",
         ),
     ],
 )

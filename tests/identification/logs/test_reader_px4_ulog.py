@@ -139,7 +139,8 @@ def test_motion_capture_and_turn_rates(write, t, topic, new, vehicle):
     assert_motion(log, t)
     np.testing.assert_allclose(log.rotor_speeds, np.multiply.outer(growth(t), OURS), atol=0.06)
     np.testing.assert_allclose(log.voltage, 12.0 - 0.1 * t, atol=1e-5)
-    assert any(topic in note and "y west" in note for note in log.notes)
+    assert f"pose: {topic}" in log.notes
+    assert any("y west" in note for note in log.notes)
     assert any("3, 2, 4, 1" in note for note in log.notes)
 
 
@@ -188,7 +189,8 @@ def test_odometry_without_attitude_takes_the_onboard_one(write, t, vehicle):
         vehicle,
     )
     assert_motion(log, t, atol=1e-5)
-    assert any("has no attitude" in note for note in log.notes)
+    assert "pose: vehicle_visual_odometry" in log.notes
+    assert any("attitude the onboard filter's" in note for note in log.notes)
 
 
 def test_lost_positions_are_not_valid(write, t, vehicle):
@@ -390,9 +392,9 @@ def test_bad_pulse_limits_are_named(write, t, vehicle):
 @pytest.mark.parametrize(
     ("topics", "parameters", "expected"),
     [
-        ([], {}, "no pose: no usable vehicle_mocap_odometry"),
-        (["esc"], {}, "no pose: .* no vehicle_local_position and no vehicle_attitude; expected"),
-        (["pose"], {}, "no motors: expected esc_status .* found vehicle_mocap_odometry"),
+        ([], {}, "no motors that turn; expected esc_status .* found nothing"),
+        (["esc"], {}, "no pose, and no accelerometer and no gyro; .* vehicle_local_position, with"),
+        (["pose"], {}, "no motors that turn; expected esc_status .* found vehicle_mocap_odometry"),
         (["pose", "esc"], {"CA_ROTOR_COUNT": 6}, "CA_ROTOR_COUNT is 6; expected a quadrotor's 4"),
         (
             ["pose", "esc"],
@@ -423,7 +425,7 @@ def test_what_is_missing_is_named(write, t, vehicle, topics, parameters, expecte
 )
 def test_what_is_no_ulog_is_refused(tmp_path, content, vehicle):
     (tmp_path / "flight.ulg").write_bytes(content)
-    with pytest.raises(InputError, match=r"flight.ulg: (cannot be read as a ULog|no pose)"):
+    with pytest.raises(InputError, match=r"flight.ulg: (cannot be read as a ULog|no motors)"):
         read_log(tmp_path / "flight.ulg", "px4_ulog", vehicle)
     with pytest.raises(InputError, match=r"absent.ulg: cannot be read"):
         read_log(tmp_path / "absent.ulg", "px4_ulog", vehicle)
