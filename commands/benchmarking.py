@@ -1,27 +1,12 @@
 """The benchmark: controllers of a task on the same episodes."""
 
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from ..runtime.whole_files import replaced
+from .options import listed
 from .running import expensive
-from .terminal import (
-    CONTROLLERS,
-    SCENARIOS,
-    ClusterOption,
-    JobsOption,
-    Out,
-    SeedOption,
-    TaskOption,
-    console,
-    names_in,
-    results_folder,
-    say,
-    show_table,
-    working,
-)
+from .terminal import console, results_folder, say, show_table, working
 
 # of a narrow terminal
 _SHOWN = ("scenario", "law", "RMSE", "median", "lost", "score", "wins", "against", "to the")
@@ -29,30 +14,14 @@ _SHOWN = ("scenario", "law", "RMSE", "median", "lost", "score", "wins", "against
 
 @expensive
 def benchmark(
-    controllers: Annotated[
-        str | None,
-        typer.Option(
-            help="Controllers, comma-separated: names, such as lead, tracker or the policy sac-0, "
-            "paths of trained policies, or FILE.py:CLASS; default: hover, admittance, ratio and "
-            "oracle, or all designed laws of another task.",
-            autocompletion=CONTROLLERS,
-        ),
-    ] = None,
-    scenarios: Annotated[
-        str | None,
-        typer.Option(
-            help="Scenario names, comma-separated; default: two or three of the task.",
-            autocompletion=SCENARIOS,
-        ),
-    ] = None,
-    episodes: Annotated[
-        int, typer.Option(min=1, help="Number of paired episodes per scenario.")
-    ] = 40,
-    seed: SeedOption = 0,
-    jobs: JobsOption = None,
-    cluster: ClusterOption = None,
-    task: TaskOption = "FanTracking",
-    out: Out = Path("results/benchmark"),
+    controllers: str | None = None,
+    scenarios: str | None = None,
+    episodes: int = 40,
+    seed: int = 0,
+    jobs: int | None = None,
+    cluster: str | None = None,
+    task: str = "FanTracking",
+    out: Path = Path("results/benchmark"),
 ) -> dict[str, Any]:
     """Fly controllers through the same episodes. Write the leaderboard as JSON, table and picture.
 
@@ -65,8 +34,8 @@ def benchmark(
     from ..evaluation.tasks import task_of
 
     known = task_of(task)
-    names = list(known.standard) if controllers is None else names_in(controllers, "--controllers")
-    worlds = list(known.defaults) if scenarios is None else names_in(scenarios, "--scenarios")
+    names = list(known.standard) if controllers is None else listed(controllers, "--controllers")
+    worlds = list(known.defaults) if scenarios is None else listed(scenarios, "--scenarios")
     check_request(names, worlds, episodes, seed, task)
     flights = count_flights(names, worlds, episodes, task)
     folder = results_folder(

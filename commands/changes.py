@@ -2,29 +2,23 @@
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
 from typer.core import TyperCommand
 
-from .flight_logs import LogVehicleOption, log_notes, read_flights
-from .terminal import MapOption, Out, ReaderOption, console, results_folder, say, show_table
+from .flight_logs import log_notes, read_flights
+from .terminal import console, results_folder, say, show_table
 
 _AGAINST = "--against"
 
 
 def compare(
-    logs: Annotated[list[Path], typer.Argument(help="Flight logs after the change.")],
-    against: Annotated[
-        list[Path],
-        typer.Option(
-            _AGAINST, help="Log of the same vehicle before the change, or several, one by one."
-        ),
-    ],
-    reader: ReaderOption = None,
-    map: MapOption = None,
-    vehicle: LogVehicleOption = None,
-    out: Out = Path("results/compare"),
+    logs: list[Path],
+    against: list[Path],
+    reader: str | None = None,
+    map: str | None = None,
+    vehicle: str | None = None,
+    out: Path = Path("results/compare"),
 ) -> dict[str, Any]:
     """Find what changed between two sets of flights. Which rotor, which side: no model has to be
     true. Write change.json and change.png.

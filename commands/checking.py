@@ -2,55 +2,24 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import InputError
 from ..runtime.whole_files import replaced
-from .terminal import (
-    VEHICLES,
-    MapOption,
-    Out,
-    ReaderOption,
-    console,
-    note,
-    results_folder,
-    say,
-    show_table,
-    working,
-)
+from .terminal import console, note, results_folder, say, show_table, working
 
 if TYPE_CHECKING:
     from ..identification.logs.flight_log import FlightLog
 
-CheckVehicleOption = Annotated[
-    str | None,
-    typer.Option(
-        "--vehicle",
-        help="Vehicle that flew, a preset or a YAML file: with it commands become rotor speeds, "
-        "and units and conventions are checked against its weight and rotors.",
-        autocompletion=VEHICLES,
-    ),
-]
-
 
 def check(
-    log: Annotated[Path, typer.Argument(help="Flight log of any kind.")],
-    map: MapOption = None,
-    reader: ReaderOption = None,
-    vehicle: CheckVehicleOption = None,
-    write_map: Annotated[
-        Path | None,
-        typer.Option("--write-map", help="Write the map by which the log was read: a YAML file."),
-    ] = None,
-    write: Annotated[
-        Path | None,
-        typer.Option(
-            "--write", help="Write the log in the kit's own format: .csv, .csv.gz or .parquet."
-        ),
-    ] = None,
-    out: Out = Path("results/check"),
+    log: Path,
+    map: str | None = None,
+    reader: str | None = None,
+    vehicle: str | None = None,
+    write_map: Path | None = None,
+    write: Path | None = None,
+    out: Path = Path("results/check"),
 ) -> dict[str, Any]:
     """Say what a flight log holds. How it was read and why; its channels, rates, gaps and doubts.
     For a table of unknown columns a map is guessed; write a picture of the channels.

@@ -9,24 +9,12 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from ..runtime.errors import InputError
 from ..runtime.workers import SINGLE_THREADED
 from .diagnosing import STAGES
-from .terminal import (
-    EFFECTS,
-    Out,
-    SeedOption,
-    VehicleOption,
-    console,
-    results_folder,
-    say,
-    show_page,
-    working,
-)
+from .terminal import console, results_folder, say, show_page, working
 
 HIDDEN = "constant_torque:tz=0.01"
 EVERY = 4.0  # s between two signs of life where there is no terminal
@@ -34,22 +22,12 @@ _BOARD = ("hover", "admittance", "ratio", "oracle")
 
 
 def demo(
-    vehicle: VehicleOption = "ardrone2",
-    effect: Annotated[
-        str,
-        typer.Option(
-            help="Effect that the vehicle has and its model lacks, NAME or NAME:coef=value,...",
-            autocompletion=EFFECTS,
-        ),
-    ] = HIDDEN,
-    episodes: Annotated[
-        int, typer.Option(min=1, help="Episodes flown before and after, and of the leaderboard.")
-    ] = 3,
-    seed: SeedOption = 0,
-    no_open: Annotated[
-        bool, typer.Option("--no-open", help="Do not open the page in a browser.")
-    ] = False,
-    out: Out = Path("results/demo"),
+    vehicle: str = "ardrone2",
+    effect: str = HIDDEN,
+    episodes: int = 3,
+    seed: int = 0,
+    no_open: bool = False,
+    out: Path = Path("results/demo"),
 ) -> dict[str, Any]:
     """Show what this kit does, in two minutes. Fly in the wind, estimate it, record a flight with a
     hidden effect, diagnose it, and fly better; write one page of all of it.

@@ -6,24 +6,11 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import InputError
-from .flight_logs import LogVehicleOption, log_notes, read_flights
-from .terminal import (
-    MapOption,
-    Out,
-    ReaderOption,
-    Without,
-    console,
-    results_folder,
-    say,
-    show_page,
-    show_table,
-    working,
-)
+from .flight_logs import log_notes, read_flights
+from .terminal import console, results_folder, say, show_page, show_table, working
 
 if TYPE_CHECKING:
     from ..identification.findings import Diagnosis
@@ -40,50 +27,17 @@ STAGES = {
 
 
 def diagnose(
-    logs: Annotated[
-        list[Path] | None,
-        typer.Argument(help="Flight logs of one vehicle: tables, or of autopilots or bags."),
-    ] = None,
-    example: Annotated[
-        bool,
-        typer.Option(
-            "--example",
-            help="Diagnose a measured flight that comes with the kit, beside what is known of it, "
-            "and open the report.",
-        ),
-    ] = False,
-    no_open: Annotated[
-        bool,
-        typer.Option("--no-open", help="With --example: do not open the report in a browser."),
-    ] = False,
-    test: Annotated[
-        list[Path] | None,
-        typer.Option(
-            help="Test log: kept out of the fit, the error is reported on test logs alone; may be "
-            "repeated."
-        ),
-    ] = None,
-    reader: ReaderOption = None,
-    map: MapOption = None,
-    rotor_faults: Annotated[
-        bool,
-        typer.Option(
-            "--rotor-faults",
-            help="Look only for a rotor that lost thrust during a flight: which, when and how "
-            "much. Needs gyro, accelerometer and motor commands; no pose and no vehicle.",
-        ),
-    ] = False,
-    without: Without = None,
-    probabilities: Annotated[
-        bool,
-        typer.Option(
-            "--probabilities/--no-probabilities",
-            help="Say how probable each name is, its alternatives, and that something unknown "
-            "acts; it takes some seconds a minute of flight.",
-        ),
-    ] = True,
-    vehicle: LogVehicleOption = None,
-    out: Out = Path("results/diagnose"),
+    logs: list[Path] | None = None,
+    example: bool = False,
+    no_open: bool = False,
+    test: list[Path] | None = None,
+    reader: str | None = None,
+    map: str | None = None,
+    rotor_faults: bool = False,
+    without: list[str] | None = None,
+    probabilities: bool = True,
+    vehicle: str | None = None,
+    out: Path = Path("results/diagnose"),
 ) -> dict[str, Any]:
     """Find effects that a vehicle's model lacks. From flight logs; write report.json, report.html
     and vehicle.yaml.

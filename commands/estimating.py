@@ -1,66 +1,28 @@
 """The external wrench on a logged flight."""
 
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from ..runtime.errors import InputError
-from .flight_logs import LogArgument, LogVehicleOption, log_notes, read_flights
-from .terminal import (
-    FilmSeconds,
-    Gate,
-    MapOption,
-    Out,
-    ReaderOption,
-    RrdOption,
-    VideoOption,
-    ViewOption,
-    checked_gate,
-    console,
-    note,
-    results_folder,
-    say,
-    show_table,
-    working,
-)
+from .flight_logs import log_notes, read_flights
+from .terminal import checked_gate, console, note, results_folder, say, show_table, working
 
 
 def estimate(
-    log: LogArgument,
-    reader: ReaderOption = None,
-    map: MapOption = None,
-    vehicle: LogVehicleOption = None,
-    smooth: Annotated[
-        bool | None,
-        typer.Option(
-            "--smooth/--no-smooth",
-            help="Use the whole log for each time's estimate, or the past alone as on the vehicle; "
-            "default: smooth, unless the log has one of gyro and accelerometer only, which the "
-            "smoother does not take. A log without a pose is always smoothed, from both.",
-        ),
-    ] = None,
-    gate: Gate = None,
-    tune: Annotated[
-        bool,
-        typer.Option("--tune", help="Fit the filter's noise to this log first (some seconds)."),
-    ] = False,
-    film: Annotated[
-        bool,
-        typer.Option(
-            "--film",
-            help="Also draw the flight with its wrench as arrows: film.gif and the last frame.",
-        ),
-    ] = False,
-    video: VideoOption = False,
-    rrd: RrdOption = False,
-    view: ViewOption = False,
-    begin: Annotated[
-        float,
-        typer.Option("--from", min=0.0, help="Start of the film, s from the start of the log."),
-    ] = 0.0,
-    film_seconds: FilmSeconds = 30.0,
-    out: Out = Path("results/estimate"),
+    log: Path,
+    reader: str | None = None,
+    map: str | None = None,
+    vehicle: str | None = None,
+    smooth: bool | None = None,
+    gate: float | None = None,
+    tune: bool = False,
+    film: bool = False,
+    video: bool = False,
+    rrd: bool = False,
+    view: bool = False,
+    begin: float = 0.0,
+    film_seconds: float = 30.0,
+    out: Path = Path("results/estimate"),
 ) -> dict[str, Any]:
     """Estimate the wrench on a logged flight. Write wrench.csv and a picture, and a film of the
     flight on request.

@@ -3,23 +3,10 @@
 import shlex
 import sys
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from ..runtime.errors import InputError
-from .terminal import (
-    Gate,
-    VehicleOption,
-    checked_gate,
-    console,
-    offering,
-    results_folder,
-    say,
-    working,
-)
-
-_EFFECTS = ("declared", "none")
+from .terminal import checked_gate, console, results_folder, say, working
 
 
 def _policy_path(name: str) -> Path | None:
@@ -45,53 +32,16 @@ def _policy_path(name: str) -> Path | None:
 
 
 def export_c(
-    vehicle: VehicleOption,
-    estimator: Annotated[
-        str,
-        typer.Option(
-            help="constant-gain (the least work), ekf or ukf.",
-            autocompletion=offering("live.export_c:ESTIMATORS"),
-        ),
-    ] = "ekf",
-    effects: Annotated[
-        str,
-        typer.Option(
-            help="declared: the effects in the vehicle file are part of the filter's model; none: "
-            "they are left out.",
-            autocompletion=offering("commands.exporting:_EFFECTS"),
-        ),
-    ] = "declared",
-    policy: Annotated[
-        str | None,
-        typer.Option(
-            help="Also a policy that tracks a fan: lead, tracker, the name of a trained one "
-            "(sac-0), or its path.",
-            autocompletion=offering(
-                "live.export_c.policies:LAWS", "controllers.registry:shipped_policies"
-            ),
-        ),
-    ] = None,
-    rate: Annotated[
-        float | None,
-        typer.Option(help="Poses a second; default: the vehicle's mocap rate_hz."),
-    ] = None,
-    rise_time: Annotated[
-        float, typer.Option(help="Rise time of force and torque, 10-90 %, s.")
-    ] = 1.0,
-    gate: Gate = None,
-    precision: Annotated[
-        str,
-        typer.Option(
-            help="single (float), or double, where the processor has a unit for it.",
-            autocompletion=offering("live.export_c:PRECISIONS"),
-        ),
-    ] = "single",
-    out: Annotated[
-        Path, typer.Option("--out", help="Folder for the C files; created if it does not exist.")
-    ] = Path("results/export_c"),
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace C files that are there already.")
-    ] = False,
+    vehicle: str,
+    estimator: str = "ekf",
+    effects: str = "declared",
+    policy: str | None = None,
+    rate: float | None = None,
+    rise_time: float = 1.0,
+    gate: float | None = None,
+    precision: str = "single",
+    out: Path = Path("results/export_c"),
+    overwrite: bool = False,
 ) -> dict[str, Any]:
     """Write the filter as C for a flight controller. One header and one C99 source, in single
     precision unless said otherwise, and without a heap; with an example and a CMake file.
@@ -101,18 +51,11 @@ def export_c(
     from dataclasses import replace
 
     from ..dynamics.vehicle_file import load_vehicle
-    from ..live.export_c import ESTIMATORS, PRECISIONS, exportable_policy
     from ..live.export_c import export_c as export
+    from ..live.export_c import exportable_policy
     from ..live.export_c.export import FILES
-    from ..runtime.errors import unknown_name
     from ..runtime.whole_files import replaced
 
-    if estimator not in ESTIMATORS:
-        raise unknown_name("estimator", estimator, ESTIMATORS)
-    if precision not in PRECISIONS:
-        raise unknown_name("precision", precision, PRECISIONS)
-    if effects not in _EFFECTS:
-        raise InputError(f"--effects {effects}: expected {' or '.join(_EFFECTS)}")
     model = load_vehicle(vehicle)
     if effects == "none":
         model = replace(model, effects=())

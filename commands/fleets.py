@@ -4,54 +4,25 @@ import shlex
 import sys
 from contextlib import closing
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from ..runtime.errors import InputError
-from .flight_logs import LogVehicleOption
-from .terminal import (
-    ClusterOption,
-    JobsOption,
-    MapOption,
-    Out,
-    ReaderOption,
-    Without,
-    console,
-    note,
-    results_folder,
-    say,
-    show_table,
-    working,
-)
+from .terminal import console, note, results_folder, say, show_table, working
 
 _MOST_ROWS = 20  # of the table in the terminal
 
 
 def fleet(
-    logs: Annotated[
-        list[Path], typer.Argument(help="Folders of flight logs of any vehicles, or single logs.")
-    ],
-    manifest: Annotated[
-        Path | None,
-        typer.Option(
-            help="Which log is of which vehicle (.yaml or .csv); default: fleet.yaml in the folder "
-            "of logs."
-        ),
-    ] = None,
-    vehicle: LogVehicleOption = None,
-    reader: ReaderOption = None,
-    map: MapOption = None,
-    without: Without = None,
-    cluster: ClusterOption = None,
-    jobs: JobsOption = None,
-    limit: Annotated[
-        float | None,
-        typer.Option(
-            min=1.0, help="Longest time for one log, s; default: 600. Then it is refused."
-        ),
-    ] = None,
-    out: Out = Path("results/fleet"),
+    logs: list[Path],
+    manifest: Path | None = None,
+    vehicle: str | None = None,
+    reader: str | None = None,
+    map: str | None = None,
+    without: list[str] | None = None,
+    cluster: str | None = None,
+    jobs: int | None = None,
+    limit: float | None = None,
+    out: Path = Path("results/fleet"),
 ) -> dict[str, Any]:
     """Diagnose every log of a fleet by itself. Many at a time; write one page and table of all:
     fleet.html, fleet.json, fleet.csv, fleet.png. A run that was ended goes on.

@@ -4,29 +4,14 @@ import warnings
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from ..runtime.errors import InputError
-from .terminal import VEHICLES, note
+from .terminal import note
 
 if TYPE_CHECKING:
     from ..dynamics.vehicle import Vehicle
     from ..identification.logs.flight_log import FlightLog
-
-LogArgument = Annotated[
-    Path, typer.Argument(help="Flight log: a table, or of an autopilot or a bag.")
-]
-LogVehicleOption = Annotated[
-    str | None,
-    typer.Option(
-        "--vehicle",
-        help="Vehicle that flew: a preset (ardrone2, crazyflie, hummingbird) or a YAML file; "
-        "required unless the log names it.",
-        autocompletion=VEHICLES,
-    ),
-]
 
 
 def read_flights(

@@ -1,74 +1,27 @@
 """Simulated flights: one episode of a task, or the log of a flight."""
 
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from ..runtime.errors import InputError
-from .terminal import (
-    CONTROLLERS,
-    SCENARIOS,
-    VEHICLES,
-    EffectOption,
-    FilmSeconds,
-    Out,
-    RrdOption,
-    SeedOption,
-    TaskOption,
-    VehicleOption,
-    VideoOption,
-    ViewOption,
-    console,
-    results_folder,
-    run,
-    say,
-    show_table,
-    working,
-)
+from .terminal import console, results_folder, run, say, show_table, working
 
 
 def fly(
-    task: TaskOption = "FanTracking",
-    scenario: Annotated[
-        str,
-        typer.Option(
-            help="Scenario: static, base, fast, slow-filter, noisy, gusty, far or varied; of a "
-            "wind task base, turbulent and so on (docs/tasks.md).",
-            autocompletion=SCENARIOS,
-        ),
-    ] = "base",
-    controller: Annotated[
-        str | None,
-        typer.Option(
-            help="Controller; default: admittance, or pid-force in the wind. Others: lead, "
-            "tracker, sac-0 ..., the path of a trained policy, or FILE.py:CLASS.",
-            autocompletion=CONTROLLERS,
-        ),
-    ] = None,
-    seed: SeedOption = 0,
-    vehicle: VehicleOption = "ardrone2",
-    truth: Annotated[
-        str | None,
-        typer.Option(
-            help="Simulated vehicle, where it is another than the model of --vehicle: an amended "
-            "model flies the vehicle that it was made for.",
-            autocompletion=VEHICLES,
-        ),
-    ] = None,
-    effect: EffectOption = None,
-    video: VideoOption = False,
-    gif: Annotated[
-        bool, typer.Option("--gif", help="Also write an animation, fly.gif, and its last frame.")
-    ] = False,
-    film_seconds: FilmSeconds = 20.0,
-    rrd: RrdOption = False,
-    csv: Annotated[
-        bool,
-        typer.Option("--csv", help="Also write the flight's time series, fly.csv."),
-    ] = False,
-    view: ViewOption = False,
-    out: Out = Path("results/fly"),
+    task: str = "FanTracking",
+    scenario: str = "base",
+    controller: str | None = None,
+    seed: int = 0,
+    vehicle: str = "ardrone2",
+    truth: str | None = None,
+    effect: list[str] | None = None,
+    video: bool = False,
+    gif: bool = False,
+    film_seconds: float = 20.0,
+    rrd: bool = False,
+    csv: bool = False,
+    view: bool = False,
+    out: Path = Path("results/fly"),
 ) -> dict[str, Any]:
     """Fly one episode in the jet or in the wind. Write a picture of it.
 
@@ -165,20 +118,12 @@ def fly(
 
 
 def record(
-    out: Annotated[
-        Path, typer.Option("--out", help="Flight log to write: .csv, .csv.gz or .parquet.")
-    ] = Path("results/flight.csv"),
-    vehicle: VehicleOption = "ardrone2",
-    effect: EffectOption = None,
-    trajectory: Annotated[
-        str,
-        typer.Option(
-            help="Trajectory: hover, gentle, excite, ground, yaw, circle, ceiling, vertical, fast, "
-            "shake or jet."
-        ),
-    ] = "excite",
-    seconds: Annotated[float, typer.Option(help="Duration of the flight, s.")] = 60.0,
-    seed: SeedOption = 0,
+    out: Path = Path("results/flight.csv"),
+    vehicle: str = "ardrone2",
+    effect: list[str] | None = None,
+    trajectory: str = "excite",
+    seconds: float = 60.0,
+    seed: int = 0,
 ) -> dict[str, Any]:
     """Simulate a flight and write its log. The vehicle may have effects that its model does not
     declare.

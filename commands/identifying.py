@@ -3,22 +3,10 @@
 import math
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from ..runtime.errors import InputError, unknown_name
-from .terminal import (
-    MapOption,
-    ReaderOption,
-    console,
-    note,
-    offering,
-    run,
-    say,
-    show_table,
-    working,
-)
+from ..runtime.errors import InputError
+from .terminal import console, note, run, say, show_table, working
 
 if TYPE_CHECKING:
     from ..identification.logs.flight_log import FlightLog
@@ -52,40 +40,15 @@ def _read(path: Path, reader: str | None, log_map: str | None) -> "FlightLog":
 
 
 def identify(
-    logs: Annotated[
-        list[str],
-        typer.Argument(
-            help="Flight logs of one vehicle; LOG:FROM-TO takes a part, in s after its start."
-        ),
-    ],
-    mass: Annotated[float, typer.Option(help="Mass in flight, kg: what the scales say.")],
-    geometry: Annotated[
-        str | None,
-        typer.Option(
-            help="Distance of the rotors from the body x and y axes, m, or their four positions "
-            "'x,y;x,y;x,y;x,y', front-left, rear-left, rear-right, front-right. Without it, "
-            "inertia is known over the arm alone."
-        ),
-    ] = None,
-    reader: ReaderOption = None,
-    map: MapOption = None,
-    begin: Annotated[
-        float, typer.Option("--from", min=0.0, help="Use each log from here on, s after its start.")
-    ] = 0.0,
-    end: Annotated[
-        float | None, typer.Option("--to", help="Use each log up to here, s after its start.")
-    ] = None,
-    export: Annotated[
-        str | None,
-        typer.Option(
-            help="Also print what another program takes: px4, ardupilot, rotorpy, drone-models or "
-            "gazebo.",
-            autocompletion=offering("identification.vehicle_fit.exports:EXPORTS"),
-        ),
-    ] = None,
-    out: Annotated[Path, typer.Option("--out", help="Vehicle file to write, .yaml.")] = Path(
-        "results/vehicle.yaml"
-    ),
+    logs: list[str],
+    mass: float,
+    geometry: str | None = None,
+    reader: str | None = None,
+    map: str | None = None,
+    begin: float = 0.0,
+    end: float | None = None,
+    export: str | None = None,
+    out: Path = Path("results/vehicle.yaml"),
 ) -> dict[str, Any]:
     """Identify a vehicle from its flight logs. Thrust and torque coefficients or the thrust curve,
     inertia, motor lag, centre of mass and drag, each with a 95 % interval; what the flights do not
@@ -102,8 +65,6 @@ def identify(
         raise InputError(f"--out {out}: expected a name that ends in .yaml")
     if not (math.isfinite(mass) and 0.0 < mass < 1e4):
         raise InputError(f"--mass {mass:g}: expected the vehicle's mass in kg")
-    if export is not None and export not in EXPORTS:
-        raise unknown_name("export", export, EXPORTS)
     where = parse_geometry(geometry)
     common = (begin, math.inf if end is None else end)
     if not common[0] < common[1]:

@@ -4,85 +4,32 @@ import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
-
-from ..runtime.errors import InputError, unknown_name
+from ..runtime.errors import InputError
 from ..runtime.extras import need
 from .running import expensive
-from .terminal import (
-    ClusterOption,
-    Out,
-    SeedOption,
-    console,
-    offering,
-    results_folder,
-    say,
-    show_table,
-    working,
-)
+from .terminal import console, results_folder, say, show_table, working
 
 
 @expensive
 def train(
-    algorithm: Annotated[
-        str,
-        typer.Argument(
-            help="Learning algorithm: sac, ppo, recurrent-ppo, td3, imitation (of the oracle, from "
-            "what a policy may observe) or recurrent-imitation; or tune: the gains of a designed "
-            "controller.",
-            autocompletion=offering("training.configuration:ALGORITHMS"),
-        ),
-    ],
-    scenario: Annotated[
-        str,
-        typer.Option(
-            help="Training scenario, or wide: all scenarios mixed.",
-            autocompletion=offering("envs.scenarios:SCENARIOS", "training.training_envs:TIERS"),
-        ),
-    ] = "base",
-    seed: SeedOption = 0,
-    steps: Annotated[
-        int | None,
-        typer.Option(
-            min=1, help="Number of decisions (environment steps); default: the configuration's."
-        ),
-    ] = None,
-    setting: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            help="Configuration value KEY=VALUE, such as learner.gamma=0.98, or of tune "
-            "controller=ratio; may be repeated.",
-        ),
-    ] = None,
-    config: Annotated[
-        Path | None,
-        typer.Option(help="YAML file of configuration values that replace the defaults."),
-    ] = None,
-    seeds: Annotated[
-        int,
-        typer.Option(
-            min=1, help="Number of runs, with seeds counted from --seed, each in its own folder."
-        ),
-    ] = 1,
-    search: Annotated[
-        list[str] | None,
-        typer.Option(help="Values to compare, KEY=VALUE|VALUE|..., one run each; may be repeated."),
-    ] = None,
-    cluster: ClusterOption = None,
-    out: Out = Path("results/train"),
+    algorithm: str,
+    scenario: str = "base",
+    seed: int = 0,
+    steps: int | None = None,
+    setting: list[str] | None = None,
+    config: Path | None = None,
+    seeds: int = 1,
+    search: list[str] | None = None,
+    cluster: str | None = None,
+    out: Path = Path("results/train"),
 ) -> dict[str, Any]:
     """Train a policy, or tune a designed controller. An interrupted run resumes from its last
     checkpoint, or, of imitation and tune, starts anew.
 
     Example: windwrench train sac --scenario base --seed 0 --steps 60000 --out results/sac-0
     """
-    from ..training.configuration import ALGORITHMS
-
-    if algorithm not in ALGORITHMS:
-        raise unknown_name("algorithm", algorithm, ALGORITHMS)
     need("stable_baselines3", "rl")
     if algorithm == "recurrent-ppo":
         need("sb3_contrib", "rl")

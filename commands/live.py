@@ -6,24 +6,12 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
 from rich.live import Live
 
 from ..runtime.errors import InputError
-from .terminal import (
-    VEHICLES,
-    Gate,
-    MapOption,
-    Out,
-    checked_gate,
-    console,
-    errors,
-    note,
-    run,
-    working,
-)
+from .terminal import checked_gate, console, errors, note, run, working
 
 if TYPE_CHECKING:
     from ..live.session import Means, Session
@@ -31,78 +19,21 @@ if TYPE_CHECKING:
 _PAGES = 5.0  # a second
 _SIMULATED = "ardrone2"  # that flies in a simulation where nothing else is said
 
-LiveVehicleOption = Annotated[
-    str | None,
-    typer.Option(
-        "--vehicle",
-        help="Vehicle that flies: a preset (ardrone2, crazyflie, hummingbird) or a YAML file; with "
-        "sim: ardrone2, unless another is given.",
-        autocompletion=VEHICLES,
-    ),
-]
-
 
 def live(
-    source: Annotated[
-        str,
-        typer.Argument(
-            help="Where messages come from: sim:SCENARIO, - (a table on standard input), "
-            "udp-json://HOST:PORT, mavlink:udp://HOST:PORT or mavlink:/dev/ttyUSB0, "
-            "crazyflie:radio://0/80/2M/E7E7E7E7E7, ros2:TOPICS.yaml."
-        ),
-    ],
-    vehicle: LiveVehicleOption = None,
-    map: MapOption = None,
-    record: Annotated[
-        Path | None,
-        typer.Option(
-            help="Flight log to write meanwhile, a new .csv; whole up to its last second, whatever "
-            "ends the recording."
-        ),
-    ] = None,
-    view: Annotated[
-        bool,
-        typer.Option(
-            "--view",
-            help="Serve a page on this machine alone that draws vehicle, force and the last 30 s.",
-        ),
-    ] = False,
-    port: Annotated[
-        int, typer.Option(min=0, max=65535, help="With --view: port of the page; 0: any free one.")
-    ] = 8765,
-    diagnose_after: Annotated[
-        bool,
-        typer.Option("--diagnose-after", help="Diagnose the recorded log when the stream ends."),
-    ] = False,
-    out: Out = Path("results/diagnose"),
-    seconds: Annotated[
-        float | None,
-        typer.Option(
-            min=0.1, help="End after so many seconds; default: with the source, or at Ctrl-C."
-        ),
-    ] = None,
-    gate: Gate = None,
-    horizon: Annotated[
-        float,
-        typer.Option(
-            min=0.01,
-            max=5.0,
-            help="Time that a message may be late, s; it is fused where it belongs.",
-        ),
-    ] = 0.3,
-    rate: Annotated[
-        float | None,
-        typer.Option(
-            min=1.0,
-            max=10_000.0,
-            help="Rate of the messages, Hz. Default: measured on the first 21, whose estimates "
-            "come then.",
-        ),
-    ] = None,
-    wait: Annotated[
-        float,
-        typer.Option(min=0.0, help="Give up after so many seconds without an estimate; 0: never."),
-    ] = 10.0,
+    source: str,
+    vehicle: str | None = None,
+    map: str | None = None,
+    record: Path | None = None,
+    view: bool = False,
+    port: int = 8765,
+    diagnose_after: bool = False,
+    out: Path = Path("results/diagnose"),
+    seconds: float | None = None,
+    gate: float | None = None,
+    horizon: float = 0.3,
+    rate: float | None = None,
+    wait: float = 10.0,
 ) -> dict[str, Any]:
     """Estimate the wrench while the vehicle flies. Show it, send it back, record the flight. Prints
     a page on a terminal, else a line for each estimate, the columns of wrench.csv.

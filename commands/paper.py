@@ -2,29 +2,19 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from .running import expensive
-from .terminal import JobsOption, Out, console, results_folder, say, working
+from .terminal import console, results_folder, say, working
 
 
 @expensive
 def reproduce(
-    figure: Annotated[
-        str, typer.Argument(help="Figure: fig3, fig4, fig5, fig6, fig7 or all.")
-    ] = "all",
-    out: Out = Path("results/reproduction"),
-    seeds: Annotated[
-        int | None,
-        typer.Option(min=1, help="Number of seeds per figure; default: that of each figure."),
-    ] = None,
-    jobs: JobsOption = None,
-    page: Annotated[
-        Path | None,
-        typer.Option(help="Markdown file for the page; default: reproduction.md in the folder."),
-    ] = None,
+    figure: str = "all",
+    out: Path = Path("results/reproduction"),
+    seeds: int | None = None,
+    jobs: int | None = None,
+    page: Path | None = None,
 ) -> dict[str, Any]:
     """Reproduce the paper's figures. A repeated command resumes and keeps finished figures.
 

@@ -13,31 +13,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, is_dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Any, TypeVar
 
 import typer
 
 from .. import __version__
 from ..runtime.compile_notice import notice
 from ..runtime.whole_files import replaced
+from .options import check_names, declared
 from .terminal import DryRun, console, errors, run
 
 Work = TypeVar("Work", bound=Callable[..., Any])
-
-JsonOption = Annotated[
-    bool,
-    typer.Option(
-        "--json", help="Print the result as one JSON object on standard output, nothing else."
-    ),
-]
-QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
-DryRunOption = Annotated[
-    bool,
-    typer.Option(
-        "--dry-run",
-        help="Check the request; print the plan; write nothing.",
-    ),
-]
 
 # what a result depends on
 _PACKAGES = (
@@ -75,6 +61,7 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
         console.quiet, errors.quiet = as_json or quiet, quiet
         notice.quiet = quiet
         try:
+            check_names(name, options)
             outcome: dict[str, Any] = {"result": work(**options)}
             if run.record is not None:
                 write_run(run.record, name, options)
@@ -108,20 +95,21 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
         if run.code:
             raise typer.Exit(run.code)
 
-    shared = {
-        "as_json": JsonOption,
-        "quiet": QuietOption,
-        **({"dry_run": DryRunOption} if can_stop else {}),
-    }
     signature = inspect.signature(work, eval_str=True)
-    extra = [
-        inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
-        for key, kind in shared.items()
+    flags = ("as_json", "quiet", *(["dry_run"] if can_stop else []))
+    given = [
+        *signature.parameters.values(),
+        *(
+            inspect.Parameter(flag, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=bool)
+            for flag in flags
+        ),
     ]
+    kinds = {one.name: declared(name, one.name, one.annotation) for one in given}
     command.__signature__ = signature.replace(  # type: ignore[attr-defined]
-        parameters=[*signature.parameters.values(), *extra], return_annotation=None
+        parameters=[one.replace(annotation=kinds[one.name]) for one in given],
+        return_annotation=None,
     )
-    command.__annotations__ = {**work.__annotations__, **shared}
+    command.__annotations__ = kinds
     return command
 
 

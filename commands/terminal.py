@@ -1,4 +1,4 @@
-"""What the commands share: terminal, folder of results, and options with one meaning everywhere."""
+"""What the commands share: the terminal, the folder of results, and the words on both."""
 
 import os
 import sys
@@ -6,11 +6,9 @@ import webbrowser
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
 from rich import box
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import (
@@ -77,120 +75,6 @@ class DryRun(Exception):  # noqa: N818 - the way out of a command whose request 
     def __init__(self, plan: Mapping[str, Any], out: Path) -> None:
         super().__init__("dry run")
         self.plan, self.out = plan, out
-
-
-def offering(*sources: str) -> Callable[[str], list[str]]:
-    """Return what completes a name, or the last of several with commas, in a shell.
-
-    Args:
-        sources: of names, ``module:attribute`` within the package: a collection, or a function that
-            returns one. A module is only imported in the shell.
-    """
-
-    def complete(incomplete: str) -> list[str]:
-        before, comma, last = incomplete.rpartition(",")
-        names: list[str] = []
-        for source in sources:
-            module, _, attribute = source.partition(":")
-            found = getattr(import_module(f"..{module}", __package__), attribute)
-            names += found() if callable(found) else found
-        return [f"{before}{comma}{name}" for name in names if name.startswith(last)]
-
-    return complete
-
-
-VEHICLES = offering("dynamics.vehicle_file:preset_names")
-EFFECTS = offering("dynamics.effects:names")
-SCENARIOS = offering("envs.scenarios:SCENARIOS")
-CONTROLLERS = offering("controllers:CONTROLLERS", "controllers.registry:shipped_policies")
-TASKS = offering("evaluation.tasks:TASKS")
-
-Out = Annotated[
-    Path, typer.Option("--out", help="Folder for the results; created if it does not exist.")
-]
-VehicleOption = Annotated[
-    str,
-    typer.Option(
-        "--vehicle",
-        help="Vehicle: a preset (ardrone2, crazyflie, hummingbird) or a YAML file.",
-        autocompletion=VEHICLES,
-    ),
-]
-ReaderOption = Annotated[
-    str | None,
-    typer.Option(
-        "--reader",
-        help="Reader of the log, where another is wanted than what is in the file says: "
-        "px4_ulog, ardupilot_bin, betaflight[:MAGNET_POLES], crazyflie_sd, rosbag[:TOPICS.yaml] "
-        "and so on (docs/readers.md).",
-        autocompletion=offering("identification.logs.readers:READERS"),
-    ),
-]
-MapOption = Annotated[
-    str | None,
-    typer.Option(
-        "--map",
-        help="What the columns of another table mean: a YAML file, or a map that comes with the "
-        "kit (cflib, crazypad, crazyswarm2, euler-pwm, nanobench, racer, rpm). windwrench check "
-        "proposes one.",
-        autocompletion=offering("identification.logs.log_map:map_names"),
-    ),
-]
-
-
-EffectOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--effect",
-        help="Effect of the simulated vehicle that its model does not declare, NAME or "
-        "NAME:coef=value,...; may be repeated.",
-        autocompletion=EFFECTS,
-    ),
-]
-TaskOption = Annotated[
-    str,
-    typer.Option(
-        "--task",
-        help="Task: FanTracking, FanTracking2D, WindHover or WindTrajectory; each has controllers "
-        "and scenarios of its own.",
-        autocompletion=TASKS,
-    ),
-]
-SeedOption = Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, help="Random seed.")]
-VideoOption = Annotated[
-    bool,
-    typer.Option("--video", help="Also write a video (.mp4; video extra), and its last frame."),
-]
-RrdOption = Annotated[
-    bool,
-    typer.Option("--rrd", help="Also write a recording for the Rerun viewer (.rrd; rerun extra)."),
-]
-ViewOption = Annotated[bool, typer.Option("--view", help="Show the flight in a window.")]
-FilmSeconds = Annotated[
-    float, typer.Option("--film-seconds", min=0.1, help="Longest duration of a film, s.")
-]
-JobsOption = Annotated[
-    int | None, typer.Option("--jobs", min=1, help="Number of processes; default: one per core.")
-]
-ClusterOption = Annotated[
-    str | None, typer.Option("--cluster", help="Address of a Ray cluster to work on, or local.")
-]
-Without = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--without",
-        help="Effect to leave out of the library; may be repeated.",
-        autocompletion=EFFECTS,
-    ),
-]
-Gate = Annotated[
-    float | None,
-    typer.Option(
-        "--gate",
-        help="Refuse poses that jump and are less likely than 1 minus this; 0: refuse none. "
-        "Default: 0.9999.",
-    ),
-]
 
 
 def checked_gate(gate: float) -> float:
@@ -264,18 +148,6 @@ def working(
             progress.update(task, total=told, completed=done, description=text, advance=more)
 
         yield report
-
-
-def names_in(text: str, option: str) -> list[str]:
-    """Return the different names in a text with commas, in its order.
-
-    Raises:
-        InputError: there is none.
-    """
-    names = [part.strip() for part in text.split(",") if part.strip()]
-    if not names:
-        raise InputError(f"{option}: expected names with commas between them, got {text!r}")
-    return list(dict.fromkeys(names))
 
 
 def note(text: str) -> None:

@@ -4,7 +4,6 @@ completion, exit codes.
 
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -13,11 +12,12 @@ from pathlib import Path
 
 import pytest
 import typer
+import yaml
 
 from tests.support.paths import ROOT
 from windwrench.cli import app, main
+from windwrench.commands.options import listed, names_of, offering
 from windwrench.commands.running import plain, write_run
-from windwrench.commands.terminal import names_in, offering
 
 COMMANDS = sorted(command.name for command in app.registered_commands)
 EXPENSIVE = ("benchmark", "reproduce")
@@ -170,22 +170,23 @@ def test_plain_values_are_strict_json():
 
 
 def test_completion_offers_names():
-    complete = offering("controllers:CONTROLLERS", "controllers.registry:shipped_policies")
+    complete = offering(["controllers:CONTROLLERS", "controllers.registry:shipped_policies"])
     assert complete("hov") == ["hover"]
     assert complete("hover,adm")[0] == "hover,admittance"
     assert "sac-0" in complete("sac")
     assert complete("x") == []
-    assert names_in("a, b,,a", "--x") == ["a", "b"]
+    assert listed("a, b,,a", "--x") == ["a", "b"]
 
 
-def test_every_source_of_completions_holds_names():
-    sources = set()
-    for path in (ROOT / "commands").glob("*.py"):
-        calls = re.findall(r"offering\(([^)]*)\)", path.read_text(encoding="utf-8"))
-        sources |= {name for call in calls for name in re.findall(r'"([a-z_.]+:\w+)"', call)}
-    assert len(sources) > 10
-    for source in sources:
-        assert offering(source)(""), source
+def test_every_entry_of_the_options_is_an_option_and_its_names_are_there():
+    used = {(c, p.name) for c in COMMANDS for p in typer.main.get_command(app).commands[c].params}
+    names = {name for _, name in used}
+    table = yaml.safe_load((ROOT / "commands" / "options.yaml").read_text(encoding="utf-8"))
+    for command, options in table.items():
+        for name, said in options.items():
+            assert (command, name) in used or (command == "common" and name in names), name
+            if "names" in said:
+                assert names_of(said["names"]), name
 
 
 @pytest.mark.skipif(
