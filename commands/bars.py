@@ -8,7 +8,7 @@ from typing import Any
 from rich.console import Console
 from rich.progress import Progress, ProgressColumn
 
-LINE_EVERY = 10.0  # s between two lines where bars cannot move
+_LINE_EVERY = 10.0  # s between two lines where bars cannot move
 
 
 class Bars(Progress):
@@ -17,15 +17,12 @@ class Bars(Progress):
     Args:
         columns: of each bar.
         console: of standard error.
-        every: s between two lines where there is no terminal.
     """
 
-    def __init__(
-        self, *columns: ProgressColumn, console: Console, every: float = LINE_EVERY
-    ) -> None:
+    def __init__(self, *columns: ProgressColumn, console: Console) -> None:
         moving = console.is_terminal and not console.quiet
         super().__init__(*columns, console=console, transient=True, disable=not moving)
-        self._every, self._over = every, threading.Event()
+        self._over = threading.Event()
         self._in_lines = not (moving or console.quiet)
 
     def start(self) -> None:
@@ -40,7 +37,7 @@ class Bars(Progress):
         super().stop()
 
     def _write_lines(self) -> None:
-        while not self._over.wait(self._every):
+        while not self._over.wait(_LINE_EVERY):
             for task in self.tasks:
                 if not task.finished:
                     self.console.print(_line(task), highlight=False, markup=False, soft_wrap=True)

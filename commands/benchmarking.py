@@ -1,12 +1,17 @@
 """The benchmark: controllers of a task on the same episodes."""
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ..runtime.whole_files import replaced
+from ..controllers.registry import STANDARD_TASK
+from ..runtime.page_files import write_text
 from .options import listed
 from .running import expensive
 from .terminal import console, results_folder, say, show_table, working
+
+if TYPE_CHECKING:
+    from ..evaluation.leaderboard import Standing
 
 # of a narrow terminal
 _SHOWN = ("scenario", "law", "RMSE", "median", "lost", "score", "wins", "against", "to the")
@@ -20,7 +25,7 @@ def benchmark(
     seed: int = 0,
     jobs: int | None = None,
     cluster: str | None = None,
-    task: str = "FanTracking",
+    task: str = STANDARD_TASK,
     out: Path = Path("results/benchmark"),
 ) -> dict[str, Any]:
     """Fly controllers through the same episodes. Write the leaderboard as JSON, table and picture.
@@ -28,9 +33,8 @@ def benchmark(
     Example: windwrench benchmark --controllers lead,tracker,sac-0 --scenarios base,fast
     --episodes 40
     """
-    from ..evaluation.benchmark import check_request, count_flights, fly_all
-    from ..evaluation.leaderboard import leaderboard, markdown, summary, table, write_leaderboard
-    from ..evaluation.pictures import draw_leaderboard
+    from ..evaluation.benchmark import check_request, count_flights
+    from ..evaluation.leaderboard import table
     from ..evaluation.tasks import task_of
 
     known = task_of(task)
@@ -42,21 +46,9 @@ def benchmark(
         out, task=task, controllers=names, scenarios=worlds, flights=flights, jobs=jobs
     )
     with working("flying episodes", flights) as progress:
-        results = fly_all(
-            names,
-            worlds,
-            episodes,
-            seed,
-            jobs,
-            lambda count: progress(more=count),
-            cluster,
-            task,
+        rows, written = write_board(
+            folder, names, worlds, episodes, seed, progress, jobs=jobs, cluster=cluster, task=task
         )
-    rows = leaderboard(results, names, seed, task)
-    path = write_leaderboard(rows, folder)
-    draw_leaderboard(rows, results, folder / "leaderboard.png")
-    with replaced(folder / "leaderboard.md") as partial:
-        partial.write_text(f"{summary(rows)}\n{markdown(rows)}", encoding="utf-8")
     columns = {title: texts for title, texts in table(rows).items() if title.startswith(_SHOWN)}
     show_table(tuple(columns), zip(*columns.values(), strict=True))
     limit = "; limit: of what can be measured" if "limit" in known.bounds else ""
@@ -64,5 +56,51 @@ def benchmark(
         f"{task}: {episodes} paired episodes per scenario, seed {seed}; score: 0 = hover, 1 = "
         f"oracle; wins over {known.rival}{limit}",
     )
-    say(path, folder / "leaderboard.md", folder / "leaderboard.png")
+    say(*written)
     return {"leaderboard": rows}
+
+
+def write_board(
+    folder: Path,
+    controllers: Sequence[str],
+    scenarios: Sequence[str],
+    episodes: int,
+    seed: int,
+    progress: Callable[..., None],
+    task: str = STANDARD_TASK,
+    **where: Any,
+) -> "tuple[list[Standing], list[Path]]":
+    """Fly controllers through the same episodes, and write the leaderboard into a folder.
+
+    Args:
+        folder: for ``leaderboard.json``, ``.md`` and ``.png``.
+        controllers: as ``fly_all`` takes them.
+        scenarios: likewise.
+        episodes: of each scenario.
+        seed: of the benchmark.
+        progress: takes ``more`` episodes.
+        task: that is flown.
+        where: ``jobs`` and ``cluster`` of ``fly_all``.
+
+    Returns:
+        The rows, and the paths of the files.
+    """
+    from ..evaluation.benchmark import fly_all
+    from ..evaluation.leaderboard import leaderboard, markdown, summary, write_leaderboard
+    from ..evaluation.pictures import draw_leaderboard
+
+    results = fly_all(
+        controllers,
+        scenarios,
+        episodes,
+        seed,
+        advance=lambda count: progress(more=count),
+        task=task,
+        **where,
+    )
+    rows = leaderboard(results, controllers, seed, task)
+    path = write_leaderboard(rows, folder)
+    table, picture = path.with_suffix(".md"), path.with_suffix(".png")
+    write_text(f"{summary(rows)}\n{markdown(rows)}", table)
+    draw_leaderboard(rows, results, picture)
+    return rows, [path, table, picture]

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import InputError
-from ..runtime.whole_files import replaced
+from ..runtime.page_files import write_text
 from .terminal import console, note, results_folder, say, show_table, working
 
 if TYPE_CHECKING:
@@ -44,8 +44,7 @@ def check(
     folder = results_folder(out)
     written.append(plot_channels(found.log.name, found.channels, folder / "check.png"))
     if write_map is not None:
-        with replaced(write_map) as temporary:
-            temporary.write_text(found.map_text, encoding="utf-8")
+        write_text(found.map_text, write_map)
         written.append(write_map)
     flight = found.log
     seconds = float(flight.t[-1] - flight.t[0])

@@ -1,29 +1,31 @@
 """The effects that a vehicle's model lacks, found from flight logs."""
 
-import math
-import shlex
-import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import InputError
 from .flight_logs import log_notes, read_flights
-from .terminal import console, results_folder, say, show_page, show_table, working
+from .terminal import command_line, console, results_folder, say, show_page, show_table, working
 
 if TYPE_CHECKING:
     from ..identification.findings import Diagnosis
     from ..identification.logs.flight_log import FlightLog
 
 # share of a diagnosis' time at which its stages begin
-STAGES = {
+_STAGES = {
     "looking at the logs": 0.0,
     "asking whether every effect is needed": 0.45,
     "asking what else it could be": 0.75,
     "looking for structure in the residual": 0.9,
     "predicting the flights": 0.96,
 }
+
+
+def staged(progress: Callable[..., None]) -> Callable[[str], None]:
+    """Return what takes the stages of a diagnosis and tells their progress."""
+    return lambda text: progress(_STAGES.get(text), text)
 
 
 def diagnose(
@@ -97,12 +99,12 @@ def _diagnose(
             model,
             every[count:],
             without or (),
-            lambda text: progress(STAGES.get(text), text),
+            staged(progress),
             probabilities,
         )
     found = _with_rotor_faults(found, paths, every[:count])
     # before a word is said: a reader who has read enough (a pipe to head) must not cost the results
-    written = write_report(found, folder, shlex.join(["windwrench", *sys.argv[1:]]))
+    written = write_report(found, folder, command_line())
     log_notes(found.notes)
     faults = [data["headline"] for data in found.rotor_faults if data["rotor"] is not None]
     sentences = (headline(found), *error_sentences(found), remainder_sentence(found), *faults)
@@ -117,6 +119,7 @@ def _diagnose(
 
 def _show(found: "Diagnosis") -> None:
     """Print the tables of effects and of the error before and after."""
+    from ..identification.report.page import error_table
     from ..identification.report.words import name_in_words, percent
 
     stated = found.probabilities.names if found.probabilities else {}
@@ -130,24 +133,11 @@ def _show(found: "Diagnosis") -> None:
     if rows:
         last = ("probability",) if stated else ()
         show_table(("effect", "coefficient", "value", "+-", "unit", *last), rows)
-    before, after = found.before, found.after
-    torques = before.torque_rms, after.torque_rms
-    predicted = before.rollout_1s_position_rms, after.rollout_1s_position_rms
-    force = before.force_rms, after.force_rms, found.floor_force_rms
-    # torques of zero before and after: the logs do not show torques
-    torque = (*torques, found.floor_torque_rms) if any(torques) else (math.nan, math.nan, None)
-    lines = (("force (N)", force), ("torque (Nm)", torque), ("1 s prediction (m)", predicted))
-    show_table(
-        ("error on held-out data", "before", "after", "noise floor"),
-        [(name, *(_figure(x) for x in (*values, None)[:3])) for name, values in lines],
-    )
-
-
-def _figure(value: float | None) -> str:
-    """Return an error with three digits; a dash where the logs do not show the quantity."""
-    if value is None:
-        return ""
-    return f"{value:.3g}" if math.isfinite(value) else "–"
+    rows = []
+    for row in error_table(found):
+        unit = f" ({row['unit']})" if row["unit"] else ""
+        rows.append((f"{row['what']}{unit}", row["before"], row["after"], row["floor"]))
+    show_table(("error on held-out data", "before", "after", "noise floor"), rows)
 
 
 def _with_rotor_faults(

@@ -3,9 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from ..runtime.errors import InputError
 from .flight_logs import log_notes, read_flights
-from .terminal import checked_gate, console, note, results_folder, say, show_table, working
+from .terminal import console, gate_of, note, results_folder, say, show_table, working
 
 
 def estimate(
@@ -32,7 +31,6 @@ def estimate(
     from ..identification.motion.inertial_signals import reads_imu
     from ..identification.report.wrench_picture import plot_wrench
     from ..identification.wrench_series import (
-        GATE,
         counts,
         estimate_log,
         truth_rmse,
@@ -40,14 +38,11 @@ def estimate(
         tuning_note_of,
         write_wrench,
     )
+    from .filming import film_kinds
     from .log_film import draw_film, shown_rows
 
-    level = GATE if gate is None else checked_gate(gate)
-    kinds = [kind for kind, wanted in (("mp4", video), ("gif", film)) if wanted]
-    if view and kinds:
-        raise InputError(
-            "--view shows the flight in a window; expected it without --film and --video"
-        )
+    level = gate_of(gate)
+    kinds = film_kinds(view, video, film, "--film")
     (flight,), model = read_flights([log], reader, vehicle, map)
     drawn = bool(kinds) or view or rrd
     rows = shown_rows(flight, log, begin, film_seconds) if drawn else None
@@ -60,9 +55,7 @@ def estimate(
         with working("fitting the tuning"):
             fit = tune_to_log(flight, model)
     with working("estimating") as progress:
-        series = estimate_log(
-            flight, model, fit.tuning if fit else None, progress, smooth, level or None
-        )
+        series = estimate_log(flight, model, fit.tuning if fit else None, progress, smooth, level)
     written = [write_wrench(series, folder), plot_wrench(series, flight, folder / "wrench.png")]
     if rows is not None:
         written += draw_film(flight, model, series, rows, folder, kinds, view, rrd)

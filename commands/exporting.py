@@ -1,12 +1,10 @@
 """The filter for a flight controller, as C."""
 
-import shlex
-import sys
 from pathlib import Path
 from typing import Any
 
 from ..runtime.errors import InputError
-from .terminal import checked_gate, console, results_folder, say, working
+from .terminal import command_line, console, gate_of, results_folder, say, working
 
 
 def _policy_path(name: str) -> Path | None:
@@ -18,17 +16,15 @@ def _policy_path(name: str) -> Path | None:
     from ..controllers.registry import shipped_policies
     from ..live.export_c.policies import LAWS
 
-    shipped = shipped_policies()
-    if name in LAWS:
-        return None
+    known = {**dict.fromkeys(LAWS), **shipped_policies()}
     if name.endswith((".npz", ".json")):
         return Path(name)
-    if name not in shipped:
+    if name not in known:
         raise InputError(
-            f"--policy {name}: no such policy; expected {', '.join((*LAWS, *shipped))}, or the "
-            "path of a trained one"
+            f"--policy {name}: no such policy; expected {', '.join(known)}, or the path of a "
+            "trained one"
         )
-    return shipped[name]
+    return known[name]
 
 
 def export_c(
@@ -54,7 +50,7 @@ def export_c(
     from ..live.export_c import export_c as export
     from ..live.export_c import exportable_policy
     from ..live.export_c.export import FILES
-    from ..runtime.whole_files import replaced
+    from ..runtime.page_files import write_text
 
     model = load_vehicle(vehicle)
     if effects == "none":
@@ -69,15 +65,14 @@ def export_c(
             estimator,
             rate,
             rise_time,
-            0.9999 if gate is None else checked_gate(gate) or None,
+            gate_of(gate),
             flown,
-            shlex.join(["windwrench", *sys.argv[1:]]),
+            command_line(),
             precision,
         )
     results_folder(out, vehicle=model.name, estimator=estimator, files=list(FILES))
     for name, text in found.files.items():
-        with replaced(out / name) as partial:
-            partial.write_text(text, encoding="utf-8")
+        write_text(text, out / name)
     console.print(
         f"{estimator} of {model.name} for {1.0 / found.filter.period:g} poses a second, with "
         f"{', '.join(found.effects) or 'no effects'}.",

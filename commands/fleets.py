@@ -1,13 +1,11 @@
 """Fleets: many logs of many vehicles, one diagnosis each."""
 
-import shlex
-import sys
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 from ..runtime.errors import InputError
-from .terminal import console, note, results_folder, say, show_table, working
+from .terminal import command_line, console, note, results_folder, say, show_table, working
 
 _MOST_ROWS = 20  # of the table in the terminal
 
@@ -66,7 +64,7 @@ def fleet(
             )
         flights = rows(done, outcomes)
     flown = fleet_of(flights)
-    written = write_fleet(flown, flights, folder, shlex.join(["windwrench", *sys.argv[1:]]))
+    written = write_fleet(flown, flights, folder, command_line())
     for sentence in (headline(flown), *(change_in_words(one) for one in changes(flown))):
         console.print(sentence)
     table = [

@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-from ..runtime.errors import InputError
 from .terminal import console, results_folder, run, say, show_table, working
 
 
@@ -34,14 +33,10 @@ def fly(
     from ..evaluation.episodes import fly_episode, loop_of, time_series
     from ..evaluation.pictures import draw_episode
     from ..evaluation.tasks import make_pilot, short_names, task_of
-    from .filming import SIZE, Tally, caption_of, films, written
+    from .filming import SIZE, Tally, caption_of, film_kinds, films, written
 
-    kinds = [kind for kind, wanted in (("mp4", video), ("gif", gif)) if wanted]
+    kinds = film_kinds(view, video, gif, "--gif")
     effects = [parse_setting(e) for e in effect or []]
-    if view and kinds:
-        raise InputError(
-            "--view shows the flight in a window; expected it without --video and --gif"
-        )
     known = task_of(task)
     controller = controller or known.flown
     check_request([controller], [scenario], 1, 0, task)
@@ -132,7 +127,7 @@ def record(
     drag.csv
     """
     from ..dynamics.effects import parse_setting
-    from ..dynamics.vehicle_file import load_vehicle, preset_names
+    from ..dynamics.vehicle_file import load_vehicle, name_in_log
     from ..envs.recording import record_flight
     from ..identification.logs.flight_log import FlightLog, log_name, write_log
     from ..identification.logs.tables import file_kind
@@ -141,25 +136,15 @@ def record(
     effects = tuple(parse_setting(e, model) for e in effect or [])
     file_kind(out)
     with working(f"flying {seconds:g} s") as progress:
-        columns = record_flight(model, effects, trajectory, seconds, seed, report=progress)
-    log = FlightLog(
-        columns["t"],
-        columns["position"],
-        columns["quaternion"],
-        columns["rotor_speeds"],
-        columns.get("voltage"),
-        columns["force"],
-        columns["torque"],
-        name=out.stem,
-        # a file's vehicle may differ from the preset of its name
-        vehicle=model.name
-        if vehicle in (known := preset_names()) or model.name not in known
-        else "",
-    )
+        flown: dict[str, Any] = record_flight(
+            model, effects, trajectory, seconds, seed, report=progress
+        )
+    name = name_in_log(model, vehicle)
+    log = FlightLog(**flown, name=out.stem, vehicle=name)
     write_log(log, out)
     run.record = out.with_name(f"{log_name(out)}.run.json")
     console.print(
-        f"{len(columns['t'])} samples of {trajectory} by {model.name} with "
+        f"{len(log.t)} samples of {trajectory} by {model.name} with "
         f"{', '.join(e.name for e in effects) or 'no undeclared effect'}",
     )
     say(out)

@@ -1,7 +1,5 @@
 """Learning: policies trained, and the gains of designed controllers tuned."""
 
-import shlex
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -9,7 +7,7 @@ from typing import Any
 from ..runtime.errors import InputError
 from ..runtime.extras import need
 from .running import expensive
-from .terminal import console, results_folder, say, show_table, working
+from .terminal import command_line, console, results_folder, say, show_table, working
 
 
 @expensive
@@ -152,7 +150,7 @@ def _tune(
     )
     with working(f"{law}, {scenario}", trials) as progress:
         found = tune(law, scenario, trials, episodes, seed, progress, task)
-    keep_gains(found, folder / "tuned.yaml", shlex.join(["windwrench", *sys.argv[1:]]))
+    keep_gains(found, folder / "tuned.yaml", command_line())
     gains = ", ".join(f"{name} {value:.3g}" for name, value in found["gains"].items())
     console.print(
         f"{law} on {scenario}: {gains}: {found['rmse_m']:.3f} m over {episodes} validation "

@@ -1,20 +1,19 @@
 """The wrench while the vehicle flies."""
 
 import sys
-import threading
-from collections.abc import Callable
-from contextlib import ExitStack
-from dataclasses import replace
+from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.live import Live
 
 from ..runtime.errors import InputError
-from .terminal import checked_gate, console, errors, note, run, working
+from ..runtime.interrupts import INTERRUPTED
+from .terminal import console, errors, gate_of, note, run, working
 
 if TYPE_CHECKING:
-    from ..live.session import Means, Session
+    from ..live.session import Session
 
 _PAGES = 5.0  # a second
 _SIMULATED = "ardrone2"  # that flies in a simulation where nothing else is said
@@ -40,11 +39,12 @@ def live(
 
     Example: windwrench live sim:base
     """
-    from ..dynamics.vehicle_file import load_vehicle, preset_names
+    from ..dynamics.vehicle_file import load_vehicle, name_in_log, preset_names
     from ..identification.logs.log_map import load_map
     from ..live.filtering import LiveSettings, warm_up
+    from ..live.outputs import COLUMNS, as_line
     from ..live.recorder import Recorder
-    from ..live.session import Means, Session
+    from ..live.session import Session
     from ..live.sources.open import kind_of, make_source
     from ..live.tallies import Tallies
 
@@ -54,39 +54,24 @@ def live(
             f"--vehicle: {source} does not say which vehicle flies; expected "
             f"{', '.join(preset_names())} or the path of a YAML file"
         )
-    model = load_vehicle(vehicle or _SIMULATED)
+    flown = vehicle or _SIMULATED
+    model = load_vehicle(flown)
     if diagnose_after and record is None:
         raise InputError("--diagnose-after: expected --record LOG with it, the log to diagnose")
-    settings = LiveSettings(horizon=horizon, rate_hz=rate, wait=wait, seconds=seconds)
-    if gate is not None:
-        settings = replace(settings, gate=checked_gate(gate) or None)
-    tallies, means = Tallies(), Means()
+    settings = LiveSettings(gate_of(gate), horizon, rate, wait, seconds)
+    tallies = Tallies()
     stream = make_source(source, model, None if map is None else load_map(map), tallies)
     recorder = None
     if record is not None:
-        preset = (vehicle or _SIMULATED) in preset_names()
-        recorder = Recorder(record, model, tallies, horizon, preset)
+        recorder = Recorder(record, name_in_log(model, flown), tallies, horizon)
     with working("preparing the filter"):
         warm_up(model)
-    lines = not console.is_terminal and not console.quiet
-    out_text = sys.stdout
-    if lines:
-        from ..live.outputs import COLUMNS, as_line
-
+    lines: dict[str, Any] = {}
+    if not console.is_terminal and not console.quiet:
+        out_text = sys.stdout
         out_text.write(",".join(COLUMNS) + "\n")
-
-    def tell(output: Any) -> None:
-        means.add(output)
-        if lines:
-            out_text.write(as_line(output))
-
-    session = Session(
-        stream,
-        settings,
-        recorder,
-        tell,
-        out_text.flush if lines else lambda: None,
-    )
+        lines = {"tell": lambda o: out_text.write(as_line(o)), "flush": out_text.flush}
+    session = Session(stream, settings, recorder, **lines)
     with ExitStack() as shown:
         if view:
             from ..live.web_view import WebView
@@ -94,7 +79,7 @@ def live(
             address = shown.enter_context(WebView(session, port)).address
             note(f"page: {address}")
         interrupted = _watch(session)
-    result = _summary(session, means)
+    result = _summary(session)
     if recorder is not None and recorder.rows:
         run.written.append(recorder.path)
         note(f"wrote {recorder.path}")
@@ -103,9 +88,9 @@ def live(
             raise InputError("--diagnose-after: nothing was recorded to diagnose")
         from .diagnosing import diagnose
 
-        result["diagnosis"] = diagnose([recorder.path], vehicle=vehicle or _SIMULATED, out=out)
+        result["diagnosis"] = diagnose([recorder.path], vehicle=flown, out=out)
     if interrupted:
-        run.code = 130
+        run.code = INTERRUPTED
     return result
 
 
@@ -115,56 +100,35 @@ def _watch(session: "Session") -> bool:
     Raises:
         InputError: as ``Session.run``.
     """
-    failed: list[BaseException] = []
-    # what is waited for: an interrupt within Thread.join has Python take the thread for ended
-    done = threading.Event()
-
-    def work() -> None:
-        try:
-            session.run()
-        except BaseException as error:
-            failed.append(error)
-        finally:
-            done.set()
-
     from ..live.terminal_page import page
 
-    def render() -> Any:
-        return page(session.snapshot(), session.source)
-
-    thread = threading.Thread(target=work, name="stream", daemon=True)
-    interrupted = False
-    draws = console.is_terminal and not console.quiet
-    thread.start()
-    try:
-        if draws:
-            with Live(render(), console=console, auto_refresh=False, transient=True) as shown:
-                _each_page(done, lambda: shown.update(render(), refresh=True))
-        else:
-            _each_page(done, lambda: None)
-    except KeyboardInterrupt:
-        interrupted = True
-    session.stop()
-    done.wait()
-    if failed:
-        raise failed[0]
+    draws, interrupted = console.is_terminal and not console.quiet, False
+    with ThreadPoolExecutor(1, "stream") as threads:
+        running = threads.submit(session.run)
+        try:
+            moving = Live(console=console, auto_refresh=False, transient=True)
+            with moving if draws else nullcontext() as shown:
+                while not running.done():
+                    if shown is not None:
+                        shown.update(page(session.snapshot(), session.source), refresh=True)
+                    wait([running], 1.0 / _PAGES)
+        except KeyboardInterrupt:
+            interrupted = True
+        finally:
+            session.stop()
+        running.result()
     if draws and session.output is not None:
-        console.print(render())
+        console.print(page(session.snapshot(), session.source))
     return interrupted
 
 
-def _each_page(done: threading.Event, show: Callable[[], None]) -> None:
-    while not done.is_set():
-        show()
-        done.wait(1.0 / _PAGES)
-
-
-def _summary(session: "Session", means: "Means") -> dict[str, Any]:
+def _summary(session: "Session") -> dict[str, Any]:
     """Say what came and what became of it; return it."""
     from ..live.terminal_page import counts_words
 
     now = session.snapshot()
     median, most = now.latency_ms
+    mean, deviation = session.tallies.wrench.mean, session.tallies.wrench.deviation
     result: dict[str, Any] = {
         "source": session.source.name,
         "vehicle": session.source.vehicle.name,
@@ -178,10 +142,10 @@ def _summary(session: "Session", means: "Means") -> dict[str, Any]:
         "latency_ms": {"median": median, "p99": most},
         "processor_ms": dict(zip(("median", "p99"), now.processor_ms, strict=True)),
         "recorded_rows": now.recorded,
-        "force_mean_N": means.mean[:3],
-        "force_std_N": means.deviation[:3],
-        "torque_mean_Nm": means.mean[3:],
-        "torque_std_Nm": means.deviation[3:],
+        "force_mean_N": mean[:3],
+        "force_std_N": deviation[:3],
+        "torque_mean_Nm": mean[3:],
+        "torque_std_Nm": deviation[3:],
         "ended": session.ended,
     }
     messages = ", ".join(f"{n} {kind}" for kind, n in sorted(result["messages"].items()))
@@ -192,8 +156,8 @@ def _summary(session: "Session", means: "Means") -> dict[str, Any]:
         lines.append(f"the filter restarted {now.restarts} time(s): after gaps or jumps")
     if median == median:
         lines.append(f"latency: median {median:.2f} ms, 99 % within {most:.2f} ms")
-    force = " ".join(f"{x:+.4g}" for x in means.mean[:3])
-    torque = " ".join(f"{x:+.4g}" for x in means.mean[3:])
+    force = " ".join(f"{x:+.4g}" for x in mean[:3])
+    torque = " ".join(f"{x:+.4g}" for x in mean[3:])
     lines.append(f"mean force {force} N, mean torque {torque} Nm")
     for text in lines:
         errors.print(text, soft_wrap=True)

@@ -13,28 +13,10 @@ from .terminal import working
 
 if TYPE_CHECKING:
     from ..dynamics.vehicle import Vehicle
-    from ..envs.replay import Flight
     from ..identification.logs.flight_log import FlightLog
     from ..identification.wrench_series import WrenchSeries
 
 Rows = NDArray[np.int64]
-
-
-def flight_to_draw(log: "FlightLog", series: "WrenchSeries") -> "Flight":
-    """Return the poses and wrenches that a film shows: where motion capture lost the vehicle, the
-    filter's own pose.
-    """
-    from ..envs.replay import Flight
-
-    return Flight(
-        series.t,
-        series.position,
-        series.quaternion,
-        series.force,
-        series.torque,
-        log.force,
-        log.torque,
-    )
 
 
 def shown_rows(log: "FlightLog", path: Path, begin: float, seconds: float) -> Rows:
@@ -87,12 +69,21 @@ def draw_film(
     """
     from ..envs.captions import Caption
     from ..envs.drawing import Viewer
-    from ..envs.replay import arrow_scales, drawn_arm, pictures
+    from ..envs.replay import Flight, arrow_scales, drawn_arm, pictures
     from ..envs.rerun_export import write_rrd
     from ..envs.video import FPS
     from .filming import SIZE, films, written
 
-    whole = flight_to_draw(log, series)
+    # where motion capture lost the vehicle, the filter's own pose
+    whole = Flight(
+        series.t,
+        series.position,
+        series.quaternion,
+        series.force,
+        series.torque,
+        log.force,
+        log.torque,
+    )
     if rrd:
         write_rrd(whole, model, folder / "film.rrd")
     made = [folder / "film.rrd"] if rrd else []

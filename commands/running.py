@@ -7,8 +7,6 @@ import inspect
 import json
 import math
 import platform
-import shlex
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, is_dataclass
 from importlib import metadata
@@ -21,7 +19,7 @@ from .. import __version__
 from ..runtime.compile_notice import notice
 from ..runtime.whole_files import replaced
 from .options import check_names, declared
-from .terminal import DryRun, console, errors, run
+from .terminal import DryRun, command_line, console, errors, run
 
 Work = TypeVar("Work", bound=Callable[..., Any])
 
@@ -147,7 +145,7 @@ def write_run(path: Path, name: str, options: Mapping[str, Any]) -> None:
         except metadata.PackageNotFoundError:
             continue
     entry = {
-        "command": shlex.join(["windwrench", *sys.argv[1:]]),
+        "command": command_line(),
         "seed": options.get("seed"),
         "options": options,
         "windwrench": __version__,

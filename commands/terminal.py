@@ -1,6 +1,7 @@
 """What the commands share: the terminal, the folder of results, and the words on both."""
 
 import os
+import shlex
 import sys
 import webbrowser
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -24,7 +25,7 @@ from rich.table import Table
 
 from ..runtime.errors import InputError
 from ..runtime.printable import printable
-from .bars import LINE_EVERY, Bars
+from .bars import Bars
 
 
 class _Terminal(Console):
@@ -77,15 +78,24 @@ class DryRun(Exception):  # noqa: N818 - the way out of a command whose request 
         self.plan, self.out = plan, out
 
 
-def checked_gate(gate: float) -> float:
-    """Return a gate: 0, or a probability.
+def command_line() -> str:
+    """Return what the user typed, for a page or a file that says how it came about."""
+    return shlex.join(["windwrench", *sys.argv[1:]])
+
+
+def gate_of(gate: float | None) -> float | None:
+    """Return the probability that ``--gate`` states, or the default one; None: no gate.
 
     Raises:
-        InputError: the gate is neither.
+        InputError: the gate is neither 0 nor a probability.
     """
+    from ..identification.wrench_series import GATE
+
+    if gate is None:
+        return GATE
     if gate != 0.0 and not 0.5 <= gate < 1.0:
         raise InputError(f"--gate: expected 0, or a probability from 0.5 to below 1, got {gate:g}")
-    return gate
+    return gate or None
 
 
 def results_folder(out: Path, **plan: object) -> Path:
@@ -118,16 +128,13 @@ def results_folder(out: Path, **plan: object) -> Path:
 
 
 @contextmanager
-def working(
-    text: str, total: float = 1.0, every: float = LINE_EVERY
-) -> Iterator[Callable[..., None]]:
+def working(text: str, total: float = 1.0) -> Iterator[Callable[..., None]]:
     """Show what is being done and how long the rest will take; give a function that takes how much
     is done, another text, or how much more is done.
 
     Args:
         text: says what is being done.
         total: how much there is to do: 1 where shares are told.
-        every: s between two lines where there is no terminal.
     """
     columns = (
         SpinnerColumn(),
@@ -138,7 +145,7 @@ def working(
         TextColumn("left:"),
         TimeRemainingColumn(),
     )
-    with Bars(*columns, console=errors, every=every) as progress:
+    with Bars(*columns, console=errors) as progress:
         task = progress.add_task(text, total=None)
 
         def report(

@@ -1,7 +1,8 @@
 """The steps of the demonstration, each with what it found, in words, a picture and its command."""
 
+import base64
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,20 +11,23 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from .. import __version__
 from ..controllers import make_controller
 from ..dynamics.vehicle import EffectSetting, Vehicle
 from ..envs.fan_tracking import FanTrackingEnv
 from ..envs.recording import record_flight
 from ..evaluation.episodes import DECISIONS, Episode, fly_episode
+from ..evaluation.leaderboard import Standing
 from ..evaluation.pictures import draw_episode
 from ..identification.diagnosis import diagnose
 from ..identification.findings import Diagnosis
 from ..identification.logs.flight_log import FlightLog, write_log
 from ..identification.report.files import write_report
 from ..identification.report.words import headline, name_in_words
-from ..runtime.page_files import write_png
+from ..runtime.page_files import page_template, write_png, write_text
 
 CONTROLLER, SCENARIO = "admittance", "base"
+LAWS = ("hover", "admittance", "ratio", "oracle")  # of the leaderboard
 SECONDS = 25.0  # of the flight that is diagnosed
 TRAJECTORY = "excite"
 _BEFORE, _AFTER, _JET = "#d1495b", "#30638e", "#cfe5f5"
@@ -40,12 +44,16 @@ class Step:
         sentences: what came of it.
         command: what a user types to repeat it.
         picture: PNG, or None.
+        report: page that the demonstration's page links to, or empty.
+        board: rows of a leaderboard.
     """
 
     title: str
     sentences: tuple[str, ...]
     command: str
     picture: Path | None = None
+    report: str = ""
+    board: Sequence[Standing] = ()
 
 
 @dataclass(frozen=True)
@@ -134,25 +142,13 @@ def fly_and_feel(request: Request, report: Report) -> list[Step]:
 
 def record(request: Request, report: Report) -> tuple[Step, FlightLog]:
     """Fly a vehicle that has the effect, and write the log."""
-    columns = record_flight(
-        request.vehicle,
-        (request.effect,),
-        TRAJECTORY,
-        SECONDS,
-        request.seed,
-        report=report,
+    columns: dict[str, Any] = record_flight(
+        request.vehicle, (request.effect,), TRAJECTORY, SECONDS, request.seed, report=report
     )
+    for truth in ("force", "torque"):  # which no real log has
+        del columns[truth]
     path = request.out / "flight.csv"
-    # what a real log has, and no truth
-    log = FlightLog(
-        columns["t"],
-        columns["position"],
-        columns["quaternion"],
-        columns["rotor_speeds"],
-        columns.get("voltage"),
-        name=path.stem,
-        vehicle=request.vehicle.name,
-    )
+    log = FlightLog(**columns, name=path.stem, vehicle=request.vehicle.name)
     write_log(log, path)
     command = (
         f"windwrench record --vehicle {shlex.quote(request.vehicle_name)} "
@@ -198,6 +194,7 @@ def find(
                 f"True: {request.effect_words}.",
             ),
             command,
+            report="diagnose/report.html",
         ),
         found,
         written,
@@ -233,6 +230,49 @@ def fly_better(request: Request, found: Diagnosis, report: Report) -> Step:
         f"--effect {request.effect_words}",
         picture,
     )
+
+
+def compare(request: Request, rows: Sequence[Standing], folder: Path) -> Step:
+    """Return the step that a leaderboard is, whose files lie in a folder."""
+    best = ", ".join(f"{r.controller} {r.rmse_m:.3f} m" for r in rows if r.scenario == SCENARIO)
+    return Step(
+        "Compare controllers",
+        (
+            f"{len(LAWS)} controllers fly the same {request.episodes} episodes of each scenario. "
+            "Score 0 is a vehicle that hovers, 1 one that sees the fan.",
+            f"RMSE on {SCENARIO}: {best}.",
+        ),
+        f"windwrench benchmark --controllers {','.join(LAWS)} --episodes {request.episodes} "
+        f"--seed {request.seed} --out {folder}",
+        folder / "leaderboard.png",
+        board=rows,
+    )
+
+
+def write_page(steps: Sequence[Step], command: str, seconds: float, path: Path) -> None:
+    """Write the steps as one page that needs no network.
+
+    Args:
+        steps: of the story, in order.
+        command: that made the page.
+        seconds: that the demonstration took.
+        path: of the page.
+
+    Raises:
+        InputError: the page cannot be written.
+    """
+    template = page_template(__package__, "page.html.j2")
+    pictures = [
+        "" if step.picture is None else base64.b64encode(step.picture.read_bytes()).decode()
+        for step in steps
+    ]
+    text = template.render(
+        steps=list(zip(steps, pictures, strict=True)),
+        command=command,
+        seconds=seconds,
+        version=__version__,
+    )
+    write_text(text + "\n", path)
 
 
 def _draw(before: Episode, after: Episode, path: Path) -> None:

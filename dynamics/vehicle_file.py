@@ -28,6 +28,18 @@ def preset_names() -> list[str]:
     )
 
 
+def name_in_log(vehicle: Vehicle, given: str) -> str:
+    """Return the name by which a log states its vehicle; empty where a file's vehicle has the name
+    of a preset, which is another vehicle.
+
+    Args:
+        vehicle: that was loaded.
+        given: the preset's name, or the path, by which it was loaded.
+    """
+    presets = preset_names()
+    return vehicle.name if given in presets or vehicle.name not in presets else ""
+
+
 def load_vehicle(name_or_path: str | Path) -> Vehicle:
     """Return a preset by its name, or the vehicle of a YAML file.
 

@@ -43,6 +43,11 @@ class Output:
     estimate: WrenchEstimate
     std: Array  # (6,) of force, N, and torque, Nm: the filter's own
 
+    @property
+    def wrench(self) -> Array:
+        """External force, N, and torque, Nm, (6,), world."""
+        return np.concatenate([self.estimate.force, self.estimate.torque])
+
 
 class LiveFilter:
     """The external wrench, row by row.

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from ..estimator.estimate import STATUSES
 from .filtering import Output
 
 COLUMNS = (
@@ -16,9 +15,7 @@ COLUMNS = (
 
 def _values(output: Output) -> list[float]:
     """Return an estimate by ``COLUMNS``, but the status."""
-    estimate = output.estimate
-    wrench = [*estimate.force.tolist(), *estimate.torque.tolist(), *output.std.tolist()]
-    return [round(output.t, 9), *wrench, estimate.nis]
+    return [round(output.t, 9), *output.wrench.tolist(), *output.std.tolist(), output.estimate.nis]
 
 
 def as_fields(output: Output) -> dict[str, Any]:
@@ -29,5 +26,4 @@ def as_fields(output: Output) -> dict[str, Any]:
 
 def as_line(output: Output) -> str:
     """Return an estimate as a line of ``wrench.csv``."""
-    status = float(STATUSES.index(output.estimate.status))
-    return ",".join(map(repr, [*_values(output), status])) + "\n"
+    return ",".join(map(repr, [*_values(output), float(output.estimate.status_code)])) + "\n"

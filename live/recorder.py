@@ -15,8 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from ..dynamics.vehicle import Vehicle
-from ..dynamics.vehicle_file import preset_names
 from ..identification.logs.flight_log import (
     ACCELEROMETER,
     COMMANDS,
@@ -56,7 +54,7 @@ class Recorder:
 
     Args:
         path: the log; it must not exist.
-        vehicle: that flies.
+        vehicle: name of the vehicle that flies, or empty where the log must not state one.
         tallies: where rows are counted that could not be recorded.
         horizon: s that a row may be late.
 
@@ -67,10 +65,9 @@ class Recorder:
     def __init__(
         self,
         path: Path,
-        vehicle: Vehicle,
+        vehicle: str,
         tallies: Tallies,
         horizon: float,
-        preset: bool = False,
     ) -> None:
         if path.suffix.lower() != ".csv":
             raise InputError(
@@ -81,9 +78,8 @@ class Recorder:
             raise InputError(f"--record {path}: exists already; expected the name of a new log")
         self.path, self.rows = path, 0
         self._tallies, self._horizon = tallies, horizon
-        named = preset or vehicle.name not in preset_names()
-        name = f"vehicle={vehicle.name}"
-        self._last = name if named and VEHICLE.fullmatch(name) else "whole"
+        name = f"vehicle={vehicle}"
+        self._last = name if vehicle and VEHICLE.fullmatch(name) else "whole"
         self._held: list[Row] = []  # by time
         self._channels: dict[str, tuple[str, ...]] = {}  # those that are written, and their columns
         self._latest: dict[str, Any] = {}  # values of ``_KEPT``

@@ -12,10 +12,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from typing import Any
-
-import numpy as np
+from dataclasses import dataclass
 
 from ..runtime.errors import InputError
 from .clocks import Clocks
@@ -166,7 +163,7 @@ class Session:
 
     def take(self, sample: Sample) -> None:
         """Deal with one message."""
-        self.tallies.message(sample.kind, sample.arrival)
+        self.tallies.rates[sample.kind].add(sample.arrival)
         t = self._clocks.time(sample)
         row = None if t is None else self._joiner.take(sample, t)
         if row is not None:
@@ -194,6 +191,7 @@ class Session:
             self.source.send(output)
         except OSError:
             self.tallies.counts["not sent"] += 1
+        self.tallies.wrench.add(output.wrench)
         self._tell(output)
         if self._recent is not None and output.t - self._shown_t >= 1.0 / _VIEWED - 1e-6:
             self._recent.append(output)
@@ -242,30 +240,6 @@ class Session:
             recorded=0 if self.recorder is None else self.recorder.rows,
             seconds=self.seconds,
         )
-
-
-@dataclass
-class Means:
-    """The mean wrench of a stream."""
-
-    count: int = 0
-    sums: Any = field(default_factory=lambda: np.zeros((2, 6)))  # and of squares
-
-    def add(self, output: Output) -> None:
-        """Take in one estimate."""
-        wrench = output.estimate.state[[16, 17, 18, 13, 14, 15]]
-        self.count += 1
-        self.sums += wrench, wrench * wrench
-
-    @property
-    def mean(self) -> Any:
-        """Of force, N, and torque, Nm (6,)."""
-        return self.sums[0] / max(self.count, 1)
-
-    @property
-    def deviation(self) -> Any:
-        """Standard deviation over the stream, (6,)."""
-        return np.sqrt(np.maximum(self.sums[1] / max(self.count, 1) - self.mean**2, 0.0))
 
 
 @contextmanager

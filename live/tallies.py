@@ -2,69 +2,82 @@
 
 import math
 from bisect import bisect_left
-from collections import Counter, deque
+from collections import Counter, defaultdict, deque
 from itertools import accumulate
 
+import numpy as np
+
+from .messages import Array
+
 _BINS_PER_OCTAVE = 16
-_LOWEST = 100.0  # ns; shorter counts as this
-_BINS = 512  # to 100 ns * 2^32, seven minutes
+_WINDOW = 5_000_000_000  # ns, over which a rate is told
 
 
 class Durations:
     """How long something takes, as a histogram whose bins are 4 % wide."""
 
     def __init__(self) -> None:
-        self.count = 0
-        self.longest = 0  # ns
-        self._bins = [0] * _BINS
+        self.longest = 1  # ns
+        self._bins: Counter[int] = Counter()
 
     def add(self, nanoseconds: int) -> None:
         """Count one."""
-        self.count += 1
         self.longest = max(self.longest, nanoseconds)
-        octaves = math.log2(max(nanoseconds, _LOWEST) / _LOWEST)
-        self._bins[min(int(_BINS_PER_OCTAVE * octaves), _BINS - 1)] += 1
+        self._bins[int(_BINS_PER_OCTAVE * math.log2(max(nanoseconds, 1)))] += 1
 
     def quantile(self, share: float) -> float:
         """Return the duration, ms, that a share of them does not exceed; NaN: there is none."""
-        if not self.count:
+        bins = sorted(dict(self._bins).items())
+        if not bins:
             return math.nan
-        i = bisect_left(list(accumulate(self._bins)), share * self.count)
-        return 1e-6 * min(_LOWEST * math.exp2((i + 1) / _BINS_PER_OCTAVE), float(self.longest))
+        counts = list(accumulate(count for _, count in bins))
+        last, _ = bins[bisect_left(counts, share * counts[-1])]
+        return 1e-6 * min(math.exp2((last + 1) / _BINS_PER_OCTAVE), self.longest)
 
 
 class Rate:
-    """How often something comes: over the last seconds, and in all."""
-
-    _SECONDS = 5
+    """How often something comes: over the last 5 s, and in all."""
 
     def __init__(self) -> None:
         self.count = 0
-        self._seconds: deque[list[int]] = deque(maxlen=self._SECONDS + 1)  # [second, count]
+        self._arrivals: deque[int] = deque()  # ns, of the last 5 s
 
     def add(self, now: int) -> None:
         """Count one that came ``now``, ns."""
         self.count += 1
-        second = now // 1_000_000_000
-        if self._seconds and self._seconds[-1][0] == second:
-            self._seconds[-1][1] += 1
-        else:
-            self._seconds.append([second, 1])
+        self._arrivals.append(now)
+        while self._arrivals[0] < now - _WINDOW:
+            self._arrivals.popleft()
 
     def hertz(self, now: int) -> float:
-        """Return the rate over the last whole seconds before ``now``, ns; over the first one, what
-        has come so far.
-        """
-        second = now // 1_000_000_000
-        seconds = list(self._seconds)
-        if not seconds:
-            return 0.0
-        whole = [(s, n) for s, n in seconds if second - self._SECONDS <= s < second]
-        # a second in which it began is no whole one
-        whole = [(s, n) for s, n in whole if s > seconds[0][0]] or whole
-        if not whole:
-            return float(seconds[-1][1]) if seconds[-1][0] == second else 0.0
-        return sum(n for _, n in whole) / (second - whole[0][0])
+        """Return the rate over the last 5 s before ``now``, ns, or since the first of them came."""
+        recent = [arrival for arrival in self._arrivals.copy() if arrival > now - _WINDOW]
+        lasted = _WINDOW if len(recent) < self.count else now - recent[0] if recent else 0
+        return 1e9 * len(recent) / max(lasted, 1_000_000_000)
+
+
+class Means:
+    """The mean wrench of a stream, and how much it varies."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._sums, self._squares = np.zeros(6), np.zeros(6)
+
+    def add(self, wrench: Array) -> None:
+        """Take in one of force, N, and torque, Nm, (6,)."""
+        self._count += 1
+        self._sums += wrench
+        self._squares += wrench * wrench
+
+    @property
+    def mean(self) -> Array:
+        """Mean (6,)."""
+        return self._sums / max(self._count, 1)
+
+    @property
+    def deviation(self) -> Array:
+        """Standard deviation (6,)."""
+        return np.sqrt(np.maximum(self._squares / max(self._count, 1) - self.mean**2, 0.0))
 
 
 class Tallies:
@@ -80,13 +93,7 @@ class Tallies:
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
-        self.rates: dict[str, Rate] = {}
+        self.rates: defaultdict[str, Rate] = defaultdict(Rate)
         self.latency = Durations()
         self.processor = Durations()
-
-    def message(self, kind: str, now: int) -> None:
-        """Count a message of a kind that came ``now``, ns."""
-        rate = self.rates.get(kind)
-        if rate is None:
-            rate = self.rates[kind] = Rate()
-        rate.add(now)
+        self.wrench = Means()

@@ -139,6 +139,5 @@ class WebView:
 
 def _point(output: Output) -> list[float]:
     """Return time, force, torque and their standard deviations."""
-    estimate = output.estimate
-    values = [output.t, *estimate.force, *estimate.torque, *output.std]
+    values = [output.t, *output.wrench, *output.std]
     return [float(f"{x:.5g}") if i else round(x, 3) for i, x in enumerate(values)]

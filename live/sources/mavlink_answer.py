@@ -14,7 +14,6 @@ import numpy as np
 
 from ...dynamics.rotation import matrix_of
 from ...dynamics.vehicle import Vehicle
-from ...estimator.estimate import STATUSES
 from ..filtering import Output
 from ..messages import Array
 from .mavlink_messages import HALF_TURN, WRAP
@@ -42,9 +41,8 @@ class WrenchSender:
         """
         force = output.estimate.force * HALF_TURN
         torque = output.estimate.torque * HALF_TURN
-        status = float(STATUSES.index(output.estimate.status))
         microseconds = max(round(1e6 * output.t), 0)
-        data = [*force, *torque, *output.std, output.estimate.nis, status]
+        data = [*force, *torque, *output.std, output.estimate.nis, output.estimate.status_code]
         padded = [float(x) for x in data] + [0.0] * (58 - len(data))
         mav.debug_float_array_send(microseconds, b"wrench", 1, padded)
         now = time.monotonic_ns()

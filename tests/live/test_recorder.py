@@ -11,7 +11,7 @@ from windwrench.live.tallies import Tallies
 
 
 def record(path, rows, close=True):
-    recorder = Recorder(path, VEHICLE, Tallies(), 0.3, preset=True)
+    recorder = Recorder(path, "ardrone2", Tallies(), 0.3)
     for row in rows:
         recorder.add(row)
     if close:
