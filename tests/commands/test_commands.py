@@ -185,7 +185,7 @@ def test_every_entry_of_the_options_is_an_option_and_its_names_are_there():
     for command, options in table.items():
         for name, said in options.items():
             assert (command, name) in used or (command == "common" and name in names), name
-            if "names" in said:
+            if isinstance(said, dict) and "names" in said:
                 assert names_of(said["names"]), name
 
 
