@@ -351,6 +351,11 @@ def load_map(name: str | Path) -> LogMap:
     return parse_map(read_yaml(path, "a map file"), str(path), str(path))
 
 
+def recording_map(name: str) -> LogMap:
+    """Return the map of an autopilot's messages, which its reader decodes."""
+    return _shipped_map(f"recordings/{name}")
+
+
 @cache
 def _shipped_map(name: str) -> LogMap:
     return parse_map(read_yaml(MAPS / f"{name}.yaml", "a map"), f"map {name}", name)

@@ -22,7 +22,7 @@ from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ..channels import Array, Samples
 from ..flight_log import FlightLog
-from ..log_map import Commands, LogMap, load_map
+from ..log_map import Commands, LogMap, recording_map
 from ..map_fit import wanted_columns, ways
 from ..mapped_log import channels_of_recording
 from ..rotor_orders import ORDERS, Order, order_words
@@ -56,7 +56,7 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         InputError: the file is no such log, is not a quadrotor's, or lacks motors, or a pose and
             inertial sensors.
     """
-    log_map = load_map("ardupilot")
+    log_map = recording_map("ardupilot")
     topics = {way.topic for name in log_map.sections for way in ways(log_map, name)}
     log = read_dataflash(path, {*topics, "PARM"})
     parameters = _parameters(log.messages.get("PARM"))

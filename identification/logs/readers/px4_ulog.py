@@ -27,7 +27,7 @@ from ....runtime.file_limits import LIMITS
 from ....runtime.regular_files import check_regular, open_regular
 from ..channels import Array, Samples
 from ..flight_log import FlightLog
-from ..log_map import load_map
+from ..log_map import recording_map
 from ..map_fit import ways
 from ..mapped_log import Recording, channels_of_recording
 from ..streams import Stream
@@ -79,7 +79,7 @@ def channels(path: Path, log: ULog | None = None) -> Recording:
     """
     log = read_ulog(path) if log is None else log
     order, order_note = motor_order(path, log.parameters)
-    log_map = with_motors(load_map("px4"), order, log.parameters)
+    log_map = with_motors(recording_map("px4"), order, log.parameters)
     notes = [*log_map.notes, order_note]
     if log.is_damaged:
         notes.append("the file is damaged; what could be read of it was used")
@@ -119,7 +119,7 @@ def read_ulog(path: Path) -> ULog:
             f"{path}: a ULog needs pyulog, which is not installed: pip install 'windwrench[logs]', "
             f"or pip install pyulog"
         ) from error
-    log_map = load_map("px4")
+    log_map = recording_map("px4")
     wanted = {way.topic for name in log_map.sections for way in ways(log_map, name)}
     check_regular(path, _WHAT, LIMITS.ulog_file)
     try:
