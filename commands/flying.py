@@ -129,8 +129,8 @@ def record(
     from ..dynamics.effects import parse_setting
     from ..dynamics.vehicle_file import load_vehicle, name_in_log
     from ..envs.recording import record_flight
-    from ..identification.logs.flight_log import FlightLog, log_name, write_log
-    from ..identification.logs.tables import file_kind
+    from ..identification.logs.flight_log import FlightLog, write_log
+    from ..identification.logs.table import file_kind, stem
 
     model = load_vehicle(vehicle)
     effects = tuple(parse_setting(e, model) for e in effect or [])
@@ -142,7 +142,7 @@ def record(
     name = name_in_log(model, vehicle)
     log = FlightLog(**flown, name=out.stem, vehicle=name)
     write_log(log, out)
-    run.record = out.with_name(f"{log_name(out)}.run.json")
+    run.record = out.with_name(f"{stem(out)}.run.json")
     console.print(
         f"{len(log.t)} samples of {trajectory} by {model.name} with "
         f"{', '.join(e.name for e in effects) or 'no undeclared effect'}",

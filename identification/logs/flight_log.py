@@ -33,7 +33,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.errors import InputError
-from .tables import Table, file_kind, write_table
+from .table import Table
+from .tables import write_table
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -123,11 +124,6 @@ class FlightLog:
     def period(self) -> float:
         """Median time step, s."""
         return float(np.median(np.diff(self.t)))
-
-
-def log_name(path: Path) -> str:
-    """Return the file's name without its ending."""
-    return path.name[: -len(file_kind(path))]
 
 
 def check_finite(

@@ -2,7 +2,6 @@
 section the first that holds measurements.
 """
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from difflib import get_close_matches
@@ -61,14 +60,6 @@ def fitted(table: Table, log_map: LogMap, vehicle: Vehicle | None, reader: str) 
         raise InputError(f"{where} does not fit: {_missing_words(missing, table.header)}")
     extra = {name: part for name, part in log_map.extra.items() if set(part.named) <= header}
     log_map = replace(log_map, **kept, alternatives=others, extra=extra)
-    repeated = {name for name, count in Counter(table.header).items() if count > 1}
-    for section, part in log_map.sections.items():
-        for name in part.columns:
-            if name in repeated:
-                raise InputError(
-                    f"{where}: {section}: column {name!r} stands in the table more than once; "
-                    "expected it once"
-                )
     if not (log_map.rotors or log_map.commands or log_map.wrench):
         raise InputError(f"{where} does not fit: no columns of rotors or of commands")
     has_imu = log_map.accelerometer is not None and log_map.gyro is not None

@@ -25,7 +25,6 @@ from ...runtime.errors import InputError
 from .column_names import PLACES, Group, Name, best_group, groups_of, take_apart
 from .evidence import EVIDENCE, Evidence, Ranking, ratio
 from .inertial import gyro_shares
-from .layout_guess import FoundLayout
 from .log_map import (
     ACCELERATION_UNITS,
     ANGLE_UNITS,
@@ -168,14 +167,11 @@ _COLUMN_FIELDS = {
 }
 
 
-def guess_map(
-    table: Table, layout: FoundLayout, vehicle: Vehicle | None = None, name: str = "guess"
-) -> Guess:
+def guess_map(table: Table, vehicle: Vehicle | None = None, name: str = "guess") -> Guess:
     """Return a guessed map of a table.
 
     Args:
-        table: of any columns.
-        layout: how it was laid out, with a line of units where it has one.
+        table: of any columns, with a line of units where it has one.
         vehicle: that flew, whose weight and rotors tell the rotors' unit; None: not known.
         name: of the map.
 
@@ -185,7 +181,7 @@ def guess_map(
     """
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # columns that hold nothing, or the absurd
-        return _guess(table, take_apart(table.header, layout.units), vehicle, name)
+        return _guess(table, take_apart(table.header, table.units), vehicle, name)
 
 
 def _guess(table: Table, names: list[Name], vehicle: Vehicle | None, name: str) -> Guess:

@@ -27,14 +27,14 @@ from .flight_log import (
     unit_quaternions,
     vehicle_of_columns,
 )
-from .layout_guess import FoundLayout, open_any_table, stem
 from .log_map import Attitude, Battery, Columns, Commands, LogMap, Position, constant
 from .map_fit import NO_QUATERNION, chosen, fitted, wanted_columns, ways
 from .rotor_orders import order_names, order_words
 from .sample_gaps import GAPS, bridged
 from .streams import Stream, flight_log, readable, slerp
-from .table import Table
+from .table import Table, stem
 from .table_rows import has_several_rates, rows_of
+from .tables import open_table
 
 _IMU = ("accelerometer", "gyro")
 _ATTITUDE_GAP = 0.1  # s, across which an attitude is not interpolated
@@ -58,16 +58,11 @@ def read_mapped(
         InputError: the table cannot be read, the map does not fit it, or a number is none that a
             flight has; the message says which column and row.
     """
-    table, found = open_any_table(path)
-    return map_table(table, found, log_map, vehicle, reader)
+    return map_table(open_table(path), log_map, vehicle, reader)
 
 
 def map_table(
-    table: Table,
-    found: FoundLayout,
-    log_map: LogMap,
-    vehicle: Vehicle | None = None,
-    reader: str = "",
+    table: Table, log_map: LogMap, vehicle: Vehicle | None = None, reader: str = ""
 ) -> FlightLog:
     """Return the flight log that a map makes of a table; as ``read_mapped``."""
     vehicle_name = vehicle_of_columns(table) if log_map.is_own else log_map.vehicle
@@ -80,8 +75,6 @@ def map_table(
     notes = [*table.notes, *log_map.notes, *([log_map.time.note] if log_map.time.note else [])]
     if not log_map.is_own or log_map.rows == "mixed":
         notes.insert(0, f"columns: by the map {log_map.name}")
-    if found.words and found.words != "fields separated by comma":
-        notes.append(f"layout: {found.words}")
     samples, time_words = rows_of(table, columns, log_map)
     notes += time_words
     log_map, _ = chosen([samples], log_map)

@@ -6,47 +6,35 @@ copies. So columns must be numbers, whose rows take 8 bytes each, and no page ma
 """
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS
 from ...runtime.regular_files import check_regular, open_regular
-from .table import WHAT, Array, Table, empty_columns
+from .table import WHAT, Array, Table
 
 _BATCH = 2**16  # rows read at a time
 _BUFFER = 2**20  # bytes of a column that are read at a time
 _HEADER = 2**16  # bytes that the header of a page may take
+_UNPACKED, _PACKED = 2, 3  # fields of that header (parquet.thrift): bytes of the page
+_COUNT = 1  # field of the structs in that header: values in the page
+# Thrift's kinds of fields; truth values stand in the kind itself
+_BYTES = {1: 0, 2: 0, 3: 1, 7: 8}
+_WHOLE_NUMBERS, _TEXT, _STRUCT = (4, 5, 6), 8, 12
 
 
-def import_parquet(path: Path) -> Any:
-    """Return pyarrow's module for Parquet.
-
-    Raises:
-        InputError: it is not installed.
-    """
-    try:
-        from pyarrow import parquet
-    except ImportError as error:
-        raise InputError(
-            f"{path}: Parquet needs pyarrow, which is not installed: pip install "
-            f"'windwrench[parquet]', "
-            "or use .csv.gz"
-        ) from error
-    return parquet
-
-
-def open_parquet(path: Path, largest: int) -> Table:
-    """Open a Parquet file of at most ``largest`` bytes.
+def open_parquet(path: Path) -> Table:
+    """Open a Parquet file.
 
     Raises:
         InputError: unreadable, not Parquet, or more than ``FileLimits`` allows.
     """
-    parquet = import_parquet(path)
+    parquet = _import_parquet(path)
     import pyarrow
 
-    check_regular(path, WHAT, largest)
+    check_regular(path, WHAT, LIMITS.table_text)
     _check_footer(path)
     try:
         file = parquet.ParquetFile(path, buffer_size=_BUFFER)
@@ -54,8 +42,8 @@ def open_parquet(path: Path, largest: int) -> Table:
     except (OSError, pyarrow.ArrowException) as error:
         raise InputError(f"{path}: cannot be read as Parquet: {error}") from error
 
-    def read(names: Sequence[str]) -> dict[str, Array]:
-        columns = empty_columns(path, rows, names)
+    def fill(table: Table, where: Sequence[int], columns: Array) -> None:
+        names = [header[i] for i in where]
         for name in names:
             _check_type(path, file, name)
         _check_pages(path, file, names)
@@ -78,9 +66,32 @@ def open_parquet(path: Path, largest: int) -> Table:
                     f"{path}: column {name} has {done if done < rows else 'more'} rows; expected "
                     f"the {rows} that the file claims"
                 )
-        return dict(zip(names, columns, strict=True))
 
-    return Table(path, header, rows, read)
+    return Table(path, header, rows, fill)
+
+
+def write_parquet(columns: Mapping[str, Array], path: Path, temporary: Path) -> None:
+    """Write columns (rows,) to the file that is to become ``path``; NaN as no value.
+
+    Raises:
+        InputError: pyarrow is not installed.
+    """
+    parquet = _import_parquet(path)
+    import pyarrow
+
+    arrays = {name: pyarrow.array(column, from_pandas=True) for name, column in columns.items()}
+    parquet.write_table(pyarrow.table(arrays), temporary)
+
+
+def _import_parquet(path: Path) -> Any:
+    try:
+        from pyarrow import parquet
+    except ImportError as error:
+        raise InputError(
+            f"{path}: Parquet needs pyarrow, which is not installed: pip install "
+            "'windwrench[parquet]', or use .csv.gz"
+        ) from error
+    return parquet
 
 
 def _check_footer(path: Path) -> None:
@@ -113,66 +124,45 @@ def _check_pages(path: Path, file: Any, names: Sequence[str]) -> None:
     metadata, pages = file.metadata, 0
     leaves = [metadata.schema.column(i).path for i in range(metadata.num_columns)]
     wanted = [i for i, leaf in enumerate(leaves) if leaf.split(".")[0] in names]
+    chunks = [
+        (leaves[i], metadata.row_group(group).column(i))
+        for group in range(metadata.num_row_groups)
+        for i in wanted
+    ]
     with open_regular(path, WHAT) as raw:
-        size = os.fstat(raw.fileno()).st_size
-        for group in range(metadata.num_row_groups):
-            for i in wanted:
-                chunk = metadata.row_group(group).column(i)
-                starts = [chunk.data_page_offset, chunk.dictionary_page_offset or 0]
-                at = min(start for start in starts if start > 0) if any(starts) else 0
-                end = min(size, at + chunk.total_compressed_size)
-                while 0 < at < end:
-                    header, length = _page_header(path, raw, at)
-                    unpacked, packed = header.get(2, 0), header.get(3, 0)
-                    values = [part.get(1, 0) for part in header.values() if isinstance(part, dict)]
-                    pages += 1
-                    too_much = (
-                        not 0 <= unpacked <= LIMITS.parquet_page
-                        or packed < 0
-                        or max(values, default=0) > LIMITS.table_rows
-                        or pages > LIMITS.parquet_pages
+        for name, chunk in chunks:
+            starts = [chunk.data_page_offset, chunk.dictionary_page_offset or 0]
+            at = min((start for start in starts if start > 0), default=0)
+            end = min(os.fstat(raw.fileno()).st_size, at + chunk.total_compressed_size)
+            while 0 < at < end:
+                raw.seek(at)
+                try:
+                    header, length = _struct(raw.read(_HEADER), 0)
+                except (IndexError, ValueError) as error:
+                    raise InputError(
+                        f"{path}: cannot be read as Parquet: no page of values at byte {at}"
+                    ) from error
+                unpacked, packed = header.get(_UNPACKED, 0), header.get(_PACKED, 0)
+                counts = (part.get(_COUNT, 0) for part in header.values() if isinstance(part, dict))
+                values, pages = max(counts, default=0), pages + 1
+                if (
+                    not 0 <= unpacked <= LIMITS.parquet_page
+                    or packed < 0
+                    or values > LIMITS.table_rows
+                    or pages > LIMITS.parquet_pages
+                ):
+                    raise InputError(
+                        f"{path}: column {name}, page {pages}: {values} values in {unpacked} "
+                        f"bytes; expected one flight, pages of at most {LIMITS.parquet_page} "
+                        f"bytes, at most {LIMITS.parquet_pages} of them"
                     )
-                    if too_much:
-                        raise InputError(
-                            f"{path}: column {leaves[i]}, page {pages}: {max(values, default=0)} "
-                            f"values in {unpacked} bytes; expected one flight, pages of at most "
-                            f"{LIMITS.parquet_page} bytes, at most {LIMITS.parquet_pages} of them"
-                        )
-                    at += length + packed
+                at += length + packed
 
 
-def _page_header(path: Path, file: BinaryIO, at: int) -> tuple[dict[int, Any], int]:
-    """Return the fields of a page's header by their numbers (parquet.thrift: 2 is its size
-    unpacked, 3 packed, 5, 7 and 8 hold the count of values as 1), and its length.
+def _struct(data: bytes, at: int, depth: int = 0) -> tuple[dict[int, Any], int]:
+    """Return the whole numbers and structs of a struct in Thrift's compact protocol by their
+    fields, and where it ends. Other fields are passed over; the header of a page has no lists.
     """
-    file.seek(at)
-    data = file.read(_HEADER)
-    try:
-        return _fields(data, 0, 0)
-    except (IndexError, ValueError) as error:
-        raise InputError(
-            f"{path}: cannot be read as Parquet: no page of values at byte {at}"
-        ) from error
-
-
-def _varint(data: bytes, at: int) -> tuple[int, int]:
-    value = shift = 0
-    while True:
-        byte = data[at]
-        value |= (byte & 0x7F) << shift
-        at, shift = at + 1, shift + 7
-        if byte < 0x80:
-            return value, at
-        if shift > 63:
-            raise ValueError("a number of more than 64 bits")
-
-
-def _fields(data: bytes, at: int, depth: int) -> tuple[dict[int, Any], int]:
-    """Return the fields of a struct in Thrift's compact protocol, and where it ends; texts and
-    lists as None.
-    """
-    if depth > 8:
-        raise ValueError("structs within structs")
     found: dict[int, Any] = {}
     number = 0
     while data[at]:
@@ -181,25 +171,32 @@ def _fields(data: bytes, at: int, depth: int) -> tuple[dict[int, Any], int]:
         if step:
             number += step
         else:
-            zigzag, at = _varint(data, at)
-            number = (zigzag >> 1) ^ -(zigzag & 1)
-        found[number], at = _value(data, at, kind, depth)
+            number, at = _whole_number(data, at)
+        if kind == _STRUCT and depth < 8:
+            found[number], at = _struct(data, at, depth + 1)
+        elif kind in _WHOLE_NUMBERS:
+            found[number], at = _whole_number(data, at)
+        elif kind == _TEXT:
+            length, at = _varint(data, at)
+            at += length
+        elif kind in _BYTES:
+            at += _BYTES[kind]
+        else:
+            raise ValueError(f"no header of a page has a field of kind {kind}")
     return found, at + 1
 
 
-def _value(data: bytes, at: int, kind: int, depth: int) -> tuple[Any, int]:
-    if kind in (1, 2):  # a truth value, in the kind itself
-        return kind == 1, at
-    if kind == 3:
-        return data[at], at + 1
-    if kind in (4, 5, 6):  # whole numbers of 16, 32 and 64 bits
-        zigzag, at = _varint(data, at)
-        return (zigzag >> 1) ^ -(zigzag & 1), at
-    if kind == 7:
-        return None, at + 8
-    if kind == 8:
-        length, at = _varint(data, at)
-        return None, at + length
-    if kind == 12:
-        return _fields(data, at, depth + 1)
-    raise ValueError(f"no header of a page has a field of kind {kind}")
+def _whole_number(data: bytes, at: int) -> tuple[int, int]:
+    zigzag, at = _varint(data, at)
+    return (zigzag >> 1) ^ -(zigzag & 1), at
+
+
+def _varint(data: bytes, at: int) -> tuple[int, int]:
+    value = shift = 0
+    while shift < 64:
+        byte = data[at]
+        value |= (byte & 0x7F) << shift
+        at, shift = at + 1, shift + 7
+        if byte < 0x80:
+            return value, at
+    raise ValueError("a number of more than 64 bits")

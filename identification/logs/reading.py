@@ -1,7 +1,6 @@
 """Reading a flight log from a file: by its reader, or as a table by a map of its columns."""
 
 import warnings
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +11,6 @@ from ...dynamics.vehicle_file import load_vehicle, preset_names
 from ...runtime.errors import InputError
 from .flight_log import ACCELEROMETER, COMMANDS, GYRO, POSE, REQUIRED, ROTORS, FlightLog
 from .inertial import check_inertial
-from .layout_guess import FoundLayout, is_text_table, open_any_table
 from .log_map import OWN_MAP, load_map
 from .magnitudes import check_magnitudes, unit_doubts
 from .mapped_log import map_table, read_mapped
@@ -23,8 +21,8 @@ from .readers.recognise import (
     reader_by_content,
     unknown_content,
 )
-from .tables import SUFFIXES, Table, open_table
-from .text_layout import TextLayout
+from .table import Table
+from .tables import is_table, open_table
 
 _SHOWN = 20  # columns that an error lists
 
@@ -107,33 +105,21 @@ def _read(
     chosen = reader_by_content(path) if reader is None else find_reader(reader)
     if chosen is not None:
         return chosen.read(path, vehicle)
-    lacking: list[str] = []
-    for table, found in _openings(path):
-        missing = missing_columns(table)
-        if not missing:
-            return map_table(table, found, load_map(OWN_MAP), vehicle)
-        chosen = reader_by_columns(path, table.header)
-        if chosen is not None:
-            return chosen.read(path, vehicle)
-        lacking = lacking or missing
+    if not is_table(path):
+        raise unknown_content(path)
+    table = open_table(path)
+    missing = missing_columns(table)
+    if not missing:
+        return map_table(table, load_map(OWN_MAP), vehicle)
+    chosen = reader_by_columns(path, table.header)
+    if chosen is not None:
+        return chosen.read(path, vehicle)
     raise InputError(
-        f"{path}: missing column(s) {', '.join(lacking)}; expected {', '.join(REQUIRED)}, or the "
+        f"{path}: missing column(s) {', '.join(missing)}; expected {', '.join(REQUIRED)}, or the "
         f"columns of {looked_for_columns()}, found {', '.join(table.header[:_SHOWN])}. A table of "
         f"other columns is read with a map: windwrench check {path.name} --write-map map.yaml "
         "proposes one"
     )
-
-
-def _openings(path: Path) -> Iterator[tuple[Table, FoundLayout]]:
-    """Yield a table as the kit lays it out, where its name is that of such a table, and then in
-    whatever layout is found.
-    """
-    plain = path.name.lower().endswith(SUFFIXES)
-    if not plain and not is_text_table(path):
-        raise unknown_content(path)
-    if plain:
-        yield open_table(path), FoundLayout(TextLayout())
-    yield open_any_table(path)
 
 
 def _with_doubts(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:

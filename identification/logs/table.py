@@ -1,5 +1,6 @@
 """A table of numbers in a file: its columns by name, and where a row stands."""
 
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,39 +13,70 @@ from ...runtime.file_limits import LIMITS
 
 Array = NDArray[np.float64]
 
-SUFFIXES = (".csv", ".csv.gz", ".parquet")
 WHAT = "a flight log"  # for errors
+SUFFIXES = (".csv", ".csv.gz", ".parquet")  # of tables that the kit writes
+TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".log")  # of text tables, packed or not
 
 
 @dataclass(frozen=True)
 class Table:
-    """A file of named columns, of which only those asked for are turned into numbers."""
+    """A file of named columns, of which only those asked for are turned into numbers.
+
+    Raises:
+        InputError: it has no rows, or more than ``FileLimits.table_rows``.
+    """
 
     path: Path
     header: tuple[str, ...]
     rows: int
-    read: Callable[
-        [Sequence[str]], dict[str, Array]
-    ]  # names to columns (rows,); empty fields are NaN
-    first_line: int = 2  # line of a text in which the first row stands
-    notes: tuple[str, ...] = ()  # what was left out
+    # puts columns, by their places in the header, into an array (columns, rows)
+    fill: Callable[["Table", Sequence[int], Array], None]
+    first_line: int = 0  # line of a text in which the first row stands; 0: rows have no lines
+    blank_before: tuple[int, ...] = ()  # a row for each blank line before it, in their order
+    units: tuple[str, ...] = ()  # of a line of units behind the header
+    notes: tuple[str, ...] = ()  # how it is laid out, and what was left out
+
+    def __post_init__(self) -> None:
+        if self.rows > LIMITS.table_rows:
+            raise InputError(
+                f"{self.path}: {self.rows} rows; expected one flight, at most {LIMITS.table_rows}"
+            )
+        if self.rows < 1:
+            raise InputError(
+                f"{self.path}: no rows; expected a header and at least one row of numbers"
+            )
+
+    def read(self, names: Sequence[str]) -> dict[str, Array]:
+        """Return columns (rows,) by their names; empty fields are NaN.
+
+        Raises:
+            InputError: a field is no number; a name stands in the header more than once; the
+                numbers are more than ``FileLimits.table_numbers``.
+        """
+        for name in names:
+            if self.header.count(name) > 1:
+                raise InputError(
+                    f"{self.path}: column {name} stands there more than once; expected it once"
+                )
+        if self.rows * len(names) > LIMITS.table_numbers:
+            raise InputError(
+                f"{self.path}: {self.rows} rows of {len(names)} columns; expected one flight, at "
+                f"most {LIMITS.table_numbers} numbers"
+            )
+        columns = np.empty((len(names), self.rows))
+        self.fill(self, [self.header.index(name) for name in names], columns)
+        return dict(zip(names, columns, strict=True))
 
     def row(self, index: int) -> str:
-        """Return how to find a row (counted from 0) in the file: rows count from 1, lines include
-        the header.
-        """
-        if self.path.name.lower().endswith(".parquet"):
+        """Return how to find a row (counted from 0) in the file: rows and lines count from 1."""
+        if not self.first_line:
             return f"row {index + 1}"
-        return text_row(index, self.first_line)
-
-
-def text_row(index: int, first_line: int = 2) -> str:
-    """Return how to find a row (counted from 0) in a text whose first row is in ``first_line``."""
-    return f"row {index + 1} (line {index + first_line})"
+        line = self.first_line + index + bisect_right(self.blank_before, index)
+        return f"row {index + 1} (line {line})"
 
 
 def file_kind(path: Path) -> str:
-    """Return which of ``SUFFIXES`` a file has.
+    """Return which of ``SUFFIXES`` a file to be written has.
 
     Raises:
         InputError: none of them.
@@ -57,15 +89,10 @@ def file_kind(path: Path) -> str:
     )
 
 
-def empty_columns(path: Path, rows: int, names: Sequence[str]) -> Array:
-    """Return room for columns, (len(names), rows).
-
-    Raises:
-        InputError: they are more numbers than ``FileLimits.table_numbers``.
-    """
-    if rows * len(names) > LIMITS.table_numbers:
-        raise InputError(
-            f"{path}: {rows} rows of {len(names)} columns; expected one flight, at most "
-            f"{LIMITS.table_numbers} numbers"
-        )
-    return np.empty((len(names), rows))
+def stem(path: Path) -> str:
+    """Return a table's name without its ending."""
+    name = path.name
+    for ending in (".gz", ".parquet", *TEXT_SUFFIXES):
+        if name.lower().endswith(ending):
+            name = name[: -len(ending)]
+    return name

@@ -3,43 +3,35 @@ not at all.
 """
 
 import gzip
-from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
 from ...runtime.errors import InputError
-from ...runtime.file_limits import LIMITS
 from ...runtime.whole_files import replaced
-from .csv_table import open_csv
-from .parquet_table import import_parquet, open_parquet
-from .table import SUFFIXES, Array, Table, file_kind
+from .parquet_table import open_parquet, write_parquet
+from .table import SUFFIXES, TEXT_SUFFIXES, Array, Table, file_kind
+from .text_table import open_text
 
-__all__ = ["SUFFIXES", "Array", "Table", "file_kind", "open_table", "write_csv", "write_table"]
 
-LARGEST = LIMITS.table_text
+def is_table(path: Path) -> bool:
+    """Return whether a file's name is that of a table: Parquet, or a text, packed or not."""
+    name = path.name.lower()
+    return name.endswith(".parquet") or name.removesuffix(".gz").endswith(TEXT_SUFFIXES)
 
 
 def open_table(path: Path) -> Table:
-    """Open a CSV, gzipped CSV or Parquet file.
+    """Open a table of any layout.
 
     Raises:
-        InputError: unreadable, not of its kind, no regular file, without rows, with two columns of
-            one name, or more than ``FileLimits`` allows.
+        InputError: unreadable, no table, no regular file, without rows, or more than
+            ``FileLimits`` allows.
     """
-    table = (open_parquet if file_kind(path) == ".parquet" else open_csv)(path, LARGEST)
-    repeated = [name for name, count in Counter(table.header).items() if count > 1]
-    if repeated:
+    if not is_table(path):
         raise InputError(
-            f"{path}: column {', '.join(sorted(repeated)[:20])} stands there more than once; "
-            f"expected it once"
+            f"{path}: unknown kind of file; expected a table whose name ends in "
+            f"{', '.join(dict.fromkeys((*TEXT_SUFFIXES, *SUFFIXES)))}"
         )
-    if table.rows > LIMITS.table_rows:
-        raise InputError(
-            f"{path}: claims {table.rows} rows; expected one flight, at most {LIMITS.table_rows}"
-        )
-    if table.rows == 0:
-        raise InputError(f"{path}: no rows; expected a header and at least one row of numbers")
-    return table
+    return open_parquet(path) if path.name.lower().endswith(".parquet") else open_text(path)
 
 
 def write_table(columns: Mapping[str, Array], path: Path) -> None:
@@ -52,25 +44,11 @@ def write_table(columns: Mapping[str, Array], path: Path) -> None:
     kind = file_kind(path)
     with replaced(path) as temporary:
         if kind == ".parquet":
-            parquet = import_parquet(path)
-            import pyarrow
-
-            arrays = {
-                name: pyarrow.array(column, from_pandas=True) for name, column in columns.items()
-            }
-            parquet.write_table(pyarrow.table(arrays), temporary)
+            write_parquet(columns, path, temporary)
             return
         data = _csv_text(columns).encode()
         # a fixed time stamp: the same table gives the same bytes
         temporary.write_bytes(gzip.compress(data, 6, mtime=0) if kind == ".csv.gz" else data)
-
-
-def _csv_text(columns: Mapping[str, Array], missing: str = "") -> str:
-    texts = [
-        [missing if value != value else repr(value) for value in column.tolist()]
-        for column in columns.values()
-    ]
-    return "\n".join([",".join(columns), *map(",".join, zip(*texts, strict=True))]) + "\n"
 
 
 def write_csv(columns: Mapping[str, Array], path: Path, missing: str = "nan") -> None:
@@ -81,3 +59,11 @@ def write_csv(columns: Mapping[str, Array], path: Path, missing: str = "nan") ->
     """
     with replaced(path) as temporary:
         temporary.write_text(_csv_text(columns, missing), encoding="utf-8")
+
+
+def _csv_text(columns: Mapping[str, Array], missing: str = "") -> str:
+    texts = [
+        [missing if value != value else repr(value) for value in column.tolist()]
+        for column in columns.values()
+    ]
+    return "\n".join([",".join(columns), *map(",".join, zip(*texts, strict=True))]) + "\n"

@@ -14,12 +14,12 @@ from ...dynamics.vehicle import Vehicle
 from ...dynamics.vehicle_file import load_vehicle, preset_names
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
-from ..logs.layout_guess import is_parquet, is_text_table, open_any_table
 from ..logs.log_map import MAPS, map_names
 from ..logs.map_guess import Guess, guess_map, map_yaml
 from ..logs.mapped_log import map_table
 from ..logs.reading import finished, is_known_table, read_log
 from ..logs.screening import screen_log
+from ..logs.tables import is_table, open_table
 from ..motion.noise_spectrum import noise_spectra
 from .log_channels import Channel, log_channels
 
@@ -98,7 +98,7 @@ def check_log(
                 log = read_log(path, reader, vehicle)
                 read_by, text = _read_by(path, log)
             except InputError as error:
-                if reader is not None or not (is_text_table(path) or is_parquet(path)):
+                if reader is not None or not is_table(path):
                     raise
                 log, guess = _guessed(path, vehicle, error)
                 read_by, text = "a map that was guessed", map_yaml(guess)
@@ -128,14 +128,14 @@ def _read_by(path: Path, log: FlightLog) -> tuple[str, str]:
 
 
 def _guessed(path: Path, vehicle: Vehicle | None, error: InputError) -> tuple[FlightLog, Guess]:
-    table, layout = open_any_table(path)
+    table = open_table(path)
     if is_known_table(table):
         raise error  # it is known what the columns mean: the fault is in what they hold
-    guess = guess_map(table, layout, vehicle)
+    guess = guess_map(table, vehicle)
     if vehicle is not None:
         guess = replace(guess, log_map=replace(guess.log_map, vehicle=vehicle.name))
     with np.errstate(over="ignore", invalid="ignore"):
-        log = map_table(table, layout, guess.log_map, vehicle)
+        log = map_table(table, guess.log_map, vehicle)
     return finished(log, vehicle), guess
 
 

@@ -3,14 +3,12 @@
 Fields are separated by commas, semicolons, tabs or white space, whichever the header has.
 """
 
-import math
 import os
 import select
 import sys
 import time
-from typing import Any
 
-from ...identification.logs.text_layout import MISSING_WORDS, TextLayout, without_mark
+from ...identification.logs.text_table import TextLayout
 from ...runtime.errors import InputError
 from ..field_map import FieldMap, Malformed
 from ..messages import Sample
@@ -92,7 +90,7 @@ class TextStream(Source):
             return None
         try:
             values = {
-                name: _number(name, field)
+                name: self._number(name, field)
                 for name, field in zip(self._header, fields, strict=True)
                 if name
             }
@@ -105,21 +103,16 @@ class TextStream(Source):
 
     def _begin(self, text: str) -> None:
         """Take the header."""
-        text = without_mark(text)
-        separator = next((mark for mark in (",", ";", "\t") if mark in text), " ")
-        self._layout = TextLayout(separator)
-        self._header = self._layout.names(self._layout.fields(text))
+        self._layout = TextLayout(next((mark for mark in (",", ";", "\t") if mark in text), " "))
+        self._header = self._layout.names(text)
         self._map.check(self._header)
+
+    def _number(self, name: str, field: str) -> float:
+        value = self._layout.number(field)
+        if value is None:
+            raise Malformed(f"field {name}: {field[:60]!r} is not a number")
+        return value
 
     def expected(self) -> str:
         """Return what must come."""
         return "rows of a table with " + ", ".join(self._header or ["a header"])
-
-
-def _number(name: str, field: str) -> Any:
-    if not field or field.lower() in MISSING_WORDS:
-        return math.nan
-    try:
-        return float(field)
-    except ValueError:
-        raise Malformed(f"field {name}: {field[:60]!r} is not a number") from None

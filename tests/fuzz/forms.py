@@ -39,10 +39,10 @@ from windwrench.dynamics.vehicle_file import dump_vehicle, load_vehicle, parse_v
 from windwrench.envs.scenarios import get_scenario
 from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.identification.logs.flight_log import FlightLog, write_log
-from windwrench.identification.logs.layout_guess import open_any_table
 from windwrench.identification.logs.map_guess import guess_map
 from windwrench.identification.logs.mapped_log import map_table
 from windwrench.identification.logs.reading import finished, read_log
+from windwrench.identification.logs.tables import open_table
 from windwrench.identification.wrench_series import estimate_log
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.yaml_file import parse_yaml
@@ -272,10 +272,10 @@ def _foreign_table() -> bytes:
 
 def _use_foreign(path: Path) -> None:
     """Guess a map for a table, and read it by that."""
-    table, layout = open_any_table(path)
-    guess = guess_map(table, layout, _vehicle("ardrone2"))
+    table = open_table(path)
+    guess = guess_map(table, _vehicle("ardrone2"))
     with np.errstate(over="ignore", invalid="ignore"):
-        finished(map_table(table, layout, guess.log_map), _vehicle("ardrone2"))
+        finished(map_table(table, guess.log_map), _vehicle("ardrone2"))
 
 
 def _folder_bag(path: Path) -> None:

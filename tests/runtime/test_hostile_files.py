@@ -20,7 +20,7 @@ import pytest
 from windwrench.controllers.trained_policy import FORMAT, load_policy
 from windwrench.dynamics import load_vehicle
 from windwrench.identification import read_log
-from windwrench.identification.logs import csv_table, parquet_table
+from windwrench.identification.logs import parquet_table, text_table
 from windwrench.identification.logs.flight_log import REQUIRED
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.file_limits import LIMITS
@@ -145,12 +145,13 @@ def test_files_that_unpack_to_gigabytes_cost_little(tmp_path):
     expected = {"zeros.csv.gz": "more than 1000000 in line 2"}
     (tmp_path / "zeros.csv.gz").write_bytes(packed_often(b"0" * 2**26, 20))
     expected["lines.csv.gz"] = "more than 4000000 rows"
-    (tmp_path / "lines.csv.gz").write_bytes(packed_often(b"1\n" * 2**25, 20))
+    (tmp_path / "lines.csv.gz").write_bytes(packed_often(b"1,2\n" * 2**24, 20))
     expected["blank.csv.gz"] = "more than 536870912 characters"
-    (tmp_path / "blank.csv.gz").write_bytes(packed_often((b" " * 999_999 + b"\n") * 64, 10))
+    blank = b"1,2\n" * 2 + (b" " * 999_999 + b"\n") * 64
+    (tmp_path / "blank.csv.gz").write_bytes(packed_often(blank, 10))
     expected["parts.csv.gz"] = "more than 100000 packed parts"
     (tmp_path / "parts.csv.gz").write_bytes(gzip.compress(b"") * 1_000_000)
-    expected["columns.csv"] = "its first line has more than"
+    expected["columns.csv"] = "no table of numbers in its first 1 line"
     (tmp_path / "columns.csv").write_text(",".join(f"{i:x}" for i in range(150_000)) + "\n1\n")
     with (tmp_path / "sparse.csv").open("wb") as file:
         file.truncate(2**34)
@@ -255,8 +256,7 @@ def test_blocks_of_a_text_join_without_a_seam(tmp_path, monkeypatch):
     table[:, 0], table[:, 4:8], table[:, 8:] = 0.01 * np.arange(rows), (1, 0, 0, 0), 300.0
     lines = [",".join(map(repr, row)) for row in table.tolist()]
     want = read_text(tmp_path, lines)
-    monkeypatch.setattr(csv_table, "_BLOCK", 7)
-    monkeypatch.setattr(csv_table, "_PIECE", 100)
+    monkeypatch.setattr(text_table, "_BLOCK", 7)
     for log in (
         want,
         read_text(tmp_path, lines),
@@ -268,8 +268,8 @@ def test_blocks_of_a_text_join_without_a_seam(tmp_path, monkeypatch):
     lines[777] = lines[777].replace(",", ",here", 1)
     with pytest.raises(InputError, match=r"column px, row 778 \(line 779\): 'here"):
         read_text(tmp_path, lines)
-    monkeypatch.setattr(csv_table, "LIMITS", replace(LIMITS, table_rows=999))
-    with pytest.raises(InputError, match="more than 999 rows; expected one flight"):
+    monkeypatch.setattr(text_table, "LIMITS", replace(LIMITS, table_rows=99))
+    with pytest.raises(InputError, match="more than 99 rows; expected one flight"):
         read_text(tmp_path, lines)
 
 

@@ -23,9 +23,9 @@ from tests.support.random_tables import fields_of, flight, random_table, save
 from windwrench.dynamics.vehicle_file import load_vehicle
 from windwrench.identification import read_log
 from windwrench.identification.logs.flight_log import FlightLog
-from windwrench.identification.logs.layout_guess import is_parquet, is_text_table, open_any_table
 from windwrench.identification.logs.map_guess import guess_map
 from windwrench.identification.logs.screening import screen_for_estimate, screen_log
+from windwrench.identification.logs.tables import is_table, open_table
 from windwrench.identification.report.log_check import check_log
 from windwrench.runtime.errors import InputError
 
@@ -82,8 +82,7 @@ def cases():
     """Return the names of all cases."""
     found = [f"file {name}" for name in files()]
     found += [
-        f"table {name}" for name, (path, _) in files().items() if is_text_table(path) or
-        is_parquet(path)
+        f"table {name}" for name, (path, _) in files().items() if is_table(path)
     ]  # fmt: skip
     found += [f"random {number}" for number in range(TABLES)]
     return found + [f"hostile {name}" for name in (*map(str, range(len(FLIGHTS))), *MEASURED)]
@@ -137,8 +136,8 @@ def _table(name):
     said = {}
     for way, model in (("alone", None), ("vehicle", _vehicle(vehicle, path))):
         try:
-            table, layout = open_any_table(path)
-            found = _fields(guess_map(table, layout, model))
+            table = open_table(path)
+            found = _fields(guess_map(table, model))
         except InputError as error:
             said[way] = {"error": _plain(str(error), path.parent)}
         else:
@@ -158,8 +157,8 @@ def random_case(number):
 def _random(name):
     written, vehicle = random_case(int(name))
     with tempfile.TemporaryDirectory() as folder:
-        table, layout = open_any_table(save(written, Path(folder) / "table.csv"))
-        found = _fields(guess_map(table, layout, vehicle))
+        table = open_table(save(written, Path(folder) / "table.csv"))
+        found = _fields(guess_map(table, vehicle))
     said = {"right": [], "right guess": [], "wrong guess": [], "wrong": []}
     true = {"/".join(key): value for key, value in fields_of(written.log_map).items()}
     for key in sorted(set(found) | set(true)):

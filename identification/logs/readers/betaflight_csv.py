@@ -29,10 +29,10 @@ from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ..channels import Samples
 from ..flight_log import FlightLog
-from ..layout_guess import open_any_table
 from ..log_map import Battery, Commands, LogMap, Rotors, Sensor, TimeColumn
 from ..mapped_log import map_recording
 from ..rotor_orders import ORDERS
+from ..tables import open_table
 
 Array = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
         InputError: the file cannot be read, or lacks a column.
     """
     poles = magnet_poles(option, path)
-    table, _ = open_any_table(path)
+    table = open_table(path)
     missing = [name for name in SIGNATURE if name not in table.header]
     if missing:
         raise InputError(

@@ -10,9 +10,9 @@ from tests.support.random_tables import fields_of, flight, random_table, save
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.logs.column_names import Group, take_apart
 from windwrench.identification.logs.flight_log import FlightLog
-from windwrench.identification.logs.layout_guess import open_any_table
 from windwrench.identification.logs.log_map import parse_map
 from windwrench.identification.logs.map_guess import Guess, guess_map, map_yaml, motor_unit
+from windwrench.identification.logs.tables import open_table
 from windwrench.runtime.errors import InputError
 
 
@@ -23,8 +23,8 @@ def flown() -> FlightLog:
 
 
 def guessed(path: Path, name: str = "") -> Guess:
-    table, layout = open_any_table(path)
-    return guess_map(table, layout, load_vehicle(name) if name else None)
+    table = open_table(path)
+    return guess_map(table, load_vehicle(name) if name else None)
 
 
 def test_the_map_that_is_written_is_the_map_that_was_guessed(

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from windwrench.identification.logs.layout_guess import open_any_table
+from windwrench.identification.logs.tables import open_table
 from windwrench.runtime.errors import InputError
 
 
@@ -29,7 +29,7 @@ def test_a_layout_is_found(
 ) -> None:
     path = tmp_path / name
     path.write_bytes(text.encode())
-    table, _ = open_any_table(path)
+    table = open_table(path)
     assert " ".join(table.header) == header
     values = table.read(list(table.header))
     np.testing.assert_array_equal([column[0] for column in values.values()], first)
@@ -39,24 +39,24 @@ def test_a_layout_is_found(
 def test_units_behind_the_header_are_kept(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("t,x\n[s],[mm]\n0,1\n1,2\n")
-    table, found = open_any_table(path)
-    assert found.units == ("[s]", "[mm]")
+    table = open_table(path)
+    assert table.units == ("[s]", "[mm]")
     assert table.row(0) == "row 1 (line 3)"
 
 
 def test_a_last_line_that_was_cut_off_is_left_out(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("t;x;y\n0;1;2\n1;2;3\n2;3")
-    table, _ = open_any_table(path)
+    table = open_table(path)
     assert table.rows == 2
-    assert table.notes == ("the last line was cut off, and left out",)
+    assert table.notes[1:] == ("the last line was cut off, and left out",)
     assert table.read(["y"])["y"].tolist() == [2.0, 3.0]
 
 
 def test_another_line_that_is_short_is_an_error_with_its_line(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("# c\nt;x;y\n0;1;2\n1;2\n2;3;4\n3;4;5\n")
-    table, _ = open_any_table(path)
+    table = open_table(path)
     with pytest.raises(InputError, match=r"row 2 \(line 4\) has 2 field\(s\); expected 3"):
         table.read(["t"])
 
@@ -65,7 +65,7 @@ def test_decimal_commas_between_commas_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("t,x\n0,5,1,5\n1,5,2,5\n")
     with pytest.raises(InputError, match="twice as many as the header; decimal commas"):
-        open_any_table(path)
+        open_table(path)
 
 
 @pytest.mark.parametrize("text", ["", "\n\n", "hello\nworld\n", "a,b\nc,d\n"])
@@ -73,10 +73,10 @@ def test_what_is_no_table_is_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "a.csv"
     path.write_text(text)
     with pytest.raises(InputError, match=r"no table of numbers|empty file"):
-        open_any_table(path)
+        open_table(path)
 
 
 def test_latin_letters_of_an_old_encoding_are_read(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_bytes("t;roll [°]\n0;1\n1;2\n".encode("latin-1"))
-    assert open_any_table(path)[0].header == ("t", "roll [°]")
+    assert open_table(path).header == ("t", "roll [°]")

@@ -1,0 +1,362 @@
+"""Tables of numbers in texts, packed or not, of any layout: separator, decimal comma, lines before
+the header, a line of units behind it.
+
+The layout is found in the first lines. Each separator and each way to write decimals is tried. The
+right one makes the most numbers of a line, in the longest run of lines that have as many fields as
+one another. That run is the table, and the line of names before it is its header. The rows are then
+counted, and the columns asked for are turned into numbers a block of lines at a time.
+"""
+
+import csv
+import io
+import math
+import zlib
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import BinaryIO, cast
+
+import numpy as np
+
+from ...runtime.errors import InputError
+from ...runtime.file_limits import LIMITS
+from ...runtime.gunzipping import Gunzip
+from ...runtime.regular_files import open_regular
+from .column_names import is_unit
+from .table import WHAT, Array, Table
+
+# what people write for a value that is not there
+MISSING_WORDS = frozenset({"na", "n/a", "null", "none", "nil", "-", "--", "?"})
+
+_SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "white space"}
+_BUFFER = 2**18  # bytes unpacked at a time
+_BLOCK = 20_000  # lines turned into numbers at a time
+_LOOKED_AT = 2**18  # characters in which the layout is found
+_LINES = 600  # of them; what Betaflight's decoder writes before the header has 150
+_BETWEEN = 5  # lines between header and first row, at most
+_FEWEST = 2  # columns of a table
+# decimal commas to points; a point beside them may stand for thousands, and is no number's
+_POINTS = str.maketrans(",.", ".?")
+_DECIMAL_COMMA = (
+    "decimal commas between fields that commas separate cannot be told apart: write the table with "
+    "semicolons"
+)
+
+
+@dataclass(frozen=True)
+class TextLayout:
+    """How the lines of a text table are written."""
+
+    separator: str = ","  # " ": any white space
+    decimal: str = "."  # or ","
+
+    def fields(self, line: str) -> list[str]:
+        """Return the fields of a line, without the space around them; none where its quotation
+        marks are not those of CSV.
+        """
+        if self.separator == " ":
+            return line.split()
+        if '"' not in line:
+            return [field.strip() for field in line.split(self.separator)]
+        rows = csv.reader([line], delimiter=self.separator, skipinitialspace=True, strict=True)
+        try:
+            return [field.strip() for field in next(rows)]
+        except csv.Error:
+            return []
+
+    def names(self, line: str) -> list[str]:
+        """Return the columns' names of a header; a separator behind the last name, and the mark of
+        a comment before the first, belong to none.
+        """
+        names = [name.strip('" ') for name in self.fields(_without_mark(line))]
+        while len(names) > 1 and not names[-1]:
+            names.pop()
+        return names
+
+    def number(self, field: str) -> float | None:
+        """Return the number in a field, NaN where it is empty, None where it holds something
+        else.
+        """
+        if not field or field.lower() in MISSING_WORDS:
+            return math.nan
+        if self.decimal == ",":
+            field = field.translate(_POINTS)
+        try:
+            return float(field.replace("_", "?"))  # Python's numbers may hold underscores
+        except ValueError:
+            return None
+
+    def is_blank(self, line: str) -> bool:
+        """Return whether a line has no field that holds anything."""
+        return not line.strip().strip(f'{self.separator} "')
+
+
+def open_text(path: Path) -> Table:
+    """Open a text table.
+
+    Raises:
+        InputError: unreadable, no text, no table, or more than ``FileLimits`` allows.
+    """
+    head, encoding = _first_lines(path)
+    layout, first = _layout(path, head)
+    header, first = _header(path, head, layout, first)
+    between = [] if header is None else [line for line in head[header + 1 : first] if line.strip()]
+    said = [f"fields separated by {_SEPARATORS[layout.separator]}"]
+    if layout.decimal == ",":
+        said.append("decimal commas")
+    if header is None:
+        names = [str(i + 1) for i in range(len(layout.fields(head[first])))]
+        said.append("no header: columns are 1, 2, 3 ...")
+    else:
+        names = layout.names(head[header])
+    if header:
+        said.append(f"{header} line(s) before the header")
+    if between:
+        said.append(f"{len(between)} line(s) between header and rows")
+    notes = [] if said == ["fields separated by comma"] else [f"layout: {', '.join(said)}"]
+
+    rows, last, blank = 0, "", []
+    for line in islice(_lines(path, encoding), first, None):
+        if layout.is_blank(line):
+            blank.append(rows)
+        else:
+            rows, last = rows + 1, line
+    if rows > 1 and len(layout.fields(last)) < len(names):
+        rows -= 1
+        notes.append("the last line was cut off, and left out")
+
+    def fill(table: Table, where: Sequence[int], columns: Array) -> None:
+        lines: Iterator[str] = islice(_lines(path, encoding), first, None)
+        if blank:
+            lines = (line for line in lines if not layout.is_blank(line))
+        kept, done = islice(lines, rows), 0
+        while block := list(islice(kept, _BLOCK)):
+            columns[:, done : done + len(block)] = _numbers(table, layout, block, done, where).T
+            done += len(block)
+        if done != rows:
+            raise InputError(f"{path}: changed while it was read; expected a whole file")
+
+    units = tuple(layout.fields(between[0])) if len(between) == 1 else ()
+    return Table(path, tuple(names), rows, fill, first + 1, tuple(blank), units, tuple(notes))
+
+
+@contextmanager
+def _text(path: Path, encoding: str) -> Iterator[io.TextIOWrapper]:
+    """Give a file's text, unpacked.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    file: BinaryIO = open_regular(path, WHAT)
+    if path.name.lower().endswith(".gz"):
+        file = cast(BinaryIO, io.BufferedReader(Gunzip(file, path, LIMITS.table_text), _BUFFER))
+    try:
+        with io.TextIOWrapper(file, encoding=encoding) as text:
+            yield text
+    except (OSError, EOFError, zlib.error) as error:
+        raise InputError(f"{path}: cannot be read as {WHAT}: {error}") from error
+
+
+def _lines(path: Path, encoding: str) -> Iterator[str]:
+    """Yield a text's lines, without their ends.
+
+    Raises:
+        InputError: no text, or more than ``FileLimits`` allows; everything is counted as it comes.
+    """
+    size = number = 0
+    with _text(path, encoding) as text:
+        try:
+            while line := text.readline(LIMITS.table_line + 1):
+                size, number = size + len(line), number + 1
+                if "\0" in line:
+                    raise InputError(f"{path}: not a text file (it holds zero bytes); expected CSV")
+                if len(line) > LIMITS.table_line:
+                    raise InputError(
+                        f"{path}: more than {LIMITS.table_line} in line {number}; expected one "
+                        "flight"
+                    )
+                if size > LIMITS.table_text:
+                    raise InputError(
+                        f"{path}: more than {LIMITS.table_text} characters of text; expected one "
+                        "flight"
+                    )
+                if number > LIMITS.table_rows + _LINES:
+                    raise InputError(
+                        f"{path}: more than {LIMITS.table_rows} rows; expected one flight"
+                    )
+                yield line.rstrip("\n")
+        except UnicodeDecodeError as error:
+            raise InputError(
+                f"{path}: not a text file (behind line {number} it is not UTF-8); expected CSV"
+            ) from error
+
+
+def _first_lines(path: Path) -> tuple[list[str], str]:
+    """Return a text's first lines, and its encoding: UTF-8, or Latin-1 where it is not that."""
+    for encoding in ("utf-8-sig", "latin-1"):
+        with _text(path, encoding) as text:
+            try:
+                text.read(_LOOKED_AT)
+            except UnicodeDecodeError:
+                continue
+        break
+    head: list[str] = []
+    size = 0
+    for line in islice(_lines(path, encoding), _LINES):
+        head.append(line)
+        size += len(line)
+        if size > _LOOKED_AT:
+            break
+    return head, encoding
+
+
+def _layout(path: Path, head: list[str]) -> tuple[TextLayout, int]:
+    """Return the layout that makes the most numbers of the first lines, and the line (from 0) of
+    the first row that is full of them.
+
+    Raises:
+        InputError: none makes a table of them.
+    """
+    best, found, first = 0.0, TextLayout(), 0
+    for separator in _SEPARATORS:
+        for decimal in (".", ",") if separator != "," else (".",):
+            layout = TextLayout(separator, decimal)
+            score, start = _score(head, layout)
+            if score > best + 1e-9:
+                best, found, first = score, layout, start
+    if best:
+        return found, first
+    if not any(head):
+        raise InputError(f"{path}: empty file; expected a header and at least one row of numbers")
+    raise InputError(
+        f"{path}: no table of numbers in its first {len(head)} line(s); expected a header and rows "
+        "of at least two numbers"
+    )
+
+
+def _score(head: list[str], layout: TextLayout) -> tuple[float, int]:
+    """Return how many numbers a line has in a layout, and the line of the first row of them."""
+    rows = []
+    for i, line in enumerate(head):
+        fields = layout.fields(line)
+        empty, numbers = _counts(layout, fields)
+        if numbers and empty + numbers >= 0.5 * len(fields):
+            rows.append((i, len(fields), numbers))
+    # the later lines decide: before them may stand a program's settings, numbers too
+    tail = rows[len(rows) // 4 :]
+    width = Counter(n for _, n, _ in tail).most_common(1)[0][0] if tail else 0
+    if width < _FEWEST:
+        return 0.0, 0
+    whole = sum(1 for line in head[tail[0][0] :] if line.strip())
+    most = max(k for _, n, k in tail if n == width)
+    start = next(i for i, n, k in rows if n >= 0.8 * width and k >= 0.5 * most)
+    return sum(k for _, n, k in tail if n == width) / whole, start
+
+
+def _counts(layout: TextLayout, fields: Sequence[str]) -> tuple[int, int]:
+    """Return how many fields are empty, and how many hold a number (``nan`` among them)."""
+    empty = sum(not field or field.lower() in MISSING_WORDS for field in fields)
+    return empty, sum(layout.number(field) is not None for field in fields) - empty
+
+
+def _header(path: Path, head: list[str], layout: TextLayout, full: int) -> tuple[int | None, int]:
+    """Return the line (from 0) of the header, None where there is none, and that of the first row.
+
+    The header is the nearest line before the first row that has a name for nearly every column.
+    Rows before the first one that is ``full`` of numbers have empty fields.
+
+    Raises:
+        InputError: the rows have twice as many fields as a line of names before them.
+    """
+    width = len(layout.fields(head[full]))
+    header, first = None, full
+    for i in range(full - 1, -1, -1):
+        fields = layout.names(head[i])
+        empty, numbers = _counts(layout, fields)
+        named = len(fields) - empty - numbers
+        if 2 * len(fields) == width and named == len(fields) and i == first - 1:
+            raise InputError(
+                f"{path}: line {first + 1} has {width} fields, twice as many as the header; "
+                f"{_DECIMAL_COMMA}"
+            )
+        if len(fields) >= width - 1 and named >= max(2, 0.8 * len(fields)):
+            is_units_line = header is None and sum(map(is_unit, fields)) >= 0.7 * len(fields)
+            header = i
+            if not is_units_line:
+                break
+        elif header is None and numbers and 2 * named <= len(layout.fields(head[i])) == width:
+            first = i
+        elif first - i > _BETWEEN:
+            break
+    return header, first
+
+
+def _numbers(
+    table: Table, layout: TextLayout, lines: Sequence[str], first: int, where: Sequence[int]
+) -> Array:
+    """Return the numbers (n, len(where)) in the fields ``where`` of rows, of which the first is
+    the table's row ``first``: by numpy's parser where that takes them, else a field at a time.
+
+    Raises:
+        InputError: a field holds something else, or a row has more or fewer fields than the header.
+    """
+    width = len(table.header)
+    plain = _plain_lines(layout, lines, width)
+    if plain:
+        separator = None if layout.separator == " " else layout.separator
+        try:
+            return np.loadtxt(plain, delimiter=separator, comments=None, usecols=where, ndmin=2)
+        except ValueError:
+            pass  # the first field that is no number is named below
+    values = np.empty((len(lines), len(where)))
+    for i, line in enumerate(lines):
+        fields = layout.fields(line)
+        if len(fields) == width + 1 and not fields[-1]:  # a separator behind the last
+            fields.pop()
+        if len(fields) != width:
+            hint = f". {_DECIMAL_COMMA.capitalize()}" if len(fields) == 2 * width else ""
+            raise InputError(
+                f"{table.path}: {table.row(first + i)} has {len(fields)} field(s); expected "
+                f"{width}, as many as the header{hint}"
+            )
+        for j, column in enumerate(where):
+            value = layout.number(fields[column])
+            if value is None:
+                raise InputError(
+                    f"{table.path}: column {table.header[column]}, {table.row(first + i)}: "
+                    f"{fields[column][:100]!r} is not a number; expected a decimal number"
+                )
+            values[i, j] = value
+    return values
+
+
+def _plain_lines(layout: TextLayout, lines: Sequence[str], width: int) -> Sequence[str]:
+    """Return rows as numpy's parser takes them, with decimal points and ``nan`` in empty fields;
+    none where a row has quotation marks or another number of fields than ``width``.
+    """
+    mark = layout.separator
+    if mark == " ":
+        if any(len(line.split()) != width for line in lines):
+            return []
+    elif any(line.count(mark) != width - 1 or '"' in line for line in lines):
+        return []
+    if layout.decimal == ",":
+        lines = [line.translate(_POINTS) for line in lines]
+    gap, filled = mark + mark, f"{mark}nan{mark}"
+    if mark != " " and any(gap in line or line[:1] == mark or line[-1:] == mark for line in lines):
+        # two passes, because neighbours share a separator
+        both = (f"{mark}{line}{mark}".replace(gap, filled).replace(gap, filled) for line in lines)
+        return [line[1:-1] for line in both]
+    return lines
+
+
+def _without_mark(line: str) -> str:
+    """Return a header without the mark of a comment in front of it."""
+    bare = line.lstrip()
+    for mark in ("#", "%", "//"):
+        if bare.startswith(mark):
+            return bare.removeprefix(mark).lstrip("#% /")
+    return line
