@@ -90,9 +90,9 @@ def _learn(
     config: Path | None,
     out: Path,
 ) -> dict[str, Any]:
-    from ..training.algorithms import run_training
     from ..training.configuration import load_config
     from ..training.run import Progress, read_progress
+    from ..training.train import train
 
     given = load_config(algorithm, overrides, config)
     folder = results_folder(
@@ -110,7 +110,7 @@ def _learn(
             progress(text=f"{algorithm}, {scenario}: {told}")
             console.print(f"{now.steps[-1]:8d} decisions: {told}, {now.lost[-1]} lost")
 
-        path = run_training(
+        path = train(
             given,
             scenario,
             seed,

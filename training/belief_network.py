@@ -1,4 +1,4 @@
-"""A recurrent network that says what a tracker would believe, and how it is fitted to episodes."""
+"""A network that says what a tracker would believe, and how it is fitted to episodes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -27,16 +27,22 @@ class Sequences:
     truth: Array  # (decisions, episodes, quantities that are taught)
     counts: Array  # (decisions, episodes), 0 where the vehicle is lost or the truth unknown
 
+    def single_decisions(self) -> "Sequences":
+        """Return each decision that counts as an episode of its own."""
+        some = self.counts.ravel() > 0.0
+        seen, truth = (x.reshape(1, len(some), -1)[:, some] for x in (self.seen, self.truth))
+        return Sequences(seen, truth, self.counts.reshape(1, -1)[:, some])
+
 
 class BeliefNetwork(torch.nn.Module):
-    """A recurrent cell, dense layers, and for each quantity that it is taught a mean and the
-    logarithm of a standard deviation.
+    """A recurrent cell or none, dense layers, and for each quantity that it is taught a mean and
+    the logarithm of a standard deviation.
 
     Args:
         quantities: of a frame.
         taught: quantities that it says.
-        cell: ``gru`` or ``lstm``; torch fits an LSTM in less than half the time, but it needs more
-                epochs.
+        cell: ``gru``, ``lstm`` or ``none``; torch fits an LSTM in less than half the time, but it
+            needs more epochs.
         state: size of the cell.
         net: sizes of the dense layers between.
         activation: of these layers.
@@ -47,11 +53,13 @@ class BeliefNetwork(torch.nn.Module):
     ) -> None:
         super().__init__()
         self.taught, self._name = taught, cell
-        self.cell = CELLS[cell](quantities, state)
+        make_cell = CELLS.get(cell)
+        self.cell = None if make_cell is None else make_cell(quantities, state)
         if cell == "lstm":  # it begins by keeping what it has, or it never learns to keep it long
             with torch.no_grad():
-                self.cell.bias_ih_l0[state : 2 * state] = 1.0
-        self.dense = dense_layers([state, *net, 2 * taught], activation)
+                self.cell.bias_ih_l0[state : 2 * state] = 1.0  # type: ignore[union-attr]
+        first = state if self.cell else quantities
+        self.dense = dense_layers([first, *net, 2 * taught], activation)
 
     def forward(
         self, frames: torch.Tensor, state: Any = None
@@ -59,20 +67,20 @@ class BeliefNetwork(torch.nn.Module):
         """Return means and logarithmic deviations (decisions, episodes, taught) and the cell's
         state for frames (decisions, episodes, quantities).
         """
-        remembered, state = self.cell(frames, state)
+        remembered = frames
+        if self.cell is not None:
+            remembered, state = self.cell(frames, state)
         said = self.dense(remembered)
         deviations = said[..., self.taught :].clamp(_SURE, _UNSURE)
         return said[..., : self.taught], deviations, state
 
     def policy_weights(self, shares: Array) -> Weights:
-        """Return the weights of the policy that commands ``shares`` (taught,), or (commands,
-        taught), of the means.
-        """
-        weights = cell_weights(self._name, self.cell) | dense_weights(self.dense)
+        """Return the weights of the policy that commands ``shares`` (axes, taught) of the means."""
+        weights = dense_weights(self.dense)
         last = layers_of(weights) - 1
         for name in (f"weight{last}", f"bias{last}"):
-            weights[name] = np.atleast_2d(shares) @ weights[name][: self.taught]
-        return weights
+            weights[name] = shares @ weights[name][: self.taught]
+        return weights if self.cell is None else cell_weights(self._name, self.cell) | weights
 
 
 def fit(

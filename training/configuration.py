@@ -10,12 +10,13 @@ from typing import Any
 
 import yaml
 
-from ..controllers.features import QUANTITIES, Features
+from ..controllers.features import Features
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.yaml_file import parse_yaml, read_yaml
 
 Config = dict[str, Any]
-ALGORITHMS = ("sac", "ppo", "recurrent-ppo", "td3", "imitation", "recurrent-imitation", "tune")
+IMITATIONS = ("imitation", "recurrent-imitation")
+ALGORITHMS = ("sac", "ppo", "recurrent-ppo", "td3", *IMITATIONS, "tune")
 _COUNTS = ("steps", "environments", "repeat", "rounds", "state", "ahead", "checkpoint")
 
 
@@ -105,30 +106,25 @@ def _check(config: Config) -> None:
         raise InputError(
             f"{config['algorithm']}: net must list sizes of hidden layers, got {config['net']}"
         )
-    in_lanes = config["algorithm"] not in ("imitation", "recurrent-imitation")
-    known = ("ukf", "constant-gain", "ukf-lanes")[: 3 if in_lanes else 2]
+    imitates = config["algorithm"] in IMITATIONS
+    known = ("ukf", "constant-gain", "ukf-lanes")[: 2 if imitates else 3]
     if config["estimator"] not in known:
         raise unknown_name("estimator", config["estimator"], known, config["algorithm"])
-    features = features_of(config)
-    if config["algorithm"] == "recurrent-imitation":
-        _check_memory(config, features)
+    features_of(config)
+    if imitates:
+        _check_imitation(config)
 
 
-def _check_memory(config: Config, features: Features) -> None:
+def _check_imitation(config: Config) -> None:
     name = config["algorithm"]
     if config["says"] not in ("motion", "command"):
         raise unknown_name("word", config["says"], ("motion", "command"), f"{name}: says")
-    if config["cell"] not in ("lstm", "gru"):
-        raise unknown_name("cell", config["cell"], ("lstm", "gru"), name)
-    if config["repeat"] != 1:
-        raise InputError(f"{name}: repeat must be 1, got {config['repeat']}")
+    if config["cell"] not in ("lstm", "gru", "none"):
+        raise unknown_name("cell", config["cell"], ("lstm", "gru", "none"), name)
     for key in ("gains", "dampings"):
         numbers = all(isinstance(x, int | float) for x in config[key])
         if not config[key] or not numbers:
             raise InputError(f"{name}: {key} must list numbers, got {config[key]}")
-    for quantity in features.frame:
-        if QUANTITIES[quantity].source not in ("observation", "force", "torque"):
-            raise InputError(f"{name}: sees {quantity}, which the vector environment does not tell")
 
 
 def features_of(config: Config) -> Features:

@@ -1,60 +1,118 @@
-"""Training flights of the vector environment as sequences, with what the simulator knows of the
-fan.
-"""
+"""Training flights as sequences: what a policy saw, and what a simulator knows of each decision."""
 
 from collections.abc import Callable
+from typing import Any, Protocol
 
 import numpy as np
 import torch
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from ..controllers.features import History
 from ..controllers.observation import DECISION_PERIOD, MAX_COMMAND, VELOCITY_Y
-from ..envs.vector import FanTrackingVectorEnv
 from ..evaluation.episodes import DECISIONS
 from .belief_network import BeliefNetwork, Sequences
 from .configuration import Config, features_of
 from .seeds import training_seed
-from .training_envs import scenarios_of
+from .training_envs import make_training_envs, scenarios_of
 
 Array = NDArray[np.float64]
+Frames = NDArray[np.float32]
 
-_ORACLE_GAIN = 2.0  # 1/s, of the oracle, which flies the first round and whose commands are taught
-_CALM = 0.5  # share of the episodes, after the first round, in which nothing leads off the axis
+_CALM = 0.5  # share of the episodes, after the first round, in which nothing leads off the path
+
+
+class Lesson(Protocol):
+    """What a network sees of n episodes side by side, and what is taught."""
+
+    decisions: int  # of an episode
+    period: float  # s, of a decision
+    largest: float  # command
+
+    def begin(self, count: int) -> None:
+        """Start ``count`` episodes."""
+        ...
+
+    def look(self, observations: Frames, infos: dict[str, Any]) -> tuple[Frames, Array]:
+        """Return frames (n, quantities) of the next decision, and the oracle's command (n, axes)
+        there; after the last decision once more.
+        """
+        ...
+
+    def taught(self, kept: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
+        """Return what is taught (decisions, n, quantities) of the episodes since ``begin``, and
+        what counts (decisions, n); ``kept`` (decisions + 1, n) says where a vehicle still flies.
+        """
+        ...
+
+
+class FanLesson:
+    """FanTracking: the oracle's command, or where the fan is ``ahead`` decisions later."""
+
+    def __init__(self, config: Config) -> None:
+        self._config, self._features = config, features_of(config)
+        self.decisions = DECISIONS // config["repeat"]
+        self.period = DECISION_PERIOD * config["repeat"]
+        self.largest = MAX_COMMAND
+
+    def begin(self, count: int) -> None:
+        """Start ``count`` episodes."""
+        self._history: History | None = None
+        self._known: list[Array] = []
+
+    def look(self, observations: Frames, infos: dict[str, Any]) -> tuple[Frames, Array]:
+        """Return frames (n, quantities) and the oracle's command (n, 1)."""
+        frames = self._features.frames(observations, infos)
+        if self._history is None:
+            self._history = History(self._features, len(frames))
+            self._history.restart(frames, list(range(len(frames))))
+        else:
+            self._history.push(frames)
+        fan, own = infos["fan_y"], infos["y"]
+        oracle = infos["fan_velocity"] + self._config["gain"] * (fan - own)
+        self._known.append(np.array([fan, own, observations[:, VELOCITY_Y], oracle]))
+        return self._history.flat(), oracle[:, None]
+
+    def taught(self, kept: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the command (decisions, n, 1), or the fan's offset, its velocity and that less the
+        vehicle's own (decisions, n, 3).
+        """
+        fan, own, speed, oracle = np.stack(self._known, axis=1)
+        now = np.arange(self.decisions)
+        ahead = np.minimum(now + self._config["ahead"], self.decisions)
+        if self._config["says"] == "command":
+            truth = np.clip(oracle[:-1], -MAX_COMMAND, MAX_COMMAND)[..., None]
+        else:
+            velocity = (fan[ahead] - fan[:-1]) / (self.period * (ahead - now))[:, None]
+            truth = np.stack([(fan - own)[:-1], velocity, velocity - speed[:-1]], axis=-1)
+        # one that was lost begins anew elsewhere: what was to come is not known before that
+        return truth, kept[ahead]
 
 
 class Flights:
-    """Training flights, in the vector environment of each scenario of a tier, and what came of
-    them.
+    """Training flights side by side, and what came of them.
+
+    Args:
+        envs: vector environments in which each round is flown; one that has lost its vehicle goes
+            on with another episode.
+        lesson: what is seen and taught.
+        config: ``rounds``, ``wander`` (``size`` and ``time``, s, of an error of the commands).
+        seed: of the run.
+        rng: of the errors of the commands.
     """
 
-    def __init__(self, config: Config, scenario: str, seed: int, rng: np.random.Generator) -> None:
-        self._config, self._seed, self._rng = config, seed, rng
-        self._features = features_of(config)
-        scenarios = scenarios_of(scenario)
-        episodes = -(-config["steps"] // (config["rounds"] * DECISIONS))
-        each = -(-episodes // len(scenarios))
-        self._envs = [
-            FanTrackingVectorEnv(
-                each * scenarios.count(name),
-                DECISIONS,
-                scenario=name,
-                estimator=config["estimator"],
-            )
-            for name in dict.fromkeys(scenarios)
-        ]
+    def __init__(
+        self, envs: list[Any], lesson: Lesson, config: Config, seed: int, rng: np.random.Generator
+    ) -> None:
+        self._envs, self._lesson, self._wander = envs, lesson, config["wander"]
+        self._seed, self._rng = seed, rng
         self._flown: list[Sequences] = []
-        self._episodes = 0
+        self.episodes = 0
 
     @property
-    def decisions(self) -> int:
-        """How many were flown."""
-        return self._episodes * DECISIONS
-
-    @property
-    def decisions_a_round(self) -> int:
-        """How many a round has."""
-        return sum(env.num_envs for env in self._envs) * DECISIONS
+    def episodes_a_round(self) -> int:
+        """How many episodes a round has."""
+        return sum(env.num_envs for env in self._envs)
 
     def sequences(self) -> Sequences:
         """Return all that were flown."""
@@ -66,70 +124,81 @@ class Flights:
         )
 
     def fly(
-        self,
-        network: BeliefNetwork | None,
-        shares: NDArray[np.float32],
-        advance: Callable[[int], None],
+        self, network: BeliefNetwork | None, shares: Frames, advance: Callable[[float], None]
     ) -> None:
-        """Fly a round, with the oracle where there is no network."""
+        """Fly a round, with the oracle where there is no network.
+
+        Args:
+            network: whose means are flown.
+            shares: (axes, taught) of the means that are commanded.
+            advance: called with the share of the round that is flown.
+        """
+        before = self.episodes
         for env in self._envs:
             n = env.num_envs
-            size = self._config["wander"]["size"] * self._rng.random(n)
+            size = self._wander["size"] * self._rng.random(n)
             if network is not None:
                 size *= self._rng.random(n) >= _CALM
-            self._flown.append(self._fly(env, network, shares, size, advance))
-            self._episodes += n
+            first = (self.episodes - before) / self.episodes_a_round
+
+            def tell(share: float, first: float = first, n: int = n) -> None:
+                advance(first + share * n / self.episodes_a_round)
+
+            self._flown.append(self._fly(env, network, shares, size[:, None], tell))
+            self.episodes += n
 
     def _fly(
         self,
-        env: FanTrackingVectorEnv,
+        env: Any,
         network: BeliefNetwork | None,
-        shares: NDArray[np.float32],
+        shares: Frames,
         size: Array,
-        advance: Callable[[int], None],
+        advance: Callable[[float], None],
     ) -> Sequences:
-        config, features, n = self._config, self._features, env.num_envs
-        history, state = History(features, n), None
-        keep = np.exp(-DECISION_PERIOD / config["wander"]["time"])
-        off, flying = size * self._rng.standard_normal(n), np.ones(n, dtype=np.bool_)
-        seen = np.zeros((DECISIONS, n, features.size), dtype=np.float32)
-        fan, own, speed = (np.zeros((DECISIONS + 1, n)) for _ in range(3))
-        kept = np.zeros((DECISIONS + 1, n), dtype=np.bool_)
-        oracle = np.zeros((DECISIONS, n))
-        first = self._episodes
-        observation, infos = env.reset(
-            seed=[training_seed(self._seed, 0, first + i) for i in range(n)]
-        )
-        for k in range(DECISIONS + 1):
-            fan[k], own[k], speed[k] = infos["fan_y"], infos["y"], observation[:, VELOCITY_Y]
-            kept[k] = flying
-            if k == DECISIONS:
-                break
-            frames = features.frames(observation, infos)
-            if k == 0:
-                history.restart(frames, list(range(n)))
-            else:
-                history.push(frames)
-            seen[k] = history.flat()
-            oracle[k] = infos["fan_velocity"] + _ORACLE_GAIN * (fan[k] - own[k])
-            if network is None:
-                command = oracle[k]
-            else:
+        lesson, n, state = self._lesson, env.num_envs, None
+        shape = n, env.single_action_space.shape[0]
+        keep = np.exp(-lesson.period / self._wander["time"])
+        off, flying = size * self._rng.standard_normal(shape), np.ones(n, dtype=np.bool_)
+        seen, kept = [], [flying]
+        seeds = [training_seed(self._seed, 0, self.episodes + i) for i in range(n)]
+        observation, infos = env.reset(seed=seeds)
+        lesson.begin(n)
+        for k in range(lesson.decisions):
+            frames, command = lesson.look(observation, infos)
+            seen.append(frames)
+            if network is not None:
                 with torch.no_grad():
-                    said, _, state = network(torch.from_numpy(seen[k])[None], state)
-                command = said[0].numpy() @ shares
-            off = keep * off + np.sqrt(1.0 - keep**2) * size * self._rng.standard_normal(n)
-            given = np.clip(command + off, -MAX_COMMAND, MAX_COMMAND).astype(np.float32)
-            observation, _, lost, _, infos = env.step(given[:, None])
-            flying &= ~lost
-            advance(first * DECISIONS + (k + 1) * n)
-        ahead = np.minimum(np.arange(DECISIONS) + config["ahead"], DECISIONS)
-        # one that was lost begins anew elsewhere: what was to come is not known before that
-        counts = kept[ahead].astype(np.float32)
-        if config["says"] == "command":
-            truth = np.clip(oracle, -MAX_COMMAND, MAX_COMMAND)[..., None]
-        else:
-            seconds = DECISION_PERIOD * (ahead - np.arange(DECISIONS))
-            velocity = (fan[ahead] - fan[:-1]) / seconds[:, None]
-            truth = np.stack([(fan - own)[:-1], velocity, velocity - speed[:-1]], axis=-1)
-        return Sequences(seen, truth.astype(np.float32), counts)
+                    said, _, state = network(torch.from_numpy(frames)[None], state)
+                command = said[0].numpy() @ shares.T
+            off = keep * off + np.sqrt(1.0 - keep**2) * size * self._rng.standard_normal(shape)
+            given = np.clip(command + off, -lesson.largest, lesson.largest).astype(np.float32)
+            observation, _, lost, _, infos = env.step(given)
+            flying = flying & ~lost
+            kept.append(flying)
+            advance((k + 1) / lesson.decisions)
+        lesson.look(observation, infos)
+        truth, counts = lesson.taught(np.array(kept))
+        return Sequences(np.array(seen), truth.astype(np.float32), counts.astype(np.float32))
+
+
+def fan_flights(config: Config, scenario: str, seed: int, rng: np.random.Generator) -> Flights:
+    """Return flights of FanTracking in each scenario of a tier.
+
+    Raises:
+        InputError: as ``make_training_envs``.
+    """
+    scenarios = scenarios_of(scenario)
+    episodes = -(-config["steps"] // (config["rounds"] * DECISIONS))
+    each = -(-episodes // len(scenarios))
+    envs = [
+        make_training_envs(
+            name,
+            each * scenarios.count(name),
+            config["estimator"],
+            config["repeat"],
+            features_of(config).sources,
+            AutoresetMode.NEXT_STEP,
+        )
+        for name in dict.fromkeys(scenarios)
+    ]
+    return Flights(envs, FanLesson(config), config, seed, rng)

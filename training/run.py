@@ -26,7 +26,7 @@ from .seeds import FIRST_VALIDATION_SEED, validation_seeds
 from .training_envs import check_training_env, make_training_env
 
 _PACKAGES = ("stable-baselines3", "sb3-contrib", "torch", "numpy", "mujoco", "gymnasium", "numba")
-_SQUASHED = ("sac", "td3", "imitation")  # algorithms whose policy sends its output through a tanh
+_SQUASHED = ("sac", "td3")  # algorithms whose policy sends its output through a tanh
 
 
 @dataclass

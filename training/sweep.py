@@ -75,10 +75,10 @@ def _words(setting: str) -> str:
 
 def run_job(job: Job, folder: Path) -> dict[str, Any]:
     """Do one run in its folder, or go on with it; return what it was worth."""
-    from .algorithms import run_training
     from .run import read_progress
+    from .train import train
 
-    path = run_training(job.config, job.scenario, job.seed, folder / job.name)
+    path = train(job.config, job.scenario, job.seed, folder / job.name)
     done = read_progress(folder / job.name)
     assert done is not None
     return {

@@ -1,4 +1,4 @@
-"""Training a policy with stable-baselines3."""
+"""Training a policy, with stable-baselines3 or by imitation."""
 
 from collections.abc import Callable
 from dataclasses import asdict
@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ..controllers.trained_policy import TrainedPolicy
-from .configuration import Config, features_of
+from .configuration import IMITATIONS, Config, features_of
 from .run import Progress, Run, progress_from
 from .seeds import training_seed
 from .training_envs import make_training_envs
@@ -26,7 +26,7 @@ def train(
     ``folder`` then holds ``best.npz`` and ``last.npz`` with their cards, ``progress.json``,
     ``training.json``, TensorBoard's events, and ``checkpoint.pt``. Called again after a run was
     killed, it goes on from the last checkpoint and ends with the same policies, bit for bit, as a
-    run that was not.
+    run that was not. Imitation has neither events nor checkpoint and starts anew.
 
     Args:
         config: as of ``load_config``.
@@ -40,11 +40,15 @@ def train(
     Raises:
         InputError: a scenario that does not exist, or a folder with another run.
     """
+    run = Run(config, scenario, seed, folder, report)
+    if config["algorithm"] in IMITATIONS:
+        from .imitation import imitate
+
+        return imitate(run, advance)
     from .checkpoint import load_checkpoint, save_checkpoint
     from .learners import make_learner, weights_of
     from .vec_env import FeatureVecEnv
 
-    run = Run(config, scenario, seed, folder, report)
     features, algorithm, whole = features_of(config), config["algorithm"], config["steps"]
     envs = make_training_envs(
         scenario, config["environments"], config["estimator"], config["repeat"], features.sources

@@ -140,9 +140,9 @@ def make_training_envs(
     estimator: str = "ukf",
     repeat: int = 1,
     sources: frozenset[str] = frozenset(),
+    autoreset: AutoresetMode = AutoresetMode.DISABLED,
 ) -> gym.vector.VectorEnv[Any, Any, Any]:
-    """Return ``count`` training environments side by side; whoever steps them resets those whose
-    episode has ended.
+    """Return ``count`` training environments side by side.
 
     Args:
         name: scenario or tier.
@@ -151,6 +151,8 @@ def make_training_envs(
             filter, with plant and flight loop beside it in the lanes of a vector unit.
         repeat: decisions for which a command is held.
         sources: as of ``make_training_env``.
+        autoreset: whether an episode that has ended is followed by another, or whoever steps the
+            environments resets them.
 
     Raises:
         InputError: a name that does not exist, or ``ukf-lanes`` with what does not fly in lanes.
@@ -175,4 +177,4 @@ def make_training_envs(
         env = make_training_env(name, estimator, sources)
         return TimeLimit(Repeat(env, repeat) if repeat > 1 else env, DECISIONS // repeat)
 
-    return SyncVectorEnv([make] * count, autoreset_mode=AutoresetMode.DISABLED)
+    return SyncVectorEnv([make] * count, autoreset_mode=autoreset)

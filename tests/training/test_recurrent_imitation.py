@@ -16,11 +16,11 @@ pytest.importorskip(
 )
 import torch
 
-from windwrench.training.algorithms import run_training
 from windwrench.training.belief_network import BeliefNetwork, Sequences, fit
-from windwrench.training.flown_sequences import Flights
+from windwrench.training.flown_sequences import fan_flights
 from windwrench.training.run import card_of, read_progress
 from windwrench.training.seeds import training_seed
+from windwrench.training.train import train as run_training
 
 SHORT = ["rounds=2", "epochs=1", "last_epochs=1", "state=4", "net=[8]", "gains=[2.0, 3.0]"]
 SHORT += ["dampings=[0.2]", "validation.episodes=1"]
@@ -35,19 +35,19 @@ def test_a_policy_commands_its_shares_of_what_the_network_says(cell):
     config = config_of()
     torch.manual_seed(1)
     network = BeliefNetwork(6, 3, cell, 5, [7], "relu")
-    shares = np.array([2.0, 1.0, 0.3], dtype=np.float32)
+    shares = np.array([[2.0, 1.0, 0.3]], dtype=np.float32)
     policy = TrainedPolicy(card_of(config, "base", 0, 0), network.policy_weights(shares))
     frames = np.random.default_rng(0).normal(size=(9, 6)).astype(np.float32)
     with torch.no_grad():
         means, _, _ = network(torch.from_numpy(frames)[:, None])
-    expected = np.clip(means[:, 0].numpy() @ shares, -1.0, 1.0)
+    expected = np.clip(means[:, 0].numpy() @ shares[0], -1.0, 1.0)
     np.testing.assert_allclose([policy.act(x)[0] for x in frames], expected, atol=1e-5)
 
 
 def test_what_is_taught_is_the_fan_s_place_and_velocity():
     config = config_of("steps=500", "rounds=1", "wander.size=0.0")
-    flights = Flights(config, "fast", 3, np.random.default_rng(0))
-    flights.fly(None, np.zeros(3, dtype=np.float32), lambda steps: None)
+    flights = fan_flights(config, "fast", 3, np.random.default_rng(0))
+    flights.fly(None, np.zeros((1, 3), dtype=np.float32), lambda steps: None)
     flown = flights.sequences()
     assert flown.seen.shape == (250, 2, 6)
     assert flown.counts.min() == 1.0
@@ -72,8 +72,8 @@ def test_what_is_taught_is_the_fan_s_place_and_velocity():
 
 def test_nothing_is_taught_where_the_vehicle_is_lost():
     config = config_of("steps=1000", "rounds=1", "wander.size=20.0", "wander.time=30.0")
-    flights = Flights(config, "base", 0, np.random.default_rng(0))
-    flights.fly(None, np.zeros(3, dtype=np.float32), lambda steps: None)
+    flights = fan_flights(config, "base", 0, np.random.default_rng(0))
+    flights.fly(None, np.zeros((1, 3), dtype=np.float32), lambda steps: None)
     flown = flights.sequences()
     ended = np.flatnonzero(flown.counts.min(axis=0) == 0.0)
     assert len(ended) > 0

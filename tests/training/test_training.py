@@ -25,7 +25,6 @@ import torch
 
 from windwrench.training.checkpoint import load_checkpoint
 from windwrench.training.configuration import features_of
-from windwrench.training.imitate import imitate
 from windwrench.training.learners import make_learner, weights_of
 from windwrench.training.run import card_of, read_progress
 from windwrench.training.train import train
@@ -111,36 +110,6 @@ def test_the_shipped_policy_does_what_the_learner_would(algorithm):
         np.testing.assert_allclose(policy.act(x), expected[0], atol=1e-5)
 
 
-def test_the_fast_update_is_that_of_stable_baselines3():
-    config = tiny("sac", "learning_rate_end=0.0008")
-    learned = []
-    for kind in (sb3.SAC, None):
-        env = make_env(config)
-        learner = make_learner(config, env, 0)
-        if kind is not None:
-            learner = kind(
-                "MlpPolicy",
-                make_env(config),
-                seed=0,
-                device="cpu",
-                policy_kwargs={"net_arch": config["net"]},
-                **{**config["learner"], "learning_rate": 0.0008},
-            )
-        learner.learn(60)  # the first updates too
-        torch.manual_seed(1)
-        np.random.seed(1)  # noqa: NPY002
-        learner.train(20, 64)
-        learned.append(
-            {**learner.policy.state_dict(), "log_ent_coef": learner.log_ent_coef.detach()}
-        )
-    for name, value in learned[0].items():
-        np.testing.assert_allclose(value.numpy(), learned[1][name].numpy(), atol=2e-5, err_msg=name)
-    fresh = make_learner(config, make_env(config), 0).policy.state_dict()
-    assert (
-        float((fresh["actor.mu.weight"] - learned[0]["actor.mu.weight"]).abs().max()) > 1e-3
-    )  # something was learned
-
-
 def test_a_checkpoint_of_another_configuration_is_refused(tmp_path):
     train(tiny("sac"), "base", 0, tmp_path)
     other = tiny("sac", "net=[9]")
@@ -177,12 +146,12 @@ def test_imitation_learns_the_oracle_s_commands(tmp_path):
             "validation.episodes=3",
         ],
     )
-    imitate(config, "base", 0, tmp_path)
+    train(config, "base", 0, tmp_path)
     progress = read_progress(tmp_path)
     assert progress.steps[-1] >= 3000
     assert progress.best_rmse < 0.35
     before = (tmp_path / "best.npz").read_bytes()
-    imitate(config, "base", 0, tmp_path)  # done already
+    train(config, "base", 0, tmp_path)  # done already
     assert (tmp_path / "best.npz").read_bytes() == before
 
 
