@@ -38,6 +38,17 @@ class Measured:
         return self.gyro is not None or self.accelerometer is not None
 
     @property
+    def has_any(self) -> bool:
+        """Whether anything was measured or commanded."""
+        quantities = (self.voltage, self.force, self.torque)
+        return (
+            self.has_pose
+            or self.has_imu
+            or self.has_motors
+            or any(q is not None for q in quantities)
+        )
+
+    @property
     def has_motors(self) -> bool:
         """Whether rotor speeds were measured, or commands given."""
         return self.rotor_speeds is not None or self.command is not None

@@ -94,6 +94,7 @@ EULER_ORDERS = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")
 # other spellings of units
 _SPELLINGS = {
     "rad/sec": "rad/s",
+    "rev/s": "Hz",
     "radps": "rad/s",
     "rad_s": "rad/s",
     "deg/sec": "deg/s",
@@ -111,7 +112,7 @@ _SPELLINGS = {
 }
 
 
-def _is(wanted: str, test: Callable[[Any], bool]) -> BeforeValidator:
+def that_is(wanted: str, test: Callable[[Any], bool]) -> BeforeValidator:
     """Return a validator that refuses what fails a test, in the words of what was wanted."""
 
     def check(value: Any, info: Any) -> Any:
@@ -122,7 +123,7 @@ def _is(wanted: str, test: Callable[[Any], bool]) -> BeforeValidator:
     return BeforeValidator(check)
 
 
-def _choice(known: Collection[str]) -> BeforeValidator:
+def one_of(known: Collection[str]) -> BeforeValidator:
     """Return a validator that takes one of some words, whatever its case, and other spellings."""
     lower = {name.lower(): name for name in known}
 
@@ -145,20 +146,24 @@ def _two_numbers(value: Any) -> bool:
     return value is None or (two and value[0] != value[1])
 
 
-_Text = Annotated[str, _is("a text", lambda x: isinstance(x, str))]
-_Number = Annotated[float, _is("a finite number", _finite)]
-_Truth = Annotated[bool, _is("true or false", lambda x: isinstance(x, bool))]
-_Count = Annotated[int, _is("a whole number from 1", lambda x: type(x) is int and 1 <= x <= 1000)]
+_Text = Annotated[str, that_is("a text", lambda x: isinstance(x, str))]
+_Number = Annotated[float, that_is("a finite number", _finite)]
+_Truth = Annotated[bool, that_is("true or false", lambda x: isinstance(x, bool))]
+_Count = Annotated[
+    int, that_is("a whole number from 1", lambda x: type(x) is int and 1 <= x <= 1000)
+]
 _Names = Annotated[
     tuple[str, ...],
-    _is(
+    that_is(
         "a list of columns",
         lambda x: isinstance(x, list | tuple) and all(isinstance(name, str) for name in x),
     ),
 ]
 _Range = Annotated[
     tuple[float, float] | None,
-    _is("two numbers, what stands for no and for full command, such as [1000, 2000]", _two_numbers),
+    that_is(
+        "two numbers, what stands for no and for full command, such as [1000, 2000]", _two_numbers
+    ),
 ]
 _Order = Annotated[Order, BeforeValidator(lambda value: rotor_order(value, "order"))]
 
@@ -171,7 +176,7 @@ class Columns:
 
     columns: tuple[str, ...]
     unit: str = ""
-    scale: Annotated[_Number, _is("a factor that is not zero", lambda x: x != 0)] = 1.0
+    scale: Annotated[_Number, that_is("a factor that is not zero", lambda x: x != 0)] = 1.0
     signs: tuple[int, ...] = ()  # one a column; empty: all as they stand
     optional: _Truth = False
     note: _Text = ""
@@ -196,10 +201,10 @@ class TimeColumn:
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     column: str = ""
-    unit: Annotated[str, _choice(TIME_UNITS)] = "s"
-    offset: Annotated[float | None, _is("a finite number", lambda x: x is None or _finite(x))] = (
-        None  # s, added; None: so that the flight begins at 0
-    )
+    unit: Annotated[str, one_of(TIME_UNITS)] = "s"
+    offset: Annotated[
+        float | None, that_is("a finite number", lambda x: x is None or _finite(x))
+    ] = None  # s, added; None: so that the flight begins at 0
     rate_hz: _Number = 0.0  # of rows, where there is no column
     note: _Text = ""
 
@@ -215,9 +220,9 @@ class Position(Columns):
 class Attitude(Columns):
     """A quaternion, or Euler angles about x, y and z."""
 
-    order: Annotated[str, _choice(QUATERNIONS)] = "wxyz"  # of the columns of a quaternion
-    euler: Annotated[str, _choice(EULER_ORDERS)] = ""  # of turns; empty: a quaternion
-    sense: Annotated[str, _choice(SENSES)] = "body_to_world"
+    order: Annotated[str, one_of(QUATERNIONS)] = "wxyz"  # of the columns of a quaternion
+    euler: Annotated[str, one_of(EULER_ORDERS)] = ""  # of turns; empty: a quaternion
+    sense: Annotated[str, one_of(SENSES)] = "body_to_world"
     of: _Names = ()  # topics of positions; empty: of all
 
 
@@ -235,7 +240,7 @@ class Commands(Columns):
 
     order: _Order = ORDERS["windwrench"]
     range: _Range = None  # None: the vehicle's motor curve states it
-    thrust_factor: Annotated[float, _is("0 to 1", lambda x: _finite(x) and 0 <= x <= 1)] = 1.0
+    thrust_factor: Annotated[float, that_is("0 to 1", lambda x: _finite(x) and 0 <= x <= 1)] = 1.0
     thrust_span: tuple[_Number, _Number] = (0.0, 1.0)  # commands at which u is 0 and 1
     clip: _Truth = False
     thrust: tuple[_Number, ...] = ()  # N a motor, of the count's powers 0, 1, 2
@@ -254,7 +259,7 @@ class Battery(Columns):
 class Sensor(Columns):
     """An inertial sensor of three axes."""
 
-    body: Annotated[str, _choice(BODIES)] = ""  # empty: the map's
+    body: Annotated[str, one_of(BODIES)] = ""  # empty: the map's
 
 
 @dataclass(frozen=True)
@@ -264,8 +269,8 @@ class LogMap:
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     time: TimeColumn
-    world: Annotated[str, _choice(WORLDS)] = "enu"
-    body: Annotated[str, _choice(BODIES)] = "flu"
+    world: Annotated[str, one_of(WORLDS)] = "enu"
+    body: Annotated[str, one_of(BODIES)] = "flu"
     position: Columns | None = None
     attitude: Attitude | None = None
     rotors: Rotors | None = None

@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ...identification.logs.readers.topic_map import Topic, topic_map
+from ...identification.logs.readers.topic_map import Setting, topic_map
 from ...runtime.errors import InputError
 from ..filtering import Output
 from ..messages import Sample
@@ -23,9 +23,8 @@ from .ros_conversions import (
     ACCELERATION,
     BUILT,
     WRENCH,
+    TopicReader,
     acceleration_message,
-    sample_of,
-    topic_of,
     wrench_message,
 )
 
@@ -42,12 +41,12 @@ class Ros2(Source):
     def _prepare(self) -> None:
         text, address = self.name, self.address
         self._frame = address.options.get("frame", "world")
-        settings: dict[str, dict[str, Any]] = {}
+        settings: dict[str, Setting] = {}
         if address.path:
             settings, _ = topic_map(Path("."), address.path)
         for part in _PARTS:
             if part in address.options:
-                settings[part] = {"topic": address.options[part]}
+                settings[part] = Setting(address.options[part])
         if "pose" not in settings or not {"rotors", "command"} & set(settings):
             raise InputError(
                 f"{text}: expected topics of a pose and of rotors or command: ros2:TOPICS.yaml, or "
@@ -79,10 +78,11 @@ class Ros2(Source):
         self._node = self._rclpy.create_node("windwrench_live")
         self._executor = executors.SingleThreadedExecutor()
         self._executor.add_node(self._node)
-        names = {part: setting["topic"] for part, setting in self._settings.items()}
+        names = {part: setting.topic for part, setting in self._settings.items()}
         kinds = self._kinds(set(names.values()))
         for part, topic in names.items():
-            read = topic_of(part, topic, kinds[topic], self._settings[part])
+            setting = self._settings[part]
+            read = TopicReader(part, topic, kinds[topic], setting, self.vehicle)
             self._node.create_subscription(
                 get_message(kinds[topic]),
                 topic,
@@ -112,8 +112,8 @@ class Ros2(Source):
                 )
             self._executor.spin_once(timeout_sec=0.1)
 
-    def _take(self, topic: Topic, message: Any) -> None:
-        sample = sample_of(topic, message, time.monotonic_ns())
+    def _take(self, topic: TopicReader, message: Any) -> None:
+        sample = topic.sample(message, time.monotonic_ns())
         if sample is None:
             self.tallies.counts["malformed"] += 1
         else:
@@ -150,5 +150,5 @@ class Ros2(Source):
 
     def expected(self) -> str:
         """Return what must come."""
-        topics = ", ".join(f"{s['topic']} ({part})" for part, s in self._settings.items())
+        topics = ", ".join(f"{s.topic} ({part})" for part, s in self._settings.items())
         return f"messages on {topics}"

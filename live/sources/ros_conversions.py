@@ -10,70 +10,54 @@ import numpy as np
 
 from ...dynamics.rotation import matrix_of
 from ...dynamics.vehicle import Vehicle
-from ...identification.logs.readers.ros_messages import COMMAND_UNITS, PARTS, SPEED_UNITS, stamp
-from ...identification.logs.readers.topic_map import Topic
+from ...identification.logs.readers.ros_messages import PARTS, stamp
+from ...identification.logs.readers.topic_map import UNITS, Setting, Topic
 from ...runtime.errors import InputError, unknown_name
+from ..field_map import FieldMap
 from ..filtering import Output
 from ..messages import Array, Sample
 
 WRENCH = "geometry_msgs/msg/WrenchStamped"
 ACCELERATION = "geometry_msgs/msg/AccelWithCovarianceStamped"
 _SECOND = 1_000_000_000  # ns
-_NORM_TOLERANCE = 0.02  # of a quaternion's length
 
 
-def topic_of(part: str, name: str, kind: str, setting: Mapping[str, Any]) -> Topic:
-    """Return what reads a topic.
+class TopicReader:
+    """From a topic's messages to what they hold.
 
     Args:
-        part: that it holds.
+        part: that the topic holds.
         name: of the topic.
         kind: the type of its messages.
         setting: of it in the map of topics.
+        vehicle: that flies.
 
     Raises:
         InputError: messages of this type hold no such part, or need a unit that is not given.
     """
-    if kind not in PARTS[part]:
-        raise unknown_name("type", kind, PARTS[part], f"{name}, for {part}")
-    topic = Topic(name, part, PARTS[part][kind], setting)
-    if part in ("rotors", "command") and not topic.unit:
-        expected = tuple(SPEED_UNITS) if part == "rotors" else COMMAND_UNITS
-        raise InputError(
-            f"{name}: {kind} does not say its unit; expected unit: one of {', '.join(expected)} "
-            f"for {part} in the map of topics"
-        )
-    return topic
 
+    def __init__(self, part: str, name: str, kind: str, setting: Setting, vehicle: Vehicle) -> None:
+        if kind not in PARTS[part]:
+            raise unknown_name("type", kind, PARTS[part], f"{name}, for {part}")
+        self._topic = Topic(name, part, PARTS[part][kind], setting)
+        if part in UNITS and not self._topic.unit:
+            raise InputError(
+                f"{name}: {kind} does not say its unit; expected unit: one of "
+                f"{', '.join(UNITS[part])} for {part} in the map of topics"
+            )
+        self._fields = FieldMap(self._topic.log_map, vehicle, name)
 
-def sample_of(topic: Topic, message: Any, arrival: int) -> Sample | None:
-    """Return what a message holds; None where that is nothing that a flight has."""
-    found = Sample(topic.name, stamp(message) or None, arrival)
-    try:
-        values = np.array(topic.kind.values(message), dtype=np.float64)
-        if topic.part in ("rotors", "command"):
-            values = topic.four(values)
-        values = topic.in_kit_units(values[None])[0]
-        if not np.isfinite(values).all():
+    def sample(self, message: Any, arrival: int) -> Sample | None:
+        """Return what a message holds; None where that is nothing that a flight has."""
+        try:
+            values = self._topic.values(message).tolist()
+            fields = dict(zip(self._topic.columns, values, strict=True))
+            fields["stamp"] = stamp(message)
+            found = self._fields.sample(self._topic.name, fields, arrival)
+        except (IndexError, ValueError, AttributeError, TypeError):
             return None
-        if topic.part == "pose":
-            length = float(np.linalg.norm(values[3:7]))
-            if not abs(length - 1.0) <= _NORM_TOLERANCE:
-                return None
-            found.position, found.quaternion = values[:3], values[3:7] / length
-        elif topic.part == "rotors":
-            found.rotor_speeds = np.abs(values)
-        elif topic.part == "command":
-            found.command = values
-        elif topic.part == "imu":
-            found.accelerometer, found.gyro = values[:3], values[3:6]
-        elif values[0] > 0.0:
-            found.voltage = float(values[0])
-        else:
-            return None
-    except (IndexError, ValueError, AttributeError, TypeError):
-        return None
-    return found
+        found.stamp = found.stamp or None
+        return found if found.has_any else None
 
 
 def wrench_message(types: Mapping[str, Any], output: Output, frame: str) -> Any:

@@ -13,6 +13,7 @@ from tests.live.stream import VEHICLE, Pipeline, Running, flight
 from tests.live.test_pipeline import whole
 from windwrench.dynamics import InputError
 from windwrench.dynamics.rotation import matrix_of
+from windwrench.identification.logs.readers.topic_map import Setting
 from windwrench.live.sources.open import make_source
 from windwrench.live.tallies import Tallies
 
@@ -22,9 +23,8 @@ from tests.support.fake_ros import STORE, World, array, install, pose
 from windwrench.live.sources.ros_conversions import (
     ACCELERATION,
     WRENCH,
+    TopicReader,
     acceleration_message,
-    sample_of,
-    topic_of,
     wrench_message,
 )
 
@@ -34,27 +34,29 @@ def test_a_pose_that_goes_over_the_wire():
     message = pose(1_700_000_000_123_456_789, flown["position"][7], flown["quaternion"][7])
     data = STORE.serialize_cdr(message, "geometry_msgs/msg/PoseStamped")
     again = STORE.deserialize_cdr(data, "geometry_msgs/msg/PoseStamped")
-    topic = topic_of("pose", "/p", "geometry_msgs/msg/PoseStamped", {})
-    sample = sample_of(topic, again, 5)
+    topic = TopicReader("pose", "/p", "geometry_msgs/msg/PoseStamped", Setting(), VEHICLE)
+    sample = topic.sample(again, 5)
     assert sample.stamp == 1_700_000_000_123_456_789
     np.testing.assert_array_equal(sample.position, flown["position"][7])
     np.testing.assert_allclose(sample.quaternion, flown["quaternion"][7], rtol=1e-15)
-    turned = topic_of("pose", "/p", "geometry_msgs/msg/PoseStamped", {"frame": "ned"})
-    ned = sample_of(turned, again, 5)
+    setting = Setting(frame="ned")
+    turned = TopicReader("pose", "/p", "geometry_msgs/msg/PoseStamped", setting, VEHICLE)
+    ned = turned.sample(again, 5)
     np.testing.assert_array_equal(ned.position, flown["position"][7] * [1, -1, -1])
 
 
 def test_rotors_of_a_multi_array_need_a_unit():
     kind = "std_msgs/msg/Float64MultiArray"
     with pytest.raises(InputError, match="does not say its unit"):
-        topic_of("rotors", "/m", kind, {})
-    topic = topic_of("rotors", "/m", kind, {"unit": "rpm", "order": [4, 3, 2, 1]})
-    sample = sample_of(topic, array([10, 20, 30, 40]), 0)
+        TopicReader("rotors", "/m", kind, Setting(), VEHICLE)
+    setting = Setting(unit="rpm", order=(4, 3, 2, 1))
+    topic = TopicReader("rotors", "/m", kind, setting, VEHICLE)
+    sample = topic.sample(array([10, 20, 30, 40]), 0)
     np.testing.assert_allclose(sample.rotor_speeds, np.array([40, 30, 20, 10]) * np.pi / 30)
     assert sample.stamp is None
-    assert sample_of(topic, array([1.0, 2.0]), 0) is None
+    assert topic.sample(array([1.0, 2.0]), 0) is None
     with pytest.raises(InputError, match="unknown type"):
-        topic_of("pose", "/m", kind, {})
+        TopicReader("pose", "/m", kind, Setting(), VEHICLE)
 
 
 def test_the_wrench_and_its_twin_as_ros_writes_them():

@@ -17,21 +17,12 @@ file given as the reader's option, ``rosbag:FILE.yaml``::
    of several inertial sensors or others that which no other name extends by ``_raw``; a note says so;
 4. where that leaves several, the bag is refused and they are listed.
 
-* ``pose``: geometry_msgs/PoseStamped, geometry_msgs/TransformStamped (body in world),
-  nav_msgs/Odometry or px4_msgs/VehicleOdometry. ``frame: flu`` is ROS's own: world z up, body
-  forward, left, up. ``ned``: world z down, body forward, right, down, which is VehicleOdometry's.
-  Without a pose, an inertial sensor must be there
-* ``rotors``: mav_msgs/Actuators (``angular_velocities``), actuator_msgs/Actuators (``velocity``),
-  px4_msgs/EscStatus, mavros_msgs/ESCStatus (rpm), or a std_msgs multi-array, the last only with a
-  ``unit``: ``rad/s``, ``rpm`` or ``rev/s``. ``order``: by name (``px4-x``, ``betaflight`` ...), or
-  which elements, from 1, are rotors 1 front-left, 2 rear-left, 3 rear-right, 4 front-right; default
-  [1, 2, 3, 4], of PX4's and MAVROS's types ``px4-x``
-* ``command``: px4_msgs/ActuatorMotors (0 to 1, NaN: off), mavros_msgs/RCOut (us),
-  actuator_msgs/Actuators (``normalized``), or a multi-array with a ``unit``: ``normalized`` or
-  ``us``. ``range``: values of the commands 0 and 1, of pulses 1000 and 2000 us unless it is given
-* ``voltage``: sensor_msgs/BatteryState
-* ``imu``: sensor_msgs/Imu, without its attitude: specific force (m/s2) and angular velocity
-  (rad/s), as ROS's REP 145 has them; or px4_msgs/SensorCombined (forward, right, down)
+Which types hold what, and in which frame, unit and order, says ``maps/recordings/ros.yaml``; a
+multi-array of std_msgs holds rotor speeds or commands where a ``unit`` is given: ``rad/s``, ``rpm``
+or ``Hz``, ``normalised`` or ``us``. ``order`` has a name (``px4-x``, ``betaflight`` ...), or the
+elements, from 1, that are rotors 1 front-left, 2 rear-left, 3 rear-right, 4 front-right. ``range``
+has the values of the commands 0 and 1, of pulses 1000 and 2000 us unless it is given. Without a
+pose, an inertial sensor must be there. Of sensor_msgs/Imu the attitude is not read.
 
 A sample's time is its header's (of PX4's types its ``timestamp_sample`` or ``timestamp``), where that runs within a second of the
 bag's clock, else the time it was recorded.
@@ -51,43 +42,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....dynamics.vehicle import Vehicle
-from ....runtime.errors import InputError, unknown_name
+from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS
 from ....runtime.regular_files import check_regular, open_regular
+from ..channels import Array, Samples
 from ..flight_log import FlightLog
-from ..streams import Stream, flight_log
-from .ros_messages import (
-    ARRAYS,
-    COMMAND_UNITS,
-    PARTS,
-    SPEED_UNITS,
-    VARIANTS,
-    definitions,
-    stamp,
-)
-from .topic_map import Topic, topic_map
+from ..mapped_log import map_recording
+from .ros_messages import VARIANTS, definitions, stamp
+from .topic_choice import chosen_topics
+from .topic_map import Topic, joined, topic_map
 from .unpacking import check_bag_files, limited_unpacking, refuse_packed_files
-
-Array = NDArray[np.float64]
 
 SUFFIXES = (".bag", ".db3", ".mcap")
 _ROS1 = b"#ROSBAG V2.0"
 BEGINS = (_ROS1, b"\x89MCAP0\r\n", b"SQLite format 3\0")
 
-_SAME_CLOCK = 1.0  # s between a header's time and the recording's
-_SETPOINTS = ("setpoint", "set_point", "reference", "command", "cmd", "desired", "target", "goal")
-_MOCAP = (
-    "vicon",
-    "vrpn",
-    "mocap",
-    "motion_capture",
-    "optitrack",
-    "qualisys",
-    "natnet",
-    "vision_pose",
-    "ground_truth",
-    "groundtruth",
-)
+_SAME_CLOCK = 1_000_000_000  # ns between a header's time and the recording's
+_NANOSECOND = 1e-9  # s
 
 
 @dataclass(frozen=True)
@@ -108,76 +79,56 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
             ambiguous or of another type, or a message cannot be used.
     """
     settings, where = topic_map(path, option)
+    times: dict[str, NDArray[np.int64]] = {}
+    columns: dict[str, dict[str, Array]] = {}
     with _opened(path) as bag:
-        chosen, doubts = _choices(bag, settings, where)
-        streams = {}
-        for part, choice in chosen.items():
+        topics, doubts = chosen_topics(path, bag.types, settings, where)
+        for part, topic in list(topics.items()):
             try:
-                streams[part] = _stream(bag, part, choice)
+                times[part], columns[part], said = _decoded_topic(bag, topic)
+                doubts += said
             except InputError as error:
                 if part in settings or part in ("pose", "rotors"):
                     raise
                 doubts.append(f"no {part}: {error}")  # nobody asked for it
-    notes = [
-        *(
-            f"{part}: topic {chosen[part].name} ({bag.types[chosen[part].name]})" + chosen[part].why
-            for part in streams
-        ),
-        *(_part_note(part, chosen[part]) for part in streams if part != "voltage"),
-        *doubts,
-        *(note for _, _, stamp_notes in streams.values() for note in stamp_notes),
-    ]
-    if not streams:
+                del topics[part]
+    if not topics:
         raise InputError(f"{path}: {doubts[0] if doubts else 'nothing in it can be read'}")
-    origin = min(int(nanoseconds[0]) for nanoseconds, _, _ in streams.values())
-    made = {
-        part: Stream(chosen[part].name, 1e-9 * (nanoseconds - origin).astype(np.float64), values)
-        for part, (nanoseconds, values, _) in streams.items()
-    }
-    return flight_log(
-        path,
-        "rosbag",
-        made.get("pose"),
-        made.get("rotors"),
-        made.get("voltage"),
-        tuple(notes),
-        *_inertial(made.get("imu")),
-        command=made.get("command"),
-        vehicle=vehicle,
-    )
+    notes = [note for topic in topics.values() for note in _notes(topic, bag.types[topic.name])]
+    origin = min(int(nanoseconds[0]) for nanoseconds in times.values())
+    recorded = [
+        Samples(
+            _NANOSECOND * (times[part] - origin).astype(np.float64),
+            columns[part],
+            np.arange(len(times[part])),
+            topic.name,
+        )
+        for part, topic in topics.items()
+    ]
+    return map_recording(path, recorded, joined(topics), vehicle, "rosbag", (*notes, *doubts))
 
 
-def _part_note(part: str, choice: Topic) -> str:
-    """Return what was assumed of a part's frame or order."""
+def _notes(topic: Topic, kind: str) -> Iterator[str]:
+    """Yield which topic holds a part, and what was assumed of its frame or order."""
+    part = topic.part
+    yield f"{part}: topic {topic.name} ({kind}){topic.why}"
     if part in ("rotors", "command"):
-        states = "" if "order" in choice.setting else _order_source(choice)
+        named = topic.kind.order
+        is_assumed = not topic.setting.order and named != "windwrench"
         pulses = ""
-        if part == "command" and choice.unit == "us":
-            low, high = choice.range
+        if part == "command" and topic.unit == "us":
+            low, high = topic.range
             pulses = f"; pulses of {low:g} to {high:g} us are the commands 0 to 1"
-        return (
-            f"{part}: rotors 1, 2, 3, 4 are elements {', '.join(map(str, choice.order))} of the "
-            f"message{states}{pulses}"
+        yield (
+            f"{part}: rotors 1, 2, 3, 4 are elements {', '.join(map(str, topic.elements))} of the "
+            f"message{f', as on {named}, which the bag does not state' if is_assumed else ''}"
+            f"{pulses}"
         )
-    if choice.frame == "flu":
-        return (
-            f"{part}: {'world z up, ' if part == 'pose' else ''}body forward, left, up, as the bag "
-            "has it"
-        )
-    return f"{part}: turned half a turn about x, from z down to z up"
-
-
-def _order_source(choice: Topic) -> str:
-    named = choice.kind.order
-    return "" if named == "windwrench" else f", as on {named}, which the bag does not state"
-
-
-def _inertial(imu: Stream | None) -> tuple[Stream | None, Stream | None]:
-    """Return accelerometer and gyro of an IMU's stream."""
-    if imu is None:
-        return None, None
-    force, turn = imu.values[:, :3], imu.values[:, 3:]
-    return Stream(imu.name, imu.t, force), Stream(imu.name, imu.t, turn)
+    elif part != "voltage" and topic.frame == "flu":
+        world = "world z up, " if part == "pose" else ""
+        yield f"{part}: {world}body forward, left, up, as the bag has it"
+    elif part != "voltage":
+        yield f"{part}: turned half a turn about x, from z down to z up"
 
 
 @contextmanager
@@ -293,180 +244,41 @@ def _decoded(raw: Any, kind: str, stores: list[Any], ros1: bool) -> Any:
             del stores[0]
 
 
-def _choices(
-    bag: _Bag, settings: Mapping[str, Mapping[str, Any]], where: str
-) -> tuple[dict[str, Topic], list[str]]:
-    """Return the topic of each part, and notes on parts that are not there.
+def _decoded_topic(
+    bag: _Bag, topic: Topic
+) -> tuple[NDArray[np.int64], dict[str, Array], list[str]]:
+    """Return times (N,) in ns, columns (N,) by name, and notes of a topic.
 
     Raises:
-        InputError: a part that is needed is missing or ambiguous.
+        InputError: it has no message or too many, or one that cannot be used.
     """
-    chosen: dict[str, Topic] = {}
-    refused: dict[str, InputError] = {}
-    for part in PARTS:
-        try:
-            if (choice := _choose(bag, part, settings.get(part, {}), where)) is not None:
-                chosen[part] = choice
-        except InputError as error:
-            if part in settings:
-                raise
-            refused[part] = error
-    if "rotors" not in chosen and "command" not in chosen:
-        raise refused.get("rotors") or _nothing(bag, "rotors", where)
-    # an ambiguous pose is no reason to go on without one
-    if "pose" not in chosen and ("imu" not in chosen or "pose" in refused):
-        raise refused.get("pose") or _nothing(bag, "pose", where)
-    doubts = [
-        str(error).removeprefix(f"{bag.path}: ")
-        for part, error in refused.items()
-        if not (part == "rotors" and _unnamed_arrays(bag))
-    ]
-    return chosen, doubts
-
-
-def _choose(bag: _Bag, part: str, setting: Mapping[str, Any], where: str) -> Topic | None:
-    """Return the topic of a part: the one named, or the one that the rules above leave; None: the
-    bag has none.
-
-    Raises:
-        InputError: several could be it, or the one named cannot.
-    """
-    kinds = PARTS[part]
-    if "topic" in setting:
-        topic = str(setting["topic"])
-        if topic not in bag.types:
-            raise unknown_name("topic", topic, bag.types, f"{bag.path}: {part} (named in {where})")
-        kind = bag.types[topic]
-        if kind not in kinds:
-            raise InputError(
-                f"{bag.path}: {part}: topic {topic} is of type {kind}; expected "
-                f"{' or '.join(kinds)}"
-            )
-        if kind in ARRAYS and "unit" not in setting:
-            raise InputError(
-                f"{bag.path}: {part}: topic {topic} is a {kind}, which states no unit; expected "
-                f"unit: {', '.join(_units(part))} in {where}"
-            )
-        return Topic(topic, part, kinds[kind], setting)
-    # an array of numbers may be anything until somebody names its unit
-    fitting = [kind for kind in kinds if kind not in ARRAYS or "unit" in setting]
-    found = sorted(topic for topic, kind in bag.types.items() if kind in fitting)
-    if part in ("pose", "rotors"):
-        found = _without(found, _SETPOINTS, keep_last=part == "rotors")
-    several = found
-    if part == "pose" and len(found) > 1:
-        named = [t for t in found if any(word in t.lower() for word in _MOCAP)]
-        found = named if len(named) == 1 else found
-    if part == "imu" and len(found) > 1:
-        found = [t for t in found if not t.endswith("_raw")] or found
-    if len(found) == 1:
-        why = ""
-        if len(several) > 1:
-            others = ", ".join(topic for topic in several if topic not in found)
-            why = f", chosen by its name before {others}; a topic map says another"
-        return Topic(found[0], part, kinds[bag.types[found[0]]], setting, why)
-    if not found:
-        return None
-    raise InputError(
-        f"{bag.path}: {part}: {len(found)} topics could be it ({', '.join(found)}); expected one: "
-        f"name it in {where}"
-    )
-
-
-def _without(found: list[str], words: tuple[str, ...], keep_last: bool) -> list[str]:
-    """Return topics whose names have none of some words; where ``keep_last`` and that leaves none,
-    all of them.
-    """
-    left = [topic for topic in found if not any(word in topic.lower() for word in words)]
-    return left or (found if keep_last else [])
-
-
-def _units(part: str) -> tuple[str, ...]:
-    return tuple(SPEED_UNITS) if part == "rotors" else COMMAND_UNITS
-
-
-def _unnamed_arrays(bag: _Bag) -> list[str]:
-    return sorted(topic for topic, kind in bag.types.items() if kind in ARRAYS)
-
-
-def _nothing(bag: _Bag, part: str, where: str) -> InputError:
-    """Return the error for a part that is not there."""
-    listed = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(bag.types.items())) or "none"
-    arrays = _unnamed_arrays(bag)
-    if part == "rotors" and arrays:
-        return InputError(
-            f"{bag.path}: rotors: {', '.join(arrays)} could be it, but a multi-array states no "
-            f"unit; expected in {where} the line rotors: {{topic: {arrays[0]}, unit: rad/s}} (or "
-            f"{', '.join(list(SPEED_UNITS)[1:])}), or command: {{topic: {arrays[0]}, unit: us}} "
-            f"(or {COMMAND_UNITS[0]}). The bag's topics: {listed}"
-        )
-    kinds = [kind for kind in PARTS[part] if kind not in ARRAYS]
-    if part == "rotors":
-        kinds += [kind for kind in PARTS["command"] if kind not in (*ARRAYS, *kinds)]
-        kinds.append("a multi-array of std_msgs with a unit")
-    left_out = sorted(t for t, kind in bag.types.items() if kind in PARTS[part])
-    why = (
-        f"no topic but set-points by their names ({', '.join(left_out)})"
-        if part == "pose" and left_out
-        else "no topic of a type that fits"
-    )
-    return InputError(
-        f"{bag.path}: {part}: {why}; expected one of {' or '.join(kinds)}, or its name in "
-        f"{where}. "
-        f"The bag's topics: {listed}"
-    )
-
-
-def _stream(bag: _Bag, part: str, choice: Topic) -> tuple[NDArray[np.int64], Array, list[str]]:
-    """Return times (N,) in ns, values (N, K) in the kit's frames, order and units, and notes of a
-    topic.
-    """
-    topic = choice.name
     recorded, stamped, values = array("q"), array("q"), array("d")
-    for index, (received, message) in enumerate(bag.messages(topic)):
+    for index, (received, message) in enumerate(bag.messages(topic.name)):
         if index >= LIMITS.table_rows:
             raise InputError(
-                f"{bag.path}: topic {topic}: more than {LIMITS.table_rows} messages; expected one "
-                f"flight"
+                f"{bag.path}: topic {topic.name}: more than {LIMITS.table_rows} messages; expected "
+                f"one flight"
             )
         recorded.append(received)
-        stamped.append(min(stamp(message), 2**63 - 1))
-        found = choice.kind.values(message)
-        if part in ("rotors", "command"):
-            found = _four(found, choice, f"{bag.path}: topic {topic}, message {index + 1}", part)
-        values.extend(found)
+        stamped.append(stamp(message))
+        try:
+            values.extend(topic.values(message))
+        except ValueError as error:
+            raise InputError(
+                f"{bag.path}: topic {topic.name}, message {index + 1}: {error}"
+            ) from error
     if not recorded:
         raise InputError(
-            f"{bag.path}: {part}: topic {topic} has no messages; expected at least two"
+            f"{bag.path}: {topic.part}: topic {topic.name} has no messages; expected at least two"
         )
-    numbers = choice.in_kit_units(np.array(values).reshape(len(recorded), -1))
+    table = np.array(values).reshape(len(recorded), -1)
+    columns = dict(zip(topic.columns, table.T, strict=True))
     received_at, sampled_at = np.array(recorded), np.array(stamped)
+    doubt = ""
     if not np.any(sampled_at):
-        return received_at, numbers, [f"{topic}: no time stamps; the times of recording were taken"]
-    if np.max(np.abs(sampled_at - received_at)) > _SAME_CLOCK * 1e9:
-        return (
-            received_at,
-            numbers,
-            [
-                f"{topic}: its time stamps are of another clock than the bag's; the times of "
-                "recording were taken"
-            ],
-        )
-    return sampled_at, numbers, []
-
-
-def _four(found: Any, choice: Topic, where: str, part: str) -> Array:
-    """Return rotor speeds (4,) or commands (4,) of a message, in the kit's order."""
-    numbers: Array = np.asarray(found, dtype=np.float64)
-    what = "rotor speed(s)" if part == "rotors" else "command(s)"
-    order = choice.setting.get("order")
-    if order is None and len(numbers) != 4 and choice.kind.order == "windwrench":
-        raise InputError(
-            f"{where}: {len(numbers)} {what}; expected 4, or an order in the topic map"
-        )
-    if len(numbers) < max(choice.order):
-        raise InputError(
-            f"{where}: {len(numbers)} {what}; expected at least {max(choice.order)} by the order "
-            f"{choice.order}"
-        )
-    return choice.four(numbers)
+        doubt = "no time stamps"
+    elif np.max(np.abs(sampled_at - received_at)) > _SAME_CLOCK:
+        doubt = "its time stamps are of another clock than the bag's"
+    if doubt:
+        return received_at, columns, [f"{topic.name}: {doubt}; the times of recording were taken"]
+    return sampled_at, columns, []

@@ -1,23 +1,42 @@
-"""The topic map of a bag: a small YAML file that says which topic is what."""
+"""The topic map of a bag or of a live source: a small YAML file that says which topic holds which
+part; and the sections of a log map that follow from it.
+"""
 
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BeforeValidator, ConfigDict
 
 from ....runtime.errors import InputError, unknown_name
+from ....runtime.forms import STRICT, checked
 from ....runtime.yaml_file import read_yaml
+from ..log_map import (
+    COMMAND_UNITS,
+    Attitude,
+    Battery,
+    Columns,
+    Commands,
+    LogMap,
+    Position,
+    Rotors,
+    Sensor,
+    TimeColumn,
+    one_of,
+    that_is,
+)
 from ..rotor_orders import ORDERS
-from ..streams import from_ned
-from .ros_messages import COMMAND_UNITS, SPEED_UNITS, Kind
+from .ros_messages import Kind
 
 Array = NDArray[np.float64]
 
-_KEYS = {
+UNITS = {"rotors": ("rad/s", "rpm", "Hz"), "command": ("normalised", "us")}
+KEYS = {  # what may be said of a part
     "pose": ("topic", "frame"),
     "rotors": ("topic", "unit", "order"),
     "command": ("topic", "unit", "order", "range"),
@@ -25,65 +44,52 @@ _KEYS = {
     "imu": ("topic", "frame"),
 }
 _FRAMES = ("flu", "ned")
+_LARGEST_COMMAND = 1e5
+_POSITION, _ATTITUDE = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
+_FORCE, _RATE = ("ax", "ay", "az"), ("gx", "gy", "gz")
+
+
+def _elements(value: Any, info: Any) -> tuple[int, ...]:
+    """Return the elements of a message, from 1, that are the kit's rotors."""
+    if isinstance(value, str):
+        if value not in ORDERS:
+            raise unknown_name("order", value, ORDERS)
+        return ORDERS[value]
+    is_list = isinstance(value, list | tuple) and all(type(i) is int and i >= 1 for i in value)
+    if not is_list or not len(set(value)) == 4 == len(value):
+        raise InputError(
+            "order: expected four different elements, counted from 1, such as [1, 2, 3, 4], or "
+            f"one of {', '.join(ORDERS)}, got {value!r}"
+        )
+    return tuple(value)
+
+
+def _is_range(value: Any) -> bool:
+    is_two = isinstance(value, list) and [type(x) in (int, float) for x in value] == [True, True]
+    return is_two and 0.0 <= value[0] < value[1] <= _LARGEST_COMMAND
+
+
+_Range = Annotated[
+    tuple[float, float] | None,
+    that_is("the values of the commands 0 and 1, such as [1000, 2000]", _is_range),
+]
 
 
 @dataclass(frozen=True)
-class Topic:
-    """A topic that holds a part, and how its numbers are read."""
+class Setting:
+    """What a topic map says of a part; what is left empty is usual of the type of messages."""
 
-    name: str
-    part: str  # pose, rotors, command, voltage or imu
-    kind: Kind
-    setting: Mapping[str, Any]  # of the topic map
-    why: str = ""  # it was chosen, where it was not the only one
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
-    @property
-    def order(self) -> list[int]:
-        """Elements of the message, from 1, that are the kit's rotors."""
-        return list(self.setting.get("order") or ORDERS[self.kind.order])
-
-    @property
-    def unit(self) -> str:
-        """Of rotor speeds or commands; nothing: not known."""
-        return str(self.setting.get("unit", self.kind.unit))
-
-    @property
-    def frame(self) -> str:
-        """Of a pose or an inertial sensor: flu or ned."""
-        return str(self.setting.get("frame", self.kind.frame))
-
-    @property
-    def range(self) -> tuple[float, float]:
-        """What stands for the commands 0 and 1."""
-        usual = self.kind.range if self.unit == "us" else (0.0, 1.0)
-        low, high = self.setting.get("range", usual)
-        return float(low), float(high)
-
-    def four(self, values: Array) -> Array:
-        """Return the values of a message (K,) that belong to the kit's rotors (4,)."""
-        return np.asarray(values[np.array(self.order) - 1])
-
-    def in_kit_units(self, values: Array) -> Array:
-        """Return the values (N, K) of messages in the kit's units and frames.
-
-        A pose is position and scalar-first quaternion, an IMU's sample accelerometer and gyro. The
-        values of rotors are in the kit's order (``four``); a command of NaN is a motor that is off.
-        """
-        if self.part == "rotors":
-            return values * SPEED_UNITS[self.unit]
-        if self.part == "command":
-            low, high = self.range
-            share = (np.nan_to_num(values, nan=low) - low) / (high - low)
-            return np.asarray(np.clip(share, 0.0, 1.0))
-        if self.part in ("pose", "imu") and self.frame == "ned":
-            if self.part == "pose":
-                return np.column_stack(from_ned(values[:, :3], values[:, 3:]))
-            return np.asarray(values * np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0]))
-        return values
+    topic: Annotated[str, that_is("a name such as /motors", lambda x: isinstance(x, str))] = ""
+    frame: Annotated[str, one_of(_FRAMES)] = ""  # ned: world and body z down; flu: ROS's own
+    unit: Annotated[str, one_of([*UNITS["rotors"], *UNITS["command"]])] = ""
+    order: Annotated[tuple[int, ...], BeforeValidator(_elements)] = ()
+    range: _Range = None  # values of the commands 0 and 1
 
 
-def topic_map(path: Path, option: str) -> tuple[dict[str, dict[str, Any]], str]:
-    """Return the settings of each part, checked, and the name of the file that they are from.
+def topic_map(path: Path, option: str) -> tuple[dict[str, Setting], str]:
+    """Return what a topic map says of each part, and the name of its file.
 
     Args:
         path: the bag.
@@ -99,71 +105,120 @@ def topic_map(path: Path, option: str) -> tuple[dict[str, dict[str, Any]], str]:
     data = read_yaml(file, "a topic map")
     if not isinstance(data, dict):
         raise InputError(
-            f"{file}: expected a mapping of {', '.join(_KEYS)} to topics, got {type(data).__name__}"
+            f"{file}: expected a mapping of {', '.join(KEYS)} to topics, got {type(data).__name__}"
         )
     settings = {}
     for part, value in data.items():
-        if part not in _KEYS:
-            raise unknown_name("key", str(part), _KEYS, str(file))
-        settings[part] = _checked(value, part, str(file))
+        if part not in KEYS:
+            raise unknown_name("key", str(part), KEYS, str(file))
+        settings[part] = _setting(part, value, f"{file}: {part}")
     return settings, str(file)
 
 
-def _checked(value: object, part: str, where: str) -> dict[str, Any]:
-    setting = {"topic": value} if isinstance(value, str) else value
-    if not isinstance(setting, dict):
-        raise InputError(
-            f"{where}: {part}: expected a topic or a mapping of {', '.join(_KEYS[part])}, got "
-            f"{value!r}"
-        )
-    for key in setting:
-        if key not in _KEYS[part]:
-            raise unknown_name("key", str(key), _KEYS[part], f"{where}: {part}")
-    if not isinstance(setting.get("topic", ""), str):
-        raise InputError(
-            f"{where}: {part}: topic: expected a name such as /motors, got {setting['topic']!r}"
-        )
-    units = tuple(SPEED_UNITS) if part == "rotors" else COMMAND_UNITS
-    for key, known in (("frame", _FRAMES), ("unit", units)):
-        if key in setting and (not isinstance(setting[key], str) or setting[key] not in known):
-            raise unknown_name(key, str(setting[key]), known, f"{where}: {part}")
-    if "order" in setting:
-        setting = setting | {"order": _order(setting["order"], f"{where}: {part}")}
-    if "range" in setting:
-        _check_range(setting["range"], f"{where}: {part}")
-    return setting
+def _setting(part: str, value: object, where: str) -> Setting:
+    given = {"topic": value} if isinstance(value, str) else value
+    for key in given if isinstance(given, dict) else ():
+        if key not in KEYS[part]:
+            raise unknown_name("key", str(key), KEYS[part], where)
+    found = checked(Setting, given, where, ", ".join(KEYS[part]))
+    if found.unit and found.unit not in UNITS[part]:
+        raise unknown_name("unit", found.unit, UNITS[part], where)
+    return found
 
 
-def _order(order: object, where: str) -> list[int]:
-    """Return an order as four elements, from 1, of the message."""
-    if isinstance(order, str):
-        if order not in ORDERS:
-            raise unknown_name("order", order, ORDERS, where)
-        return list(ORDERS[order])
-    good = (
-        isinstance(order, list)
-        and all(type(i) is int and i >= 1 for i in order)
-        and len(set(order)) == 4 == len(order)
+@dataclass(frozen=True)
+class Topic:
+    """A topic that holds a part, and how its numbers are read."""
+
+    name: str
+    part: str  # of ``KEYS``
+    kind: Kind
+    setting: Setting
+    why: str = ""  # it was chosen, where it was not the only one
+
+    @property
+    def frame(self) -> str:
+        """Of a pose or an inertial sensor: flu or ned."""
+        return self.setting.frame or self.kind.frame
+
+    @property
+    def unit(self) -> str:
+        """Of rotor speeds or commands; nothing: not known."""
+        return self.setting.unit or self.kind.unit
+
+    @property
+    def elements(self) -> tuple[int, ...]:
+        """Elements of the message, from 1, that are the kit's rotors."""
+        return self.setting.order or ORDERS[self.kind.order]
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """What stands for the commands 0 and 1."""
+        return self.setting.range or COMMAND_UNITS[self.unit] or (0.0, 1.0)
+
+    @cached_property
+    def log_map(self) -> LogMap:
+        """What the columns of its messages mean."""
+        is_ned = self.frame == "ned" and self.part in ("pose", "imu")
+        world, body = ("ned", "frd") if is_ned else ("enu", "flu")
+        parts: dict[str, Columns] = {}
+        if self.part == "pose":
+            parts["position"] = Position(_POSITION, "m", topic=self.name)
+            parts["attitude"] = Attitude(_ATTITUDE, topic=self.name, of=(self.name,))
+        elif self.part == "imu":
+            parts["accelerometer"] = Sensor(_FORCE, "m/s2", topic=self.name, body=body)
+            parts["gyro"] = Sensor(_RATE, "rad/s", topic=self.name, body=body)
+        elif self.part == "voltage":
+            parts["battery"] = Battery(("voltage",), "V", topic=self.name)
+        else:
+            picked = sorted(self.elements)
+            names = tuple(f"{self.part} {element}" for element in picked)
+            a, b, c, d = (picked.index(element) + 1 for element in self.elements)
+            order = (a, b, c, d)
+            if self.part == "rotors":
+                parts["rotors"] = Rotors(names, self.unit, topic=self.name, order=order)
+            else:
+                parts["commands"] = Commands(
+                    names, self.unit, topic=self.name, order=order, range=self.range
+                )
+        return LogMap(TimeColumn("stamp", "ns"), world, body, rows="messages", **parts)  # type: ignore[arg-type]
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """Names of what ``values`` returns."""
+        return tuple(name for part in self.log_map.sections.values() for name in part.columns)
+
+    def values(self, message: Any) -> Array:
+        """Return the columns of a message (K,); a command of NaN is a motor that is off.
+
+        Raises:
+            ValueError: it has too few rotors, or more than four and no order.
+        """
+        found = self.kind.values(message)
+        if self.part not in UNITS:
+            return found
+        what = "rotor speed(s)" if self.part == "rotors" else "command(s)"
+        if not self.setting.order and len(found) != 4 and self.kind.order == "windwrench":
+            raise ValueError(f"{len(found)} {what}; expected 4, or an order in the topic map")
+        if len(found) < max(self.elements):
+            raise ValueError(
+                f"{len(found)} {what}; expected at least {max(self.elements)} by the order "
+                f"{list(self.elements)}"
+            )
+        found = found[np.array(sorted(self.elements)) - 1]
+        if self.part == "command":
+            found = np.where(np.isnan(found), self.range[0], found)
+        return found
+
+
+def joined(topics: Mapping[str, Topic]) -> LogMap:
+    """Return the map of several topics, by their parts, each with its own columns."""
+    parts = {name: way for topic in topics.values() for name, way in topic.log_map.sections.items()}
+    pose = topics["pose"].log_map if "pose" in topics else LogMap(TimeColumn())
+    return LogMap(
+        TimeColumn(),
+        pose.world,
+        pose.body,
+        rows="messages",
+        **parts,  # type: ignore[arg-type]
     )
-    if not good:
-        raise InputError(
-            f"{where}: order: expected four different elements, counted from 1, such "
-            f"as "
-            f"[1, 2, 3, 4], or one of {', '.join(ORDERS)}, got {order!r}"
-        )
-    assert isinstance(order, list)
-    return order
-
-
-def _check_range(value: object, where: str) -> None:
-    good = (
-        isinstance(value, list)
-        and len(value) == 2
-        and all(type(x) in (int, float) for x in value)
-        and 0.0 <= value[0] < value[1] <= 1e5
-    )
-    if not good:
-        raise InputError(
-            f"{where}: range: expected the values of the commands 0 and 1, such as [1000, 2000], "
-            f"got {value!r}"
-        )

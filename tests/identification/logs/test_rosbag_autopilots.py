@@ -290,7 +290,9 @@ def test_an_array_without_a_unit_is_named_with_what_to_write(write):
     path.with_name("flight.topics.yaml").write_text(
         "command: {topic: /motors, unit: us, range: [2, 1]}"
     )
-    with pytest.raises(InputError, match=r"range: expected the values of the commands 0 and 1"):
+    with pytest.raises(
+        InputError, match=r"range: \[2, 1\]; expected the values of the commands 0 and 1"
+    ):
         read_log(path)
 
 
