@@ -150,18 +150,16 @@ class Recorder:
     def _begin(self) -> None:
         """Choose the columns by what has come, and write their names."""
         measured = not all(row.commanded for row in self._held)
-        commanded = all(row.command is not None for row in self._held)
-        if not measured and not commanded:  # the first rows had none yet
+        if not measured:  # the first rows had no command yet
             self._held = [row for row in self._held if row.command is not None]
-            commanded = True
         there = {
             name: [value for row in self._held if (value := getattr(row, name)) is not None]
             for name in _CHANNELS
         }
         chosen = {name: bool(values) for name, values in there.items()}
-        chosen |= {name: len(there[name]) == len(self._held) for name in ("force", "torque")}
-        chosen |= {"position": True, "quaternion": True}
-        chosen |= {"rotor_speeds": measured, "command": commanded}
+        for name in ("command", "force", "torque"):
+            chosen[name] = len(there[name]) == len(self._held)
+        chosen |= {"position": True, "quaternion": True, "rotor_speeds": measured}
         self._channels = {name: _CHANNELS[name] for name, taken in chosen.items() if taken}
         self._latest = {name: there[name][0] for name in _KEPT if chosen[name]}
         names = ["t", *(column for columns in self._channels.values() for column in columns)]

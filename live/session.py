@@ -5,7 +5,6 @@ other; whoever shows the estimates looks at ``snapshot`` from another.
 """
 
 import gc
-import math
 import sys
 import threading
 import time
@@ -79,25 +78,14 @@ class Session:
         self._unrecorded: list[Row] = []
         self._fresh: list[int] = []  # ns, arrivals whose estimates are being told
         self.output: Output | None = None
-        self._recent: deque[Output] | None = None  # what a view shows
-        self._shown, self._shown_t = 0, -math.inf  # how many it got, and the last one's time
+        # what a view shows
+        self._recent: deque[Output] = deque(maxlen=round(_VIEW_SECONDS * _VIEWED))
         self.estimates = 0
         self.ended = ""  # why, in words
 
-    def watch(self) -> None:
-        """Keep the last 30 s for a view."""
-        if self._recent is None:
-            self._recent = deque(maxlen=round(_VIEW_SECONDS * _VIEWED))
-
-    def since(self, number: int) -> tuple[list[Output], int]:
-        """Return what a view has not got yet of the last 30 s, from any thread.
-
-        Args:
-            number: that the last call returned; 0 at first.
-        """
-        shown = self._shown
-        recent = [] if self._recent is None else list(self._recent)
-        return recent[max(0, len(recent) - (shown - number)) :] if shown > number else [], shown
+    def since(self, t: float) -> list[Output]:
+        """Return the estimates of the last 30 s that lie after ``t``, s, from any thread."""
+        return [output for output in self._recent.copy() if output.t > t]
 
     def stop(self) -> None:
         """Have the stream end; from any thread."""
@@ -193,9 +181,8 @@ class Session:
             self.tallies.counts["not sent"] += 1
         self.tallies.wrench.add(output.wrench)
         self._tell(output)
-        if self._recent is not None and output.t - self._shown_t >= 1.0 / _VIEWED - 1e-6:
+        if not self._recent or output.t - self._recent[-1].t >= 1.0 / _VIEWED - 1e-6:
             self._recent.append(output)
-            self._shown, self._shown_t = self._shown + 1, output.t
         if self._begin_t is None:
             self._begin_t = output.t
         seconds = self._settings.seconds

@@ -8,6 +8,7 @@ machine.
 """
 
 import json
+import math
 import threading
 import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -83,7 +84,6 @@ class WebView:
         self.address = f"http://127.0.0.1:{self._server.server_address[1]}/"
 
     def __enter__(self) -> "WebView":
-        self._session.watch()
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
         self._thread.start()
         return self
@@ -103,11 +103,12 @@ class WebView:
             "arm": source.vehicle.arm_l,
             "rotors": source.vehicle.positions.tolist(),
         }
-        number = 0
+        last = -math.inf  # s, stream's time of the newest estimate that was sent
         try:
             while True:
                 over = self._over.is_set()
-                points, number = self._session.since(number)
+                points = self._session.since(last)
+                last = points[-1].t if points else last
                 event = {**first, **self._state(points), "over": over}
                 file.write(f"data: {json.dumps(event)}\n\n".encode())
                 file.flush()

@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections import Counter
 from dataclasses import dataclass, field
+from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
 import numpy as np
@@ -37,6 +38,7 @@ class Source(ABC):
     options: tuple[str, ...] = ()  # of an address
     library = ""  # that the extra of the kind's name brings
     paced = True  # messages arrive at the vehicle's own pace
+    link: Any = None  # a ``Link`` that messages come by, of a source that has one
 
     def __init__(
         self, text: str, vehicle: Vehicle, tallies: Tallies, log_map: LogMap | None = None
@@ -58,13 +60,14 @@ class Source(ABC):
             InputError: one is wrong.
         """
 
-    @abstractmethod
     def open(self) -> None:
-        """Begin to listen.
+        """Begin to listen: at the source's link, where it has one.
 
         Raises:
             InputError: there is no such source, or it cannot be opened.
         """
+        if self.link is not None:
+            self.link.open()
 
     @abstractmethod
     def receive(self, timeout: float) -> list[Sample] | None:
@@ -85,8 +88,10 @@ class Source(ABC):
             OSError: the link takes no more now.
         """
 
-    def close(self) -> None:  # noqa: B027 - there may be nothing to close
+    def close(self) -> None:
         """Listen no more."""
+        if self.link is not None:
+            self.link.close()
 
     def take_sound(self, sample: Sample) -> Sample:
         """Return a message that was understood: from now on others are only counted."""

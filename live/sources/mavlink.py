@@ -68,7 +68,7 @@ class Mavlink(Source):
     def open(self) -> None:
         """Open the link."""
         dialect: Any = importlib.import_module("pymavlink.dialects.v20.ardupilotmega")
-        self.link.open()
+        super().open()
         self._mav = dialect.MAVLink(self.link, srcSystem=1, srcComponent=_OURS)
         self._mav.robust_parsing = True
         add_esc_status(dialect)
@@ -124,10 +124,6 @@ class Mavlink(Source):
         """Send the wrench back, in north, east, down."""
         if self.link.peer is not None and output.row.has_pose:
             self._sender.send(self._mav, output)
-
-    def close(self) -> None:
-        """Close the link."""
-        self.link.close()
 
     def expected(self) -> str:
         """Return what must come."""

@@ -31,10 +31,6 @@ class UdpJson(Source):
         self._map = FieldMap(self.log_map, self.vehicle, self.name)
         self.link = Datagrams(self.address, "127.0.0.1")
 
-    def open(self) -> None:
-        """Begin to listen."""
-        self.link.open()
-
     def receive(self, timeout: float) -> list[Sample] | None:
         """Return what the datagrams that are there hold."""
         samples: list[Sample] = []
@@ -77,10 +73,6 @@ class UdpJson(Source):
         """Send the estimate to where the last datagram came from, if it wants to know."""
         if self._reply:
             self.link.write(json.dumps(as_fields(output)).encode())
-
-    def close(self) -> None:
-        """Listen no more."""
-        self.link.close()
 
     def expected(self) -> str:
         """Return what must come."""

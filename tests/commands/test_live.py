@@ -82,7 +82,7 @@ def test_an_address_is_printed_as_it_is(capsys):
 @pytest.fixture(scope="module")
 def watched():
     """A flight of 2 s that was watched."""
-    running = Running("sim:base?speed=0", watched=True, seconds=2.0)
+    running = Running("sim:base?speed=0", seconds=2.0)
     running.thread.join()
     return running.session
 

@@ -92,7 +92,7 @@ class Running:
     """A session of a source, in a thread of its own."""
 
     def __init__(
-        self, text, vehicle=VEHICLE, log_map=None, descriptor=None, watched=False, **settings
+        self, text, vehicle=VEHICLE, log_map=None, descriptor=None, **settings
     ):
         self.tallies, self.outputs, self.failed = Tallies(), [], []
         self.source = make_source(text, vehicle, log_map, self.tallies)
@@ -102,8 +102,6 @@ class Running:
             settings=LiveSettings(**{"wait": 0.0} | settings),
             tell=self.outputs.append,
         )
-        if watched:
-            self.session.watch()
         self.thread = threading.Thread(target=self._run, daemon=True)
         self.thread.start()
 
