@@ -9,7 +9,6 @@ import pytest
 from tests.support.random_tables import Written, flight, random_table, save
 from windwrench.cli import app
 from windwrench.identification.logs.reading import read_log
-from windwrench.runtime.errors import InputError
 
 
 @pytest.fixture(scope="module")
@@ -41,20 +40,6 @@ def test_check_proposes_a_map_and_writes_the_log_by_it(
     again = run(capsys, "check", ours, "--out", tmp_path / "again")
     assert again["read_by"] == "this kit's own format"
     assert again["vehicle"] == "ardrone2"
-
-
-def test_a_log_of_the_kits_own_needs_no_map(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    run(capsys, "record", "--seconds", 2, "--out", tmp_path / "own.csv")
-    with pytest.raises(InputError, match="is read by this kit's own format and needs no map"):
-        app(
-            ["check", str(tmp_path / "own.csv"), "--write-map", str(tmp_path / "map.yaml")],
-            standalone_mode=False,
-        )
-    own = str(tmp_path / "own.csv")
-    with pytest.raises(InputError, match="is the log itself"):
-        app(["check", own, "--write", own], standalone_mode=False)
 
 
 def test_commands_stay_commands_when_they_are_written(

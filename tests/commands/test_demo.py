@@ -6,27 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from windwrench.cli import main
 from windwrench.commands.example import confronted
 from windwrench.identification.logs.example import example_flight
 from windwrench.identification.logs.reading import read_log
-
-
-@pytest.fixture
-def call(capsys, monkeypatch, tmp_path):
-    """Run a command in an empty folder, with no browser; give its exit code and what it says."""
-    monkeypatch.chdir(tmp_path)
-    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-
-    def run(*arguments):
-        monkeypatch.setattr("sys.argv", ["windwrench", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        return ended.value.code or 0, *capsys.readouterr()
-
-    return run
 
 
 def test_the_demo_tells_its_story_on_one_offline_page(call):
@@ -47,13 +29,6 @@ def test_the_demo_tells_its_story_on_one_offline_page(call):
     assert Path("demo/diagnose/report.html").is_file()
     # the log holds no truth that would give the effect away
     assert "fx" not in Path("demo/flight.csv").read_text().splitlines()[0].split(",")
-
-
-def test_an_effect_that_is_unknown_is_refused_at_once(call, tmp_path):
-    code, _, err = call("demo", "--effect", "constant_torqe", "--out", "demo")
-    assert code == 2
-    assert "Did you mean 'constant_torque'" in err
-    assert not (tmp_path / "demo").exists()
 
 
 def test_the_example_is_a_measured_flight_with_its_licence():
@@ -86,12 +61,3 @@ def test_the_example_is_diagnosed_beside_what_is_known(call):
     assert "battery_sag: known, and found" in out
     assert "page: file://" in out
     assert json.loads(Path("example/report.json").read_text())["effects"]
-
-
-def test_the_example_takes_no_log(call):
-    code, _, err = call("diagnose", "mine.csv", "--example")
-    assert code == 2
-    assert "expected it without LOGS" in err
-    code, _, err = call("diagnose")
-    assert code == 2
-    assert "expected at least one flight log, or --example" in err

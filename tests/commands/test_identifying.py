@@ -1,18 +1,15 @@
-"""The command identify: files, words and refusals."""
+"""The command identify: files and words."""
 
 import json
 import math
-import sys
 from dataclasses import replace
 
 import pytest
 
 from tests.identification.vehicle_fit.flown import ARM, MASS, inertial_flights
-from windwrench.cli import main
 from windwrench.commands.identifying import parse_window
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.logs.flight_log import write_log
-from windwrench.runtime.errors import InputError
 
 
 @pytest.fixture(scope="module")
@@ -23,19 +20,9 @@ def log(tmp_path_factory):
     return path
 
 
-def call(monkeypatch, capsys, *arguments):
-    monkeypatch.setattr(sys, "argv", ["windwrench", *map(str, arguments)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    said = capsys.readouterr()
-    return ended.value.code or 0, said.out, said.err
-
-
-def test_identify_writes_a_vehicle_that_loads(log, tmp_path, monkeypatch, capsys):
+def test_identify_writes_a_vehicle_that_loads(call, log, tmp_path):
     out = tmp_path / "mine.yaml"
     code, text, _ = call(
-        monkeypatch,
-        capsys,
         *("identify", f"{log}:1-11.5", "--mass", MASS, "--geometry", ARM, "--out", out),
         *("--export", "gazebo"),
     )
@@ -51,27 +38,7 @@ def test_identify_writes_a_vehicle_that_loads(log, tmp_path, monkeypatch, capsys
     assert "95 % interval" in text
 
 
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (("--mass", "0"), "--mass 0: expected the vehicle's mass"),
-        (("--mass", "0.5", "--geometry", "x"), "--geometry x"),
-        (("--mass", "0.5", "--out", "v.txt"), "ends in .yaml"),
-        (("--mass", "0.5", "--export", "px5"), "px4"),
-        (("--mass", "0.5", "--from", "9", "--to", "3"), "--to 3: expected a time after"),
-    ],
-)
-def test_what_is_asked_wrongly_is_refused(log, tmp_path, monkeypatch, capsys, arguments, says):
-    monkeypatch.chdir(tmp_path)
-    code, _, error = call(monkeypatch, capsys, "identify", log, *arguments)
-    assert code == 2
-    assert says in error
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_part_of_a_log():
     path, window = parse_window("a/b.csv:35-65.5")
     assert (str(path), window) == ("a/b.csv", (35.0, 65.5))
     assert parse_window("b.csv")[1] == (0.0, math.inf)
-    with pytest.raises(InputError, match="FROM before TO"):
-        parse_window("b.csv:5-3")

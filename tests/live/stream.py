@@ -91,9 +91,7 @@ class Pipeline:
 class Running:
     """A session of a source, in a thread of its own."""
 
-    def __init__(
-        self, text, vehicle=VEHICLE, log_map=None, descriptor=None, **settings
-    ):
+    def __init__(self, text, vehicle=VEHICLE, log_map=None, descriptor=None, **settings):
         self.tallies, self.outputs, self.failed = Tallies(), [], []
         self.source = make_source(text, vehicle, log_map, self.tallies)
         self.source.descriptor = descriptor  # of a table

@@ -8,11 +8,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.live.stream import VEHICLE, Running, flight, free_port
-from windwrench.dynamics import EffectSetting, InputError
+from windwrench.dynamics import EffectSetting
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.live.sources.esc_status import CHECKSUM, add_esc_status
-from windwrench.live.sources.open import make_source
-from windwrench.live.tallies import Tallies
 
 pytest.importorskip(
     "pymavlink", reason="pymavlink is not installed: pip install windwrench[mavlink]"
@@ -214,15 +212,3 @@ def test_a_stream_without_motors_says_what_came():
     said = pilot.end_by_itself()
     assert "poses came (ODOMETRY), and no rotor speeds within 0.5 s" in said
     assert "came: ODOMETRY" in said
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("mavlink:", "expected mavlink:udp"),
-        ("mavlink:udp://127.0.0.1:14550?pose=GPS", "pose=GPS: expected one of"),
-    ],
-)
-def test_no_autopilot(text, said):
-    with pytest.raises(InputError, match=said):
-        make_source(text, VEHICLE, None, Tallies())

@@ -9,7 +9,6 @@ import pytest
 
 from tests.live.stream import VEHICLE, Running, as_csv, as_objects, flight, free_port
 from tests.live.test_pipeline import offline
-from windwrench.dynamics import InputError
 from windwrench.identification.logs.log_map import load_map
 from windwrench.identification.logs.reading import read_log
 from windwrench.live.field_map import FieldMap, Malformed
@@ -186,19 +185,6 @@ def test_two_streams_cannot_listen_at_one_address():
     sender = Sender()
     assert "cannot listen" in Running(f"udp-json://127.0.0.1:{sender.port}").end_by_itself()
     sender.end()
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("sim:base?speed=-1", "at least 0"),
-        ("udp-json://127.0.0.1:99999", "no address"),
-        ("flight.csv", "unknown source"),
-    ],
-)
-def test_an_address_that_is_none_is_refused(text, said):
-    with pytest.raises(InputError, match=said):
-        make_source(text, VEHICLE, None, Tallies())
 
 
 def test_commands_beyond_their_range_are_no_commands():

@@ -1,0 +1,27 @@
+"""What the tests of commands share."""
+
+import sys
+
+import pytest
+
+from windwrench.cli import main
+
+
+@pytest.fixture
+def call(tmp_path, monkeypatch, capfd):
+    """Run a command in ``tmp_path`` and without a display, in this process to save its start;
+    return exit code, standard output and error.
+    """
+
+    def run_here(*arguments):
+        monkeypatch.chdir(tmp_path)
+        for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+            monkeypatch.delenv(name, raising=False)
+        monkeypatch.setattr(sys, "argv", ["windwrench", *map(str, arguments)])
+        capfd.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            main()
+        said = capfd.readouterr()
+        return ended.value.code or 0, said.out, said.err
+
+    return run_here
