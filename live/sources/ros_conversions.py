@@ -10,7 +10,7 @@ import numpy as np
 
 from ...dynamics.rotation import matrix_of
 from ...dynamics.vehicle import Vehicle
-from ...identification.logs.readers.ros_messages import PARTS, stamp
+from ...identification.logs.readers.ros_messages import kinds, stamp
 from ...identification.logs.readers.topic_map import UNITS, Setting, Topic
 from ...runtime.errors import InputError, unknown_name
 from ..field_map import FieldMap
@@ -37,9 +37,9 @@ class TopicReader:
     """
 
     def __init__(self, part: str, name: str, kind: str, setting: Setting, vehicle: Vehicle) -> None:
-        if kind not in PARTS[part]:
-            raise unknown_name("type", kind, PARTS[part], f"{name}, for {part}")
-        self._topic = Topic(name, part, PARTS[part][kind], setting)
+        if kind not in kinds(part):
+            raise unknown_name("type", kind, kinds(part), f"{name}, for {part}")
+        self._topic = Topic(name, part, kinds(part)[kind], setting)
         if part in UNITS and not self._topic.unit:
             raise InputError(
                 f"{name}: {kind} does not say its unit; expected unit: one of "

@@ -24,6 +24,8 @@ ARRAYS = tuple(
         *("UInt8", "UInt16", "UInt32", "UInt64"),
     )
 )
+PARTS = ("pose", "rotors", "command", "voltage", "imu")
+MOTORS = ("rotors", "command")  # parts
 _MOTOR1 = 101  # PX4's number of the output function "motor 1"
 _SECOND = 10**9  # ns
 _MICROSECOND = 1000  # ns
@@ -84,30 +86,26 @@ def _stated() -> dict[str, Any]:
     return found
 
 
-def _kinds(part: str) -> dict[str, Kind]:
+@cache
+def kinds(part: str) -> dict[str, Kind]:
+    """Return how a part is read from messages, by their types."""
     found = {}
     for name, stated in _stated()[part].items():
         fields = stated["fields"]
-        found[name] = Kind(
-            **stated | {"fields": fields if isinstance(fields, str) else tuple(fields)}
-        )
-    if part in ("rotors", "command"):
-        found |= {name: Kind(("data",)) for name in ARRAYS}
-    return found
+        paths = fields if isinstance(fields, str) else tuple(fields)
+        found[name] = Kind(**stated | {"fields": paths})
+    return found | ({name: Kind(("data",)) for name in ARRAYS} if part in MOTORS else {})
 
 
-PARTS: Mapping[str, Mapping[str, Kind]] = {
-    part: _kinds(part) for part in ("pose", "rotors", "command", "voltage", "imu")
-}
-VARIANTS = max(len(texts) for texts in _stated()["definitions"].values())
-
-
-def definitions(variant: int) -> dict[str, str]:
-    """Return the definitions of the types that rosbags does not know; ``variant`` 0 has the newest
-    of each.
+def definitions() -> list[dict[str, str]]:
+    """Return the definitions of the types that rosbags does not know, in several variants: the
+    newest of each comes first.
     """
-    known = _stated()["definitions"].items()
-    return {name: texts[min(variant, len(texts) - 1)] for name, texts in known}
+    known: dict[str, list[str]] = _stated()["definitions"]
+    return [
+        {name: texts[min(variant, len(texts) - 1)] for name, texts in known.items()}
+        for variant in range(max(map(len, known.values())))
+    ]
 
 
 def stamp(message: Any) -> int:

@@ -48,7 +48,7 @@ from ....runtime.regular_files import check_regular, open_regular
 from ..channels import Array, Samples
 from ..flight_log import FlightLog
 from ..mapped_log import map_recording
-from .ros_messages import VARIANTS, definitions, stamp
+from .ros_messages import definitions, stamp
 from .topic_choice import chosen_topics
 from .topic_map import Topic, joined, topic_map
 from .unpacking import check_bag_files, limited_unpacking, refuse_packed_files
@@ -160,9 +160,9 @@ def _opened(path: Path) -> Iterator[_Bag]:
             "install rosbags"
         ) from error
     stores = []
-    for variant in range(VARIANTS):
+    for variant in definitions():
         store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
-        for name, text in definitions(variant).items():
+        for name, text in variant.items():
             store.register(get_types_from_msg(text, name))
         stores.append(store)
     if ros1:

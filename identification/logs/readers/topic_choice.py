@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ....runtime.errors import InputError, unknown_name
-from .ros_messages import ARRAYS, PARTS
+from .ros_messages import ARRAYS, PARTS, kinds
 from .topic_map import UNITS, Setting, Topic
 
 _SETPOINTS = ("setpoint", "set_point", "reference", "command", "cmd", "desired", "target", "goal")
@@ -62,15 +62,15 @@ def _named(path: Path, types: Mapping[str, str], part: str, setting: Setting, wh
     Raises:
         InputError: it is not there, or of a type that cannot be the part.
     """
-    topic, kinds = setting.topic, PARTS[part]
+    topic, fitting = setting.topic, kinds(part)
     if topic not in types:
         raise unknown_name("topic", topic, types, f"{path}: {part} (named in {where})")
     kind = types[topic]
-    if kind not in kinds:
+    if kind not in fitting:
         raise InputError(
-            f"{path}: {part}: topic {topic} is of type {kind}; expected {' or '.join(kinds)}"
+            f"{path}: {part}: topic {topic} is of type {kind}; expected {' or '.join(fitting)}"
         )
-    found = Topic(topic, part, kinds[kind], setting)
+    found = Topic(topic, part, fitting[kind], setting)
     if part in UNITS and not found.unit:
         raise InputError(
             f"{path}: {part}: topic {topic} is a {kind}, which states no unit; expected "
@@ -87,9 +87,8 @@ def _fitting(
     Raises:
         InputError: several may be it.
     """
-    kinds = PARTS[part]
     # an array of numbers may be anything until somebody names its unit
-    fitting = [kind for kind in kinds if kind not in ARRAYS or setting.unit]
+    fitting = [kind for kind in kinds(part) if kind not in ARRAYS or setting.unit]
     several = sorted(topic for topic, kind in types.items() if kind in fitting)
     if part in ("pose", "rotors"):
         flown = [t for t in several if not any(word in t.lower() for word in _SETPOINTS)]
@@ -109,7 +108,7 @@ def _fitting(
         return None
     others = ", ".join(topic for topic in several if topic not in found)
     why = f", chosen by its name before {others}; a topic map says another" if others else ""
-    return Topic(found[0], part, kinds[types[found[0]]], setting, why)
+    return Topic(found[0], part, kinds(part)[types[found[0]]], setting, why)
 
 
 def _listed(types: Mapping[str, str]) -> str:
@@ -127,7 +126,7 @@ def _no_rotors(path: Path, types: Mapping[str, str], where: str) -> InputError:
             f"{', '.join(UNITS['rotors'][1:])}), or command: {{topic: {arrays[0]}, unit: us}} "
             f"(or {UNITS['command'][0]}). {_listed(types)}"
         )
-    known = [kind for part in UNITS for kind in PARTS[part] if kind not in ARRAYS]
+    known = [kind for part in UNITS for kind in kinds(part) if kind not in ARRAYS]
     return InputError(
         f"{path}: rotors: no topic of a type that fits; expected one of "
         f"{' or '.join(dict.fromkeys(known))} or a multi-array of std_msgs with a unit, or its "
@@ -137,11 +136,11 @@ def _no_rotors(path: Path, types: Mapping[str, str], where: str) -> InputError:
 
 def _no_pose(path: Path, types: Mapping[str, str], where: str) -> InputError:
     """Return the error for a bag without a pose and inertial sensors."""
-    left_out = sorted(topic for topic, kind in types.items() if kind in PARTS["pose"])
+    left_out = sorted(topic for topic, kind in types.items() if kind in kinds("pose"))
     why = "no topic of a type that fits"
     if left_out:
         why = f"no topic but set-points by their names ({', '.join(left_out)})"
     return InputError(
-        f"{path}: pose: {why}; expected one of {' or '.join(PARTS['pose'])}, or its name in "
+        f"{path}: pose: {why}; expected one of {' or '.join(kinds('pose'))}, or its name in "
         f"{where}. {_listed(types)}"
     )

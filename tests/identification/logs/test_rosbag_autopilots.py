@@ -14,7 +14,7 @@ pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'wi
 from rosbags import rosbag1, rosbag2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from windwrench.identification.logs.readers.ros_messages import VARIANTS, definitions
+from windwrench.identification.logs.readers.ros_messages import definitions
 
 START = 1_700_000_000_000_000_000  # ns
 FLIP = np.diag([1.0, -1.0, -1.0])
@@ -42,7 +42,7 @@ class Maker:
     def __init__(self, ros1, variant=0):
         self.ros1 = ros1
         self.store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
-        for name, text in definitions(variant).items():
+        for name, text in definitions()[variant].items():
             self.store.register(get_types_from_msg(text, name))
 
     def make(self, kind, **fields):
@@ -211,7 +211,7 @@ def assert_inertial(log):
 
 
 @pytest.mark.parametrize("kind", ["mcap", "db3"])
-@pytest.mark.parametrize("variant", range(VARIANTS))
+@pytest.mark.parametrize("variant", range(len(definitions())))
 def test_messages_of_px4_of_several_years(write, kind, variant):
     topics = {
         "/fmu/out/vehicle_odometry": "odometry",
