@@ -31,7 +31,6 @@ from .log_map import (
 )
 
 Array = NDArray[np.float64]
-Rows = NDArray[np.intp]
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])
 # from the log's world, or its body axes, to the kit's
@@ -49,7 +48,6 @@ class Samples:
 
     t: Array  # (N,) s
     columns: Mapping[str, Array]  # by name (N,); NaN where there is no value
-    rows: Rows  # (N,) of the file's table
     topic: str = ""  # of the message in which they stood, where a log has several
 
     def values(self, part: Columns) -> Array:
@@ -60,10 +58,10 @@ class Samples:
         """Return whether a section's columns are there."""
         return part.topic in ("", self.topic) and set(part.named) <= set(self.columns)
 
-    def cut(self, keep: slice | Mask | Rows) -> "Samples":
+    def cut(self, keep: slice | Mask) -> "Samples":
         """Return some of the rows."""
         columns = {name: column[keep] for name, column in self.columns.items()}
-        return Samples(self.t[keep], columns, self.rows[keep], self.topic)
+        return Samples(self.t[keep], columns, self.topic)
 
     def _column(self, name: str) -> Array:
         """Return a column (N,), or the constant that ``=0`` stands for."""
@@ -93,6 +91,8 @@ def in_kit_units(log_map: LogMap, section: str, part: Columns, values: Array) ->
     if isinstance(part, Sensor):
         units = ACCELERATION_UNITS if section == "accelerometer" else RATE_UNITS
         return np.asarray(values * units[part.unit] @ _BODY_TURNS[part.body or log_map.body].T)
+    if section == "wrench":
+        return values
     unit = LENGTH_UNITS.get(part.unit, 1e-3 if part.unit in ("mN", "mNm") else 1.0)
     return np.asarray(values * unit @ _WORLD_TURNS[log_map.world].T)
 

@@ -177,22 +177,26 @@ def check_times(table: Table, t: Array) -> None:
         )
 
 
-def unit_quaternions(table: Table, quaternions: Array, where: Mask, columns: str) -> Array:
-    """Return quaternions (N, 4) at length 1, after checking that they nearly were in the rows
-    ``where`` (N,).
+def check_quaternions(
+    table: Table, quaternions: Array, where: Mask, columns: str, rows: NDArray[np.intp]
+) -> None:
+    """Raise InputError at the first quaternion (N, 4) ``where`` (N,) whose length differs from 1 by
+    more than 0.02.
 
-    Raises:
-        InputError: a length differs from 1 by more than 0.02.
+    Args:
+        table: they come from.
+        quaternions: (N, 4).
+        where: (N,) those that are looked at.
+        columns: their names.
+        rows: (N,) of the table in which they stand.
     """
     length = np.linalg.norm(quaternions, axis=1)
     bad = np.flatnonzero(where & ~(np.abs(length - 1.0) <= _NORM_TOLERANCE))
     if bad.size:
         raise InputError(
-            f"{table.path}: columns {columns}, {table.row(bad[0])}: a quaternion of length "
-            f"{length[bad[0]]:.4g}; expected 1 within {_NORM_TOLERANCE:g}"
+            f"{table.path}: columns {columns}, {table.row(int(rows[bad[0]]))}: a quaternion of "
+            f"length {length[bad[0]]:.4g}; expected 1 within {_NORM_TOLERANCE:g}"
         )
-    unit: Array = quaternions / length[:, None]
-    return unit
 
 
 def time_notes(t: Array) -> tuple[str, ...]:

@@ -13,10 +13,10 @@ columns the log has, with numbers in them.
 * ``notes``: said of every log
 * ``world``: enu (z up; also nwu, flu), ned (z down; also frd), y_up (motion capture)
 * ``body``: flu (forward, left, up) or frd (forward, right, down)
-* ``rows``: mixed (default: fields may be empty where a channel has no sample), whole (every field
-  of a pose is filled, or all are empty; times strictly increase), streams (each channel has
-  samples of its own, an empty field is none; commands become rotor speeds where the vehicle is
-  given) or messages (streams whose every row is a sample: a pose of NaN was lost)
+* ``rows``: mixed (default: fields may be empty where a channel has no sample), streams (as mixed,
+  and rows that go back in time are left out), messages (as streams, and every row of a position is
+  one of the log's: one of NaN was lost) or whole (every field of a pose is filled, or all are
+  empty; times strictly increase; every row is one of the log's)
 * ``stray_rows``: how many rows at the start are dropped, at most, where a gap follows them
 * ``time``: column, unit (s, ms, us, ns, min), offset (s; default: the flight begins at 0); or
   rate_hz alone, where the table has no time
@@ -297,11 +297,6 @@ class LogMap:
         """The sections that the map has, but the time."""
         found = {name: getattr(self, name) for name in SECTIONS}
         return {name: part for name, part in found.items() if part is not None}
-
-    @property
-    def has_clocks(self) -> bool:
-        """Does each channel have samples of its own?"""
-        return self.rows in ("streams", "messages")
 
     @property
     def is_own(self) -> bool:

@@ -127,7 +127,7 @@ def chosen(recorded: Sequence[Samples], log_map: LogMap) -> tuple[LogMap, dict[s
     ]
     if pairs:
         usable["position"], usable["attitude"] = pairs[0]
-    elif log_map.has_clocks or not places:
+    elif not (log_map.is_own and places):
         usable["position"], usable["attitude"] = [], []
     found: dict[str, Any] = {
         section: ways[0][0] if ways else None for section, ways in usable.items()
@@ -145,24 +145,24 @@ def _usable(
     there = [
         (way, samples) for way in ways(log_map, section) for samples in recorded if samples.has(way)
     ]
-    if len(there) == 1 and (log_map.rows == "whole" or not there[0][0].optional):
+    stated = log_map.rows == "whole" or log_map.is_own
+    if len(there) == 1 and (stated or not there[0][0].optional):
         return there
     return [one for one in there if _is_measured(section, *one, log_map.rows)]
 
 
 def _is_measured(section: str, way: Columns, samples: Samples, rows: str) -> bool:
-    """Return whether a section's columns hold measurements: of channels with clocks of their own
-    rotors that turn, a voltage, of ``streams`` a position that changes, and two samples of others.
+    """Return whether a section's columns hold measurements: rotors that turn, a voltage, but of
+    ``messages`` a position that changes, and two samples of others.
     """
     values = samples.values(way)
     values = values[np.isfinite(values).all(axis=1)]
     if isinstance(way, Attitude) and not way.euler:
         return bool(np.any(np.linalg.norm(values, axis=1) > NO_QUATERNION))
-    has_clocks = rows in ("streams", "messages")
-    if section == "rotors" and has_clocks:
+    if section == "rotors":
         return bool(np.any(values != 0.0))
-    if section == "position" and rows == "streams" and len(values):
-        return bool(np.any(np.ptp(values, axis=0) > 0.0))
-    if section == "battery" and has_clocks:
+    if section == "battery":
         return bool(np.any(values > 0.0))
-    return len(values) > has_clocks
+    if section == "position" and rows != "messages" and len(values):
+        return bool(np.any(np.ptp(values, axis=0) > 0.0))
+    return len(values) > 1

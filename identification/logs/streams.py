@@ -1,10 +1,10 @@
-"""From streams with clocks of their own (topics of a bag, messages of an autopilot's log) to one
-flight log.
+"""Streams with clocks of their own, and the one flight log that is made of them.
 
 Rows are the pose's samples. Where an inertial sensor is much faster than the pose, or where there
-is no pose, they are the sensor's: the kit's form has room for rows without a pose.
+is no pose, rows are the sensor's: the kit's form has room for rows without a pose.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from .commanded_speeds import with_commanded_speeds
+from .commanded_speeds import speeds_of_wrench, with_commanded_speeds
 from .flight_log import FlightLog, Mask, time_notes
 from .log_map import Commands
 
@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 _NORM_TOLERANCE = 0.02  # of a quaternion's length
 _SENSOR_GAP = 3.5  # median steps, across which an inertial sensor is not interpolated
 _ROTOR_GAP = 0.5  # s without rotor speeds that deserves a note
+_MOTORS = {"rotors": "rotor speeds", "commands": "commands", "wrench": "commanded wrenches"}
 # times faster than the pose from which an inertial sensor has rows of its own: a pose is put to the
 # nearest of them, so it moves by a tenth of the pose's step at most, and its noise stays its own
 _OWN_ROWS = 5.0
@@ -30,11 +31,11 @@ _OWN_ROWS = 5.0
 
 @dataclass(frozen=True, eq=False)
 class Stream:
-    """Samples of one topic."""
+    """Samples of one quantity."""
 
-    name: str  # of the topic
+    name: str  # of the topic or the column
     t: Array  # (N,) s, all streams of a log on one clock
-    values: Array  # (N, K)
+    values: Array  # (N, K); NaN: not measured
 
     def forward(self) -> "tuple[Stream, tuple[str, ...]]":
         """Return the samples that are later than every one before them, and a note where that left
@@ -51,23 +52,43 @@ class Stream:
         )
         return Stream(self.name, self.t[keep], self.values[keep]), (note,)
 
+    def whole(self) -> "Stream":
+        """Return the samples whose values are all finite."""
+        good = np.isfinite(self.values).all(axis=1)
+        return self if good.all() else Stream(self.name, self.t[good], self.values[good])
+
     def at(self, t: Array) -> Array:
-        """Return the values (M, K) at times (M,) in s, linear between samples and held beyond the
-        first and the last.
+        """Return the values (M, K) at times (M,) in s: each column is linear between its finite
+        values and held beyond the first and the last. A column without any is NaN.
         """
-        return np.column_stack([np.interp(t, self.t, column) for column in self.values.T])
+        out = np.full((len(t), self.values.shape[1]), np.nan)
+        for i, column in enumerate(self.values.T):
+            good = np.isfinite(column)
+            if good.any():
+                out[:, i] = np.interp(t, self.t[good], column[good])
+        return out
 
     def between(self, t: Array) -> Array:
-        """Return the values (M, K) at times (M,) in s, linear between samples; NaN beyond the first
-        and the last, and where samples are missing.
+        """Return the values (M, K) at times (M,) in s: a sample's own at its time, else linear
+        between its neighbours; NaN beyond the first and the last, and where samples are missing.
         """
-        out = self.at(t)
+        out = np.column_stack([np.interp(t, self.t, column) for column in self.values.T])
         step = np.diff(self.t)
         after = np.clip(np.searchsorted(self.t, t), 1, len(self.t) - 1)
         there = step[after - 1] <= _SENSOR_GAP * float(np.median(step))
         there |= (self.t[after] == t) | (self.t[after - 1] == t)
         out[~there | (t < self.t[0]) | (t > self.t[-1])] = np.nan
         return out
+
+
+def readable(stream: Stream | None) -> Stream | None:
+    """Return the samples (N, K) that are finite and in order of time; None where they are fewer
+    than two.
+    """
+    if stream is None:
+        return None
+    found, _ = stream.whole().forward()
+    return found if len(found.t) >= 2 else None
 
 
 def from_ned(position: Array, quaternion: Array) -> tuple[Array, Array]:
@@ -81,39 +102,42 @@ def from_ned(position: Array, quaternion: Array) -> tuple[Array, Array]:
     return position * half_turn, quaternion * np.concatenate([[1.0], half_turn])
 
 
-def slerp(t: Array, attitude: Stream) -> Array:
-    """Return attitudes (M, 4), scalar first, at times (M,) in s; NaN before the first sample and
-    after the last.
+def slerp(t: Array, attitude: Stream, longest: float = np.inf) -> Array:
+    """Return attitudes (M, 4), scalar first, at times (M,) in s; NaN before the first sample, after
+    the last, and within a gap of more than ``longest`` s. Samples at all of the times are returned
+    as they are, whatever their length.
     """
     out = np.full((len(t), 4), np.nan)
     good = np.linalg.norm(attitude.values, axis=1) > 0.5  # False where NaN
-    times = attitude.t[good]
+    times, values = attitude.t[good], attitude.values[good]
+    after = np.searchsorted(times, t)
+    exact = np.isin(t, times)
+    if exact.all():
+        return np.asarray(values[after])
     if len(times) < 2:
         return out
     inside = (t >= times[0]) & (t <= times[-1])
-    turn = Slerp(times, Rotation.from_quat(attitude.values[good], scalar_first=True))(t[inside])
-    out[inside] = turn.as_quat(scalar_first=True)
+    inside &= exact | (np.diff(times)[np.clip(after, 1, len(times) - 1) - 1] <= longest)
+    if inside.any():
+        turn = Slerp(times, Rotation.from_quat(values, scalar_first=True))(t[inside])
+        out[inside] = turn.as_quat(scalar_first=True)
     return out
 
 
 def flight_log(
     path: Path,
     reader: str,
-    pose: Stream | None,
-    rotors: Stream | None,
-    voltage: Stream | None,
+    streams: Mapping[str, Stream | None],
     notes: tuple[str, ...],
-    accelerometer: Stream | None = None,
-    gyro: Stream | None = None,
-    command: Stream | None = None,
     vehicle: Vehicle | None = None,
-    commanded: bool = False,
     vehicle_name: str = "",
     model: Commands | None = None,
+    *,
+    extra: Mapping[str, Stream] | None = None,
+    commanded: bool = False,
+    from_zero: bool = True,
 ) -> FlightLog:
-    """Return the log of a pose (position and scalar-first quaternion), rotor speeds (rad/s) or
-    motor commands (0 to 1), and where they are there a voltage (V), an accelerometer (m/s2) and a
-    gyro (rad/s), body axes forward, left, up.
+    """Return the log of some streams, by the names of a map's sections.
 
     Rows are the pose's samples within the span of the motors' stream. Of a sensor 5 times faster
     than the pose, or of a log without a pose, they are the sensor's; a pose then stands in the
@@ -122,103 +146,158 @@ def flight_log(
 
     Args:
         path: the file, for errors and the log's name.
-        reader: its reader's name.
-        pose: (N, 7); None: the log has none, and then accelerometer and gyro must be there.
-        rotors: (N, 4) rad/s in the kit's order; None: not known, and then ``command`` must be
-            there.
-        voltage: (N, 1) V.
+        reader: its reader's name; nothing: the file is a table of the kit's own or of a map.
+        streams: ``position`` (N, 7) m, with its scalar-first quaternion; ``rotors`` (N, 4) rad/s,
+            ``commands`` (N, 4) 0 to 1, both in the kit's order, or ``wrench`` (N, 4) N and Nm,
+            commanded; ``battery`` (N, 1) V; ``accelerometer`` (N, 3) m/s2 and ``gyro`` (N, 3)
+            rad/s, body axes forward, left, up; ``force`` and ``torque`` (N, 3), truth.
         notes: what the reader assumed.
-        accelerometer: (N, 3) m/s2.
-        gyro: (N, 3) rad/s.
-        command: (N, 4), 0 to 1, in the kit's order.
         vehicle: turns commands into rotor speeds where none are known, by its motor curve or by an
             assumption that the notes state; None: they stay unknown.
-        commanded: ``rotors`` were computed from commands.
         vehicle_name: the vehicle that flew, where the reader knows it.
         model: what commands are assumed to give where the vehicle states no motor curve.
+        extra: what else is kept, by name.
+        commanded: ``rotors`` were computed from commands.
+        from_zero: the log's time begins at 0; else it stays the file's.
 
     Raises:
-        InputError: too few samples, a rotor speed that is not finite, a quaternion that is none,
-            nothing to find motion from, no motors, or streams that do not overlap.
+        InputError: too few samples, an infinite rotor speed, a quaternion that is none, nothing to
+            find motion from, no motors, or streams that do not overlap.
     """
-    motors = rotors if rotors is not None else command
-    if motors is None:
+    made, words = _cleaned(path, streams)
+    notes += words
+    sensors = {name: made[name] for name in ("gyro", "accelerometer") if name in made}
+    of_motors = [name for name in _MOTORS if name in made]
+    if not of_motors:
         raise InputError(f"{path}: no motors; expected rotor speeds or motor commands")
-    accelerometer, gyro = readable(accelerometer), readable(gyro)
-    if pose is None and (accelerometer is None or gyro is None):
-        absent = " and no ".join(
-            name for name, s in (("accelerometer", accelerometer), ("gyro", gyro)) if s is None
-        )
+    motors = made[of_motors[0]].whole()
+    if "position" not in made and len(sensors) < 2:
+        absent = " and no ".join(x for x in ("accelerometer", "gyro") if x not in sensors)
         raise InputError(
             f"{path}: no pose, and no {absent}; expected a pose, or accelerometer and gyro"
         )
-    for stream in (pose, rotors, command):
-        if stream is not None and len(stream.t) < 2:
-            raise InputError(
-                f"{path}: {stream.name}: {len(stream.t)} message(s); expected at least two"
-            )
-    if pose is not None:
-        pose, pose_notes = pose.forward()
-        notes += pose_notes
-        _check_pose(path, pose)
-    if rotors is not None:
-        rotors, rotor_notes = rotors.forward()
-        notes += rotor_notes
-        _check_rotor_speeds(path, rotors)
-    if command is not None:
-        command = readable(command)
-        if command is None or len(command.t) < 2:
-            raise InputError(
-                f"{path}: {motors.name}: no two commands are finite numbers; expected some"
-            )
-        command = Stream(command.name, command.t, np.clip(command.values, 0.0, 1.0))
-    motors = rotors if rotors is not None else command
-    assert motors is not None
-    if (longest := float(np.diff(motors.t).max())) > _ROTOR_GAP:
+    t, pose, words = _rows(path, made.get("position"), motors, [*sensors.values()])
+    notes += words
+    between = ~np.isin(t, motors.t)
+    steps = np.diff(motors.t)[np.searchsorted(motors.t, t[between]) - 1]
+    if (longest := float(steps.max(initial=0.0))) > _ROTOR_GAP:
         notes += (
-            f"{motors.name}: up to {longest:.2g} s between messages; the "
-            f"{'rotor speeds' if rotors is not None else 'commands'} there are interpolated",
+            f"{motors.name}: up to {longest:.2g} s between messages; the {_MOTORS[of_motors[0]]} "
+            "there are interpolated",
         )
-    t, values, row_notes = _rows(path, pose, motors, gyro or accelerometer)
-    notes += row_notes
-    valid: Mask = np.asarray(np.isfinite(values).all(axis=1))
-    length = np.linalg.norm(values[:, 3:], axis=1)
-    values = np.where(valid[:, None], values, np.nan)
-    if rotors is not None and np.any(rotors.values < 0.0):
-        notes += (
-            f"{rotors.name}: negative rotor speeds (a sense of rotation) were taken as positive",
-        )
-    if voltage is not None:
-        good = np.isfinite(voltage.values[:, 0]) & (voltage.values[:, 0] > 0.0)
-        if good.any():
-            voltage, _ = Stream(voltage.name, voltage.t[good], voltage.values[good]).forward()
-        else:
-            notes += (f"{voltage.name}: no positive voltage; left out",)
-            voltage = None
-    volts = None if voltage is None else voltage.at(t)[:, 0]
-    commands = None if command is None else command.at(t)
-    speeds = np.full((len(t), 4), np.nan) if rotors is None else np.abs(rotors.at(t))
+    valid: Mask = np.asarray(np.isfinite(pose).all(axis=1))
+    if np.isfinite(pose[:, 3:]).any():  # else positions without an attitude, which are kept
+        pose[~valid] = np.nan
+    pose[valid, 3:] /= np.linalg.norm(pose[valid, 3:], axis=1)[:, None]
+    speeds = np.full((len(t), 4), np.nan)
+    if "rotors" in made:
+        speeds = made["rotors"].at(t)
+    elif "wrench" in made:
+        commanded = True
+        if vehicle is not None:
+            speeds, wrench_notes = speeds_of_wrench(made["wrench"].at(t), vehicle)
+            notes += tuple(wrench_notes)
+    measured = {name: x for name, s in sensors.items() if np.isfinite(x := s.between(t)).any()}
+    truth = {name: made[name].at(t) for name in ("force", "torque") if name in made}
+    kept = {name: stream.between(t) for name, stream in (extra or {}).items()}
+    times = t - t[0] if from_zero else t
     log = FlightLog(
-        t=t - t[0],
-        position=values[:, :3],
-        quaternion=values[:, 3:] / np.where(valid, length, 1.0)[:, None],
+        t=times,
+        position=pose[:, :3],
+        quaternion=pose[:, 3:],
         rotor_speeds=speeds,
-        voltage=volts,
-        accelerometer=_sensor(accelerometer, t),
-        gyro=_sensor(gyro, t),
-        name=path.stem.removesuffix(".csv") if path.is_file() else path.name,
-        source=f"{path} (reader {reader})",
-        notes=(*notes, *time_notes(t - t[0])),
+        voltage=made["battery"].at(t)[:, 0] if "battery" in made else None,
+        accelerometer=measured.get("accelerometer"),
+        gyro=measured.get("gyro"),
+        name=Path(path.name.removesuffix(".gz")).stem if path.is_file() else path.name,
+        source=f"{path} (reader {reader})" if reader else str(path),
+        notes=(*notes, *_gap_notes(times, valid, bool(measured))),
         valid=valid,
+        extra={name: x[:, 0] if x.shape[1] == 1 else x for name, x in kept.items()},
         commanded=commanded,
-        command=commands,
+        command=made["commands"].at(t) if "commands" in made else None,
         vehicle=vehicle_name,
+        **truth,
     )
     return with_commanded_speeds(log, vehicle, model)
 
 
+def _cleaned(
+    path: Path, streams: Mapping[str, Stream | None]
+) -> tuple[dict[str, Stream], tuple[str, ...]]:
+    """Return the streams that hold something, in order of time and within what a flight has, and
+    notes.
+
+    Raises:
+        InputError: too few samples, an infinite rotor speed, or a quaternion that is none.
+    """
+    made: dict[str, Stream] = {}
+    notes: tuple[str, ...] = ()
+    for name, stream in streams.items():
+        if stream is None:
+            continue
+        needed = name in ("position", "rotors", "commands", "wrench")
+        if needed and len(stream.t) < 2:
+            raise InputError(
+                f"{path}: {stream.name}: {len(stream.t)} message(s); expected at least two"
+            )
+        stream, words = stream.forward()
+        values = stream.values
+        if name == "position":
+            check_norms(path, stream)
+        elif name in ("rotors", "commands", "wrench"):
+            words += _check_motors(path, name, stream)
+            values = np.abs(values) if name == "rotors" else values
+            values = np.clip(values, 0.0, 1.0) if name == "commands" else values
+        elif name == "battery":
+            values = np.where((values > 0.0) & np.isfinite(values), values, np.nan)
+        elif name in ("accelerometer", "gyro"):
+            values = np.where(np.isfinite(values).all(axis=1, keepdims=True), values, np.nan)
+        if name == "position" or (np.isfinite(values).any() and len(values) > 1):
+            made[name] = Stream(stream.name, stream.t, values)
+        elif name == "battery":
+            notes += (f"{stream.name}: no positive voltage; left out",)
+        notes += words if needed else ()
+    return made, notes
+
+
+def check_norms(path: Path, pose: Stream) -> None:
+    """Raise InputError at the first pose (N, 7) or quaternion (N, 4) whose length is not 1."""
+    whole = np.isfinite(pose.values).all(axis=1)
+    length = np.linalg.norm(pose.values[:, -4:], axis=1)
+    off = np.flatnonzero(whole & (np.abs(length - 1.0) > _NORM_TOLERANCE))
+    if off.size:
+        raise InputError(
+            f"{path}: {pose.name}, at {pose.t[off[0]]:.6g} s: a quaternion of length "
+            f"{length[off[0]]:.4g}; expected 1 within {_NORM_TOLERANCE:g}"
+        )
+
+
+def _check_motors(path: Path, name: str, motors: Stream) -> tuple[str, ...]:
+    """Return a note where rotor speeds are negative.
+
+    Raises:
+        InputError: a rotor speed is infinite, or fewer than two samples are finite numbers.
+    """
+    infinite = np.argwhere(np.isinf(motors.values))
+    if infinite.size and name == "rotors":
+        raise InputError(
+            f"{path}: {motors.name}, message {infinite[0][0] + 1}: the rotor speed of rotor "
+            f"{infinite[0][1] + 1} is {motors.values[tuple(infinite[0])]}; expected a finite number"
+        )
+    if len(motors.whole().t) < 2:
+        raise InputError(
+            f"{path}: {motors.name}: no two samples have four finite {_MOTORS[name]}; expected some"
+        )
+    if name == "rotors" and np.any(motors.values < 0.0):
+        return (
+            f"{motors.name}: negative rotor speeds (a sense of rotation) were taken as positive",
+        )
+    return ()
+
+
 def _rows(
-    path: Path, pose: Stream | None, motors: Stream, sensor: Stream | None
+    path: Path, pose: Stream | None, motors: Stream, sensors: Sequence[Stream]
 ) -> tuple[Array, Array, tuple[str, ...]]:
     """Return the rows' times (M,) in s, the poses (M, 7) in them, NaN where there is none, and
     notes.
@@ -226,6 +305,7 @@ def _rows(
     Raises:
         InputError: fewer than two rows lie within the span of the motors' stream.
     """
+    sensor = sensors[0] if sensors else None
     own = sensor is not None and (pose is None or _step(pose.t) > _OWN_ROWS * _step(sensor.t) > 0.0)
     stream = sensor if own else pose
     assert stream is not None
@@ -236,42 +316,30 @@ def _rows(
     if inside.sum() < 2:
         raise InputError(
             f"{path}: {stream.name} (from {stream.t[0]:.6g} to {stream.t[-1]:.6g} s) and "
-            f"{motors.name} (from "
-            f"{motors.t[0]:.6g} to {motors.t[-1]:.6g} s) do not overlap; expected both over the "
-            f"same flight"
+            f"{motors.name} (from {motors.t[0]:.6g} to {motors.t[-1]:.6g} s) do not overlap; "
+            "expected both over the same flight"
         )
     t = stream.t[inside]
-    if pose is None:
-        note = f"rows are those of {stream.name}, {1.0 / _step(t):.4g} Hz"
-        return t, np.full((len(t), 7), np.nan), (note,)
     if not own:
-        values = pose.values[inside]
-        whole = np.isfinite(values).all(axis=1)
-        if whole.all():
-            return t, values, ()
-        note = f"{pose.name}: {int(np.sum(~whole))} of {len(t)} rows without a whole pose"
-        return t, values, (note,)
-    values = np.full((len(t), 7), np.nan)
-    here = pose.values[np.isfinite(pose.values).all(axis=1)]
-    times = pose.t[np.isfinite(pose.values).all(axis=1)]
-    if len(times) >= 2:
-        near = np.clip(np.searchsorted(t, times), 1, len(t) - 1)
-        near -= times - t[near - 1] < t[near] - times
-        reach = max(0.6 * _step(t), 0.5 * _step(times) / _OWN_ROWS)
-        near = np.unique(near[np.abs(t[near] - times) <= reach])
-        near = near[(t[near] >= times[0]) & (t[near] <= times[-1])]
-        attitude = slerp(t[near], Stream(pose.name, times, here[:, 3:]))
-        values[near] = np.column_stack(
-            [Stream(pose.name, times, here[:, :3]).at(t[near]), attitude]
-        )
-    return (
-        t,
-        values,
-        (
-            f"rows are those of {stream.name}, {1.0 / _step(stream.t):.4g} Hz; the pose of "
-            f"{pose.name}, {1.0 / _step(pose.t):.4g} Hz, stands in the nearest of them",
-        ),
+        assert pose is not None
+        return t, pose.values[inside], ()
+    rows = f"rows are those of {stream.name}, {1.0 / _step(stream.t):.4g} Hz"
+    placed = np.full((len(t), 7), np.nan)
+    if pose is None:
+        return t, placed, (rows,)
+    seen = pose.whole()
+    if len(seen.t) >= 2:
+        near = np.clip(np.searchsorted(t, seen.t), 1, len(t) - 1)
+        near -= seen.t - t[near - 1] < t[near] - seen.t
+        reach = max(0.6 * _step(t), 0.5 * _step(seen.t) / _OWN_ROWS)
+        near = np.unique(near[np.abs(t[near] - seen.t) <= reach])
+        near = near[(t[near] >= seen.t[0]) & (t[near] <= seen.t[-1])]
+        placed[near, :3] = Stream(pose.name, seen.t, seen.values[:, :3]).at(t[near])
+        placed[near, 3:] = slerp(t[near], Stream(pose.name, seen.t, seen.values[:, 3:]))
+    rows += (
+        f"; the pose of {pose.name}, {1.0 / _step(pose.t):.4g} Hz, stands in the nearest of them"
     )
+    return t, placed, (rows,)
 
 
 def _step(t: Array) -> float:
@@ -279,49 +347,17 @@ def _step(t: Array) -> float:
     return float(np.median(np.diff(t)))
 
 
-def _check_pose(path: Path, pose: Stream) -> None:
-    whole = np.isfinite(pose.values).all(axis=1)
-    length = np.linalg.norm(pose.values[:, 3:], axis=1)
-    off = np.flatnonzero(whole & (np.abs(length - 1.0) > _NORM_TOLERANCE))
-    if off.size:
-        raise InputError(
-            f"{path}: {pose.name}, at {pose.t[off[0]]:.6g} s: a quaternion of length "
-            f"{length[off[0]]:.4g}; "
-            f"expected 1 within {_NORM_TOLERANCE:g}"
-        )
-    if not whole.any():
-        raise InputError(
-            f"{path}: {pose.name}: no pose has seven finite numbers; expected at least one"
-        )
-
-
-def _check_rotor_speeds(path: Path, rotors: Stream) -> None:
-    bad = np.argwhere(~np.isfinite(rotors.values))
-    if bad.size:
-        raise InputError(
-            f"{path}: {rotors.name}, message {bad[0][0] + 1}: the rotor speed of rotor "
-            f"{bad[0][1] + 1} is "
-            f"{rotors.values[tuple(bad[0])]}; expected a finite number"
-        )
-
-
-def readable(sensor: Stream | None) -> Stream | None:
-    """Return the samples (N, K) that are finite and in order of time; None where they are fewer
-    than two.
+def _gap_notes(t: Array, valid: Mask, inertial: bool) -> tuple[str, ...]:
+    """Return notes on gaps in time, and on rows without a pose; beside an inertial sensor, which
+    may be faster than the pose, on the pose's gaps alone.
     """
-    if sensor is None:
-        return None
-    good = np.isfinite(sensor.values).all(axis=1)
-    sensor, _ = Stream(sensor.name, sensor.t[good], sensor.values[good]).forward()
-    return sensor if len(sensor.t) >= 2 else None
-
-
-def _sensor(sensor: Stream | None, t: Array) -> Array | None:
-    """Return what an inertial sensor measured (M, 3) at times (M,) in s, or None where it did not.
-
-    A sensor that is faster than the rows is thinned to them.
-    """
-    if sensor is None:
-        return None
-    values = sensor.between(t)
-    return values if np.isfinite(values[:, 0]).any() else None
+    notes = time_notes(t)
+    if not valid.any() or valid.all():
+        return notes
+    if inertial:
+        return notes + tuple(f"of the pose: {text}" for text in time_notes(t[valid]))
+    return (
+        *notes,
+        f"{int(np.sum(~valid))} of {len(t)} rows without a pose, the first at t = "
+        f"{t[np.flatnonzero(~valid)[0]]:.6g} s",
+    )

@@ -104,8 +104,6 @@ def check_log(
                 read_by, text = "a map that was guessed", map_yaml(guess)
     if vehicle is None and log.vehicle in preset_names():
         vehicle = load_vehicle(log.vehicle)
-        if not log.has_rotor_speeds:  # with the vehicle, a reader makes them of commands
-            return check_log(path, reader, vehicle, log_map)
     doubts = [
         f"guessed: {r.section}{f' {r.field}' if r.field else ''}: {r.why}"
         for r in (guess.doubts if guess else ())

@@ -100,7 +100,7 @@ def _samples(messages: Messages, columns: set[str]) -> Samples | None:
     found = {name: messages.column(name) for name in messages.units if name in columns}
     if set(_PLACE) <= set(found):
         found |= _metres(*(found.pop(name) for name in _PLACE))
-    return Samples(t, found, np.arange(len(t)), messages.name)
+    return Samples(t, found, messages.name)
 
 
 def _metres(latitude: Array, longitude: Array, altitude: Array) -> dict[str, Array]:
@@ -214,7 +214,7 @@ def _telemetry(
     t = each[0].t
     columns = {f"RPM {motor}": stream.at(t)[:, 0] for motor, stream in enumerate(each, 1)}
     poles = parameters.get("SERVO_BLH_POLES", 14.0)
-    return [Samples(t, columns, np.arange(len(t)), "ESC")], [
+    return [Samples(t, columns, "ESC")], [
         f"rotor speeds: measured by the ESCs (ESC), with {poles:g} magnet poles as ArduPilot took "
         "them"
     ]

@@ -161,7 +161,7 @@ def betaflight_log(
         scale = {"V": 1.0, "mV": 1e-3}.get(units.get(_VOLTAGE, ""), 0.01)
         parts["battery"] = Battery((_VOLTAGE,), "V", scale)
     log_map = LogMap(TimeColumn(), rows="streams", **parts)
-    samples = Samples(t, fields, np.arange(len(t)))
+    samples = Samples(t, fields)
     return map_recording(path, [samples], log_map, vehicle, reader, tuple(said))
 
 

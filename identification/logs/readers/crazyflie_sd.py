@@ -71,7 +71,7 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         t = _TIMES[version][1] * rows["time"].astype(np.float64)
         with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
             columns = {name: rows[name].astype(np.float64) for name in kind.variables}
-        events.append(Samples(t, columns, np.arange(len(t))))
+        events.append(Samples(t, columns))
     if not events:
         raise InputError(f"{path}: no event twice; expected at least two samples")
     first = min(float(samples.t[0]) for samples in events)

@@ -196,7 +196,7 @@ def _samples(
         for field, gained in _SENSORS:
             yield from _sensor(topic, t, fields, columns, field, gained)
         return
-    yield Samples(t, columns, np.arange(len(t)), topic)
+    yield Samples(t, columns, topic)
 
 
 def _command(values: Array) -> Array:
@@ -227,7 +227,7 @@ def _sensor(
     late = np.asarray(fields.get("accelerometer_timestamp_relative", 0), dtype=np.float64)
     if field == "accelerometer_m_s2" and np.all(np.abs(late) < 1e6):
         t = t + _MICROSECOND * late
-    yield Samples(t, found, np.arange(len(t)), topic)
+    yield Samples(t, found, topic)
 
 
 def _landed(log: ULog) -> Stream | None:

@@ -100,7 +100,6 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
         Samples(
             _NANOSECOND * (times[part] - origin).astype(np.float64),
             columns[part],
-            np.arange(len(times[part])),
             topic.name,
         )
         for part, topic in topics.items()

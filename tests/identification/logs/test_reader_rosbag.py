@@ -386,7 +386,7 @@ def test_a_wrong_map_is_named(write, topic_map, expected, vehicle):
         ({"/a": pose_topic(), "/motors": actuator_topic(times=WIDE + 9)}, "do not overlap"),
         (
             {"/a": pose_topic(), "/motors": actuator_topic([1, 2, np.nan, 3])},
-            "rotor speed of rotor 3 is nan; expected a finite",
+            "no two samples have four finite rotor speeds",
         ),
     ],
 )
