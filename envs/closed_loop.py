@@ -216,7 +216,6 @@ def _actuate(record: Record, world: World, path: Array, noise: Array, k: int) ->
         noise[k],
         xfrc,
     )
-    loop.ticks += 1
     if noise.shape[1] > NOISE:
         _accelerate(loop, xfrc, noise, k)
 
@@ -261,6 +260,7 @@ def run_ticks(record: Record, world: World, path: Array, noise: Array, move: int
         _steer(record, world, path, noise, k)
         _actuate(record, world, path, noise, k)
         call_at(move, 0)
+        record[0].ticks += 1
 
 
 @compiled
@@ -330,7 +330,6 @@ class ClosedLoop:
             ``disturbance`` that of the actuators, and ``applied`` what a user applies.
         specific: (3,) m/s2, world, specific force by the accelerometer, mean of the last run.
         thrust: (3,) m/s2, likewise that of the rotors by the declared model.
-        ticks: since the start of the episode; below zero while the filter settles.
 
     Raises:
         InputError: no estimator has this name.
@@ -392,7 +391,8 @@ class ClosedLoop:
         self.winds = Sum()
         self.noise, self.row = np.zeros((1, self.noise_size)), 0  # normals of the run, and its tick
         self.fan_path = self._fan_at_rest = np.array([[0.0, float(loop["fan"]["height"])]])
-        self.ticks = self._ticks_since_reset = 0
+        self._ticks: NDArray[np.int64] = self.record["ticks"]
+        self._settled = 0  # ticks before the episode
         self.stages = self._pipeline(stages)
         self._look_at_world(np.zeros((0, REFERENCE_SIZE)))
         given = self.record, self.world, self.fan_path, self.noise
@@ -467,6 +467,16 @@ class ClosedLoop:
         """Time since the start of the episode, s."""
         return self.ticks * TICK
 
+    @property
+    def ticks(self) -> int:
+        """Ticks since the start of the episode; below zero while the filter settles."""
+        return self._ticks.item()
+
+    @property
+    def flight(self) -> tuple[np.ndarray, World, int]:
+        """What ``run_ticks`` takes: record, world, and the address of MuJoCo's step."""
+        return self.record, self.world, self._move_address
+
     def reset(
         self,
         rng: np.random.Generator,
@@ -511,8 +521,7 @@ class ClosedLoop:
         if self.accelerometer is not None:
             loop["accelerometer_sigma"], sigma = self.accelerometer
             loop["accelerometer_bias"] = sigma * rng.standard_normal(3)
-        loop["ticks"] = self.ticks = -settle
-        self._ticks_since_reset = 0
+        loop["ticks"], self._settled = -settle, settle
         reset_plant(loop["plant"], self._body)
         self._qpos[:3], self._qpos[3:7] = position, quaternion_of_yaw(yaw)
         self.setpoint[:] = 0.0
@@ -577,8 +586,6 @@ class ClosedLoop:
                     stage(self)
         else:
             self._run_ticks(self.record, self.world, path, noise, self._move_address)
-            self.ticks += count
-            self._ticks_since_reset += count
 
     def blow(self) -> None:
         """Write the winds at the vehicle's stations into ``air``, every second tick."""
@@ -590,15 +597,14 @@ class ClosedLoop:
     def move(self) -> None:
         """Let MuJoCo integrate the rigid body over the tick."""
         mujoco.mj_step(self.model, self.data, SUBSTEPS)
-        self.ticks += 1
-        self._ticks_since_reset += 1
+        self._ticks += 1
 
     @property
     def was_reset(self) -> bool:
         """Whether MuJoCo reset the vehicle on its own: it does so, silently in code, where a state
         is not finite. Its time then is zero.
         """
-        return bool(self.data.time < (self._ticks_since_reset - 0.5) * TICK)
+        return bool(self.data.time < (self._settled + self.ticks - 0.5) * TICK)
 
     def __reduce__(self) -> NoReturn:
         """Refuse to be copied or pickled: the loop's arrays are views of its record and of MuJoCo's

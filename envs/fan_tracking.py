@@ -39,9 +39,11 @@ def see(state: Array, command: float, frame: Frame) -> None:
     keep_within(frame, _LIMITS)
 
 
+@compiled
 def reward_terms(offset: float, change: float) -> tuple[float, float]:
     """Return the rewards of tracking at an offset in m and of a change of the command in m/s."""
-    return 1.0 / (1.0 + (offset / TRACKING_WIDTH) ** 2), -CHANGE_COST * change * change
+    ratio = offset / TRACKING_WIDTH
+    return 1.0 / (1.0 + ratio * ratio), -CHANGE_COST * change * change
 
 
 class FanTrackingEnv(Task):
@@ -175,14 +177,14 @@ class FanTrackingEnv(Task):
         return distance, self.loop, fan_y
 
     def _begin(self) -> None:
-        self._distance, loop, fan_y = self.hover(SETTLE_TICKS)
-        self._path = np.column_stack([fan_y, np.full(len(fan_y), self.fan.height)])
+        self.distance, loop, fan_y = self.hover(SETTLE_TICKS)
+        self.path = np.column_stack([fan_y, np.full(len(fan_y), self.fan.height)])
         self.view.restart(loop.state)
 
     def _fly(self, noise: Array) -> None:
         loop = self.loop
         loop.setpoint[4] = self.command[0]
-        loop.run(noise, self._path[min(loop.ticks, len(self._path) - 1) :])
+        loop.run(noise, self.path[min(loop.ticks, len(self.path) - 1) :])
 
     def _get_obs(self) -> Frame:
         loop, frame = self.loop, np.empty(OBSERVATION_SIZE, dtype=np.float32)
@@ -190,7 +192,7 @@ class FanTrackingEnv(Task):
         return frame if self.view.is_plain else self.view.of(frame, loop.state, loop.ticks)
 
     def _get_info(self) -> dict[str, Any]:
-        loop, path = self.loop, self._path
+        loop, path = self.loop, self.path
         k = min(loop.ticks, len(path) - 1)
         fan_y = float(path[max(k - 1, 0), 0])
         x, y, z = loop.position.tolist()
@@ -198,7 +200,7 @@ class FanTrackingEnv(Task):
         flying = (
             self.is_flying()
             and abs(y - fan_y) <= LOST_OFFSET
-            and abs(x - self._distance) <= AWAY
+            and abs(x - self.distance) <= AWAY
             and abs(z - self.fan.height) <= AWAY
         )
         return {

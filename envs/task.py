@@ -239,10 +239,10 @@ class Task(gym.Env[Frame, Frame], ABC):
             )
         if not self._in_flight:
             raise InputError(f"{self.name}: call reset before step")
-        loop, last, largest = self.loop, self.command, self.largest_action
+        last, largest = self.command, self.largest_action
         wanted = [self._action_scale * number for number in numbers]
         self.command = np.array([min(max(value, -largest), largest) for value in wanted])
-        self._fly(self._draw_normals(loop.noise_size))
+        self.fly()
         if self.render_mode == "human":
             self.render()
         info = self._get_info()
@@ -250,15 +250,15 @@ class Task(gym.Env[Frame, Frame], ABC):
         reward = sum(terms.values())
         return self._get_obs(), reward, info["lost"], False, {**terms, **info}
 
-    def _draw_normals(self, columns: int) -> Array:
-        """Return a decision's normals, a row a tick: those of ``np_random.standard_normal``."""
+    def fly(self) -> None:
+        """Fly a decision at ``command``, with the normals of ``np_random.standard_normal``."""
         generator = self.np_random
         if generator is not self._generator:
             self._generator, self._generators = generator, generator_list([generator])
-            self._normals = np.empty((self.decision_ticks, columns))
-            self._draw_normals_into = specialised(draw_normals, self._generators, 0, self._normals)
-        self._draw_normals_into(self._generators, 0, self._normals)
-        return self._normals
+            self._normals = np.empty((self.decision_ticks, self.loop.noise_size))
+            self._draw_normals = specialised(draw_normals, self._generators, 0, self._normals)
+        self._draw_normals(self._generators, 0, self._normals)
+        self._fly(self._normals)
 
     def is_flying(self) -> bool:
         """Whether the vehicle still flies: finite, no faster than a vehicle can be, and upright."""

@@ -125,11 +125,6 @@ def write_lanes(blocks: np.ndarray, block: int, lanes: slice, record: np.ndarray
     _BLOCK.write(blocks, block, lanes, record[0])
 
 
-def estimates_of(blocks: np.ndarray, count: int) -> Array:
-    """Return the estimated states (count, 20) of the first filters of blocks."""
-    return _each(blocks, "x")[:count]
-
-
 def _each(blocks: np.ndarray, name: str) -> Array:
     return np.concatenate(list(np.moveaxis(blocks[name], -1, 1)))
 

@@ -169,8 +169,10 @@ def fly_blocks(
     jet: Array,
     noise: Array,
     fan_y: Array,
+    setpoint: Array,
     generators: Any,
     flying: np.ndarray,
+    commands: Array,
     paths: Array,
     first: np.ndarray,
     ticks: int,
@@ -187,8 +189,10 @@ def fly_blocks(
         jet: (2, COUNT_X, COUNT_R) of the jet's table.
         noise: (blocks, NOISE, WIDTH) of the records.
         fan_y: (blocks, WIDTH) likewise.
+        setpoint: (blocks, 11, WIDTH) likewise.
         generators: (n,) of the loops; a typed list.
         flying: (n,) booleans; a loop that does not fly draws nothing.
+        commands: (n,) m/s, along y.
         paths: (n, m) m, the fan's y.
         first: (n,) columns of ``paths`` at the first tick; of a loop that flies, then the next.
         ticks: of ``TICK`` s.
@@ -200,6 +204,8 @@ def fly_blocks(
             continue
         loop, block = loops[0] + b * loops[1], kept[0] + b * kept[1]
         take_up(block, work)
+        for n in members:
+            setpoint[b, 4, n - members.start] = commands[n]
         for k in range(ticks):
             for n in members:
                 if flying[n]:
@@ -233,14 +239,9 @@ class Blocks:
         # of all blocks, (blocks, n, WIDTH): position and quaternion, velocities, external wrench,
         # estimated states
         loops = self.loops
-        self.seen = (
-            loops["qpos"],
-            loops["qvel"],
-            loops["plant"]["external"],
-            self.filters["x"],
-        )
-        self.commanded = loops["flight"]["setpoint"][:, 4]  # m/s, along y
-        self.drawn = self.loops["noise"], self.loops["fan"]["y"]
+        external = loops["plant"]["external"]
+        self.motion = loops["qpos"], loops["qvel"], external, self.filters["x"]
+        self.drawn = loops["noise"], loops["fan"]["y"], loops["flight"]["setpoint"]
 
     def __len__(self) -> int:
         """Return how many blocks there are."""

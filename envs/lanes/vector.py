@@ -1,31 +1,21 @@
 """Many fan-tracking environments in the lanes of a vector unit."""
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from gymnasium.utils.seeding import np_random
 
-from ...controllers.observation import OBSERVATION_SIZE
 from ...dynamics.motion import Array
-from ...estimator.ukf_lanes import estimates_of, new_work, step_address
-from ...runtime.compiled import compiled, compiled_without_gil, specialised
+from ...estimator.ukf_lanes import new_work, step_address
+from ...runtime.compiled import compiled
 from ...runtime.errors import InputError, unknown_name
 from ...runtime.vector_lanes import WIDTH
-from ..closed_loop import ClosedLoop, is_healthy
-from ..fan_tracking import (
-    AWAY,
-    DECISION_TICKS,
-    FAN_TIMES,
-    FanTrackingEnv,
-    reward_terms,
-    see,
-)
+from ..closed_loop import ClosedLoop
+from ..fan_tracking import DECISION_TICKS, FanTrackingEnv
 from ..normals import generator_list
-from ..observing import View
-from ..plant import TICK
-from ..task import LOST_OFFSET, SETTLE_TICKS, UPRIGHT, Frame
+from ..task import SETTLE_TICKS
 from ..vector import FanTrackingVectorEnv, Flags
 from .flight import Blocks, fly_blocks
 
@@ -54,32 +44,21 @@ class FanTrackingLanes(FanTrackingVectorEnv):
         InputError: what does not fly in lanes, or what ``FanTrackingVectorEnv`` refuses.
     """
 
-    def __init__(self, num_envs: int = 1, *args: Any, **kwargs: Any) -> None:
-        super().__init__(num_envs, *args, **kwargs)
-        self._env = self.envs[0]
-        self._like = self._env.make_loop(self._env.truth, self._env.fan)
-        _refuse(self._env, self._like)
-        self._step = step_address()
-        blocks = -(-num_envs // WIDTH)
-        self._flying, self._settling = Blocks(blocks, self._like), Blocks(0, self._like)
-        self._works: deque[np.ndarray] = deque()
-        # each environment's own; one that was not reset yet has another's
-        self._generators = generator_list([np_random(0)[0]] * num_envs)
-        self._seeded = np.zeros(num_envs, dtype=np.bool_)
-        view = self._env.view
-        self._views = [View(view.observe, view.normalize) for _ in range(num_envs)]
-        self._ticks = np.zeros(num_envs, dtype=np.int64)  # since the start of the episode
-        self._paths = np.zeros((num_envs, FAN_TIMES.size))  # m, the fan's y, a column a tick
-        self._distance = np.zeros(num_envs)
-        self._commands, self._changes = np.zeros(num_envs), np.zeros(num_envs)  # m/s
-        self._seen = self._frames
-        if not view.is_plain:
-            self._seen = np.zeros((num_envs, OBSERVATION_SIZE), dtype=np.float32)
-        self._compiled: dict[Any, Callable[..., None]] = {}
-
     def _make_envs(self, kwargs: dict[str, Any]) -> list[FanTrackingEnv]:
         """Return one environment: it says what all are, and never flies."""
         return [FanTrackingEnv(**kwargs)]
+
+    def _make_memory(self) -> tuple[Array, Array, Array, Array]:
+        """Make what ``_fly`` works on; return motion, wrench and estimates."""
+        env = self.envs[0]
+        self._like = env.make_loop(env.truth, env.fan)
+        _refuse(env, self._like)
+        self._step = step_address()
+        self._flying = Blocks(-(-self.num_envs // WIDTH), self._like)
+        self._settling = Blocks(0, self._like)
+        self._works: deque[np.ndarray] = deque()
+        self._seeded = np.zeros(self.num_envs, dtype=np.bool_)
+        return self._flying.motion
 
     def _fly_blocks(self, blocks: Blocks, count: int, *given: Any) -> None:
         """Fly blocks; each thread has a record of its own for the filters in hand."""
@@ -93,139 +72,60 @@ class FanTrackingLanes(FanTrackingVectorEnv):
             try:
                 first, last = part * count // parts, (part + 1) * count // parts
                 memory = *blocks.addresses, work.ctypes.data, self._step, self._like.jet_table
-                arguments = first, last, *memory, *blocks.drawn, *given
-                self._call(fly_blocks, *arguments)
+                self._call(fly_blocks, first, last, *memory, *blocks.drawn, *given)
             finally:
                 self._works.append(work)
 
         self._spread(fly, parts)
 
-    def _call(self, function: Callable[..., None], *arguments: Any) -> None:
-        """Call a compiled function, always with arguments of the same types."""
-        if function not in self._compiled:
-            self._compiled[function] = specialised(function, *arguments)
-        self._compiled[function](*arguments)
-
-    def _fly(self, commands: np.ndarray, which: Flags) -> None:
-        blocks, limit = self._flying, self._env.largest_action
-        self._call(command, which, commands, limit, self._commands, self._changes, blocks.commanded)
-        given = self._generators, which, self._paths, self._ticks, DECISION_TICKS
+    def _fly(self, which: Flags) -> None:
+        blocks = self._flying
+        given = self._generators, which, self._commands, self._paths, self._ticks, DECISION_TICKS
         self._fly_blocks(blocks, len(blocks), *given)
-        self._look(which)
+        self._call(start_over, which, *self._motion[:2], self._broken)
 
-    def _begin(self, which: list[int], seeds: Sequence[int | None] | None) -> None:
+    def _hover(self, which: list[int], seeds: Sequence[int | None]) -> None:
         places = _places(which)
         count = 1 + max((block for block, _ in places.values()), default=-1)
         if count > len(self._settling):
             self._settling = Blocks(count, self._like)
-        settling = self._settling
-        generators = generator_list([np_random(0)[0]] * (count * WIDTH))
-        flying = np.zeros(count * WIDTH, dtype=np.bool_)
-        still = np.zeros((count * WIDTH, 1))
+        settling, size = self._settling, count * WIDTH
+        generators = generator_list([np.random.default_rng(0)] * size)
+        flying, still = np.zeros(size, dtype=np.bool_), np.zeros((size, 1))
         for i, (block, lane) in places.items():
             n = WIDTH * block + lane
-            generators[n] = self._hover(i, None if seeds is None else seeds[i], block, lane)
+            generators[n] = self._draw(i, seeds[i], block, lane)
             flying[n], still[n] = True, self._paths[i, 0]
-        given = generators, flying, still, np.zeros(len(flying), np.int64), SETTLE_TICKS
+        given = generators, flying, np.zeros(size), still, np.zeros(size, np.int64), SETTLE_TICKS
         self._fly_blocks(settling, count, *given)
         for i, (block, lane) in places.items():
             self._flying.take(i // WIDTH, lane, settling, block)
-        started = np.zeros(self.num_envs, dtype=np.bool_)
-        started[which] = True
-        self._ticks[which], self._commands[which], self._changes[which] = 0, 0.0, 0.0
-        states = estimates_of(self._flying.filters, self.num_envs)
-        for i in which:
-            self._views[i].restart(states[i])
-        self._look(started)
-        for name in ("reward_tracking", "reward_change", "lost"):
-            self._values[name][which] = 0
 
-    def _hover(self, i: int, seed: int | None, block: int, lane: int) -> np.random.Generator:
-        """Draw an episode and let its vehicle hover at the start, in a lane of the blocks that
-        settle; return the generator.
+    def _draw(self, i: int, seed: int | None, block: int, lane: int) -> np.random.Generator:
+        """Draw an episode and put its vehicle at the start, in a lane of the blocks that settle;
+        return the generator.
         """
+        env = self.envs[0]
         if not self._seeded[i] or seed is not None:
             self._generators[i], self._seeded[i] = np_random(seed)[0], True
         generator: np.random.Generator = self._generators[i]
-        self._env.np_random = generator
-        self._distance[i], loop, self._paths[i] = self._env.hover()
+        env.np_random = generator
+        self._distance[i], loop, self._paths[i] = env.hover()
         self._settling.put(block, slice(lane, lane + 1), loop)
-        self._values["fan_motion"][i] = self._env.fan_motion
+        self._values["fan_motion"][i] = env.fan_motion
         return generator
-
-    def _look(self, which: Flags) -> None:
-        """Write frames and values of some environments, as ``FanTrackingEnv`` has them."""
-        blocks, view, frames = self._flying, self._env.view, self._seen
-        height, moves = self._env.fan.height, (self._commands, self._changes)
-        episodes = which, self._ticks, self._paths, self._distance
-        self._call(look, *episodes, height, *moves, *blocks.seen, frames, self._table)
-        if view.is_plain:
-            return
-        if view.is_of_a_frame:
-            self._frames[which] = view.of_frames(frames[which])
-            return
-        states = estimates_of(blocks.filters, self.num_envs)
-        for i in np.flatnonzero(which).tolist():
-            self._frames[i] = self._views[i].of(frames[i], states[i], int(self._ticks[i]))
-
-
-_reward_terms = compiled(reward_terms)
 
 
 @compiled
-def command(
-    which: Flags, wanted: Array, limit: float, commands: Array, changes: Array, setpoint: Array
-) -> None:
-    """Write the commands (n,) m/s of the environments ``which``, within ``limit``, their changes,
-    and the velocities (blocks, WIDTH) to fly at.
-    """
-    for n in np.flatnonzero(which):
-        value = min(max(wanted[n, 0], -limit), limit)
-        changes[n], commands[n] = value - commands[n], value
-        setpoint[n // WIDTH, n % WIDTH] = value
-
-
-@compiled_without_gil
-def look(
-    which: Flags,
-    ticks: np.ndarray,
-    paths: Array,
-    distance: Array,
-    height: float,
-    commands: Array,
-    changes: Array,
-    qpos: Array,
-    qvel: Array,
-    external: Array,
-    states: Array,
-    frames: Frame,
-    values: np.ndarray,
-) -> None:
-    """Write frames and the truth of the environments ``which`` as ``FanTrackingEnv`` has them."""
+def start_over(which: Flags, position: Array, velocity: Array, broken: Flags) -> None:
+    """Let environments start over, as MuJoCo does, whose numbers are too large or not finite."""
     for n in np.flatnonzero(which):
         b, lane = n // WIDTH, n % WIDTH
-        p, v = qpos[b, :, lane], qvel[b, :, lane]
-        broken = not (np.abs(p).max() <= _LARGEST and np.abs(v).max() <= _LARGEST)
-        if broken:  # MuJoCo starts over
+        p, v = position[b, :, lane], velocity[b, :, lane]
+        broken[n] = not (np.abs(p).max() <= _LARGEST and np.abs(v).max() <= _LARGEST)
+        if broken[n]:
             p[:], v[:] = 0.0, 0.0
             p[3] = 1.0
-        state = states[b, :, lane].copy()
-        see(state, commands[n], frames[n])
-        k, value = min(ticks[n], paths.shape[1] - 1), values[n]
-        value.time, value.fan_y = ticks[n] * TICK, paths[n, max(k - 1, 0)]
-        value.fan_velocity = (paths[n, k] - value.fan_y) / TICK
-        value.y, value.offset = p[1], p[1] - value.fan_y
-        value.force[:], value.torque[:] = external[b, :3, lane], external[b, 3:, lane]
-        terms = _reward_terms(value.offset, changes[n])
-        value.reward_tracking, value.reward_change = terms
-        # written such that a number that is not finite counts as lost
-        value.lost = broken or not (
-            is_healthy(state, v)
-            and 1.0 - 2.0 * (p[4] * p[4] + p[5] * p[5]) >= UPRIGHT
-            and abs(value.offset) <= LOST_OFFSET
-            and abs(p[0] - distance[n]) <= AWAY
-            and abs(p[2] - height) <= AWAY
-        )
 
 
 def _places(which: list[int]) -> dict[int, tuple[int, int]]:
