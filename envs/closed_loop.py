@@ -59,6 +59,7 @@ from .plant import (
     sense,
 )
 from .suspended_load import SuspendedLoad, hang, pull, set_down
+from .untimed import Untimed
 from .wind.field import Calls, Sum, Wind, add_winds
 
 _C_FUNCTION = ctypes.CFUNCTYPE(None)
@@ -391,7 +392,7 @@ class ClosedLoop:
         self.winds = Sum()
         self.noise, self.row = np.zeros((1, self.noise_size)), 0  # normals of the run, and its tick
         self.fan_path = self._fan_at_rest = np.array([[0.0, float(loop["fan"]["height"])]])
-        self._ticks: NDArray[np.int64] = self.record["ticks"]
+        self._ticks: np.ndarray = self.record["ticks"]
         self._settled = 0  # ticks before the episode
         self.stages = self._pipeline(stages)
         self._look_at_world(np.zeros((0, REFERENCE_SIZE)))
@@ -470,7 +471,7 @@ class ClosedLoop:
     @property
     def ticks(self) -> int:
         """Ticks since the start of the episode; below zero while the filter settles."""
-        return self._ticks.item()
+        return int(self._ticks.item())
 
     @property
     def flight(self) -> tuple[np.ndarray, World, int]:
@@ -579,13 +580,14 @@ class ClosedLoop:
                 f"got shapes {noise.shape} and {path.shape}"
             )
         self.noise, self.fan_path = noise, path
-        if self._own_stages or self.winds.own:
+        with Untimed():
+            if not (self._own_stages or self.winds.own):
+                self._run_ticks(self.record, self.world, path, noise, self._move_address)
+                return
             for k in range(count):
                 self.row = k
                 for stage in self.stages.values():
                     stage(self)
-        else:
-            self._run_ticks(self.record, self.world, path, noise, self._move_address)
 
     def blow(self) -> None:
         """Write the winds at the vehicle's stations into ``air``, every second tick."""

@@ -29,6 +29,7 @@ from .normals import draw_normals, generator_list
 from .observing import View
 from .plant import NOISE, TICK
 from .task import LOST_OFFSET, UPRIGHT, Frame
+from .untimed import Untimed
 
 Flags = NDArray[np.bool_]
 Infos = dict[str, Any]
@@ -256,7 +257,8 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
             first, last = part * self.num_envs // parts, (part + 1) * self.num_envs // parts
             self._call(fly_loops, first, last, *given, height, self._ticks, ticks, *self._motion)
 
-        self._spread(move, parts)
+        with Untimed():
+            self._spread(move, parts)
 
     def _state(self, i: int) -> Array:
         """Return the estimated state (20,) of an environment."""

@@ -1,6 +1,7 @@
 """Many environments in one process are as many single ones."""
 
 import gymnasium as gym
+import mujoco
 import numpy as np
 import pytest
 
@@ -99,3 +100,20 @@ def test_bad_actions_are_named_and_nothing_flies(actions):
 def test_numbers_below_one_are_refused(name, value):
     with pytest.raises(InputError, match=name):
         make(**{"num_envs": 2, name: value})
+
+
+def test_mujoco_s_clock_is_a_user_s_again_after_a_flight():
+    envs, calls = make(1), []
+
+    def clock():
+        calls.append(0)
+        return 0.0
+
+    envs.reset(seed=0)
+    mujoco.set_mjcb_time(clock)
+    try:
+        envs.step(np.zeros((1, 1)))
+        assert not calls  # no step of the flight is timed
+        assert mujoco.get_mjcb_time() is clock
+    finally:
+        mujoco.set_mjcb_time(None)
