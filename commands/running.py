@@ -5,10 +5,8 @@
 import functools
 import inspect
 import json
-import math
 import platform
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, is_dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import Any, TypeVar
@@ -17,7 +15,8 @@ import typer
 
 from .. import __version__
 from ..runtime.compile_notice import notice
-from ..runtime.whole_files import replaced
+from ..runtime.page_files import write_text
+from ..runtime.plain_values import plain
 from .options import check_names, declared
 from .terminal import DryRun, command_line, console, errors, run
 
@@ -154,27 +153,4 @@ def write_run(path: Path, name: str, options: Mapping[str, Any]) -> None:
         "packages": packages,
     }
     runs = {**(kept if isinstance(kept, dict) else {}), name: plain(entry)}
-    with replaced(path) as partial:
-        partial.write_text(
-            json.dumps(runs, indent=1, sort_keys=True, allow_nan=False) + "\n", encoding="utf-8"
-        )
-
-
-def plain(value: Any) -> Any:
-    """Return a value as strict JSON holds it: arrays as lists, paths as texts, what is not finite
-    as None.
-    """
-    if is_dataclass(value) and not isinstance(value, type):
-        value = asdict(value)
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if hasattr(value, "tolist"):  # NumPy's arrays and numbers
-        value = value.tolist()
-    if isinstance(value, (list, tuple, set)):
-        return [plain(item) for item in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if value is None or isinstance(value, (bool, int)):
-        return value
-    # a name of a file may hold bytes that are no text
-    return str(value).encode("utf-8", "replace").decode()
+    write_text(json.dumps(runs, indent=1, sort_keys=True, allow_nan=False) + "\n", path)

@@ -1,16 +1,16 @@
 """Vehicles as YAML files: the presets in ``vehicles/`` and a user's own."""
 
 import math
-from dataclasses import asdict, replace
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import yaml
 
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.forms import checked
+from ..runtime.plain_values import plain
 from ..runtime.whole_files import replaced
 from ..runtime.yaml_file import parse_yaml, read_yaml
 from .effects import check_setting
@@ -84,21 +84,8 @@ def _vehicle(data: object, where: str) -> Vehicle:
 
 def dump_vehicle(vehicle: Vehicle) -> str:
     """Return the YAML text of a vehicle: ``parse_vehicle`` of it gives the vehicle again."""
-    data = {
-        key: value
-        for key, value in _plain(asdict(vehicle)).items()
-        if value is not None and not (isinstance(value, float) and math.isinf(value))
-    }
+    data = {key: value for key, value in plain(vehicle).items() if value is not None}
     return yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
-
-
-def _plain(value: Any) -> Any:
-    """Return numbers, lists and mappings in place of NumPy's and of tuples."""
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
 def save_vehicle(vehicle: Vehicle, path: str | Path) -> None:

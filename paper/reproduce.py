@@ -12,11 +12,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from .. import __version__
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.page_files import write_figure, write_json, write_text
+from ..runtime.plain_values import plain
 from ..runtime.provenance import commit, made_by
 from ..runtime.regular_files import read_json
 from ..runtime.workers import every, shared_dict
@@ -131,7 +130,7 @@ def write_result(name: str, title: str, seeds: int, result: Result, folder: Path
         "version": __version__,
         "commit": commit(),
         "seeds": seeds,
-        "figures": _plain(result.figures),
+        "figures": plain(result.figures),
         "comparison": [asdict(row) for row in result.comparison],
         "remarks": result.remarks,
     }
@@ -143,20 +142,9 @@ def _csv(columns: Columns) -> str:
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(columns)
-    for row in zip(*(_plain(column) for column in columns.values()), strict=True):
+    for row in zip(*(plain(column) for column in columns.values()), strict=True):
         writer.writerow([float(f"{v:.6g}") if isinstance(v, float) else v for v in row])
     return buffer.getvalue()
-
-
-def _plain(value: Any) -> Any:
-    """Return a value with NumPy's numbers as Python's, and what is not finite as None."""
-    if isinstance(value, Mapping):
-        return {str(k): _plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple, np.ndarray)):
-        return [_plain(v) for v in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def write_page(names: Sequence[str], folder: Path, page: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from ... import __version__
 from ...runtime.page_files import write_text
-from ..report.files import plain
+from ...runtime.plain_values import plain
 from .drift import Fleet
 from .page import fleet_page
 from .picture import draw_fleet
@@ -79,7 +79,8 @@ def fleet_data(fleet: Fleet) -> dict[str, Any]:
                 for one in fleet.trends
             ],
             "appearances": [{**vars(one), "changed": one.told} for one in fleet.appearances],
-        }
+        },
+        6,
     )
     return found
 

@@ -14,11 +14,12 @@ from ...dynamics.vehicle import Vehicle
 from ...dynamics.vehicle_file import dump_vehicle, load_vehicle, preset_names
 from ...runtime.code_digest import code_digest
 from ...runtime.errors import InputError
+from ...runtime.plain_values import as_text
 from ..diagnosis import diagnose
 from ..logs.flight_log import FlightLog
 from ..logs.log_map import load_map
 from ..logs.reading import read_log
-from ..report.files import printable, report_data
+from ..report.files import report_data
 from .manifest import FleetLog
 
 _CODE = ("runtime", "dynamics", "estimator", "identification")
@@ -90,7 +91,7 @@ def refusal(key: str, kind: str, reason: str) -> dict[str, Any]:
         kind: input (the log or its vehicle), memory, time, died, or error (a fault of the kit).
         reason: one line.
     """
-    text = " ".join(printable(reason).split())
+    text = " ".join(as_text(reason).split())
     return {"key": key, "status": "refused", "kind": kind, "reason": text}
 
 

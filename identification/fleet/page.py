@@ -10,7 +10,7 @@ import numpy as np
 
 from ... import __version__
 from ...runtime.page_files import page_template
-from ..report.files import printable
+from ...runtime.plain_values import as_text
 from ..report.words import MISSING, coefficient_meaning, in_words, with_std
 from .drift import DRIFT, Appearance, Fleet, Trend
 
@@ -44,7 +44,7 @@ def fleet_page(fleet: Fleet, rows: Sequence[Mapping[str, Any]], command: str) ->
         in_words=in_words,
         coefficients=_coefficients,
         settings=DRIFT,
-        command=printable(command),
+        command=as_text(command),
         version=__version__,
     )
 

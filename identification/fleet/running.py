@@ -9,8 +9,8 @@ from typing import Any
 
 from ...dynamics.vehicle_file import load_vehicle
 from ...runtime.errors import InputError
+from ...runtime.plain_values import as_text
 from ...runtime.workers import Lost, each
-from ..report.files import printable
 from .flight import LogTask, diagnose_one, key_of, refusal
 from .manifest import FleetLog, natural
 from .outcomes import Outcome, Outcomes
@@ -132,7 +132,7 @@ def rows(done: Sequence[LogTask], outcomes: Outcomes) -> list[dict[str, Any]]:
     found = []
     for name, one in sorted(named, key=place):
         flights[name] += 1
-        known = {"id": printable(name), "flight": flights[name], "log": printable(one.log.name)}
+        known = {"id": as_text(name), "flight": flights[name], "log": as_text(one.log.name)}
         found.append({**known, "time": one.log.time, **outcomes[one.key]})
         for key in ("key", "limit_s"):
             found[-1].pop(key, None)

@@ -3,18 +3,15 @@
 """
 
 import json
-import math
 import shlex
-from collections.abc import Mapping
 from dataclasses import asdict
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ... import __version__
 from ...dynamics.vehicle_file import save_vehicle
+from ...runtime.plain_values import as_text, plain
 from ...runtime.whole_files import replaced
 from ..findings import Diagnosis, Errors
 from .page import report_page
@@ -46,7 +43,7 @@ def write_report(
     folder = Path(folder)
     command = command or _command(diagnosis, folder)
     data = json.dumps(report_data(diagnosis), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
-    page = printable(report_page(diagnosis, command))
+    page = as_text(report_page(diagnosis, command))
     numbers, html, vehicle = folder / "report.json", folder / "report.html", folder / "vehicle.yaml"
     save_vehicle(diagnosis.amended, vehicle)
     for path, text in ((html, page), (numbers, data)):
@@ -106,7 +103,7 @@ def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "version": __version__,
         "schema_version": SCHEMA_VERSION,
     }
-    kept: dict[str, Any] = plain(data)
+    kept: dict[str, Any] = plain(data, 6)
     return kept
 
 
@@ -124,26 +121,6 @@ def _errors(errors: Errors) -> dict[str, float]:
         "nis_without_wrench_state": errors.nis_without_wrench_state,
         "rollout_1s_position_rms_m": errors.rollout_1s_position_rms,
     }
-
-
-def plain(value: Any) -> Any:
-    """Return a value as strict JSON can hold it: six significant digits, None for what is not
-    finite, a question mark for each byte of a file's name that is no text.
-    """
-    if isinstance(value, Mapping):
-        return {printable(str(key)): plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple, np.ndarray)):
-        return [plain(item) for item in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float):
-        return float(f"{value:.6g}") if math.isfinite(value) else None
-    return printable(value) if isinstance(value, str) else value
-
-
-def printable(text: str) -> str:
-    """Return a text with a question mark for each byte of a file's name that is no text."""
-    return text.encode("utf-8", "replace").decode()
 
 
 def _command(diagnosis: Diagnosis, folder: Path) -> str:

@@ -12,8 +12,6 @@ from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.dynamics.vehicle import Vehicle
@@ -23,6 +21,7 @@ from windwrench.identification.findings import Diagnosis
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.prediction import rollout_error
 from windwrench.runtime.errors import InputError, unknown_name
+from windwrench.runtime.plain_values import plain
 from windwrench.studies.runner import code_stamp, run_tasks
 from windwrench.studies.scoring import EQUIVALENTS
 from windwrench.studies.trials.held_back_outsiders import HELD_BACK
@@ -198,7 +197,7 @@ def fly_and_diagnose(trial: Trial) -> dict[str, Any]:
     """
     out: dict[str, Any] = {
         "key": trial.key,
-        "trial": _plain(asdict(trial)),
+        "trial": plain(trial, 6),
         "diagnoses": [],
     }
     begun = time.perf_counter()
@@ -213,7 +212,7 @@ def fly_and_diagnose(trial: Trial) -> dict[str, Any]:
         return out
     out.pop("error", None)
     flown["rollout_of_truth"] = None
-    out |= {"flown": _plain(flown), "seconds": _since(begun)}
+    out |= {"flown": plain(flown, 6), "seconds": _since(begun)}
     for without in trial.libraries:
         begun = time.perf_counter()
         try:
@@ -226,7 +225,7 @@ def fly_and_diagnose(trial: Trial) -> dict[str, Any]:
                     flown["truth"],
                     [(a, b) for _, a, b in diagnosis.held_out_segments],
                 )
-                out["flown"]["rollout_of_truth"] = _plain(truth)
+                out["flown"]["rollout_of_truth"] = plain(truth, 6)
         except Exception as error:  # a diagnosis that falls over is an outcome too, and a bad one
             found = {"error": f"{type(error).__name__}: {error}"}
         out["diagnoses"].append({"without": list(without), **found, "seconds": _since(begun)})
@@ -328,7 +327,7 @@ def _findings(found: Diagnosis) -> dict[str, Any]:
         "structure": [asdict(sign) for sign in found.structure[:3]],
         "gusts": [gusts.rms for gusts in found.gusts],
     }
-    return dict(_plain(summary))
+    return dict(plain(summary, 6))
 
 
 def run_trials(trials: Iterable[Trial], folder: Path, jobs: int = 1) -> list[dict[str, Any]]:
@@ -349,18 +348,3 @@ def run_trials(trials: Iterable[Trial], folder: Path, jobs: int = 1) -> list[dic
 
 def _outcome(*parts: Any) -> dict[str, Any]:
     return fly_and_diagnose(Trial(*parts))
-
-
-def _plain(value: Any) -> Any:
-    """Return a value as JSON knows it: tuples as lists, numbers to six digits, what is not finite
-    as None.
-    """
-    if isinstance(value, Mapping):
-        return {str(k): _plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float):
-        return float(f"{value:.6g}") if np.isfinite(value) else None
-    return value

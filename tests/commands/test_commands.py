@@ -16,8 +16,9 @@ import yaml
 from tests.support.paths import ROOT
 from windwrench.cli import app
 from windwrench.commands.options import listed, names_of, offering
-from windwrench.commands.running import plain, write_run
+from windwrench.commands.running import write_run
 from windwrench.dynamics.effects.__main__ import effects_page
+from windwrench.runtime.plain_values import plain
 
 COMMANDS = sorted(command.name for command in app.registered_commands)
 EXPENSIVE = ("benchmark", "reproduce")

@@ -6,7 +6,6 @@ import json
 import pytest
 from pebble import ProcessExpired
 
-from windwrench.commands.running import plain
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.envs.recording import record_flight
 from windwrench.identification.fleet.flight import LogTask, diagnose_one, key_of
@@ -15,6 +14,7 @@ from windwrench.identification.fleet.outcomes import Outcomes
 from windwrench.identification.fleet.running import OUTCOMES, run_fleet
 from windwrench.identification.logs.flight_log import FlightLog, write_log
 from windwrench.runtime import workers
+from windwrench.runtime.plain_values import plain
 
 FOUND = {
     "status": "diagnosed",
