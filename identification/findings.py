@@ -97,17 +97,11 @@ class Trace:
 
     log: str
     period: float
-    t: Array
-    before: Array
-    after: Array
-    held_out: Mask
-    parts: Mapping[str, Array] = field(default_factory=dict)
-
-    def __repr__(self) -> str:
-        return (
-            f"<{type(self).__name__} of {self.log}: {len(self.t)} samples, {self.t[0]:.3g} to "
-            f"{self.t[-1]:.3g} s>"
-        )
+    t: Array = field(repr=False)
+    before: Array = field(repr=False)
+    after: Array = field(repr=False)
+    held_out: Mask = field(repr=False)
+    parts: Mapping[str, Array] = field(default_factory=dict, repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,15 +121,9 @@ class Signature:
     effect: str
     channel: str
     regressor: str
-    x: Array
-    residual: Array
-    fitted: Array
-
-    def __repr__(self) -> str:
-        return (
-            f"<{type(self).__name__} of {self.effect}: {self.channel} over {self.regressor}, "
-            f"{len(self.x)} points>"
-        )
+    x: Array = field(repr=False)
+    residual: Array = field(repr=False)
+    fitted: Array = field(repr=False)
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,6 @@ summed over the kinds.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,41 +131,43 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     shares = np.mean([trim.thrust / trim.total for trim in before], axis=0)
 
     def logs_of(means: Array, spread: Array) -> Array:
-        """Logarithms (scales, n) of how likely the difference is, for changes whose ``means`` (n,
-        4) and standard deviations beside the scatter, ``spread`` (n, 4), are given.
+        """Logarithms (n,) of how likely the difference is, for changes whose ``means`` (n, 4) and
+        standard deviations beside the scatter, ``spread`` (n, 4), are given.
         """
         scales = unchanged[:, None] + spread[:, :, None] ** 2 * np.eye(4)
-        return scale_logs[:, None] + _log_t(difference, means, scales, freedom)
+        logs = scale_logs[:, None] + _log_t(difference, means, scales, freedom)
+        return np.asarray(np.logaddexp.reduce(logs, axis=0))
 
-    nothing = float(np.logaddexp.reduce(logs_of(np.zeros((1, 4)), np.zeros((1, 4))), axis=None))
     amounts = np.linspace(0.02, 4.0, _AMOUNTS) * use.amount
-    prior = np.exp(-0.5 * np.square(amounts / use.amount))
-    prior /= prior.sum()
-    tried: dict[str, list[_KindOfChange]] = {}
+    prior = -0.5 * np.square(amounts / use.amount)
+    prior -= np.logaddexp.reduce(prior)
+    evidence: dict[str, dict[str, float]] = {}  # logarithms, by place and kind
+    sizes: dict[tuple[str, str], tuple[float, float]] = {}  # mean and standard deviation
     for place, kind in _hypotheses():
-        means = np.array([_moved(place, kind, amount, shares) for amount in amounts])
-        size = np.linalg.norm(means, axis=1)[:, None] * np.array(use.bend)
-        logs = np.logaddexp.reduce(logs_of(means, size), axis=0) + np.log(prior)
-        evidence = float(np.logaddexp.reduce(logs))
-        weights = np.exp(logs - evidence)
+        if place == SOMETHING_ELSE:
+            means, spread = np.zeros((_AMOUNTS, 4)), np.repeat(amounts[:, None], 4, axis=1)
+        else:
+            means = np.array([_moved(place, kind, amount, shares) for amount in amounts])
+            spread = np.linalg.norm(means, axis=1)[:, None] * np.array(use.bend)
+        logs = logs_of(means, spread) + prior
+        total = float(np.logaddexp.reduce(logs))
+        weights = np.exp(logs - total)
         middle = float(amounts @ weights)
-        spread = math.sqrt(float(np.square(amounts - middle) @ weights))
-        tried.setdefault(place, []).append(_KindOfChange(kind, evidence, middle, spread))
-    wide = np.repeat(amounts[:, None], 4, axis=1)
-    logs = np.logaddexp.reduce(logs_of(np.zeros_like(wide), wide), axis=0) + np.log(prior)
-    tried[SOMETHING_ELSE] = [_KindOfChange("", float(np.logaddexp.reduce(logs)), 0.0, 0.0)]
+        evidence.setdefault(place, {})[kind] = total
+        sizes[place, kind] = middle, math.sqrt(float(np.square(amounts - middle) @ weights))
 
     # each place is as likely as the other beforehand
+    nothing = float(logs_of(np.zeros((1, 4)), np.zeros((1, 4)))[0])
     chances = {NOWHERE: nothing + math.log(use.unchanged)}
-    for place, kinds in tried.items():
-        each = (1.0 - use.unchanged) / (len(tried) * len(kinds))
-        chances[place] = float(np.logaddexp.reduce([k.evidence + math.log(each) for k in kinds]))
+    for place, kinds in evidence.items():
+        each = math.log((1.0 - use.unchanged) / (len(evidence) * len(kinds)))
+        chances[place] = float(np.logaddexp.reduce(list(kinds.values()))) + each
     whole = np.logaddexp.reduce(list(chances.values()))
     places = {place: math.exp(log - whole) for place, log in chances.items()}
-    kinds = tried.get(max(places, key=places.__getitem__), [])
-    best = max(kinds, key=lambda k: k.evidence, default=_KindOfChange("", 0.0, 0.0, 0.0))
-    total = np.logaddexp.reduce([k.evidence for k in kinds]) if kinds else 0.0
-    by_kind = {k.kind: math.exp(k.evidence - total) for k in kinds}
+    likeliest = max(places, key=places.__getitem__)
+    kinds = evidence.get(likeliest, {"": 0.0})
+    total = np.logaddexp.reduce(list(kinds.values()))
+    best = max(kinds, key=kinds.__getitem__)
     usual = np.tensordot(np.exp(scale_logs), unchanged, 1)
     return Change(
         tuple(before),
@@ -174,20 +175,9 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
         difference,
         np.sqrt(np.diagonal(usual)),
         places,
-        by_kind.get("weaker", 0.0),
-        by_kind.get("carries more", 0.0),
-        best.amount,
-        best.spread,
+        *(math.exp(kinds.get(kind, -math.inf) - total) for kind in ("weaker", "carries more")),
+        *((0.0, 0.0) if best == "" else sizes[likeliest, best]),
     )
-
-
-class _KindOfChange(NamedTuple):
-    """A kind of change at one place."""
-
-    kind: str
-    evidence: float  # logarithm
-    amount: float  # mean, if this changed
-    spread: float  # standard deviation of the amount
 
 
 def _voltage_ratio(after: Sequence[Trim], before: Sequence[Trim]) -> float:
@@ -209,7 +199,7 @@ def _hypotheses() -> list[tuple[str, str]]:
     """Return every place and kind of change."""
     weaker = [(place, "weaker") for place in _ROTORS]
     heavier = [(place, "carries more") for place in (*_ROTORS, *_SIDES)]
-    return [*weaker, *heavier, ("all rotors", "carries more")]
+    return [*weaker, *heavier, ("all rotors", "carries more"), (SOMETHING_ELSE, "")]
 
 
 def _moved(place: str, kind: str, amount: float, shares: Array) -> Array:

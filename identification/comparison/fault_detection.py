@@ -72,7 +72,6 @@ class RotorFault:
     remaining: tuple[float, float, float]  # share of its thrust that is left
     seconds: float  # of flight that were looked at
     ended: str  # why nothing later was looked at; empty: the log's end
-    lag: float  # s, of the rotors
     motor_names: tuple[str, str, str, str] | None
 
     @property
@@ -119,7 +118,6 @@ def find_fault(channels: Channels) -> RotorFault:
         remaining,
         len(samples.t) * STEP,
         samples.ended,
-        best.balance.lag,
         channels.motor_names,
     )
 

@@ -24,7 +24,6 @@ from .manifest import FleetLog
 
 _CODE = ("runtime", "dynamics", "estimator", "identification")
 _NOT_CODE = ("identification/fleet", "identification/report")  # tell what was found, find nothing
-_BLOCK = 2**20  # bytes read at a time
 # of report.json, what a fleet keeps of a flight
 _KEPT = (
     *("verdict", "remainder", "headline", "effects", "error"),
@@ -41,34 +40,28 @@ class LogTask:
     without: tuple[str, ...] = ()  # effects taken out of the library
 
 
-def key_of(log: FleetLog, without: tuple[str, ...], known: dict[str, str]) -> str:
+def key_of(log: FleetLog, without: tuple[str, ...]) -> str:
     """Return what an outcome depends on, as a digest (32 hexadecimal digits): the log's bytes, the
     vehicle, the reader or map, the effects that are left out, and the code.
 
     Args:
         log: the log.
         without: effects taken out of the library.
-        known: texts of vehicles, filled here.
 
     Raises:
         InputError: the log cannot be read.
     """
-    digest = hashlib.blake2b(digest_size=16)
-    vehicle = log.vehicle or ""
-    if vehicle and vehicle not in known:
-        known[vehicle] = dump_vehicle(load_vehicle(vehicle))
     reader = log.reader or ""
     option = Path(reader.partition(":")[2])
-    log_map = "" if log.map is None else repr(load_map(log.map))
-    for text in (
-        known.get(vehicle, ""),
+    texts = (
+        "" if log.vehicle is None else dump_vehicle(load_vehicle(log.vehicle)),
         reader,
         option.read_text(encoding="utf-8", errors="replace") if option.is_file() else "",
-        log_map,
+        "" if log.map is None else repr(load_map(log.map)),
         *sorted(without),
         code_digest(_CODE, (), _NOT_CODE),
-    ):
-        digest.update(len(text.encode()).to_bytes(8, "big") + text.encode())
+    )
+    digest = hashlib.blake2b(repr(texts).encode(), digest_size=16)
     path = Path(log.path)
     files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
     try:
@@ -76,8 +69,7 @@ def key_of(log: FleetLog, without: tuple[str, ...], known: dict[str, str]) -> st
             if not file.is_file():  # a pipe would never end
                 raise InputError(f"{file}: is no regular file")
             with open(file, "rb") as data:
-                while block := data.read(_BLOCK):
-                    digest.update(block)
+                digest.update(hashlib.file_digest(data, "blake2b").digest())
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
     return digest.hexdigest()

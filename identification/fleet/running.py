@@ -50,7 +50,6 @@ def run_fleet(
     counts = {"kept": 0, "diagnosed": 0, "refused": 0}
     done: list[LogTask] = []
     first: dict[str, str] = {}  # the first log of each key: another one is its copy
-    texts: dict[str, str] = {}
 
     def keep(outcome: Outcome) -> None:
         if outcomes.get(outcome["key"]) != outcome:
@@ -61,7 +60,7 @@ def run_fleet(
     def pending() -> Iterator[LogTask]:
         for log in logs:
             try:
-                key = key_of(log, without, texts)
+                key = key_of(log, without)
                 unread = None
             except InputError as error:
                 key, unread = _key_of_name(log), str(error)

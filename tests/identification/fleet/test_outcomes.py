@@ -55,7 +55,7 @@ def test_the_key_is_of_all_that_an_outcome_depends_on(tmp_path):
     other.write_text("1")
 
     def key(file=path, without=(), **given):
-        return key_of(FleetLog(str(file), "a", **given), without, {})
+        return key_of(FleetLog(str(file), "a", **given), without)
 
     assert key() == key() == key(other) == key(id="x", time=3.0)
     keys = {key(), key(vehicle="ardrone2"), key(vehicle="crazyflie"), key(reader="nanobench")}
