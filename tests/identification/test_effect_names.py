@@ -1,15 +1,12 @@
 """A diagnosis knows effects by what they declare: their names may be any."""
 
-import ast
 import json
 import re
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import pytest
 
-import windwrench.identification as room
 from tests.support.imu_flights import imu_flight, pose_removed
 from tests.support.own_effects import copied, joined, renamed
 from windwrench.dynamics import EffectSetting, load_vehicle
@@ -19,49 +16,6 @@ from windwrench.identification.report.files import report_data
 from windwrench.studies.trials.practice_flights import fly_practice
 
 VEHICLE = load_vehicle("ardrone2")
-MODULES = sorted(Path(room.__file__).parent.rglob("*.py"))
-
-
-def named_in(source: str) -> list[str]:
-    """Return the effects' names in the code and the strings of a source, docstrings left out.
-
-    A name that is an English word as well (mass, wind) counts where a string is that word alone.
-    """
-    tree = ast.parse(source)
-    docstrings = {
-        id(node.body[0].value)
-        for node in ast.walk(tree)
-        if isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef))
-        and node.body
-        and isinstance(node.body[0], ast.Expr)
-    }
-    word = re.compile(rf"\b(?:{'|'.join(n for n in names() if '_' in n)})\b")
-    known = set(names())
-    found = []
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str):
-            if id(node) not in docstrings:
-                found += [node.value] if node.value in known else word.findall(node.value)
-        else:
-            text = (
-                getattr(node, "id", None) or getattr(node, "attr", None) or getattr(node, "arg", "")
-            )
-            found += word.findall(text) if isinstance(text, str) else []
-            if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
-                found += word.findall(node.name)
-    return found
-
-
-@pytest.mark.parametrize("path", MODULES, ids=lambda p: p.relative_to(MODULES[0].parent).as_posix())
-def test_no_effect_is_known_by_its_name(path):
-    assert named_in(path.read_text(encoding="utf-8")) == []
-
-
-def test_a_name_is_found():
-    assert named_in('x = {"mass": 1}') == ["mass"]
-    assert named_in('x = f"{a} may be a motor_lag"') == ["motor_lag"]
-    assert named_in("def thrust_scale(mass): return mass") == ["thrust_scale"]
-    assert named_in('"""The wind and a motor_lag."""\nx = "the mass of a vehicle"') == []
 
 
 FLIGHTS = {

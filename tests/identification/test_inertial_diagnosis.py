@@ -8,10 +8,7 @@ from tests.support.imu_flights import imu_flight, pose_removed
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.inference import regression
 from windwrench.identification.inference.regression import Flights
-from windwrench.identification.logs.flight_log import FlightLog
-from windwrench.identification.motion.inertial_signals import InertialSignals, inertial_signals
 from windwrench.identification.report.files import report_data
 from windwrench.runtime.errors import InputError
 
@@ -47,26 +44,6 @@ def test_what_a_few_positions_add() -> None:
     assert {"rotor_drag", "wind", "fan_jet"} <= alone.needs_pose
     assert "rotor_drag" not in placed.not_identifiable
     assert not {"rotor_efficiency", "motor_lag", "inertia"} & alone.not_identifiable
-
-
-def test_a_log_is_fused_once_whatever_is_asked_of_it(monkeypatch) -> None:
-    """No effect changes what an IMU measured: the log and its louder copy are fused, and no more,
-    though effects that act on the pose cut pieces of their own.
-    """
-    log = pose_removed(imu_flight(VEHICLE, seconds=5.0), 20)
-    fused: list[str] = []
-
-    def counted(log: FlightLog, gravity: float) -> list[InertialSignals]:
-        fused.append(log.name)
-        return inertial_signals(log, gravity)
-
-    monkeypatch.setattr(regression, "inertial_signals", counted)
-    flights = Flights([log], VEHICLE)
-    assert len(fused) == 2
-    settings: tuple[regression.Setting, ...] = ({}, {"clock_offset": {"dt": 0.01}})
-    still, moved = (flights.pieces(setting) for setting in settings)
-    assert still is not moved
-    assert len(fused) == 2
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import pytest
 from tests.support.imu_flights import imu_flight, pose_removed
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
-from windwrench.identification.inertial_wrench import _smoothed_force, _smoothed_turning
+from windwrench.identification.inertial_wrench import _smoothed_force
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.wrench_series import estimate_log, truth_rmse, tune_to_log
 from windwrench.runtime.errors import InputError
@@ -60,30 +60,3 @@ def test_the_force_is_the_posterior_of_a_walk() -> None:
     inner = slice(150, 250)
     np.testing.assert_allclose(found[inner], (covariance @ y / variance)[inner], atol=1e-5)
     assert std == pytest.approx(np.sqrt(covariance[200, 200]), rel=1e-4)
-
-
-def test_the_torque_is_the_posterior_of_a_walk_behind_the_gyro() -> None:
-    """The same of an angular acceleration, of which the gyro shows the integral."""
-    rng = np.random.default_rng(1)
-    n, T, walk, miss, variance = 300, 0.01, 0.04, 1e-4, 1e-3
-    a = np.cumsum(np.sqrt(walk) * rng.standard_normal(n))
-    driven = np.sin(0.1 * np.arange(n))
-    acting = np.append(0.0, 0.5 * T * (driven[:-1] + driven[1:]))
-    rate = np.cumsum(np.append(0.0, T * a[:-1]) + acting)
-    rate += np.sqrt(variance) * rng.standard_normal(n)
-    found, std = _smoothed_turning(rate, driven, T, walk, miss, variance)
-    # unknowns: rate and acceleration at each sample
-    eye, nothing = np.eye(n), np.zeros((n, n))
-    rows = [np.hstack([eye, nothing]) / np.sqrt(variance)]
-    right = [rate / np.sqrt(variance)]
-    step = np.diff(eye, axis=0)
-    rows.append(np.hstack([step, -T * eye[:-1]]) / np.sqrt(miss))
-    right.append(acting[1:] / np.sqrt(miss))
-    rows.append(np.hstack([np.zeros((n - 1, n)), step]) / np.sqrt(walk))
-    right.append(np.zeros(n - 1))
-    A, b = np.vstack(rows), np.concatenate(right)
-    covariance = np.linalg.inv(A.T @ A)
-    expected = covariance @ (A.T @ b)
-    inner = slice(130, 170)
-    np.testing.assert_allclose(found[inner], expected[n:][inner], atol=1e-3)
-    assert std == pytest.approx(np.sqrt(covariance[n + 150, n + 150]), rel=1e-3)

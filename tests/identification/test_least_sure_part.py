@@ -3,13 +3,12 @@ effects that a flight cannot tell apart.
 """
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import pytest
 
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.inference.commanded_rotors import COMMANDED, thrust_is_assumed
+from windwrench.identification.inference.commanded_rotors import COMMANDED
 from windwrench.identification.inference.regression import lost_behind_a_filter
 from windwrench.identification.report.words import headline
 from windwrench.studies.trials.logged_poses import FILTERS
@@ -41,14 +40,6 @@ def test_a_factor_on_thrust_from_commands_alone_is_never_sure(name, value):
         )
     assert found.verdict == "partly explained"
     assert headline(found).startswith("These logs cannot tell ")
-
-
-def test_a_stated_motor_curve_says_how_much_thrust_a_command_makes():
-    log = SimpleNamespace(commanded=True)
-    assert thrust_is_assumed([log], SimpleNamespace())
-    assert thrust_is_assumed([log], SimpleNamespace(motor_curve=None))
-    assert not thrust_is_assumed([log], SimpleNamespace(motor_curve=object()))
-    assert not thrust_is_assumed([SimpleNamespace(commanded=False)], SimpleNamespace())
 
 
 @pytest.mark.parametrize(

@@ -76,17 +76,6 @@ def test_a_crazyswarm2_flight_carries_what_hangs_from_it(number, load, vehicle):
     assert np.abs(series.torque[settled]).max() < 1e-3
 
 
-def test_a_px4_log_of_motors_that_stand_still_is_refused(vehicle):
-    with pytest.raises(
-        InputError,
-        match=(
-            r"sample\.ulg: no motors that turn; expected esc_status .*, found "
-            "actuator_outputs, vehicle_attitude, vehicle_local_position"
-        ),
-    ):
-        read_log(excerpt("px4/sample.ulg"), "px4_ulog", vehicle)
-
-
 def test_a_diagnosis_of_one_flight_explains_another(logs, vehicle):
     """Fitted on a circle, judged on a helix, by motion capture and by an accelerometer that nothing
     else looks at.

@@ -84,10 +84,6 @@ def test_a_log_without_its_sensing_effects_leaves_the_residual_of_a_clean_flight
     assert np.max(after[before < 1.5]) < 1.2
 
 
-def test_a_vehicle_without_sensing_effects_keeps_its_log(clean):
-    assert undo_log_sensing(clean, VEHICLE.with_effects(typical("rotor_drag"))) is clean
-
-
 def test_a_delayed_pose_is_not_made_up_after_a_gap():
     late = VEHICLE.with_effects(EffectSetting("clock_offset", {"dt": -0.03}))
     log = without_pose(fly(*late.effects, seconds=8.0), slice(800, 900))
@@ -97,17 +93,6 @@ def test_a_delayed_pose_is_not_made_up_after_a_gap():
     # the pose of a row is the log's of 6 rows before, and the turn rates are the row's own
     np.testing.assert_allclose(corrected.position[906:], log.position[900:-6], atol=1e-12)
     np.testing.assert_array_equal(corrected.rotor_speeds, log.rotor_speeds)
-
-
-@pytest.mark.parametrize("dt", [0.03, -0.03])
-def test_the_voltage_of_a_log_with_a_clock_offset_is_that_of_the_flight_it_tells(clean, dt):
-    log = replace(clean, voltage=11.0 + 0.1 * np.sin(3.0 * clean.t))
-    corrected = undo_log_sensing(
-        log, VEHICLE.with_effects(EffectSetting("clock_offset", {"dt": dt}))
-    )
-    np.testing.assert_allclose(corrected.voltage[6:], log.voltage[:-6], atol=1e-9)
-    late = log.rotor_speeds[:-6] if dt > 0.0 else log.rotor_speeds[6:]
-    np.testing.assert_allclose(corrected.rotor_speeds[6:], late, atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -132,18 +117,6 @@ def test_the_missing_effect_brings_prediction_back_to_the_flight(name, trajector
     assert rollout_error(log, whole, SEGMENTS) < ratio * rollout_error(log, VEHICLE, SEGMENTS)
     assert nis_without_wrench_state(log, whole, SEGMENTS) < nis_without_wrench_state(
         log, VEHICLE, SEGMENTS
-    )
-
-
-def test_time_runs_from_the_start_of_the_log():
-    """After a break, thrust goes on fading from where it was."""
-    effect = EffectSetting("thrust_fade", {"rate": 4e-3})
-    log = without_pose(fly(effect, trajectory="gentle", settings=None), slice(2200, 2800))
-    after = [(15.0, 24.0)]
-    whole = VEHICLE.with_effects(effect)
-    assert rollout_error(log, whole, after) < 0.25 * rollout_error(log, VEHICLE, after)
-    assert nis_without_wrench_state(log, whole, after) < nis_without_wrench_state(
-        log, VEHICLE, after
     )
 
 
@@ -188,17 +161,3 @@ def test_only_whole_predictions_inside_a_segment_count(clean):
     assert rollout_error(push, VEHICLE, [(19.2, 20.7)]) > 0.3
     assert math.isnan(rollout_error(clean, VEHICLE, [(4.0, 4.9)]))
     assert math.isnan(rollout_error(clean, VEHICLE, []))
-
-
-def test_a_gap_is_left_out(clean):
-    gap = without_pose(clean, slice(1000, 1600))
-    whole, broken = (
-        rollout_error(clean, VEHICLE, [(10.0, 22.0)]),
-        rollout_error(gap, VEHICLE, [(3.0, 22.0)]),
-    )
-    assert broken < 1.5 * whole
-    assert math.isnan(rollout_error(gap, VEHICLE, [(5.2, 7.8)]))
-    assert math.isnan(nis_without_wrench_state(gap, VEHICLE, [(5.2, 7.8)]))
-    assert nis_without_wrench_state(gap, VEHICLE, [(10.0, 22.0)]) == pytest.approx(
-        nis_without_wrench_state(clean, VEHICLE, [(10.0, 22.0)]), rel=0.02
-    )

@@ -1,6 +1,5 @@
 import csv
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -18,7 +17,6 @@ from windwrench.identification.logs.flight_phases import (
     TAKE_OFF,
     flight_phases,
 )
-from windwrench.identification.report.wrench_picture import plot_wrench
 from windwrench.identification.wrench_series import (
     counts,
     estimate_log,
@@ -193,13 +191,6 @@ def test_wrench_csv(vehicle, tmp_path):
         write_wrench(series, tmp_path / "file")
 
 
-def test_the_picture_shows_truth_and_lost_poses(vehicle, tmp_path):
-    log = held_flight(vehicle, 0.005 * np.arange(300), lost=slice(100, 140))
-    path = plot_wrench(estimate_log(log, vehicle), log, tmp_path / "wrench.png")
-    assert path.read_bytes().startswith(b"\x89PNG")
-    assert [p.name for p in tmp_path.iterdir()] == ["wrench.png"]
-
-
 # phases
 
 
@@ -220,28 +211,6 @@ def test_phases_of_a_hop(vehicle, top, bounce):
     np.testing.assert_allclose([phase.end for phase in phases[:4]], edges, atol=0.3)
     assert phases[0].start == t[0]
     assert phases[-1].end == t[-1]
-
-
-@settings(max_examples=50, deadline=None)
-@given(
-    top=st.floats(0.0, 5.0),
-    climb=st.floats(0.05, 10.0),
-    stay=st.floats(0.05, 5.0),
-    start=st.floats(0.0, 0.9),
-    end=st.floats(0.1, 1.0),
-)
-def test_phases_cover_the_log_in_order(top, climb, stay, start, end):
-    vehicle = load_vehicle("crazyflie")
-    t, height, speeds, _ = hop(vehicle, top=top, climb=climb, stay=stay)
-    part = slice(int(start * len(t)), max(int(start * len(t)) + 2, int(end * len(t))))
-    t, height, speeds = t[part], height[part], speeds[part]
-    phases = flight_phases(t, height, speeds, vehicle)
-    assert phases[0].start == t[0]
-    assert phases[-1].end == t[-1]
-    for one, other in pairwise(phases):
-        assert one.start < one.end == other.start
-    still = flight_phases(t, height, 0 * speeds, vehicle)
-    assert [phase.name for phase in still] == [GROUND]
 
 
 def test_gyro_and_accelerometer_of_a_log_sharpen_its_estimate(vehicle):

@@ -40,21 +40,6 @@ def test_means_over_an_interval_are_those_of_what_is_linear_between_samples():
     assert samples.t[0] > 1.5  # what may still be taking off is left out
 
 
-@pytest.mark.parametrize(
-    ("bend", "dead", "expected"), [(0.0, 0.0, 1.5), (1.0, 0.0, 2.25), (1.0, 0.5, 4.0)]
-)
-def test_thrust_follows_the_command_by_its_curve(bend, dead, expected):
-    command = np.full((1600, 4), 0.4)
-    command[1200:, 2] = 0.6
-    samples = sample(hover(command=command))
-    thrust = samples.thrust(0.0, bend, dead)
-    np.testing.assert_allclose(thrust[:100], 1.0)
-    np.testing.assert_allclose(thrust[-20:], np.tile([1.0, 1.0, expected, 1.0], (20, 1)))
-    lagged = samples.thrust(0.05, bend, dead)
-    k = np.searchsorted(samples.t, 6.0 + 0.05)
-    assert lagged[k, 2] - 1.0 == pytest.approx((1.0 - np.exp(-1.0)) * (expected - 1.0), rel=0.15)
-
-
 def test_nothing_is_read_behind_a_clipped_gyro_or_an_impact():
     t = np.arange(0.0, 8.0, 0.005)
     clipped = np.zeros((len(t), 3))
@@ -70,27 +55,6 @@ def test_nothing_is_read_behind_a_clipped_gyro_or_an_impact():
     turning = np.zeros((len(t), 3))
     turning[:, 2] = 2.0  # a steady turn is no clipped gyro
     assert sample(hover(gyro=turning)).ended == ""
-
-
-def test_a_log_of_the_kits_format_gives_its_channels():
-    channels = hover()
-    n = len(channels.gyro_times)
-    nothing = np.full((n, 4), np.nan)
-    gyro = channels.gyro.copy()
-    gyro[::2] = np.nan
-    log = FlightLog(
-        t=channels.gyro_times,
-        position=nothing[:, :3],
-        quaternion=nothing,
-        rotor_speeds=np.full((n, 4), 400.0),
-        gyro=gyro,
-        accelerometer=channels.accelerometer,
-        name="flight",
-    )
-    found = channels_of_log(log)
-    assert found.thrust_known
-    assert len(found.gyro_times) == n // 2
-    np.testing.assert_allclose(found.command, 160_000.0)
 
 
 def test_what_cannot_show_a_fault_is_refused():

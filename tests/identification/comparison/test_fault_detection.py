@@ -9,8 +9,7 @@ from typer.testing import CliRunner
 from tests.support.data_paths import data_file
 from tests.support.golden_identification import failing_flight
 from windwrench.cli import app
-from windwrench.identification.comparison.fault_balance import AT_ONCE, Begin, FaultBalance
-from windwrench.identification.comparison.fault_channels import channels_of_log, sample
+from windwrench.identification.comparison.fault_channels import channels_of_log
 from windwrench.identification.comparison.fault_detection import find_fault
 from windwrench.identification.comparison.fault_noise import ORDER, fit_noise
 from windwrench.identification.comparison.words import fault_data, fault_headline
@@ -30,32 +29,6 @@ def test_the_noise_of_an_autoregression_is_whitened():
     np.testing.assert_allclose(white, drive[noise.whole], atol=0.5)
     assert noise.variance == pytest.approx(1.0, abs=0.06)
     assert not noise.whole[:ORDER].any()
-
-
-def test_a_step_is_weighed_as_if_it_were_fitted_at_every_time():
-    """The sums that run backwards, against one regression a time."""
-    samples = sample(channels_of_log(failing_flight()))
-    balance = FaultBalance(samples, samples.thrust(0.03, 0.0, 0.0), 0.03)
-    noise = balance.noises(balance.residuals())
-    rows = np.array([60, 150, len(samples.t) - 6])
-    for begin in (AT_ONCE, Begin(0.25, True)):
-        found = balance.steps(noise, rows, begin)
-        for row, value in zip(rows, found, strict=True):
-            share = balance._share(int(row), begin)
-            expected = 0.0
-            for c, one in enumerate(noise):
-                columns = [balance.moment[:, c], share, balance.free_columns[c]]
-                x = one.whiten(np.column_stack(columns))
-                plain = np.delete(x, 1, axis=1)
-                y = one.whiten(balance.y[:, c])
-                left, before = (
-                    float(np.sum(np.square(y - m @ np.linalg.lstsq(m, y, rcond=None)[0])))
-                    for m in (x, plain)
-                )
-                width = np.log(max((before - left) / one.variance, 1.0))
-                price = 0.5 * max(1.0 + width, np.log(len(y)))
-                expected += -0.5 * len(y) * np.log(left / len(y)) - one.log_scale - price
-            assert value == pytest.approx(expected, rel=1e-6)
 
 
 def test_a_failing_rotor_is_named_with_its_time():

@@ -8,18 +8,12 @@ from windwrench.identification.inference.commanded_rotors import (
     COMMANDED,
     DEVIATION_SIZES,
     THRUST_SCALE,
-    assumed_thrust_doubts,
     cancels_thrust_scale,
     deviation,
-    deviation_size,
     deviations,
-    downsampled,
     in_flight_by_thrust,
-    similar_effects,
-    without_deviations,
 )
 from windwrench.identification.logs.flight_log import FlightLog
-from windwrench.identification.motion.signals import log_signals
 
 VEHICLE = load_vehicle("ardrone2")
 
@@ -50,23 +44,6 @@ def test_deviations_of_flights_sum_to_zero_and_are_apart(count):
     np.testing.assert_allclose(products, np.diag(np.diagonal(products)), atol=1e-12)
 
 
-def test_a_test_flight_has_no_deviation_and_a_setting_can_lose_them():
-    setting = {"": {f"{THRUST_SCALE} 1": 0.1, "rotor_time_offset": 0.002}, "mass": {"dm": 0.1}}
-    assert deviation(setting, THRUST_SCALE, 2, 2) == 0.0
-    assert deviation(setting, THRUST_SCALE, 1, 2) == 0.1
-    assert deviation_size("rotor_time_offset") is None
-    left = without_deviations(setting)
-    assert left == {"": {"rotor_time_offset": 0.002}, "mass": {"dm": 0.1}}
-
-
-def test_signals_are_thinned_to_fifty_a_second():
-    (signals,) = log_signals(still())
-    thin = downsampled(signals)
-    assert thin.period == pytest.approx(COMMANDED.period)
-    assert len(thin.t) == len(thin.rotor_speeds) == -(-len(signals.t) // 4)
-    assert downsampled(thin) is thin
-
-
 def test_only_the_time_in_the_air_counts():
     log = still(20.0)
     speeds = log.rotor_speeds.copy()
@@ -85,10 +62,3 @@ def test_a_force_that_cancels_the_scale_of_thrust_is_none():
     assert cancels_thrust_scale({**less, "constant_force": {**up, "fz": 0.08 * weight}}, weight)
     assert not cancels_thrust_scale({**less, "constant_force": {**up, "fz": 0.02 * weight}}, weight)
     assert not cancels_thrust_scale({**less, "constant_force": {**up, "fz": -0.1 * weight}}, weight)
-
-
-def test_effects_of_one_trace_are_alike_and_rest_on_the_same_assumption():
-    assert "mass" in similar_effects("thrust_scale")
-    assert "thrust_scale" not in similar_effects("thrust_scale")
-    (doubt,) = assumed_thrust_doubts(["thrust_scale", "rotor_drag"])
-    assert doubt.startswith("thrust_scale: ")

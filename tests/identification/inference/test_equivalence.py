@@ -7,7 +7,6 @@ import pytest
 from tests.support.searches import VEHICLE, searched, settings
 from windwrench.identification.inference.equivalence import (
     composite_doubts,
-    unlisted_equivalent_doubts,
 )
 from windwrench.identification.inference.search import FittedEffects
 from windwrench.studies.trials.practice_flights import fly_practice
@@ -38,34 +37,6 @@ def test_what_coincides_within_its_noise_may_be_one_effect():
     assert len(composite_doubts(FLIGHTS, fit)) == 1
     fit.std["inertia", "jx"] = 0.004
     assert not composite_doubts(FLIGHTS, fit)
-
-
-@pytest.mark.parametrize(
-    ("dm", "cx", "hangs"), [(0.02, 0.0, True), (0.02, 0.002, False), (-0.02, 0.0, False)]
-)
-def test_mass_and_a_centre_below_may_be_a_load_that_hangs(dm, cx, hangs):
-    fit = FittedEffects({"mass": {"dm": dm}, "com_offset": {"cx": cx, "cy": 0.0, "cz": 0.004}})
-    library = ("mass", "thrust_scale", "com_offset")
-    assert (
-        bool(unlisted_equivalent_doubts(SimpleNamespace(flights=FLIGHTS, library=library), fit))
-        == hangs
-    )
-    # where a load is in the library, it has been tried in their place
-    assert not unlisted_equivalent_doubts(
-        SimpleNamespace(flights=FLIGHTS, library=(*library, "slung_payload")), fit
-    )
-
-
-def test_more_than_two_effects_may_stand_for_one():
-    three = {
-        "mass": {"dm": 0.02},
-        "com_offset": {"cx": 0.005, "cy": 0.0, "cz": 0.0},
-        "battery_sag": {"n": 1.0},
-    }
-    assert len(composite_doubts(FLIGHTS, FittedEffects(three))) == 1
-    assert not composite_doubts(
-        FLIGHTS, FittedEffects({name: three[name] for name in ("mass", "com_offset")})
-    )
 
 
 @pytest.mark.parametrize("trajectory", ["hover", "vertical"])

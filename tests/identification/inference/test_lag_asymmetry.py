@@ -6,24 +6,10 @@ import numpy as np
 import pytest
 
 from tests.support.searches import VEHICLE, recorded, searched
-from windwrench.dynamics.vehicle import EffectSetting
-from windwrench.identification.inference.time_offsets import with_uneven_lag
-from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass
 
 TAU, APART = 0.03, 0.008  # s: 22 ms up, 38 ms down
 EFFECTS = {"motor_lag": {"tau": TAU}, "mass": {"dm": 0.0}}
-
-
-def followed(commands, period, up, down):
-    """Rotor speeds behind a lag of two time constants, integrated in steps far below them."""
-    out, now = np.empty_like(commands), commands[0].copy()
-    for k, wanted in enumerate(commands):
-        for _ in range(20):
-            tau = np.where(wanted > now, up, down)
-            now = now + period / 20 * (wanted - now) / tau
-        out[k] = now
-    return out
 
 
 def flown(commanded):
@@ -33,19 +19,6 @@ def flown(commanded):
     rate = np.gradient(speeds, log.period, axis=0)
     tau = np.where(rate > 0.0, TAU - APART, TAU + APART)
     return replace(log, rotor_speeds=speeds + tau * rate if commanded else speeds)
-
-
-def test_the_first_order_is_most_of_it():
-    (signals,) = log_signals(flown(commanded=True))
-    lag = VEHICLE.with_effects(EffectSetting("motor_lag", {"tau": TAU}))
-    commands, period = signals.rotor_speeds, signals.period
-    even = followed(commands, period, TAU, TAU)
-    uneven = followed(commands, period, TAU - APART, TAU + APART)
-    near = followed(with_uneven_lag(signals, lag, APART).rotor_speeds, period, TAU, TAU)
-    inner = slice(100, -100)
-    left, whole = (np.sqrt(np.mean((x - uneven)[inner] ** 2)) for x in (near, even))
-    assert left < 0.25 * whole
-    assert with_uneven_lag(signals, VEHICLE, APART) is signals  # without a lag there is none
 
 
 def fitted(log, *effects):

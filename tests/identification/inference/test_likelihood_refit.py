@@ -2,8 +2,6 @@
 as it is.
 """
 
-from types import SimpleNamespace
-
 import pytest
 
 from tests.support.searches import VEHICLE, searched, settings
@@ -15,7 +13,6 @@ from windwrench.identification.inference.likelihood_refit import (
     refitted_by_likelihood,
     with_lag,
 )
-from windwrench.identification.inference.search import FittedEffects
 from windwrench.identification.inference.time_offsets import (
     ROTOR_TIME_OFFSET,
 )
@@ -62,29 +59,6 @@ def test_lag_and_delay_are_told_apart(truth, guess):
         )
 
 
-def test_a_lag_takes_no_delay_s_place_that_the_library_lacks():
-    search, fit = fitted(
-        {"motor_lag": {"tau": 0.012}},
-        {"latency": {"d": 0.01}},
-        seconds=20.0,
-        seed=4,
-        turbulence=0.0,
-    )
-    search.library = tuple(name for name in search.library if name != "motor_lag")
-    assert with_lag(search, fit) is fit
-
-
-@pytest.mark.parametrize(("effect", "other"), [("motor_lag", "latency"), ("latency", "motor_lag")])
-def test_what_flights_do_not_tell_may_be_the_other_or_what_the_library_lacks(effect, other):
-    search = SimpleNamespace(library=names())
-    fit = FittedEffects({effect: {}})
-    assert other in delay_alternatives(search, fit, "either")[effect]
-    assert not delay_doubts(search, fit, "either")
-    search.library = (effect, "mass")
-    assert not delay_alternatives(search, fit, "either")[effect]
-    assert delay_doubts(search, fit, "either")
-
-
 def test_a_gain_of_the_attitude_has_no_share_of_its_noise():
     """On a gentle flight in twice the noise."""
     truth = {"attitude_gain": {"g": 0.05}}
@@ -94,11 +68,6 @@ def test_a_gain_of_the_attitude_has_no_share_of_its_noise():
     )
     assert by_residual > 0.02
     assert abs(by_innovations) < 0.3 * by_residual
-
-
-def test_other_effects_stay_as_they_are():
-    search, fit = fitted({"mass": {"dm": 0.03}}, {"mass": {"dm": 0.03}}, seconds=20.0, seed=4)
-    assert refitted_by_likelihood(search, fit) is fit
 
 
 def test_a_clock_beside_a_gain_of_the_attitude_is_measured_as_late_turn_rates():

@@ -51,8 +51,3 @@ def test_it_is_said_in_which_log_the_push_was():
     assert (push.log, push.channel) == ("pushed", "Fx")
     assert push.t == pytest.approx(12.25, abs=0.1)
     assert push.peak == pytest.approx(0.1 * VEHICLE.weight, rel=0.3)
-
-
-def test_a_flight_too_short_to_look_at_has_no_pushes():
-    log = fly_practice(VEHICLE, seconds=3.1, seed=6)
-    assert transient_disturbances(Flights([log], VEHICLE), {}) == []

@@ -25,13 +25,6 @@ def test_the_delay_that_was_flown(vehicle):
     assert found.std < 0.004
 
 
-def test_a_lag_shows_as_the_latency_of_what_it_delays():
-    model = load_vehicle("ardrone2")
-    found = turning_delay(flown(model, motor_lag={"tau": 0.04}), model)
-    assert found is not None
-    assert 0.025 < found.seconds < 0.042
-
-
 def test_moments_of_another_flight_show_no_delay():
     model = load_vehicle("ardrone2")
     pieces = [

@@ -37,23 +37,3 @@ def test_a_constant_that_nothing_explains_stays():
     )
     constant = np.full((ROWS, 6), 0.1)
     assert np.mean(off(constant)[50:] ** 2) > 0.5 * np.mean(plain(constant)[50:] ** 2) > 1.0
-
-
-def test_disturbances_count_as_noise_by_their_strength():
-    rng = np.random.default_rng(2)
-    quiet = 0.01 * rng.standard_normal((ROWS, 6))
-    gusts = 0.1 * coloured(rng, np.exp(-PERIOD / 0.25))
-    calm, windy = (
-        Whitener(quiet + x, quiet, NOWHERE, EVERYWHERE, PERIOD) for x in (0.0 * gusts, gusts)
-    )
-    slow = np.sin(2.0 * np.pi * 0.3 * PERIOD * np.arange(ROWS))[:, None] * np.full(6, 0.05)
-    assert np.mean(windy(slow) ** 2) < 0.1 * np.mean(calm(slow) ** 2)
-
-
-def test_the_first_rows_of_each_piece_are_lost():
-    start = NOWHERE | (np.arange(ROWS) == 3000)
-    noise = np.random.default_rng(3).standard_normal((ROWS, 6))
-    white = Whitener(noise, noise, start, EVERYWHERE, PERIOD)(noise)
-    for begin in (0, 3000):
-        assert not white[begin : begin + WHITENING.order].any()
-        assert white[begin + WHITENING.order :].any()

@@ -6,8 +6,6 @@ import pytest
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import compile_effects
 from windwrench.identification.motion.residual import (
-    acting_wrench,
-    needed_wrench,
     residual_wrench,
 )
 from windwrench.identification.motion.signals import log_signals
@@ -45,17 +43,3 @@ def test_the_residual_is_newton_and_euler(flown):
     np.testing.assert_allclose(
         residual_wrench(flown, VEHICLE), np.column_stack([force, torque]), atol=1e-10
     )
-
-
-def test_by_the_declared_body_it_is_the_same_accelerations(flown):
-    acting, by = acting_wrench(flown, VEHICLE, DECLARED)
-    assert by is DECLARED
-    body = compile_effects(VEHICLE).vehicle
-    r = residual_wrench(flown, VEHICLE)
-    r = np.column_stack(
-        [
-            DECLARED.mass / body.mass * r[:, :3],
-            np.linalg.solve(body.inertia, r[:, 3:].T).T @ DECLARED.inertia.T,
-        ]
-    )
-    np.testing.assert_allclose(needed_wrench(flown, DECLARED) - acting, r, atol=1e-10)

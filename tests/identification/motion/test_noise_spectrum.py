@@ -91,19 +91,6 @@ def test_channels_are_asked_one_by_one(log):
     assert not pose_was_filtered(made)
 
 
-@pytest.mark.parametrize("name", ["as measured", "causal 20 Hz"])
-def test_a_pose_that_is_lost_now_and_then_says_the_same(log, name):
-    whole = FILTERS[name](log, VEHICLE)
-    position, quaternion = whole.position.copy(), whole.quaternion.copy()
-    for k in range(200, len(log.t), 400):
-        position[k : k + 30], quaternion[k : k + 30] = np.nan, np.nan
-    torn = replace(whole, position=position, quaternion=quaternion, valid=np.zeros(0, bool))
-    assert not torn.valid.all()
-    assert pose_was_filtered(torn) == pose_was_filtered(whole) == (name != "as measured")
-    for one, other in zip(noise_spectra(whole)[:2], noise_spectra(torn)[:2], strict=True):
-        assert other.slope == pytest.approx(one.slope, rel=0.1, abs=0.3)
-
-
 def test_a_log_that_is_short_or_still_says_nothing():
     n = 300
     still = FlightLog(

@@ -89,34 +89,6 @@ def test_sensitivities_are_derivatives_of_the_predictions(vehicle):
     np.testing.assert_allclose(change, size * out[:, 1, 0], atol=1e-9)
 
 
-def test_what_is_known_of_a_state_is_added_before_the_pose_is_read(vehicle):
-    poses, six = hovering(vehicle), noise()
-    known = np.zeros((COUNT, 6, 3))
-    known[200, 1, 0], known[200, 5, 0], known[400, 4, 1] = 0.01, 0.02, 0.1
-    before, after = run(poses, vehicle, six), run(poses, vehicle, six, known)
-    np.testing.assert_array_equal(before.predicted[:200], after.predicted[:200])
-    moved = after.innovations[200] - before.innovations[200]
-    assert moved == pytest.approx([0.0, -0.01, 0.0, 0.0, 0.0, -0.02], abs=1e-5)
-    turned = after.innovations[401, 4] - after.innovations[400, 4]
-    assert turned == pytest.approx(-0.1 * PERIOD, rel=0.2)
-
-
-def test_a_piece_shorter_than_the_lags_has_no_innovations(vehicle):
-    rng = np.random.default_rng(3)
-    hover = np.sqrt(vehicle.weight / np.sum(vehicle.k))
-    inertias = np.array([vehicle.mass, *np.diagonal(vehicle.inertia)])
-    long, short = (
-        hovering(vehicle, hover + 0.1 * rng.standard_normal((n, 4)))
-        for n in (COUNT, FEEDBACK.lags // 2)
-    )
-    pieces = [(poses, run(poses, vehicle, noise())) for poses in (long, short)]
-    alone = rotor_innovations(pieces[:1], inertias)
-    both = rotor_innovations(pieces, inertias)
-    np.testing.assert_array_equal(alone[0], both[0])
-    assert both[1].shape == (FEEDBACK.lags // 2, 4)
-    assert not both[1].any()
-
-
 def test_only_what_the_past_does_not_predict_is_a_rotors_innovation(vehicle):
     count = 10 * COUNT
     rng = np.random.default_rng(2)

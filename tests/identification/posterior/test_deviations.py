@@ -7,7 +7,6 @@ from windwrench.identification.findings import NamedEffect, RankedSet, Ranking
 from windwrench.identification.posterior.deviations import (
     of_two_estimates,
     with_both_estimates,
-    without_other_estimate,
 )
 
 
@@ -22,12 +21,6 @@ def test_intervals_hold_where_both_estimates_are_wrong_alike():
     assert np.mean(np.square(std)) == pytest.approx(np.mean(np.square(own)), rel=0.1)
     assert np.mean(np.abs(own) < np.multiply(1.96, noise)) < 0.6
     assert np.mean(np.abs(own) < np.multiply(1.96, std)) > 0.8
-
-
-def test_the_deviation_of_one_estimate_alone_comes_back():
-    both = of_two_estimates(0.02, 1.0, 1.05)
-    assert without_other_estimate(both, 1.0, 1.05) == pytest.approx(0.02)
-    assert without_other_estimate(0.01, 1.0, 1.05) == 0.0
 
 
 def test_an_effect_that_no_set_has_stays_as_it_is():

@@ -39,16 +39,6 @@ def test_the_evidence_of_one_coefficient_is_the_integral(right, low):
     assert found.mode[0] == pytest.approx(max(right / 3.0, low))
 
 
-def test_bounds_hold_jointly():
-    # alone both would be positive; together the second pays for the first
-    m = Marginal(np.array([[50.0, 49.0], [49.0, 50.0]]), np.array([20.0, 5.0]), 0.0)
-    free = set_evidence(m, [0, 1], np.full(2, -np.inf), np.full(2, np.inf))
-    held = set_evidence(m, [0, 1], np.zeros(2), np.full(2, np.inf))
-    assert free.mode[1] < 0.0
-    assert held.mode[1] == 0.0
-    assert held.mode[0] == pytest.approx(20.0 / 51.0)
-
-
 def test_what_is_integrated_out_costs_what_it_explains():
     rng = np.random.default_rng(1)
     x, y = rng.standard_normal((300, 3)), rng.standard_normal(300)
@@ -96,8 +86,3 @@ def test_one_more_column_is_worth_the_mean_of_its_bayes_factors():
     assert found > 5.0
     without = evidence_of_one_more(normal, right, chosen, np.ones(2), np.array([2]), sizes)
     assert without < 0.0
-
-
-def test_log_sums():
-    assert log_sum([0.0, 0.0]) == pytest.approx(math.log(2.0))
-    assert log_sum([]) == -math.inf

@@ -2,13 +2,11 @@
 
 from dataclasses import dataclass, replace
 
-import numpy as np
 import pytest
 
 from windwrench.identification.posterior.pooling import (
     POOLING,
     SEARCH_ALONE,
-    SIGNS,
     Signs,
     explanations,
     pooled,
@@ -51,36 +49,10 @@ def test_what_flights_cannot_tell_apart_shares_its_probability():
     assert frozenset(["clock_offset"]) not in found
 
 
-def test_two_names_of_one_class_stay_two():
-    names = [Name("mass", indistinguishable_from=("inertia",)), Name("inertia")]
-    found = explanations(names, [(("mass", "inertia"), 1.0)])
-    assert found[frozenset(["mass", "inertia"])] == 0.0
-
-
 def test_what_the_posterior_never_tried_is_as_bad_as_can_be():
     found = explanations([Name("wind"), Name("rotor_drag")], [(("rotor_drag",), 1.0)])
     assert found[frozenset(["wind", "rotor_drag"])] == pytest.approx(-POOLING.most_worse)
     assert found[frozenset()] == pytest.approx(-POOLING.most_worse)
-
-
-def test_signs_make_something_unknown_likelier():
-    quiet = pooled([Name("mass")], BOTH, CALM)
-    loud = pooled([Name("mass", tentative=True)], BOTH, LOUD)
-    assert quiet.unknown < 0.2 < 0.5 < loud.unknown
-    assert loud.names["mass"] < quiet.names["mass"]
-
-
-def test_signs_have_their_ranges():
-    beyond = Signs(1, 2, -np.inf, 99.0).numbers([])
-    least, most = POOLING.disturbance_range[0], POOLING.structure_range[1]
-    np.testing.assert_allclose(beyond, [1, 1, 0, 1, 1, least, 0, most])
-
-
-def test_a_disturbance_counts_where_nothing_is_named():
-    """A name that stands for an unknown cause leaves little of it."""
-    loud = Signs(0, 0, 3.0, -1.0)
-    assert loud.numbers([Name("mass")])[SIGNS.index("disturbance")] == 0.0
-    assert pooled([], [((), 1.0)], loud).unknown > 0.99
 
 
 def test_a_check_that_doubts_makes_something_unknown_likelier():
@@ -90,22 +62,6 @@ def test_a_check_that_doubts_makes_something_unknown_likelier():
     ]
     assert found == sorted(found)
     assert found[0] < 0.05 < 0.2 < found[1] < 0.5 < found[3]
-
-
-def test_a_tentative_name_is_a_sign_and_so_is_none():
-    """What the weights of other signs are beside them: a sure name leaves little to doubt."""
-    sure, unsure, none = ([Name("mass")], [Name("mass", tentative=True)], [])
-    u = [pooled(named, BOTH, CALM).unknown for named in (sure, unsure, none)]
-    assert u[0] < 0.5 * u[1]
-    assert CALM.numbers(none)[SIGNS.index("nothing")] == 1.0
-    assert CALM.numbers(unsure)[SIGNS.index("unsure")] == 1.0
-
-
-def test_nothing_found_is_an_explanation_too():
-    found = pooled([], [((), 1.0)], CALM)
-    assert found.alternatives[0].effects == ()
-    assert found.names == {}
-    assert found.unknown + found.alternatives[0].probability == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("kind", SEARCH_ALONE)

@@ -4,7 +4,6 @@ import pytest
 
 from tests.support.searches import DRAG, VEHICLE, settings
 from windwrench.identification.inference.regression import Flights
-from windwrench.identification.posterior.likelihood import Likelihood
 from windwrench.identification.posterior.ranking import rank
 from windwrench.studies.trials.practice_flights import fly_practice
 
@@ -46,11 +45,3 @@ def test_what_another_search_proposes_is_asked_too():
     assert best.coefficients["wind"]["wx"] == pytest.approx(2.0, rel=0.1)
     # what lies outside the library is no proposal
     assert rank(flights, ("mass",), truth).sets == rank(flights, ("mass",)).sets
-
-
-def test_the_noise_is_that_of_the_flight():
-    noise = Likelihood(flown(), {}).noise
-    for axis in noise[:3]:
-        assert axis.pose == pytest.approx(VEHICLE.mocap.sigma_pos_m, rel=0.1)
-    for axis in noise[3:]:
-        assert axis.pose == pytest.approx(VEHICLE.mocap.sigma_att_rad, rel=0.1)

@@ -21,8 +21,7 @@ from windwrench.identification.findings import (
     NamedEffect,
     Structure,
 )
-from windwrench.identification.report.files import report_data, write_report
-from windwrench.identification.report.page import report_page
+from windwrench.identification.report.files import write_report
 from windwrench.identification.report.plot_numbers import candidate_bars
 from windwrench.identification.report.words import (
     headline,
@@ -237,14 +236,6 @@ def test_chart_and_names_agree(diagnosis):
     assert bars["mass"].width == pytest.approx(2 * bars["wind"].width, abs=0.2)
 
 
-def test_a_floor_that_is_a_bound_is_called_one(diagnosis):
-    made = replace(diagnosis, floor_is_bound=True)
-    assert "noise floor, at least" in Page(report_page(made, "command")).text
-    assert "noise floor, at least" not in Page(report_page(diagnosis, "command")).text
-    assert report_data(made)["floor_is_lower_bound"] is True
-    assert report_data(made)["headline"] == headline(made)
-
-
 class Page(HTMLParser):
     """The tags of a page, and its text."""
 
@@ -338,9 +329,7 @@ class TestInABrowser:
         ("kind", "width", "scripts"),
         [
             ("hard", 1280, True),
-            pytest.param("hard", 360, True, marks=pytest.mark.slow),
             pytest.param("hard", 360, False, marks=pytest.mark.slow),
-            pytest.param("hard", 1280, False, marks=pytest.mark.slow),
             pytest.param("plain", 390, True, marks=pytest.mark.slow),
         ],
     )

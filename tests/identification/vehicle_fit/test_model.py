@@ -11,7 +11,6 @@ from windwrench.identification.vehicle_fit.columns import (
 )
 from windwrench.identification.vehicle_fit.geometry import SPIN, parse_geometry
 from windwrench.identification.vehicle_fit.model import coefficients
-from windwrench.identification.vehicle_fit.result import told
 
 
 def test_coefficients_are_newton_and_euler():
@@ -65,11 +64,3 @@ def test_coefficients_are_newton_and_euler():
         want = np.linalg.solve(inertia, torque - np.cross(w, inertia @ w)) + np.array([0, 0.1, 0])
         assert got[i, :3] == pytest.approx(force, rel=1e-6, abs=1e-4)
         assert got[i, 3:] == pytest.approx(want, rel=1e-6, abs=2e-3)
-
-
-@pytest.mark.parametrize(
-    ("low", "high", "known"),
-    [(0.03, 0.05, True), (0.004, 0.33, False), (0.0, 1.0, False), (-0.1, 0.2, False)],
-)
-def test_an_interval_wider_than_half_the_value_tells_nothing(low, high, known):
-    assert told((0.04, low, high)) is known
