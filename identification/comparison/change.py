@@ -168,6 +168,7 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     kinds = evidence.get(likeliest, {"": 0.0})
     total = np.logaddexp.reduce(list(kinds.values()))
     best = max(kinds, key=kinds.__getitem__)
+    amount, amount_std = sizes[likeliest, best] if best else (0.0, 0.0)
     usual = np.tensordot(np.exp(scale_logs), unchanged, 1)
     return Change(
         tuple(before),
@@ -175,8 +176,10 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
         difference,
         np.sqrt(np.diagonal(usual)),
         places,
-        *(math.exp(kinds.get(kind, -math.inf) - total) for kind in ("weaker", "carries more")),
-        *((0.0, 0.0) if best == "" else sizes[likeliest, best]),
+        math.exp(kinds.get("weaker", -math.inf) - total),
+        math.exp(kinds.get("carries more", -math.inf) - total),
+        amount,
+        amount_std,
     )
 
 
