@@ -78,27 +78,18 @@ class Oracle(FanLaw):
 @dataclass(eq=False)
 class Admittance(FanLaw):
     """The admittance controller of McKinnon and Schoellig (2016): velocity in proportion to the yaw
-    torque.
+    torque, and where a second axis is commanded, to the pitch torque.
 
     ``gain`` times the jet's largest torque bounds the speed of a fan that the law can follow.
     """
 
-    gain: float = 18.0  # m/s per Nm
-
-    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
-        """Return ``-gain tau_z``."""
-        return (-self.gain * o[TORQUE_Z],)
-
-
-@dataclass(eq=False)
-class Admittance2D(FanLaw):
-    """Velocities in proportion to the torques, as in McKinnon and Schoellig (2016) for one."""
-
     gain: float = 18.0  # m/s per Nm, sideways
-    gain_z: float = 18.0  # m/s per Nm, up and down
+    gain_z: float | None = None  # m/s per Nm, up and down; None: not commanded
 
     def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
-        """Return ``-gain tau_z`` and ``gain_z tau_y``."""
+        """Return ``-gain tau_z``, and ``gain_z tau_y``."""
+        if self.gain_z is None:
+            return (-self.gain * o[TORQUE_Z],)
         return -self.gain * float(o[TORQUE_Z]), self.gain_z * float(o[TORQUE_Y])
 
 
@@ -108,25 +99,15 @@ class Ratio(FanLaw):
     falls off again.
     """
 
-    gain: float = 8.0  # m/s per m
-    least_force: float = 0.1  # N, below which the force is held to be no jet at all
-
-    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
-        """Return ``-gain tau_z / f_x``."""
-        return (-self.gain * o[TORQUE_Z] / max(float(o[FORCE_X]), self.least_force),)
-
-
-@dataclass(eq=False)
-class Ratio2D(FanLaw):
-    """Velocities in proportion to the torques over the force along the jet."""
-
     gain: float = 8.0  # m/s per m, sideways
-    gain_z: float = 8.0  # m/s per m, up and down
     least_force: float = 0.1  # N, below which the force is held to be no jet at all
+    gain_z: float | None = None  # m/s per m, up and down; None: not commanded
 
     def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
-        """Return ``-gain tau_z / f_x`` and ``gain_z tau_y / f_x``."""
+        """Return ``-gain tau_z / f_x``, and ``gain_z tau_y / f_x``."""
         force = max(float(o[FORCE_X]), self.least_force)
+        if self.gain_z is None:
+            return (-self.gain * o[TORQUE_Z] / force,)
         return -self.gain * float(o[TORQUE_Z]) / force, self.gain_z * float(o[TORQUE_Y]) / force
 
 

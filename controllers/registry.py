@@ -13,16 +13,7 @@ import yaml
 from numpy.typing import NDArray
 
 from ..runtime.errors import unknown_name
-from .fan_laws import (
-    Admittance,
-    Admittance2D,
-    AdmittancePID,
-    Hover,
-    Lead,
-    Oracle,
-    Ratio,
-    Ratio2D,
-)
+from .fan_laws import Admittance, AdmittancePID, Hover, Lead, Oracle, Ratio
 from .tracker import InformedTracker, Limit, Tracker
 from .wind_laws import INDI, PID, FlightLoopAlone, L1Adaptive, PIDWithForce, WindOracle
 
@@ -97,8 +88,8 @@ TASK_LAWS: dict[str, Laws] = {
     STANDARD_TASK: CONTROLLERS,
     "FanTracking2D": {
         "hover": partial(Hover, axes=2),
-        "admittance": Admittance2D,
-        "ratio": Ratio2D,
+        "admittance": partial(Admittance, gain_z=18.0),
+        "ratio": partial(Ratio, gain_z=8.0),
         "oracle": partial(Oracle, entries=("fan", "fan_velocity", "position")),
     },
     "WindHover": _WIND,

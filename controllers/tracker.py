@@ -12,7 +12,7 @@ anew with every episode.
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,9 @@ class _Belief(ABC):
     level: float = 0.0  # logarithmic spread of the noise's size; 0: as the briefing says
     particles: int = 1000
 
+    # what a particle has, (n, ...) each
+    _arrays: ClassVar[tuple[str, ...]] = ("_level", "_memory", "_place", "_velocity")
+
     def __post_init__(self) -> None:
         self.particles = int(self.particles)
         self._briefing = Briefing()
@@ -79,9 +82,10 @@ class _Belief(ABC):
     def _move(self) -> None:
         """Carry particles on by one decision."""
 
-    @abstractmethod
     def _choose(self, chosen: NDArray[np.int64]) -> None:
         """Let the particles be those chosen (n,)."""
+        for name in self._arrays:
+            setattr(self, name, getattr(self, name)[chosen])
 
     def __call__(
         self, observation: NDArray[np.floating[Any]], info: Mapping[str, Any] | None = None
@@ -101,7 +105,6 @@ class _Belief(ABC):
         self.deviation = float(np.sqrt(shares @ (self._place - place) ** 2))
         if shares @ shares > 1.0 / (FEW * len(shares)):
             resample(shares, self._rng.random(), self._chosen)
-            self._level, self._memory = self._level[self._chosen], self._memory[self._chosen]
             self._weight[:] = 0.0
             self._choose(self._chosen)
         command = (
@@ -112,32 +115,29 @@ class _Belief(ABC):
         return np.array([np.clip(command, -MAX_COMMAND, MAX_COMMAND)], dtype=np.float32)
 
 
-@dataclass(frozen=True)
-class GenericMotion:
-    """A fan of which nothing is known: it rests, or its velocity stays and drifts a little; now and
-    then this changes at once, to none, to the opposite, or to any other.
+def velocity_after(
+    before: Array,
+    rng: np.random.Generator,
+    acceleration: float = 0.025,
+    jumps: float = 0.25,
+    speed: float = 0.28,
+) -> Array:
+    """Return velocities (n,) m/s a decision after ``before`` (n,) of fans of which nothing is
+    known: each rests, or its velocity stays and drifts a little; now and then the velocity changes
+    at once, to none, to the opposite, or to any other. Defaults and units as of ``Tracker``.
     """
-
-    acceleration: float = 0.025  # m/s, standard deviation of the velocity's drift over a second
-    jumps: float = 0.25  # 1/s, how often the velocity changes at once
-    speed: float = 0.28  # m/s, standard deviation of a fresh velocity
-
-    def velocity_after(self, before: Array, rng: np.random.Generator) -> Array:
-        """Return velocities (n,) m/s a decision later."""
-        n = len(before)
-        drift = self.acceleration * np.sqrt(DECISION_PERIOD) * (before != 0.0)
-        after: Array = before + drift * rng.standard_normal(n)
-        jumped = np.flatnonzero(rng.random(n) < self.jumps * DECISION_PERIOD)
-        kind, fresh = rng.random(len(jumped)), self.speed * rng.standard_normal(len(jumped))
-        after[jumped] = np.where(
-            kind < STOP, 0.0, np.where(kind < STOP + TURN, -before[jumped], fresh)
-        )
-        return after
+    n = len(before)
+    drift = acceleration * np.sqrt(DECISION_PERIOD) * (before != 0.0)
+    after: Array = before + drift * rng.standard_normal(n)
+    jumped = np.flatnonzero(rng.random(n) < jumps * DECISION_PERIOD)
+    kind, fresh = rng.random(len(jumped)), speed * rng.standard_normal(len(jumped))
+    after[jumped] = np.where(kind < STOP, 0.0, np.where(kind < STOP + TURN, -before[jumped], fresh))
+    return after
 
 
 @dataclass(eq=False, kw_only=True)
 class Tracker(_Belief):
-    """Knows nothing of how the fan moves: ``GenericMotion``."""
+    """Knows nothing of how the fan moves: ``velocity_after``."""
 
     gain: float = 2.5
     damping: float = 0.4
@@ -157,12 +157,10 @@ class Tracker(_Belief):
 
     def _move(self) -> None:
         before = self._velocity
-        motion = GenericMotion(self.acceleration, self.jumps, self.speed)
-        self._velocity = motion.velocity_after(before, self._rng)
+        self._velocity = velocity_after(
+            before, self._rng, self.acceleration, self.jumps, self.speed
+        )
         self._place += 0.5 * DECISION_PERIOD * (before + self._velocity)
-
-    def _choose(self, chosen: NDArray[np.int64]) -> None:
-        self._place, self._velocity = self._place[chosen], self._velocity[chosen]
 
 
 @dataclass(eq=False, kw_only=True)
@@ -181,6 +179,10 @@ class InformedTracker(_Belief):
     spread: float = 0.1486  # of particles drawn anew, as a share of their standard deviation
     # 1/s, how often a particle leaves the family and moves as those of ``Tracker``; 0: never
     leave: float = 0.03
+    _arrays: ClassVar[tuple[str, ...]] = (
+        *("_level", "_memory", "_place", "_velocity"),
+        *("_kind", "_sign", "_side", "_motion", "_free"),
+    )
 
     def brief(self, briefing: Briefing) -> None:
         """Take what is known of vehicle, sensors, fan and its motions, but not of its gusts."""
@@ -208,7 +210,7 @@ class InformedTracker(_Belief):
         self._free |= self._rng.random(len(place)) < self.leave * DECISION_PERIOD
         some = np.flatnonzero(self._free)
         before = velocity[some]
-        after = GenericMotion().velocity_after(before, self._rng)
+        after = velocity_after(before, self._rng)
         self._velocity[some] = after
         self._place[some] = place[some] + 0.5 * DECISION_PERIOD * (before + after)
 
@@ -224,11 +226,7 @@ class InformedTracker(_Belief):
         self._velocity = (then - now) / self.ahead
 
     def _choose(self, chosen: NDArray[np.int64]) -> None:
-        if self.leave > 0.0:
-            self._free = self._free[chosen]
-            self._place, self._velocity = self._place[chosen], self._velocity[chosen]
-        self._kind, self._sign = self._kind[chosen], self._sign[chosen]
-        self._side, self._motion = self._side[chosen], self._motion[chosen]
+        super()._choose(chosen)
         low, high = self._bounds
         respread(
             self._motion,

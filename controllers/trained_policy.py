@@ -107,37 +107,31 @@ class _Network:
         self.card, self.weights, self._largest = dict(card), weights, largest
         self._activation, self._squash = str(card["activation"]), bool(card["squash"])
         if self._activation not in _ACTIVATIONS:
-            raise InputError(f"{name}: activation must be one of {', '.join(_ACTIVATIONS)}")
+            raise InputError(
+                f"{name}: activation must be one of {', '.join(_ACTIVATIONS)}, got "
+                f"{self._activation!r}"
+            )
         self._cell = cell_of(weights)
-        entry = weights.get("weight0" if self._cell is None else f"{self._cell}_input")
-        if entry is None or entry.ndim != 2 or entry.shape[1] != seen:
-            raise InputError(f"{name}: the first layer must take {seen} numbers")
+        self._memory_size, below = 0, seen
+        shapes: dict[str, tuple[int, ...]] = {}
         if self._cell is not None:
-            self._check_cell(self._cell, seen, name)
-        for i in range(layers_of(weights)):
-            bias = weights.get(f"bias{i}")
-            below = (self._memory_size or seen) if i == 0 else weights[f"weight{i - 1}"].shape[0]
-            if bias is None or weights[f"weight{i}"].shape != (len(bias), below):
-                raise InputError(f"{name}: layer {i} does not fit the one before it")
-        if layers_of(weights) == 0:
-            raise InputError(f"{name}: has no dense layer")
-
-    def _check_cell(self, cell: str, seen: int, name: str) -> None:
-        size, gates = self._memory_size, _CELLS[cell] * self._memory_size
-        shapes = {
-            "input": (gates, seen),
-            "hidden": (gates, size),
-            "input_bias": (gates,),
-            "hidden_bias": (gates,),
-        }
+            rows = len(weights[f"{self._cell}_input"])
+            below = self._memory_size = rows // _CELLS[self._cell]
+            shapes = {
+                f"{self._cell}_input": (rows, seen),
+                f"{self._cell}_hidden": (rows, below),
+                f"{self._cell}_input_bias": (rows,),
+                f"{self._cell}_hidden_bias": (rows,),
+            }
+        for i in range(max(layers_of(weights), 1)):
+            rows = len(weights.get(f"weight{i}", ()))
+            shapes |= {f"weight{i}": (rows, below), f"bias{i}": (rows,)}
+            below = rows
         for part, shape in shapes.items():
-            if self.weights[f"{cell}_{part}"].shape != shape:
-                raise InputError(f"{name}: {cell}_{part} must have the shape {shape}")
-
-    @property
-    def _memory_size(self) -> int:
-        """Size of the recurrent cell's state, 0 where there is none."""
-        return 0 if self._cell is None else int(self.weights[f"{self._cell}_hidden"].shape[1])
+            found = weights[part].shape if part in weights else "none"
+            if found != shape:
+                raise InputError(f"{name}: {part} must have the shape {shape}, got {found}")
+        self.size = below  # of the action
 
     def reset(self) -> None:
         """Forget the last episode."""
@@ -182,6 +176,8 @@ class TrainedPolicy(_Network):
         InputError: card and weights do not go together.
     """
 
+    task = "FanTracking"
+
     def __init__(self, card: Mapping[str, Any], weights: Weights, name: str = "policy") -> None:
         with _entries_named(name):
             seen = card["features"]
@@ -189,14 +185,11 @@ class TrainedPolicy(_Network):
                 tuple(seen["frame"]), int(seen["history"]), tuple(map(float, seen["scale"]))
             )
             self._repeat = int(card["repeat"])
-            if card["activation"] not in _ACTIVATIONS or self._repeat < 1:
-                raise InputError(
-                    f"{name}: activation must be one of {', '.join(_ACTIVATIONS)} and repeat at "
-                    f"least 1"
-                )
+            if self._repeat < 1:
+                raise InputError(f"{name}: repeat must be at least 1, got {self._repeat}")
             super().__init__(card, weights, self.features.size, MAX_COMMAND, name)
-        if weights[f"weight{layers_of(weights) - 1}"].shape[0] != 1:
-            raise InputError(f"{name}: the last layer must give one number")
+        if self.size != 1:
+            raise InputError(f"{name}: the last layer must give one number, got {self.size}")
         self.reset()
 
     def reset(self) -> None:
@@ -306,29 +299,16 @@ def read_policy(path: str | Path) -> tuple[Path, dict[str, Any], Weights]:
     return file, card, weights
 
 
-def load_policy(path: str | Path) -> TrainedPolicy:
-    """Read a policy from its ``.npz`` or its card.
+def load_policy(path: str | Path) -> Any:
+    """Return the policy of a ``.npz`` file or of its card: a ``TrainedPolicy``, or where the
+    card names another task, a ``TaskPolicy``.
 
     Raises:
         InputError: as ``read_policy``, or card and weights do not go together.
     """
     file, card, weights = read_policy(path)
-    try:
-        return TrainedPolicy(card, weights, str(file))
-    except (KeyError, IndexError, TypeError, ValueError, OverflowError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{file}: its weights lack or spoil an entry: {error}") from error
-
-
-def load_task_policy(path: str | Path) -> TaskPolicy:
-    """Read a policy of another task from its ``.npz`` or its card.
-
-    Raises:
-        InputError: as ``load_policy``.
-    """
-    file, card, weights = read_policy(path)
-    return TaskPolicy(card, weights, str(file))
+    kind = TaskPolicy if "task" in card else TrainedPolicy
+    return kind(card, weights, str(file))
 
 
 def is_policy_path(name: str) -> bool:

@@ -8,12 +8,7 @@ from typing import Any
 
 from ..controllers.own_file import is_file_name, load_controller
 from ..controllers.registry import STANDARD_TASK, TASK_LAWS, make_controller, shipped_policies
-from ..controllers.trained_policy import (
-    TrainedPolicy,
-    is_policy_path,
-    load_policy,
-    load_task_policy,
-)
+from ..controllers.trained_policy import TrainedPolicy, is_policy_path, load_policy
 from ..envs.fan_tracking import FanTrackingEnv, scenario_env
 from ..envs.fan_tracking_2d import FanTracking2DEnv
 from ..envs.scenarios import SCENARIOS
@@ -118,10 +113,7 @@ def make_pilot(name: str, task: str = STANDARD_TASK) -> Any:
         return load_controller(name)
     shipped = known.policies()
     if name in shipped or is_policy_path(name):
-        path = shipped.get(name, name)
-        if task == STANDARD_TASK:
-            return load_policy(path)
-        policy = load_task_policy(path)
+        policy = load_policy(shipped.get(name, name))
         if policy.task != task:
             raise InputError(f"{name}: a policy of {policy.task}, not of {task}")
         return policy

@@ -15,7 +15,7 @@ from ...controllers.observation import (
     TORQUE_Z,
     VELOCITY_Y,
 )
-from ...controllers.trained_policy import cell_of, layers_of, load_policy
+from ...controllers.trained_policy import TrainedPolicy, cell_of, layers_of, load_policy
 from ...runtime.errors import InputError
 from .c_numbers import literal, table
 
@@ -57,6 +57,8 @@ def exportable_policy(name: str, path: Path | None) -> Mapping[str, Any]:
             f"--policy {name}: expected {', '.join(LAWS)} or the name or path of a trained policy"
         )
     policy = load_policy(path)
+    if not isinstance(policy, TrainedPolicy):
+        raise InputError(f"--policy {name}: is of {policy.task}; expected one of FanTracking")
     if cell_of(policy.weights) is not None:
         raise InputError(
             f"--policy {name}: is recurrent; only policies of dense layers can be exported"

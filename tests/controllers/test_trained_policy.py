@@ -12,7 +12,6 @@ from windwrench.controllers.trained_policy import (
     TrainedPolicy,
     gru,
     load_policy,
-    load_task_policy,
     lstm,
     save_policy,
 )
@@ -164,15 +163,15 @@ def test_a_file_that_would_run_code_is_refused(tmp_path):
         (
             {"features": {"frame": ["torque_z"], "history": 2, "scale": [1.0]}},
             {},
-            "must take 2 numbers",
+            r"weight0 must have the shape \(1, 2\), got \(1, 1\)",
         ),
         ({"features": {}}, {}, "lacks or spoils"),
         (
             {},
             {"weight1": np.zeros((1, 5), np.float32), "bias1": np.zeros(1, np.float32)},
-            "layer 1 does not fit",
+            "weight1 must have the shape",
         ),
-        ({}, {"bias0": np.zeros(2, np.float32)}, "layer 0 does not fit"),
+        ({}, {"bias0": np.zeros(2, np.float32)}, "bias0 must have the shape"),
     ],
 )
 def test_cards_and_weights_that_do_not_fit_are_named(card, weights, words):
@@ -205,7 +204,7 @@ def weights(rng, seen=27, state=5, size=3):
 def test_a_policy_comes_back_from_its_file_and_remembers(tmp_path):
     rng = np.random.default_rng(0)
     policy = TaskPolicy(TASK_CARD, weights(rng))
-    again = load_task_policy(save_policy(TASK_CARD, policy.weights, tmp_path / "mine.npz"))
+    again = load_policy(save_policy(TASK_CARD, policy.weights, tmp_path / "mine.npz"))
     seen = rng.standard_normal((4, 27)).astype(np.float32)
     said = np.array([policy(x) for x in seen])
     np.testing.assert_array_equal(said, [again(x) for x in seen])
@@ -217,7 +216,10 @@ def test_a_policy_comes_back_from_its_file_and_remembers(tmp_path):
 
 @pytest.mark.parametrize(
     ("change", "words"),
-    [({"scale": [1.0] * 26}, "must take 26 numbers"), ({"largest": None}, "spoils an entry")],
+    [
+        ({"scale": [1.0] * 26}, r"gru_input must have the shape \(15, 26\)"),
+        ({"largest": None}, "spoils an entry"),
+    ],
 )
 def test_a_card_that_does_not_fit_is_refused(change, words):
     with pytest.raises(InputError, match=words):
