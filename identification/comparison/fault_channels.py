@@ -17,8 +17,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
-from ..logs.readers import px4_ulog
-from ..logs.readers.recognise import reader_by_content
+from ..logs.readers import px4_ulog, reader_by_content
 from ..logs.reading import read_log
 from ..logs.streams import readable
 from ..motion.smoothing import lagged, resampled

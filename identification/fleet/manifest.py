@@ -36,8 +36,7 @@ from ...runtime.forms import STRICT, checked, expected
 from ...runtime.regular_files import read_bytes
 from ...runtime.yaml_file import read_yaml
 from ..logs.log_map import load_map
-from ..logs.readers import READERS, find_reader
-from ..logs.readers.recognise import reader_by_content
+from ..logs.readers import binary_logs, find_reader, reader_by_content
 
 MANIFEST = "fleet.yaml"  # is found by itself in a folder of logs
 VEHICLE_FILE = "vehicle.yaml"
@@ -192,7 +191,7 @@ def find_logs(
         raise InputError(
             f"{', '.join(map(str, given))}: no flight log found; expected tables "
             f"({', '.join(_TABLES)}), or files that a reader knows: "
-            f"{', '.join(reader.what for reader in READERS.values() if reader.begins)}"
+            f"{binary_logs()}"
         )
     for named in dict.fromkeys(log.vehicle for log in logs.values() if log.vehicle):
         load_vehicle(named)  # a mistake in the vehicle is no log's

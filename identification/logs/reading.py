@@ -14,8 +14,8 @@ from .inertial import check_inertial
 from .log_map import OWN_MAP, load_map
 from .magnitudes import check_magnitudes, unit_doubts
 from .mapped_log import map_table, read_mapped
-from .readers import find_reader
-from .readers.recognise import (
+from .readers import (
+    find_reader,
     looked_for_columns,
     reader_by_columns,
     reader_by_content,

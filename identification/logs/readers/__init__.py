@@ -4,19 +4,30 @@ in the log's notes.
 A table needs no code: a file in ``identification/logs/maps/`` that says what its columns mean, and
 its name in ``TABLES``. A reader of another form is a file in this folder with a function
 ``read(path, vehicle)`` that returns a FlightLog, and a line in ``READERS``.
+
+Which reader a log needs is told from what is in it: the first bytes of a file, or the columns of a
+table. A file's name decides nothing but how a table is packed.
 """
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError, unknown_name
+from ....runtime.regular_files import open_regular
 from ..flight_log import FlightLog
 from ..log_map import load_map
 from ..mapped_log import read_mapped
-from . import ardupilot_bin, betaflight_bbl, betaflight_csv, crazyflie_sd, px4_ulog, rosbag
+from ..table import SUFFIXES
+from . import ardupilot_bin, betaflight, crazyflie_sd, px4_ulog, rosbag
+
+_HEAD = 4096  # bytes of a file that are looked at
+_LISTED = 8  # entries of a folder that a message lists
+_GZIP = b"\x1f\x8b"
+_BAG_FOLDER = ("metadata.yaml", ".db3", ".mcap")  # one of these is in a ROS 2 bag's folder
 
 
 @dataclass(frozen=True)
@@ -41,21 +52,9 @@ TABLES = {
     "crazypad": "crazypad",
     "racer": "racer",
 }
-
-
-def _read_table(path: Path, vehicle: Vehicle | None, name: str) -> FlightLog:
-    return read_mapped(path, load_map(TABLES[name]), vehicle, name)
-
-
-def _table(name: str) -> Reader:
-    found = load_map(TABLES[name])
-    return Reader(name, found.about, partial(_read_table, name=name), found.recognise)
-
-
 READERS = {
     reader.name: reader
     for reader in (
-        *map(_table, TABLES),
         Reader(
             "crazyflie_sd",
             "a Crazyflie's SD-card log",
@@ -65,15 +64,15 @@ READERS = {
         Reader(
             "betaflight",
             "a blackbox of Betaflight or INAV",
-            betaflight_bbl.read,
-            begins=betaflight_bbl.BEGINS,
+            betaflight.read,
+            begins=betaflight.BEGINS,
             takes_option=True,
         ),
         Reader(
             "betaflight_csv",
             "a blackbox_decode table",
-            betaflight_csv.read,
-            betaflight_csv.SIGNATURE,
+            betaflight.read_table,
+            betaflight.SIGNATURE,
             takes_option=True,
         ),
         Reader(
@@ -94,6 +93,10 @@ READERS = {
 }
 
 
+def _read_table(path: Path, vehicle: Vehicle | None, name: str) -> FlightLog:
+    return read_mapped(path, load_map(TABLES[name]), vehicle, name)
+
+
 def find_reader(name: str) -> Reader:
     """Return the reader of a name, or of ``name:option`` with that option bound.
 
@@ -101,9 +104,13 @@ def find_reader(name: str) -> Reader:
         InputError: there is none, or it takes no option.
     """
     name, colon, option = name.partition(":")
-    if name not in READERS:
-        raise unknown_name("reader", name, READERS)
-    reader = READERS[name]
+    if name in TABLES:
+        found = load_map(TABLES[name])
+        reader = Reader(name, found.about, partial(_read_table, name=name), found.recognise)
+    elif name in READERS:
+        reader = READERS[name]
+    else:
+        raise unknown_name("reader", name, [*TABLES, *READERS])
     if not colon:
         return reader
     if not reader.takes_option:
@@ -111,3 +118,102 @@ def find_reader(name: str) -> Reader:
             f"reader {name!r} takes no option, got {option!r}; expected the name alone"
         )
     return replace(reader, read=partial(reader.read, option=option))
+
+
+def reader_by_content(path: Path) -> Reader | None:
+    """Return the reader of a file or folder by its first bytes; None where no reader knows them.
+
+    Raises:
+        InputError: it is a folder, but no ROS 2 bag's.
+    """
+    if os.path.isdir(path):  # False for a name that is too long
+        return _folder(path)
+    try:
+        head = _head(path)
+    except InputError:
+        return None  # whoever reads it says what is wrong
+    for reader in READERS.values():
+        if reader.begins and head.startswith(reader.begins):
+            return reader
+    return None
+
+
+def binary_logs() -> str:
+    """Return the words for the files that are known by their first bytes."""
+    return ", ".join(reader.what for reader in READERS.values() if reader.begins)
+
+
+def unknown_content(path: Path) -> InputError:
+    """Return the error for a file that no reader knows and that is no table by its name.
+
+    Raises:
+        InputError: it cannot be read at all.
+    """
+    head = _head(path)
+    if head.startswith(_GZIP):
+        return InputError(
+            f"{path}: is packed (gzip); expected a table, .csv.gz by name, or the log unpacked"
+        )
+    return InputError(
+        f"{path}: unknown kind of file: it begins with {_shown(head)}; expected {binary_logs()}, "
+        f"or a table, with a name that ends in {', '.join(SUFFIXES)}"
+    )
+
+
+def _head(path: Path) -> bytes:
+    with open_regular(path, "a flight log") as file:
+        return file.read(_HEAD)
+
+
+def _table_readers() -> list[Reader]:
+    """Return the readers of tables that are known by their columns."""
+    return [*map(find_reader, TABLES), READERS["betaflight_csv"]]
+
+
+def reader_by_columns(path: Path, header: Sequence[str]) -> Reader | None:
+    """Return the reader whose columns a table has; None where it has those of none.
+
+    Raises:
+        InputError: it has those of several.
+    """
+    found = [reader for reader in _table_readers() if set(header).issuperset(reader.signature)]
+    if len(found) > 1:
+        raise InputError(
+            f"{path}: its columns are those of {' and of '.join(r.what for r in found)}; expected "
+            f"one: choose by --reader {' or --reader '.join(r.name for r in found)}"
+        )
+    return found[0] if found else None
+
+
+def looked_for_columns() -> str:
+    """Return the words for the tables that are recognised, each with a column that tells it."""
+    return ", ".join(f"{r.name} ({r.signature[0]} ...)" for r in _table_readers())
+
+
+def _folder(path: Path) -> Reader:
+    """Return the reader of a folder.
+
+    Raises:
+        InputError: it is no ROS 2 bag's.
+    """
+    try:
+        names = sorted(entry.name for entry in path.iterdir())
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read as a folder: {error.strerror}") from error
+    if any(name.lower().endswith(_BAG_FOLDER) for name in names):
+        return READERS["rosbag"]
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    raise InputError(
+        f"{path}: is a folder; expected a file, or the folder of a ROS 2 bag, which has one of "
+        f"{', '.join(_BAG_FOLDER)}; found {', '.join(names[:_LISTED]) or 'nothing in it'}{more}"
+    )
+
+
+def _shown(head: bytes) -> str:
+    """Return the first bytes in words."""
+    if not head:
+        return "nothing (it is empty)"
+    start = head[:16]
+    if all(32 <= byte < 127 or byte in b"\t\r\n" for byte in start):
+        return repr(start.decode("ascii"))
+    return " ".join(f"{byte:02x}" for byte in start[:8])

@@ -9,8 +9,9 @@ import pytest
 from tests.fuzz.forms import _crazyswarm2, _nanobench, _own_log, _text_table
 from tests.support.data_paths import data_file
 from windwrench.dynamics import InputError
-from windwrench.identification.logs.readers import READERS
-from windwrench.identification.logs.readers.recognise import (
+from windwrench.identification.logs.readers import (
+    READERS,
+    find_reader,
     reader_by_columns,
     reader_by_content,
 )
@@ -101,7 +102,7 @@ def test_a_table_of_unknown_columns_lists_what_was_looked_for(tmp_path):
 
 
 def test_a_table_that_fits_two_readers_is_refused():
-    header = [*READERS["racer"].signature, *READERS["nanobench"].signature]
+    header = [*find_reader("racer").signature, *find_reader("nanobench").signature]
     with pytest.raises(InputError, match="--reader nanobench or --reader racer"):
         reader_by_columns(Path("a.csv"), header)
 

@@ -1,24 +1,22 @@
-"""Blackboxes of Betaflight and INAV (``.bbl``, ``.bfl``, ``.txt``) as they are.
+"""Blackboxes of Betaflight and INAV (``.bbl``, ``.bfl``, ``.txt``) as they are: their headers and
+fields.
 
 A file may hold several logs, one for each time that the vehicle was armed: the longest is read, and
-a note says so. ``blackbox_frames`` decodes it, ``betaflight_csv`` says what its fields become.
-orangebox, the library for these logs, is under the GPL, lacks an encoding that Betaflight's logs
-have (10) and decodes in Python; it serves the tests as a second opinion.
+a note says so. ``blackbox_frames`` decodes its frames. orangebox, the library for these logs, is
+under the GPL, lacks an encoding that Betaflight's logs have (10) and decodes in Python; it serves
+the tests as a second opinion.
 """
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS
 from ....runtime.regular_files import read_bytes
-from ..flight_log import FlightLog
-from .betaflight_csv import FIELDS, betaflight_log, magnet_poles
+from ..channels import Array
 from .blackbox_frames import ENCODINGS, PREDICTORS, Layout, decode
 
 _START = b"H Product:Blackbox"
@@ -28,26 +26,21 @@ _WHAT = "a blackbox of Betaflight or INAV"
 _HEADERS = 2_000  # lines
 _LINE = 20_000  # bytes
 _FRAMES = "IPSGH"
-_WANTED = ("time", *FIELDS)
 
 
-@dataclass(frozen=True)
-class _Section:
-    """One log of a file."""
+def read_blackbox(
+    path: Path, wanted: Sequence[str]
+) -> tuple[dict[str, str], dict[str, Array], list[str]]:
+    """Return the headers of a file's longest log, its fields (N,) by name, and notes.
 
-    headers: Mapping[str, str]
-    begin: int  # of its frames
-    end: int
-
-
-def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> FlightLog:
-    """Read a blackbox; ``option``: number of the motors' magnet poles, for eRPM.
+    Args:
+        path: the file.
+        wanted: names of fields, ``time`` among them; those that the log lacks are left out.
 
     Raises:
         InputError: the file cannot be read, is no blackbox, is damaged from its start, or has no
-            motors or inertial sensors.
+            times.
     """
-    poles = magnet_poles(option, path)
     data = read_bytes(path, _WHAT, LIMITS.binary_log)
     if not data.startswith(_START):
         raise InputError(
@@ -56,51 +49,37 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
     starts = [match.start() for match in re.finditer(re.escape(_START), data)]
     ends = [*starts[1:], len(data)]
     longest = max(range(len(starts)), key=lambda i: ends[i] - starts[i])
-    section = _section(path, data, starts[longest], ends[longest])
-    version = section.headers.get("Data version", "2")
+    headers, begin = _headers(path, data, starts[longest], ends[longest])
+    version = headers.get("Data version", "2")
     if version != "2":
         raise InputError(f"{path}: header Data version: {version[:20]!r}; expected 2")
-    names = section.headers.get("Field I name", "").split(",")
-    layout = _layout(path, section.headers, names)
-    keep = [name for name in _WANTED if name in names]
+    names = headers.get("Field I name", "").split(",")
+    layout = _layout(path, headers, names)
+    keep = [name for name in wanted if name in names]
     if "time" not in keep:
         raise InputError(f"{path}: no field time; found {', '.join(names[:20])}")
     where = np.array([names.index(name) for name in keep], dtype=np.int64)
-    frames = np.frombuffer(data[: section.end], np.uint8)
-    longest_log = min(LIMITS.table_rows, LIMITS.table_numbers // len(keep))
-    count, _, _ = decode(
-        frames, section.begin, layout, where, np.zeros((0, len(keep)), np.int64), longest_log + 1
-    )
-    if count > longest_log:
-        raise InputError(f"{path}: more than {longest_log} frames; expected one flight")
+    frames = np.frombuffer(data[: ends[longest]], np.uint8)
+    most = min(LIMITS.table_rows, LIMITS.table_numbers // len(keep))
+    nothing = np.zeros((0, len(keep)), np.int64)
+    count, _, _ = decode(frames, begin, layout, where, nothing, most + 1)
+    if count > most:
+        raise InputError(f"{path}: more than {most} frames; expected one flight")
     if count < 2:
         raise InputError(f"{path}: {count} frame(s) that can be decoded; expected at least two")
     rows = np.zeros((count, len(keep)), np.int64)
-    _, lost, _ = decode(frames, section.begin, layout, where, rows, count)
-    columns = {name: rows[:, i].astype(np.float64) for i, name in enumerate(keep)}
-    t = 1e-6 * columns.pop("time")
-    firmware = section.headers.get("Firmware revision", "an unknown firmware")[:60]
-    notes = [f"blackbox of {firmware}"]
+    _, lost, _ = decode(frames, begin, layout, where, rows, count)
+    notes = [f"blackbox of {headers.get('Firmware revision', 'an unknown firmware')[:60]}"]
     if len(starts) > 1:
         notes.append(
             f"the file holds {len(starts)} logs; the longest, number {longest + 1}, was read"
         )
     if lost:
         notes.append(f"{lost} frame(s) of {count + lost} could not be decoded and were left out")
-    return betaflight_log(
-        path,
-        "betaflight",
-        t,
-        columns,
-        {},
-        section.headers,
-        poles,
-        vehicle,
-        tuple(notes),
-    )
+    return headers, dict(zip(keep, rows.T.astype(np.float64), strict=True)), notes
 
 
-def _section(path: Path, data: bytes, start: int, end: int) -> _Section:
+def _headers(path: Path, data: bytes, start: int, end: int) -> tuple[dict[str, str], int]:
     """Return the headers of a log and where its frames begin.
 
     Raises:
@@ -110,7 +89,7 @@ def _section(path: Path, data: bytes, start: int, end: int) -> _Section:
     place = start
     for _ in range(_HEADERS):
         if data[place : place + 2] != b"H ":
-            return _Section(headers, place, end)
+            return headers, place
         stop = data.find(b"\n", place, min(end, place + _LINE))
         if stop < 0:
             break

@@ -1,0 +1,186 @@
+"""Blackboxes of Betaflight or INAV: as they are (``blackbox``), and the tables of blackbox_decode.
+The map ``betaflight`` says what their fields mean, this module in which unit they are.
+
+* **Accelerometer.** Counts: ``acc_1G`` of the header is one g; without a header, the power of two
+  that is nearest to its length in the first half second, when a quadrotor stands (recording begins
+  when it is armed).
+* **Gyro.** Degrees per second, tenths of them where the header says ``blackbox_high_resolution``.
+* **Commands.** Between the two numbers of the header's ``motorOutput``; without one, 48 to 2047
+  (DShot) where a motor leaves 1000 to 2000, else those.
+* **Rotor speeds.** eRPM in hundreds: rpm is eRPM times 200 over the number of magnet poles, which
+  the header (``motor_poles``) or the reader's option says, else 14.
+* **Voltage.** Hundredths of a volt.
+
+A table has the log's numbers without its headers, so what the headers would say is told from the
+numbers, and a note says how. A unit that a table's column states is taken.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from ....dynamics.vehicle import Vehicle
+from ....runtime.errors import InputError
+from ..channels import Array, Samples
+from ..flight_log import FlightLog
+from ..log_map import recording_map
+from ..map_fit import wanted_columns
+from ..mapped_log import map_recording
+from ..tables import open_table
+from .blackbox import BEGINS as BEGINS
+from .blackbox import read_blackbox
+
+SIGNATURE = ("time (us)", "motor[0]", "motor[3]")
+
+# what a stated unit is in the map's: g, degrees per second, volts
+_UNITS = {"g": 1.0, "m/s2": 1.0 / 9.80665, "deg/s": 1.0, "rad/s": np.degrees(1.0)}
+_UNITS |= {"V": 1.0, "mV": 1e-3}
+_POLES = 14  # of most motors of 5 inch quadrotors
+_STANDING = 0.5  # s after arming in which a vehicle stands
+_ONE_G = 2.0 ** np.arange(8, 15)  # counts
+_DSHOT, _PWM = (48.0, 2047.0), (1000.0, 2000.0)
+
+
+def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> FlightLog:
+    """Read a blackbox; ``option``: number of the motors' magnet poles, for eRPM.
+
+    Raises:
+        InputError: the file cannot be read, is no blackbox, is damaged from its start, or has no
+            motors or inertial sensors.
+    """
+    poles = _magnet_poles(option, path)
+    headers, fields, notes = read_blackbox(path, wanted_columns(recording_map("betaflight")))
+    return _log(path, "betaflight", fields, set(), headers, poles, vehicle, notes)
+
+
+def read_table(path: Path, vehicle: Vehicle | None = None, option: str = "") -> FlightLog:
+    """Read a table of blackbox_decode; ``option``: number of the motors' magnet poles, for eRPM.
+
+    Raises:
+        InputError: the file cannot be read, or lacks a column.
+    """
+    poles = _magnet_poles(option, path)
+    table = open_table(path)
+    missing = [name for name in SIGNATURE if name not in table.header]
+    if missing:
+        raise InputError(
+            f"{path}: missing column(s) {', '.join(missing)}; expected those of blackbox_decode"
+        )
+    wanted = wanted_columns(recording_map("betaflight"))
+    scales, names = {}, {"time": "time (us)"}
+    for name in table.header:
+        field, _, unit = name.removesuffix(")").partition(" (")
+        if field in wanted and (not unit or unit in _UNITS):
+            names[field] = name
+            if unit:
+                scales[field] = _UNITS[unit]
+    read = table.read(list(names.values()))
+    fields = {field: scales.get(field, 1.0) * read[name] for field, name in names.items()}
+    return _log(path, "betaflight_csv", fields, {*scales}, {}, poles, vehicle, [*table.notes])
+
+
+def _magnet_poles(option: str, path: Path) -> int | None:
+    """Return the number of magnet poles that a reader's option says; None: nothing.
+
+    Raises:
+        InputError: it is none.
+    """
+    if not option:
+        return None
+    if not (option.isdecimal() and len(option) < 4 and int(option) >= 2 and int(option) % 2 == 0):
+        raise InputError(
+            f"{path}: reader option {option!r}; expected the motors' number of magnet poles, even, "
+            "such as betaflight:14"
+        )
+    return int(option)
+
+
+def _log(
+    path: Path,
+    reader: str,
+    fields: dict[str, Array],
+    stated: set[str],
+    headers: Mapping[str, str],
+    poles: int | None,
+    vehicle: Vehicle | None,
+    notes: list[str],
+) -> FlightLog:
+    """Return the log of a blackbox's fields (N,), of which those ``stated`` are in the map's units.
+
+    Raises:
+        InputError: no motors, or no gyro and accelerometer.
+    """
+    log_map = recording_map("betaflight")
+    t = 1e-6 * fields.pop("time")
+    groups = {
+        kind: [name for name in fields if name.startswith(kind) and name not in stated]
+        for kind in ("motor", "eRPM", "gyro", "acc", "vbat")
+    }
+    said = [*notes, *log_map.notes]
+    scales = {"gyro": 0.1 if headers.get("blackbox_high_resolution") == "1" else 1.0, "vbat": 0.01}
+    low = 0.0
+    if groups["motor"]:
+        low, high, whence = _range(path, [fields[name] for name in groups["motor"]], headers)
+        scales["motor"] = 1.0 / (high - low)
+        said.append(f"commands: {low:g} to {high:g} ({whence}) taken as 0 to 1")
+    if any(np.any(fields[name] > 0.0) for name in groups["eRPM"]):
+        scales["eRPM"], words = _rpm(headers, poles)
+        said.append(words)
+    if groups["acc"]:
+        counts, words = _one_g(t, [fields[name] for name in groups["acc"]], headers)
+        scales["acc"] = 1.0 / counts
+        said.append(words)
+    for kind, scale in scales.items():
+        for name in groups[kind]:
+            fields[name] = (fields[name] - (low if kind == "motor" else 0.0)) * scale
+    return map_recording(path, [Samples(t, fields)], log_map, vehicle, reader, said)
+
+
+def _range(path: Path, motors: list[Array], headers: Mapping[str, str]) -> tuple[float, float, str]:
+    """Return the values of the commands 0 and 1, and whence they are known.
+
+    Raises:
+        InputError: the header's are none.
+    """
+    stated = headers.get("motorOutput", "")
+    if stated:
+        try:
+            low, high = (float(x) for x in stated.split(","))
+        except ValueError as error:
+            raise InputError(
+                f"{path}: header motorOutput: {stated[:60]!r}; expected two numbers"
+            ) from error
+        if not 0.0 <= low < high <= 1e5:
+            raise InputError(
+                f"{path}: header motorOutput: {stated[:60]!r}; expected the lower number first"
+            )
+        return low, high, "motorOutput of the header"
+    outside = any(np.any((x > _PWM[1]) | ((x < _PWM[0]) & (x > 0.0))) for x in motors)
+    low, high = _DSHOT if outside else _PWM
+    return low, high, f"assumed: {'DShot' if outside else 'pulses in us'}, no header says it"
+
+
+def _rpm(headers: Mapping[str, str], poles: int | None) -> tuple[float, str]:
+    """Return the rpm in one count of eRPM, and words on whence the number of poles is known."""
+    stated = headers.get("motor_poles", "")
+    whence = "as the reader's option says"
+    if poles is None:
+        known = stated.isdecimal() and 2 <= int(stated[:4]) <= 100
+        poles = int(stated) if known else _POLES
+        whence = "motor_poles of the header" if known else "assumed; betaflight:NUMBER says another"
+    return 200.0 / poles, f"eRPM: {poles} magnet poles ({whence})"
+
+
+def _one_g(t: Array, force: list[Array], headers: Mapping[str, str]) -> tuple[float, str]:
+    """Return the accelerometer's counts of 1 g, and words on whence they are known."""
+    stated = headers.get("acc_1G", "")
+    if stated.isdecimal() and 1 <= int(stated[:9]) <= 10**6:
+        return float(stated), f"accelerometer: acc_1G of the header: {stated} counts are 1 g"
+    length = np.linalg.norm(np.column_stack(force)[t <= t[0] + _STANDING], axis=1)
+    middle = float(np.nanmedian(length)) if np.isfinite(length).any() else 0.0
+    counts = float(_ONE_G[np.argmin(np.abs(np.log2(np.maximum(middle, 1.0) / _ONE_G)))])
+    return counts, (
+        f"accelerometer: {counts:g} counts taken as 1 g, from its {middle:.4g} in the first "
+        f"{_STANDING:g} s; no header says it"
+    )
