@@ -136,7 +136,7 @@ def _one_line(error: ValidationError, form: type, data: Any, where: str) -> Inpu
     if one["type"] == "value_error":
         error_of_field = one["ctx"]["error"]
         if isinstance(error_of_field, InputError):
-            return InputError(f"{where}: {error_of_field}")
+            return InputError(": ".join([where, *_words(one["loc"], data), str(error_of_field)]))
         words = str(error_of_field)
     elif one["type"] == "literal_error":
         known = one["ctx"]["expected"].replace("'", "")
@@ -172,8 +172,8 @@ def _form_at(form: Any, location: Any) -> Any:
     """Return the form of the section at a location within another."""
     for part in location:
         if isinstance(part, str):
-            (kind,) = [field.type for field in fields(form) if field.name == part]
-            form = next((one for one in _parts(kind) if is_dataclass(one)), form)
+            kinds = [field.type for field in fields(form) if field.name == part]
+            form = next((one for kind in kinds for one in _parts(kind) if is_dataclass(one)), form)
     return form
 
 

@@ -45,18 +45,25 @@ columns the log has, with numbers in them.
 * ``extra``: what else is kept, by name: columns and scale
 """
 
-import dataclasses
 import math
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    Strict,
+    StringConstraints,
+    WrapValidator,
+)
 
 from ...runtime.errors import InputError, unknown_name
-from ...runtime.forms import STRICT, checked
+from ...runtime.forms import STRICT, Number, Positive, checked, expected
 from ...runtime.yaml_file import read_yaml
 from .rotor_orders import ORDERS, Order, rotor_order
 
@@ -65,9 +72,10 @@ OWN_MAP = "windwrench"  # of this kit's own columns
 
 WORLDS = {"enu": "enu", "nwu": "enu", "flu": "enu", "ned": "ned", "frd": "ned", "y_up": "y_up"}
 BODIES = {"flu": "flu", "frd": "frd"}
+# units; the first of each is taken where a section states none
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
 LENGTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "ft": 0.3048}
-ANGLE_UNITS = {"rad": 1.0, "deg": math.pi / 180.0}
+ANGLE_UNITS = {"deg": math.pi / 180.0, "rad": 1.0}
 # a rotor's unit in rad/s; that of eRPM is divided by the pairs of poles
 ROTOR_UNITS = {
     "rad/s": 1.0,
@@ -77,8 +85,8 @@ ROTOR_UNITS = {
 }
 # what stands for no and for full command; None: must be said
 COMMAND_UNITS: dict[str, tuple[float, float] | None] = {
-    "us": (1000.0, 2000.0),
     "normalised": (0.0, 1.0),
+    "us": (1000.0, 2000.0),
     "duty": (0.0, 1.0),
     "percent": (0.0, 100.0),
     "dshot": (48.0, 2047.0),
@@ -112,60 +120,48 @@ _SPELLINGS = {
 }
 
 
-def that_is(wanted: str, test: Callable[[Any], bool]) -> BeforeValidator:
-    """Return a validator that refuses what fails a test, in the words of what was wanted."""
-
-    def check(value: Any, info: Any) -> Any:
-        if not test(value):
-            raise InputError(f"{info.field_name}: {_shown(value)}; expected {wanted}")
-        return tuple(value) if isinstance(value, list) else value
-
-    return BeforeValidator(check)
+def _known(value: Any, known: Collection[str], what: str) -> str:
+    """Return which of some words a value is, whatever its case, or in another spelling."""
+    lower = {name.lower(): name for name in known}
+    text = str(value).lower()
+    found = lower.get(text) or lower.get(_SPELLINGS.get(text, "").lower())
+    if found is None:
+        raise unknown_name(what, str(value), known)
+    return found
 
 
 def one_of(known: Collection[str]) -> BeforeValidator:
-    """Return a validator that takes one of some words, whatever its case, and other spellings."""
-    lower = {name.lower(): name for name in known}
-
-    def check(value: Any, info: Any) -> str:
-        text = str(value).lower()
-        found = lower.get(text) or lower.get(_SPELLINGS.get(text, "").lower())
-        if found is None:
-            raise unknown_name(info.field_name, str(value), known)
-        return found
-
-    return BeforeValidator(check)
+    """Return a validator that takes one of some words, as ``_known``."""
+    return BeforeValidator(lambda value, info: _known(value, known, info.field_name))
 
 
-def _finite(value: Any) -> bool:
-    return type(value) in (int, float) and abs(value) <= 1e300
+def _two_levels(given: tuple[float, float]) -> tuple[float, float]:
+    if given[0] == given[1]:
+        raise ValueError("the same")
+    return given
 
 
-def _two_numbers(value: Any) -> bool:
-    two = isinstance(value, list | tuple) and len(value) == 2 and all(map(_finite, value))
-    return value is None or (two and value[0] != value[1])
+def _not_zero(factor: float) -> float:
+    if factor == 0.0:
+        raise ValueError("zero")
+    return factor
 
 
-_Text = Annotated[str, that_is("a text", lambda x: isinstance(x, str))]
-_Number = Annotated[float, that_is("a finite number", _finite)]
-_Truth = Annotated[bool, that_is("true or false", lambda x: isinstance(x, bool))]
-_Count = Annotated[
-    int, that_is("a whole number from 1", lambda x: type(x) is int and 1 <= x <= 1000)
-]
-_Names = Annotated[
-    tuple[str, ...],
-    that_is(
-        "a list of columns",
-        lambda x: isinstance(x, list | tuple) and all(isinstance(name, str) for name in x),
-    ),
+_Truth = Annotated[bool, Strict()]
+_Count = Annotated[int, Strict(), Field(ge=1, le=1000)]
+_Scale = Annotated[Number, AfterValidator(_not_zero), expected("a factor that is not zero")]
+_Sign = Annotated[int, Strict(), Field(ge=-1, le=1), AfterValidator(_not_zero), expected("1 or -1")]
+_Name = Annotated[
+    str,
+    StringConstraints(strip_whitespace=True, min_length=1),
+    Field(coerce_numbers_to_str=True),  # columns without a header are named by their numbers
 ]
 _Range = Annotated[
-    tuple[float, float] | None,
-    that_is(
-        "two numbers, what stands for no and for full command, such as [1000, 2000]", _two_numbers
-    ),
+    tuple[Number, Number],
+    AfterValidator(_two_levels),
+    expected("two numbers, what stands for no and for full command, such as [1000, 2000]"),
 ]
-_Order = Annotated[Order, BeforeValidator(lambda value: rotor_order(value, "order"))]
+_Order = Annotated[Order, BeforeValidator(rotor_order)]
 
 
 @dataclass(frozen=True)
@@ -174,13 +170,13 @@ class Columns:
 
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
-    columns: tuple[str, ...]
+    columns: tuple[_Name, ...]
     unit: str = ""
-    scale: Annotated[_Number, that_is("a factor that is not zero", lambda x: x != 0)] = 1.0
-    signs: tuple[int, ...] = ()  # one a column; empty: all as they stand
+    scale: _Scale = 1.0
+    signs: tuple[_Sign, ...] = ()  # one a column; empty: all as they stand
     optional: _Truth = False
-    note: _Text = ""
-    topic: _Text = ""  # of the messages in which the columns stand; empty: any
+    note: str = ""
+    topic: str = ""  # of the messages in which the columns stand; empty: any
 
     @property
     def label(self) -> str:
@@ -200,13 +196,11 @@ class TimeColumn:
 
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
-    column: str = ""
+    column: _Name = ""
     unit: Annotated[str, one_of(TIME_UNITS)] = "s"
-    offset: Annotated[
-        float | None, that_is("a finite number", lambda x: x is None or _finite(x))
-    ] = None  # s, added; None: so that the flight begins at 0
-    rate_hz: _Number = 0.0  # of rows, where there is no column
-    note: _Text = ""
+    offset: Number | None = None  # s, added; None: so that the flight begins at 0
+    rate_hz: Positive = 0.0  # of rows, where there is no column
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -223,7 +217,7 @@ class Attitude(Columns):
     order: Annotated[str, one_of(QUATERNIONS)] = "wxyz"  # of the columns of a quaternion
     euler: Annotated[str, one_of(EULER_ORDERS)] = ""  # of turns; empty: a quaternion
     sense: Annotated[str, one_of(SENSES)] = "body_to_world"
-    of: _Names = ()  # topics of positions; empty: of all
+    of: tuple[str, ...] = ()  # topics of positions; empty: of all
 
 
 @dataclass(frozen=True)
@@ -239,12 +233,12 @@ class Commands(Columns):
     """Motor commands."""
 
     order: _Order = ORDERS["windwrench"]
-    range: _Range = None  # None: the vehicle's motor curve states it
-    thrust_factor: Annotated[float, that_is("0 to 1", lambda x: _finite(x) and 0 <= x <= 1)] = 1.0
-    thrust_span: tuple[_Number, _Number] = (0.0, 1.0)  # commands at which u is 0 and 1
+    range: _Range | None = None  # None: the vehicle's motor curve states it
+    thrust_factor: Annotated[Number, Field(ge=0.0, le=1.0)] = 1.0
+    thrust_span: tuple[Number, Number] = (0.0, 1.0)  # commands at which u is 0 and 1
     clip: _Truth = False
-    thrust: tuple[_Number, ...] = ()  # N a motor, of the count's powers 0, 1, 2
-    full_voltage: Annotated[_Number, Field(gt=0.0)] = 1.0  # V, at which ``thrust`` holds
+    thrust: tuple[Number, ...] = ()  # N a motor, of the count's powers 0, 1, 2
+    full_voltage: Positive = 1.0  # V, at which ``thrust`` holds
 
 
 @dataclass(frozen=True)
@@ -252,7 +246,7 @@ class Battery(Columns):
     """The battery's voltage."""
 
     cells: _Count = 1
-    late: _Number = 0.0  # s, by which the voltage is logged late
+    late: Number = 0.0  # s, by which the voltage is logged late
 
 
 @dataclass(frozen=True)
@@ -262,33 +256,79 @@ class Sensor(Columns):
     body: Annotated[str, one_of(BODIES)] = ""  # empty: the map's
 
 
+def _section(count: int, units: Collection[str] = ()) -> WrapValidator:
+    """Return a validator of a section: as many columns as it needs, their unit and signs.
+
+    Args:
+        count: columns; 0: any but none.
+        units: that the columns may have; nothing: they have none.
+    """
+
+    def check(given: Any, inner: Callable[[Any], Any]) -> Any:
+        stated = given if isinstance(given, Mapping) else {}
+        if stated:
+            given = {str(key): value for key, value in stated.items() if value is not None}
+            if count == 1 and "column" in given:
+                given["columns"] = [given.pop("column")]
+            given.setdefault("columns", [])
+        part: Any = inner(given)
+        quaternion = isinstance(part, Attitude) and not part.euler
+        needed = 3 if isinstance(part, Attitude) and part.euler else count
+        if len(part.columns) != (needed or max(1, len(part.columns))):
+            words = {0: "some columns", 1: "one column"}.get(needed, f"a list of {needed} columns")
+            raise ValueError(f"must have {words} of the table, got {list(part.columns)!r:.100}")
+        if part.signs and len(part.signs) != len(part.columns):
+            count_words = f"{len(part.columns)} times 1 or -1"
+            raise ValueError(f"must have signs of {count_words}, got {list(part.signs)!r:.100}")
+        if units and not (quaternion and not part.unit):
+            part = replace(part, unit=_known(part.unit or next(iter(units)), units, "unit"))
+        if part.unit == "raw" and "scale" not in stated:
+            raise ValueError("has unit raw without a scale; expected the scale to SI units")
+        if part.unit == "eRPM" and "pole_pairs" not in stated:
+            raise ValueError(
+                "has unit eRPM without pole_pairs; expected the motors' pairs of poles (7 on most "
+                "motors of 5-inch racers, 6 on smaller ones)"
+            )
+        if isinstance(part, Commands) and part.range is None:
+            part = replace(part, range=COMMAND_UNITS[part.unit])
+        return part
+
+    return WrapValidator(check)
+
+
+def _clock(time: TimeColumn) -> TimeColumn:
+    if bool(time.column) == bool(time.rate_hz):
+        raise ValueError("must have one column of the table, or rate_hz above 0 without one")
+    return time
+
+
 @dataclass(frozen=True)
 class LogMap:
     """What the columns of a table mean."""
 
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
-    time: TimeColumn
+    time: Annotated[TimeColumn, AfterValidator(_clock)]
     world: Annotated[str, one_of(WORLDS)] = "enu"
     body: Annotated[str, one_of(BODIES)] = "flu"
-    position: Columns | None = None
-    attitude: Attitude | None = None
-    rotors: Rotors | None = None
-    commands: Commands | None = None
-    wrench: Columns | None = None
-    battery: Battery | None = None
-    accelerometer: Sensor | None = None
-    gyro: Sensor | None = None
-    force: Columns | None = None
-    torque: Columns | None = None
-    about: _Text = ""
-    vehicle: _Text = ""
-    recognise: _Names = ()
+    position: Annotated[Position, _section(3, LENGTH_UNITS)] | None = None
+    attitude: Annotated[Attitude, _section(4, ANGLE_UNITS)] | None = None
+    rotors: Annotated[Rotors, _section(4, ROTOR_UNITS)] | None = None
+    commands: Annotated[Commands, _section(4, COMMAND_UNITS)] | None = None
+    wrench: Annotated[Columns, _section(4, ("N",))] | None = None
+    battery: Annotated[Battery, _section(1, VOLTAGE_UNITS)] | None = None
+    accelerometer: Annotated[Sensor, _section(3, ACCELERATION_UNITS)] | None = None
+    gyro: Annotated[Sensor, _section(3, RATE_UNITS)] | None = None
+    force: Annotated[Columns, _section(3, ("N", "mN"))] | None = None
+    torque: Annotated[Columns, _section(3, ("Nm", "mNm"))] | None = None
+    about: str = ""
+    vehicle: str = ""
+    recognise: tuple[str, ...] = ()
     name: str = ""  # where it comes from: a shipped map's name or a file
-    notes: _Names = ()
+    notes: tuple[str, ...] = ()
     rows: Literal["mixed", "whole", "streams", "messages"] = "mixed"
     stray_rows: Annotated[int, Field(ge=0)] = 0
-    extra: Mapping[str, Columns] = field(default_factory=dict)
+    extra: Mapping[str, Annotated[Columns, _section(0)]] = field(default_factory=dict)
     # further ways to fill a section (``time`` among them), in their order
     alternatives: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
 
@@ -304,21 +344,11 @@ class LogMap:
         return self.name == OWN_MAP
 
 
-# sections: their class, how many columns they have, and their units
-_FORMS: dict[str, tuple[type[Columns], int, Collection[str]]] = {
-    "position": (Position, 3, LENGTH_UNITS),
-    "attitude": (Attitude, 4, ANGLE_UNITS),
-    "rotors": (Rotors, 4, ROTOR_UNITS),
-    "commands": (Commands, 4, COMMAND_UNITS),
-    "wrench": (Columns, 4, ("N",)),
-    "battery": (Battery, 1, VOLTAGE_UNITS),
-    "accelerometer": (Sensor, 3, ACCELERATION_UNITS),
-    "gyro": (Sensor, 3, RATE_UNITS),
-    "force": (Columns, 3, ("N", "mN")),
-    "torque": (Columns, 3, ("Nm", "mNm")),
-}
-_DEFAULT_UNITS = {"attitude": "deg", "commands": "normalised"}  # of others the first
-SECTIONS = tuple(_FORMS)
+SECTIONS = (
+    *("position", "attitude", "rotors", "commands", "wrench", "battery"),
+    *("accelerometer", "gyro", "force", "torque"),
+)
+_FIELDS = [field.name for field in fields(LogMap) if field.name not in ("name", "alternatives")]
 
 
 def constant(name: str) -> float | None:
@@ -372,32 +402,23 @@ def parse_map(value: object, where: str, name: str = "") -> LogMap:
     Raises:
         InputError: a field is unknown, missing, or of another kind.
     """
-    if not isinstance(value, dict):
-        raise InputError(f"{where}: {_shown(value)}; expected a mapping of fields")
-    given: dict[str, Any] = {str(key): item for key, item in value.items() if item is not None}
-    others: dict[str, tuple[Any, ...]] = {}
-    for section in ("time", *SECTIONS):
-        ways = given.get(section, {} if section == "time" else None)
-        if ways is None:
-            continue
-        read = _time if section == "time" else _section
-        ways = ways if isinstance(ways, list) and ways else [ways]
-        given[section], *more = [read(way, where, section) for way in ways]
-        others[section] = tuple(more)
-    extra = given.pop("extra", {})
-    if not isinstance(extra, dict):
-        raise InputError(f"{where}: extra: {_shown(extra)}; expected a mapping of names")
-    for key, part in extra.items():
-        if isinstance(part, dict) and not part.get("columns"):
-            raise InputError(f"{where}: extra: {key}: columns: missing; expected some of the table")
-    given["extra"] = {
-        str(key): checked(Columns, _filled(part, f"{where}: extra"), f"{where}: extra: {key}")
-        for key, part in extra.items()
+    if not isinstance(value, Mapping):
+        raise InputError(
+            f"{where}: expected a mapping of fields such as time and position, got {value!r:.100}"
+        )
+    given = {str(key): item for key, item in value.items() if item is not None}
+    for key in given:
+        if key not in _FIELDS:
+            raise unknown_name("key", key, _FIELDS, where)
+    ways = {key: given[key] for key in ("time", *SECTIONS) if isinstance(given.get(key), list)}
+    first = given | {key: listed[0] for key, listed in ways.items() if listed}
+    found = checked(LogMap, first, where)
+    others = {
+        key: tuple(getattr(checked(LogMap, first | {key: way}, where), key) for way in listed[1:])
+        for key, listed in ways.items()
     }
-    _check_names(given, LogMap, where)
-    found = checked(LogMap, given | {"name": name or where, "alternatives": others}, where)
     _check_whole(found, where)
-    return found
+    return replace(found, name=name or where, alternatives=others)
 
 
 def _check_whole(found: LogMap, where: str) -> None:
@@ -418,89 +439,3 @@ def _check_whole(found: LogMap, where: str) -> None:
         raise InputError(f"{where}: no motors; expected a section rotors or commands")
     if (found.force is None) != (found.torque is None):
         raise InputError(f"{where}: force and torque come together; expected both or neither")
-
-
-def _filled(given: object, where: str) -> dict[str, Any]:
-    """Return a section's fields that are stated, its columns as texts."""
-    if not isinstance(given, dict):
-        raise InputError(f"{where}: {_shown(given)}; expected a mapping of fields")
-    fields = {str(key): item for key, item in given.items() if item is not None}
-    if isinstance(columns := fields.get("columns"), list):
-        for name in columns:
-            if isinstance(name, bool) or not isinstance(name, str | int) or name == "":
-                raise InputError(f"{where}: columns: {_shown(name)}; expected the name of a column")
-        fields["columns"] = tuple(str(name).strip() for name in columns)
-    return fields
-
-
-def _time(given: object, where: str, section: str) -> TimeColumn:
-    where = f"{where}: {section}"
-    fields = _filled(given, where)
-    _check_names(fields, TimeColumn, where)
-    rate = fields.get("rate_hz")
-    column = fields.get("column")
-    if not rate and (isinstance(column, bool) or not isinstance(column, str | int)):
-        raise InputError(f"{where}: column: {_shown(column)}; expected one column of the table")
-    found = checked(TimeColumn, fields | ({} if rate else {"column": str(column).strip()}), where)
-    if rate and (found.rate_hz <= 0.0 or column is not None):
-        raise InputError(f"{where}: expected a column, or rate_hz above 0 without one")
-    return found
-
-
-def _section(given: object, where: str, section: str) -> Columns:
-    kind, count, units = _FORMS[section]
-    where = f"{where}: {section}"
-    fields = _filled(given, where)
-    _check_names(fields, kind, where, *(["column"] if count == 1 else []))
-    named = "columns"
-    if count == 1:
-        named = "column"
-        column = fields.pop("column", None)
-        fields["columns"] = [column] if isinstance(column, str | int) else column
-        fields = _filled(fields, where)
-    if "euler" in fields:
-        count = 3
-    if not isinstance(fields.get("columns"), tuple) or len(fields["columns"]) != count:
-        what = "one column" if count == 1 else f"a list of {count} columns"
-        found = fields.get("columns", given.get(named) if isinstance(given, dict) else None)
-        found = list(found) if isinstance(found, tuple) else found
-        raise InputError(f"{where}: {named}: {_shown(found)}; expected {what} of the table")
-    lower = {name.lower(): name for name in units}
-    default = "" if section == "attitude" and count == 4 else _DEFAULT_UNITS.get(section)
-    unit = str(fields.get("unit", next(iter(units)) if default is None else default))
-    spelt = lower.get(unit.lower()) or lower.get(_SPELLINGS.get(unit.lower(), "").lower())
-    if unit and spelt is None:
-        raise unknown_name("unit", unit, units, where)
-    fields["unit"] = spelt or ""
-    if spelt == "raw" and "scale" not in fields:
-        raise InputError(f"{where}: unit raw without a scale; expected the scale to SI units")
-    if spelt == "eRPM" and "pole_pairs" not in fields:
-        raise InputError(
-            f"{where}: unit eRPM without pole_pairs; expected the motors' pairs of poles (7 "
-            "on most motors of 5-inch racers, 6 on smaller ones)"
-        )
-    if section == "commands":
-        fields.setdefault("range", COMMAND_UNITS[fields["unit"]])
-    signs = fields.get("signs", [])
-    if signs and not (
-        isinstance(signs, list)
-        and len(signs) == count
-        and all(s in (1, -1) and not isinstance(s, bool) for s in signs)
-    ):
-        raise InputError(
-            f"{where}: signs: {_shown(signs)}; expected {count} times 1 or -1, such as "
-            f"{[1, -1, 1, 1][:count]}"
-        )
-    return checked(kind, fields, where)
-
-
-def _check_names(fields: Mapping[str, Any], form: Any, where: str, *more: str) -> None:
-    """Raise InputError at a field that no file states."""
-    known = {field.name for field in dataclasses.fields(form)} - {"alternatives", "name"} | {*more}
-    for name in fields:
-        if name not in known:
-            raise unknown_name("field", name, known, where)
-
-
-def _shown(value: object) -> str:
-    return "missing" if value is None else repr(value)[:100]

@@ -21,25 +21,24 @@ ORDERS: dict[str, Order] = {
 }
 
 
-def rotor_order(value: object, where: str) -> Order:
+def rotor_order(value: object) -> Order:
     """Return which motor, from 1, each of the kit's rotors is.
 
     Args:
         value: a name of ``ORDERS``, or the four motors' numbers, front-left first.
-        where: for errors.
 
     Raises:
         InputError: neither.
     """
     if isinstance(value, str):
         if value not in ORDERS:
-            raise unknown_name("rotor order", value, ORDERS, where)
+            raise unknown_name("rotor order", value, ORDERS)
         return ORDERS[value]
     if isinstance(value, list | tuple) and sorted(map(str, value)) == ["1", "2", "3", "4"]:
         a, b, c, d = (int(str(x)) for x in value)
         return a, b, c, d
     raise InputError(
-        f"{where}: {value!r}; expected one of {', '.join(ORDERS)}, or the numbers of the motors "
+        f"{value!r}; expected one of {', '.join(ORDERS)}, or the numbers of the motors "
         f"at the {', '.join(PLACES)}, such as [3, 2, 4, 1]"
     )
 

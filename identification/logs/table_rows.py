@@ -94,7 +94,7 @@ def _check_whole(table: Table, columns: Mapping[str, Array], log_map: LogMap) ->
     """Raise InputError where a row has a part of a pose, or of a sensor's three values, or lacks
     another number; ``check_rows`` looks at gaps of motors and of the voltage.
     """
-    pose = [part for part in (log_map.position, log_map.attitude) if part is not None]
+    pose: list[Columns] = [p for p in (log_map.position, log_map.attitude) if p is not None]
     groups = [(pose, "only all {} pose columns together may be empty (pose lost)")]
     groups += [
         ([part], "only {} together may be empty (not measured)")

@@ -11,10 +11,10 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, ConfigDict
+from pydantic import AfterValidator, BeforeValidator, ConfigDict
 
 from ....runtime.errors import InputError, unknown_name
-from ....runtime.forms import STRICT, checked
+from ....runtime.forms import STRICT, Number, checked, expected
 from ....runtime.yaml_file import read_yaml
 from ..log_map import (
     COMMAND_UNITS,
@@ -28,7 +28,6 @@ from ..log_map import (
     Sensor,
     TimeColumn,
     one_of,
-    that_is,
 )
 from ..rotor_orders import ORDERS
 from .ros_messages import Kind
@@ -49,7 +48,7 @@ _POSITION, _ATTITUDE = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
 _FORCE, _RATE = ("ax", "ay", "az"), ("gx", "gy", "gz")
 
 
-def _elements(value: Any, info: Any) -> tuple[int, ...]:
+def _elements(value: Any) -> tuple[int, ...]:
     """Return the elements of a message, from 1, that are the kit's rotors."""
     if isinstance(value, str):
         if value not in ORDERS:
@@ -58,20 +57,22 @@ def _elements(value: Any, info: Any) -> tuple[int, ...]:
     is_list = isinstance(value, list | tuple) and all(type(i) is int and i >= 1 for i in value)
     if not is_list or not len(set(value)) == 4 == len(value):
         raise InputError(
-            "order: expected four different elements, counted from 1, such as [1, 2, 3, 4], or "
+            "expected four different elements, counted from 1, such as [1, 2, 3, 4], or "
             f"one of {', '.join(ORDERS)}, got {value!r}"
         )
     return tuple(value)
 
 
-def _is_range(value: Any) -> bool:
-    is_two = isinstance(value, list) and [type(x) in (int, float) for x in value] == [True, True]
-    return is_two and 0.0 <= value[0] < value[1] <= _LARGEST_COMMAND
+def _rising(values: tuple[float, float]) -> tuple[float, float]:
+    if not 0.0 <= values[0] < values[1] <= _LARGEST_COMMAND:
+        raise ValueError("no range")
+    return values
 
 
 _Range = Annotated[
-    tuple[float, float] | None,
-    that_is("the values of the commands 0 and 1, such as [1000, 2000]", _is_range),
+    tuple[Number, Number],
+    AfterValidator(_rising),
+    expected("the values of the commands 0 and 1, such as [1000, 2000]"),
 ]
 
 
@@ -81,11 +82,11 @@ class Setting:
 
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
-    topic: Annotated[str, that_is("a name such as /motors", lambda x: isinstance(x, str))] = ""
+    topic: Annotated[str, expected("a name such as /motors")] = ""
     frame: Annotated[str, one_of(_FRAMES)] = ""  # ned: world and body z down; flu: ROS's own
     unit: Annotated[str, one_of([*UNITS["rotors"], *UNITS["command"]])] = ""
     order: Annotated[tuple[int, ...], BeforeValidator(_elements)] = ()
-    range: _Range = None  # values of the commands 0 and 1
+    range: _Range | None = None  # values of the commands 0 and 1
 
 
 def topic_map(path: Path, option: str) -> tuple[dict[str, Setting], str]:
