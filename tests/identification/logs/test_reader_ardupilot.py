@@ -8,6 +8,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.support.autopilot_flight import (
+    FLIP,
+    assert_inertial,
+    assert_motion,
+    inertial,
+    motion,
+    ned,
+)
 from tests.support.data_paths import data_file
 from tests.support.dataflash_writer import dataflash
 from windwrench.dynamics import InputError, load_vehicle
@@ -15,7 +23,6 @@ from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.logs.readers.dataflash import read_dataflash
 from windwrench.identification.logs.reading import read_log
 
-FLIP = np.diag([1.0, -1.0, -1.0])
 T = 5.0 + 0.02 * np.arange(300)
 SLOW = T[::5]
 FAST = 5.0 + 0.0025 * np.arange(2400)
@@ -33,26 +40,6 @@ PARAMETERS = {
     "SERVO12_FUNCTION": 36.0,
 }
 COMMAND = np.array([0.50, 0.52, 0.54, 0.56])  # ours: front-left, rear-left, rear-right, front-right
-
-
-def motion(t):
-    position = np.column_stack([0.5 * np.cos(t), 0.8 * np.sin(t), 1.0 + 0.1 * t])
-    turn = Rotation.from_euler(
-        "ZYX", np.column_stack([2.0 + 0.5 * t, 0.2 * np.sin(2 * t), 0.3 * np.cos(t)])
-    )
-    return position, turn
-
-
-def inertial(t):
-    """Angular velocity (rad/s) and specific force (m/s2), body axes forward, left, up."""
-    turn, after = motion(t)[1], motion(t + 1e-5)[1]
-    acceleration = np.column_stack([-0.5 * np.cos(t), -0.8 * np.sin(t), np.full(len(t), 9.81)])
-    return (turn.inv() * after).as_rotvec() / 1e-5, turn.inv().apply(acceleration)
-
-
-def ned(t):
-    position, turn = motion(t)
-    return position @ FLIP, Rotation.from_matrix(FLIP @ turn.as_matrix() @ FLIP)
 
 
 def micro(t):
@@ -140,20 +127,12 @@ def vehicle():
     return load_vehicle("ardrone2")
 
 
-def assert_pose(log, atol):
-    position, turn = motion(log.t[log.valid] + 5.0)
-    np.testing.assert_allclose(log.position[log.valid], position, atol=atol)
-    seen = Rotation.from_quat(log.quaternion[log.valid], scalar_first=True)
-    assert (turn.inv() * seen).magnitude().max() < 10 * atol
-
-
 def test_frames_motors_and_commands(write, vehicle):
     battery = "BAT", "QBf", {"TimeUS": micro(SLOW), "Inst": 0 * SLOW, "Volt": 16.0 - 0.1 * SLOW}
     log = read_log(write(parm(), xkf1(T), xkq(T), imu(T), rcou(T), battery), None, vehicle)
     assert "reader ardupilot_bin" in log.source
-    assert_pose(log, 1e-5)
-    np.testing.assert_allclose(log.gyro, inertial(T)[0], atol=1e-4)
-    np.testing.assert_allclose(log.accelerometer, inertial(T)[1], atol=1e-4)
+    assert_motion(log, T, 1e-5)
+    assert_inertial(log, T, 1e-4)
     np.testing.assert_allclose(log.command, np.tile(COMMAND, (len(T), 1)), atol=1e-9)
     np.testing.assert_allclose(log.voltage[0], 16.0 - 0.5, atol=1e-5)
     # ArduPilot's own curve, scaled to the accelerometer's specific force
@@ -179,7 +158,7 @@ def test_a_slow_pose_beside_a_fast_imu(write):
     log = read_log(write(parm(), xkf1(SLOW), att(T), imu(FAST), rcou(T)))
     assert len(log.t) > 2000
     assert 50 < log.valid.sum() <= len(SLOW)
-    assert_pose(log, 2e-3)
+    assert_motion(log, log.t[log.valid] + 5.0, 2e-3)
 
 
 def test_escs_that_report_their_speed(write):

@@ -3,8 +3,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
+from tests.support.autopilot_flight import (
+    FLIP,
+    OURS,
+    PX4,
+    assert_inertial,
+    assert_motion,
+    growth,
+    inertial,
+    motion,
+    ned,
+)
 from tests.support.ulog_writer import ulog_bytes
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.vehicle import MotorCurve
@@ -12,40 +22,10 @@ from windwrench.identification.logs.reading import read_log
 
 pytest.importorskip("pyulog", reason="pyulog is not installed: pip install 'windwrench[logs]'")
 
-# our world and body seen from PX4's, each half a turn about x
-FLIP = np.diag([1.0, -1.0, -1.0])
-OURS = np.array(
-    [301.0, 302.0, 303.0, 304.0]
-)  # rad/s of front-left, rear-left, rear-right, front-right
-PX4 = OURS[[3, 1, 0, 2]]  # 1 front-right, 2 rear-left, 3 front-left, 4 rear-right
-
 
 @pytest.fixture(scope="module")
 def vehicle():
     return load_vehicle("ardrone2")
-
-
-def motion(t):
-    """A climbing, yawing, tilting flight in the kit's frames."""
-    position = np.column_stack([0.5 * np.cos(t), 0.8 * np.sin(t), 1.0 + 0.1 * t])
-    turn = Rotation.from_euler(
-        "ZYX", np.column_stack([2.0 + 1.5 * t, 0.2 * np.sin(2 * t), 0.3 * np.cos(t)])
-    )
-    return position, turn
-
-
-def inertial(t):
-    """Angular velocity (rad/s) and specific force (m/s2), body axes forward, left, up."""
-    turn, after = motion(t)[1], motion(t + 1e-5)[1]
-    acceleration = np.column_stack([-0.5 * np.cos(t), -0.8 * np.sin(t), np.full(len(t), 9.81)])
-    return (turn.inv() * after).as_rotvec() / 1e-5, turn.inv().apply(acceleration)
-
-
-def ned(t):
-    position, turn = motion(t)
-    return position @ FLIP, Rotation.from_matrix(FLIP @ turn.as_matrix() @ FLIP).as_quat()[
-        :, [3, 0, 1, 2]
-    ]
 
 
 def stamps(t):
@@ -53,20 +33,20 @@ def stamps(t):
 
 
 def odometry(t, new=True):
-    position, quaternion = ned(t)
+    position, turn = ned(t)
     head = {"uint64_t timestamp": stamps(t + 0.02), "uint64_t timestamp_sample": stamps(t)}
     if new:
         return head | {
             "uint8_t pose_frame": np.full(len(t), 2),
             "float position": position,
-            "float q": quaternion,
+            "float q": turn.as_quat(scalar_first=True),
         }
     xyz = {f"float {axis}": position[:, i] for i, axis in enumerate("xyz")}
-    return head | {"uint8_t local_frame": np.full(len(t), 0), **xyz, "float q": quaternion}
-
-
-def growth(t):
-    return 1.0 + 0.1 * t
+    return head | {
+        "uint8_t local_frame": np.full(len(t), 0),
+        **xyz,
+        "float q": turn.as_quat(scalar_first=True),
+    }
 
 
 def esc(t, speeds=PX4, **functions):
@@ -90,7 +70,19 @@ def onboard(t):
             "bool xy_valid": np.ones(len(t), bool),
             "bool z_valid": np.ones(len(t), bool),
         },
-        "vehicle_attitude": {"uint64_t timestamp": stamps(fast), "float q": ned(fast)[1]},
+        "vehicle_attitude": {
+            "uint64_t timestamp": stamps(fast),
+            "float q": ned(fast)[1].as_quat(scalar_first=True),
+        },
+    }
+
+
+def sensor_combined(t):
+    gyro, force = inertial(t)
+    return {
+        "uint64_t timestamp": stamps(t),
+        "float gyro_rad": gyro @ FLIP,
+        "float accelerometer_m_s2": force @ FLIP,
     }
 
 
@@ -111,14 +103,6 @@ def write(tmp_path):
         return path
 
     return to_file
-
-
-def assert_motion(log, t, atol=1e-6):
-    position, turn = motion(t)
-    np.testing.assert_allclose(log.t, t - t[0], atol=2e-6)
-    np.testing.assert_allclose(log.position, position, atol=atol)
-    error = (turn.inv() * Rotation.from_quat(log.quaternion[:, [1, 2, 3, 0]])).magnitude()
-    assert error.max() < 10 * atol
 
 
 @pytest.mark.parametrize("topic", ["vehicle_mocap_odometry", "vehicle_visual_odometry"])
@@ -146,16 +130,10 @@ def test_motion_capture_and_turn_rates(write, t, topic, new, vehicle):
 
 def test_inertial_sensors_come_in_the_kits_axes(write, t, vehicle):
     times = wide(t)
-    gyro, force = inertial(times)
-    fields = {
-        "uint64_t timestamp": stamps(times),
-        "float gyro_rad": gyro @ FLIP,
-        "float accelerometer_m_s2": force @ FLIP,
-    }
+    fields = sensor_combined(times)
     topics = {"vehicle_mocap_odometry": odometry(t), "esc_status": esc(times)}
     log = read_log(write(topics | {"sensor_combined": fields}), "px4_ulog", vehicle)
-    np.testing.assert_allclose(log.gyro, inertial(log.t)[0], atol=1e-3)
-    np.testing.assert_allclose(log.accelerometer, inertial(log.t)[1], atol=1e-3)
+    assert_inertial(log, log.t)
     # half a second in which nothing was read stays empty
     lost = (times > 0.7) & (times < 1.2)
     fields = {name: column[~lost] for name, column in fields.items()}
@@ -286,11 +264,7 @@ def test_a_tilted_flight_needs_more_thrust_than_its_weight(write, t, vehicle):
 def test_without_a_pose_the_inertial_sensors_are_read(write, t, vehicle):
     times = wide(t)
     gyro, force = inertial(times)
-    combined = {
-        "uint64_t timestamp": stamps(times),
-        "float gyro_rad": gyro @ FLIP,
-        "float accelerometer_m_s2": force @ FLIP,
-    }
+    combined = sensor_combined(times)
     step = np.full(len(times), 4000)  # us
     integrated = {
         "uint64_t timestamp": stamps(times + 0.002),  # the end of what they were gained over
@@ -304,31 +278,18 @@ def test_without_a_pose_the_inertial_sensors_are_read(write, t, vehicle):
         assert not log.has_pose
         at = log.t + times[0]
         assert 0.9 * len(times) < len(at)
-        np.testing.assert_allclose(log.gyro, inertial(at)[0], atol=2e-2)
-        np.testing.assert_allclose(log.accelerometer, inertial(at)[1], atol=2e-2)
+        assert_inertial(log, at, 2e-2)
         np.testing.assert_allclose(log.rotor_speeds[5], growth(at[5]) * OURS, atol=0.3)
 
 
 def test_a_slow_pose_stands_in_rows_of_the_inertial_sensors(write, vehicle):
     slow, times = 0.1 * np.arange(40), np.arange(-0.2, 4.2, 0.004)
-    gyro, force = inertial(times)
-    topics = {
-        "sensor_combined": {
-            "uint64_t timestamp": stamps(times),
-            "float gyro_rad": gyro @ FLIP,
-            "float accelerometer_m_s2": force @ FLIP,
-        },
-        "esc_status": esc(times),
-    }
+    topics = {"sensor_combined": sensor_combined(times), "esc_status": esc(times)}
     for pose in ({"vehicle_mocap_odometry": odometry(slow)}, onboard(slow)):
         log = read_log(write(topics | pose), None, vehicle)
         assert log.valid.sum() == len(slow)
         assert len(log.t) > 1000
-        at = log.t[log.valid] + times[0]
-        position, turn = motion(at)
-        np.testing.assert_allclose(log.position[log.valid], position, atol=1e-3)
-        seen = Rotation.from_quat(log.quaternion[log.valid], scalar_first=True)
-        assert (turn.inv() * seen).magnitude().max() < 2e-3
+        assert_motion(log, log.t[log.valid] + times[0], 1e-3)
         np.testing.assert_allclose(log.gyro, inertial(log.t + times[0])[0], atol=2e-2)
 
 

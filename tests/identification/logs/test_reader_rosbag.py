@@ -1,3 +1,7 @@
+"""Bags of ROS 1 and ROS 2, of PX4, MAVROS and simulators; which topic is taken for what; and bags
+that are cut, packed or hostile.
+"""
+
 import sqlite3
 import sys
 from contextlib import closing
@@ -5,8 +9,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
+from tests.support.autopilot_flight import (
+    FLIP,
+    OURS,
+    PX4,
+    assert_inertial,
+    assert_motion,
+    growth,
+    inertial,
+    motion,
+    ned,
+)
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.logs.readers import rosbag, unpacking
 from windwrench.identification.logs.reading import read_log
@@ -16,21 +30,15 @@ pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'wi
 
 from rosbags import rosbag1, rosbag2
 from rosbags.rosbag1 import reader
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-ACTUATORS = "mav_msgs/msg/Actuators"
-ACTUATORS_TEXT = (
-    "std_msgs/Header header\nfloat64[] angles\nfloat64[] angular_velocities\nfloat64[] normalized\n"
-)
-START = 1_700_000_000_000_000_000  # ns
-OURS = np.array(
-    [301.0, 302.0, 303.0, 304.0]
-)  # rad/s of front-left, rear-left, rear-right, front-right
-PX4 = OURS[[3, 1, 0, 2]]  # 1 front-right, 2 rear-left, 3 front-left, 4 rear-right
-FLIP = np.diag([1.0, -1.0, -1.0])
+from tests.support.bag_writer import START, stamp, write_bag
+from windwrench.identification.logs.readers.ros_messages import definitions
+
 T = 0.01 * np.arange(50)
 WIDE = np.arange(-0.05, 0.6, 0.004)
 KINDS = ("bag", "db3", "mcap")
+SHARE = OURS / 1000.0  # commands
+THEIRS = [3, 1, 0, 2]  # our rotors of PX4's motors
 
 
 @pytest.fixture(scope="module")
@@ -38,217 +46,147 @@ def vehicle():
     return load_vehicle("ardrone2")
 
 
-@pytest.fixture(scope="module")
-def stores():
-    made = {True: get_typestore(Stores.ROS1_NOETIC), False: get_typestore(Stores.ROS2_HUMBLE)}
-    for store in made.values():
-        store.register(get_types_from_msg(ACTUATORS_TEXT, ACTUATORS))
-    return made
-
-
-def motion(t):
-    position = np.column_stack([0.5 * np.cos(t), 0.8 * np.sin(t), 1.0 + 0.1 * t])
-    turn = Rotation.from_euler(
-        "ZYX", np.column_stack([2.0 + 1.5 * t, 0.2 * np.sin(2 * t), 0.3 * np.cos(t)])
-    )
-    return position, turn
-
-
-def inertial(t):
-    """Angular velocity (rad/s) and specific force (m/s2), body axes forward, left, up."""
-    turn, after = motion(t)[1], motion(t + 1e-5)[1]
-    acceleration = np.column_stack([-0.5 * np.cos(t), -0.8 * np.sin(t), np.full(len(t), 9.81)])
-    return (turn.inv() * after).as_rotvec() / 1e-5, turn.inv().apply(acceleration)
-
-
-def growth(t):
-    return 1.0 + 0.1 * t
-
-
-class Messages:
-    """Makes the messages of one typestore."""
-
-    def __init__(self, store, ros1):
-        self.types, self.ros1 = store.types, ros1
-
-    def header(self, t):
-        if t is None:
-            t = -1e-9 * START
-        nanoseconds = START + round(1e9 * t)
-        stamp = self.types["builtin_interfaces/msg/Time"](nanoseconds // 10**9, nanoseconds % 10**9)
-        return self.types["std_msgs/msg/Header"](*([0] if self.ros1 else []), stamp, "world")
-
-    def pose(self, kind, t, ned=False, stamp=True):
-        (p,), turn = motion(np.array([t]))
-        matrix = turn.as_matrix()[0]
-        if ned:
-            p, matrix = FLIP @ p, FLIP @ matrix @ FLIP
-        quaternion = self.types["geometry_msgs/msg/Quaternion"](
-            *Rotation.from_matrix(matrix).as_quat()
-        )
-        header = self.header(t if stamp else None)
-        if kind == "geometry_msgs/msg/TransformStamped":
-            place = self.types["geometry_msgs/msg/Vector3"](*p)
-            return self.types[kind](
-                header, "body", self.types["geometry_msgs/msg/Transform"](place, quaternion)
-            )
-        pose = self.types["geometry_msgs/msg/Pose"](
-            self.types["geometry_msgs/msg/Point"](*p), quaternion
-        )
-        if kind == "geometry_msgs/msg/PoseStamped":
-            return self.types[kind](header, pose)
-        zero = self.types["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0)
-        twist = self.types["geometry_msgs/msg/Twist"](zero, zero)
-        return self.types[kind](
-            header,
-            "body",
-            self.types["geometry_msgs/msg/PoseWithCovariance"](pose, np.zeros(36)),
-            self.types["geometry_msgs/msg/TwistWithCovariance"](twist, np.zeros(36)),
-        )
-
-    def actuators(self, t, speeds):
-        return self.types[ACTUATORS](
-            self.header(t), np.zeros(0), np.asarray(speeds) * growth(t), np.zeros(0)
-        )
-
-    def array(self, t, speeds):
-        layout = self.types["std_msgs/msg/MultiArrayLayout"]([], 0)
-        return self.types["std_msgs/msg/Float32MultiArray"](
-            layout, (np.asarray(speeds) * growth(t)).astype(np.float32)
-        )
-
-    def imu(self, t):
-        make = self.types["geometry_msgs/msg/Vector3"]
-        zero, turn = np.zeros(9), self.types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)
-        (gyro,), (force,) = inertial(np.array([t]))
-        return self.types["sensor_msgs/msg/Imu"](
-            self.header(t), turn, zero, make(*(FLIP @ gyro)), zero, make(*(FLIP @ force)), zero
-        )
-
-    def battery(self, t):
-        kind = self.types["sensor_msgs/msg/BatteryState"]
-        names = {
-            name: 0 if "power" in name else 0.0
-            for name in kind.__dataclass_fields__
-            if not name.startswith("__")
-        }
-        names |= {
-            "header": self.header(t),
-            "voltage": 12.0 - t,
-            "present": True,
-            "location": "",
-            "serial_number": "",
-            "cell_voltage": np.zeros(0, np.float32),
-            "cell_temperature": np.zeros(0, np.float32),
-        }
-        return kind(**names)
-
-
 @pytest.fixture
-def write(tmp_path, stores):
-    def to_bag(kind, topics, topic_map=None, delay=0.0, packed=()):
-        """Write ``{topic: (type, times, make(messages, t), definition)}`` into a bag and return its
-        path.
-        """
-        ros1 = kind == "bag"
-        store, path = stores[ros1], tmp_path / ("flight.bag" if ros1 else "flight")
-        messages = Messages(store, ros1)
-        if ros1:
-            writer = rosbag1.Writer(path)
-        else:
-            plugin = rosbag2.StoragePlugin.MCAP if kind == "mcap" else rosbag2.StoragePlugin.SQLITE3
-            writer = rosbag2.Writer(path, version=9, storage_plugin=plugin)
-        if packed:
-            writer.set_compression(*packed)
-        with writer:
-            for topic, (name, times, make, *definition) in topics.items():
-                how = (
-                    {"msgdef": definition[0], "md5sum": 32 * "0"}
-                    if definition
-                    else {"typestore": store}
-                )
-                connection = writer.add_connection(topic, name, **how)
-                for t in times:
-                    message = make(messages, t)
-                    raw = (
-                        store.serialize_ros1(message, name)
-                        if ros1
-                        else store.serialize_cdr(message, name)
-                    )
-                    writer.write(connection, START + round(1e9 * (t + delay)), raw)
+def write(tmp_path):
+    def to_bag(topics, kind="mcap", topic_map=None, name="flight", **how):
         if topic_map is not None:
-            (tmp_path / "flight.topics.yaml").write_text(topic_map)
-        return path
+            (tmp_path / f"{name}.topics.yaml").write_text(topic_map)
+        path = tmp_path / (f"{name}.bag" if kind == "bag" else name)
+        return write_bag(path, topics, kind, **how)
 
     return to_bag
 
 
-def pose_topic(kind="geometry_msgs/msg/PoseStamped", times=T, **options):
-    return kind, times, lambda messages, t: messages.pose(kind, t, **options)
+def xyz(values):
+    return dict(zip("xyz", map(float, values), strict=True))
 
 
-def actuator_topic(speeds=OURS, times=WIDE):
-    return ACTUATORS, times, lambda messages, t: messages.actuators(t, speeds)
+def place_and_turn(t, is_ned):
+    position, turn = (ned if is_ned else motion)(np.array([t]))
+    return xyz(position[0]), dict(zip("xyzw", map(float, turn.as_quat()[0]), strict=True))
 
 
-def array_topic(speeds):
-    return "std_msgs/msg/Float32MultiArray", WIDE, lambda messages, t: messages.array(t, speeds)
+def pose(kind="PoseStamped", times=T, is_ned=False, is_stamped=True):
+    def fields(t):
+        place, turn = place_and_turn(t, is_ned)
+        header = stamp(t) if is_stamped else {}
+        if kind == "TransformStamped":
+            return {"header": header, "transform": {"translation": place, "rotation": turn}}
+        here = {"position": place, "orientation": turn}
+        return {"header": header, "pose": {"pose": here} if kind == "Odometry" else here}
+
+    package = "nav_msgs" if kind == "Odometry" else "geometry_msgs"
+    return f"{package}/msg/{kind}", times, fields
 
 
-def battery_topic():
-    return "sensor_msgs/msg/BatteryState", WIDE[::10], lambda messages, t: messages.battery(t)
+def motors(speeds=OURS, times=WIDE):
+    def fields(t):
+        return {"header": stamp(t), "angular_velocities": np.asarray(speeds) * growth(t)}
+
+    return "mav_msgs/msg/Actuators", times, fields
 
 
-def assert_motion(log, atol=1e-7):
-    position, turn = motion(T)
+def numbers(values, kind="Float32"):
+    return f"std_msgs/msg/{kind}MultiArray", WIDE, lambda t: {"data": np.asarray(values)}
+
+
+def battery():
+    fields = lambda t: {"header": stamp(t), "voltage": 12.0 - t}  # noqa: E731
+    return "sensor_msgs/msg/BatteryState", WIDE[::10], fields
+
+
+def imu(turn=None):
+    turn = np.eye(3) if turn is None else turn
+
+    def fields(t):
+        (gyro,), (force,) = inertial(np.array([t]))
+        sensed = {"angular_velocity": xyz(turn @ gyro), "linear_acceleration": xyz(turn @ force)}
+        return {"header": stamp(t)} | sensed
+
+    return "sensor_msgs/msg/Imu", WIDE, fields
+
+
+def actuators():
+    fields = lambda t: {"header": stamp(t), "velocity": OURS, "normalized": SHARE}  # noqa: E731
+    return "actuator_msgs/msg/Actuators", WIDE, fields
+
+
+def of_mavros(name, **fields):
+    return f"mavros_msgs/msg/{name}", WIDE, lambda t: {"header": stamp(t)} | fields
+
+
+def of_px4(name, times, fields):
+    def stamped(t):
+        at = START // 1000 + round(1e6 * t)
+        return {"timestamp": at} | fields(t, at)
+
+    return f"px4_msgs/msg/{name}", times, stamped
+
+
+def px4_topics(is_new):
+    def odometry(t, at):
+        (place,), turn = ned(np.array([t]))
+        q = turn.as_quat(scalar_first=True)[0]
+        if is_new:
+            return {"timestamp_sample": at, "pose_frame": 1, "position": place, "q": q}
+        return {"q": q} | xyz(place)
+
+    def escs(t, at):
+        rpm = [*(PX4 * growth(t) * 30 / np.pi), 0, 0, 0, 0]
+        each = [{"esc_rpm": round(w), "actuator_function": 101 + i} for i, w in enumerate(rpm)]
+        return {"esc": each[::-1]}  # each says which motor it drives
+
+    def control(t, at):
+        return {"timestamp_sample": at, "control": [*SHARE[THEIRS], *[np.nan] * 8]}
+
+    def sensed(t, at):
+        (gyro,), (force,) = inertial(np.array([t]))
+        return {"gyro_rad": FLIP @ gyro, "accelerometer_m_s2": FLIP @ force}
+
+    return {
+        "/fmu/out/vehicle_odometry": of_px4("VehicleOdometry", T, odometry),
+        "/fmu/out/esc_status": of_px4("EscStatus", WIDE, escs),
+        "/fmu/out/actuator_motors": of_px4("ActuatorMotors", WIDE, control),
+        "/fmu/out/sensor_combined": of_px4("SensorCombined", WIDE, sensed),
+    }
+
+
+FLIGHT = {"/a": pose(), "/motors": motors()}
+
+
+def assert_flight(log, atol=1e-7):
     np.testing.assert_allclose(log.t, T, atol=1e-8)
-    np.testing.assert_allclose(log.position, position, atol=atol)
-    assert (
-        turn.inv() * Rotation.from_quat(log.quaternion[:, [1, 2, 3, 0]])
-    ).magnitude().max() < 10 * atol
+    assert_motion(log, T, atol)
     np.testing.assert_allclose(log.rotor_speeds, np.multiply.outer(growth(T), OURS), rtol=1e-6)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_only_topics_that_fit_are_taken(write, kind, vehicle):
-    path = write(
-        kind,
-        {"/vicon/drone": pose_topic(), "/motors": actuator_topic(), "/battery": battery_topic()},
-        delay=0.01,
-    )
-    log = read_log(path, "rosbag", vehicle)
-    assert_motion(log)
+    topics = {"/vicon/drone": pose(), "/motors": motors(), "/battery": battery()}
+    path = write(topics, kind, delay=0.01)
+    log = read_log(path, None, vehicle)
+    assert_flight(log)
     np.testing.assert_allclose(log.voltage, 12.0 - T, atol=1e-5)
     assert log.name == "flight"
-    assert any(
-        "pose: topic /vicon/drone (geometry_msgs/msg/PoseStamped)" in note for note in log.notes
-    )
+    assert "pose: topic /vicon/drone (geometry_msgs/msg/PoseStamped)" in log.notes
     if kind != "bag":
-        inside = next(path.glob(f"*.{kind}"))
-        assert_motion(read_log(inside, "rosbag", vehicle))
+        assert_flight(read_log(next(path.glob(f"*.{kind}")), "rosbag", vehicle))
 
 
 @pytest.mark.parametrize("kind", ["bag", "mcap"])
-@pytest.mark.parametrize(
-    "pose",
-    [
-        "geometry_msgs/msg/PoseStamped",
-        "geometry_msgs/msg/TransformStamped",
-        "nav_msgs/msg/Odometry",
-    ],
-)
-def test_a_map_states_topics_frames_units_and_order(write, kind, pose, vehicle):
-    path = write(
-        kind,
-        {
-            "/a": pose_topic(pose, ned=True),
-            "/b": pose_topic(),
-            "/rpm": array_topic(PX4 * 30 / np.pi),
-        },
-        "pose: {topic: /a, frame: ned}\nrotors: {topic: /rpm, unit: rpm, order: [3, 2, 4, 1]}\n",
-    )
-    log = read_log(path, "rosbag", vehicle)
-    assert_motion(log)
+@pytest.mark.parametrize("shape", ["PoseStamped", "TransformStamped", "Odometry"])
+def test_a_map_states_topics_frames_units_and_order(write, kind, shape, vehicle):
+    def rpm(t):
+        return {"data": PX4 * growth(t) * 30 / np.pi}
+
+    topics = {
+        "/a": pose(shape, is_ned=True),
+        "/b": pose(),
+        "/rpm": ("std_msgs/msg/Float32MultiArray", WIDE, rpm),
+    }
+    lines = "pose: {topic: /a, frame: ned}\nrotors: {topic: /rpm, unit: rpm, order: [3, 2, 4, 1]}\n"
+    log = read_log(write(topics, kind, lines), "rosbag", vehicle)
+    assert_flight(log)
     assert log.voltage is None
     assert any("elements 3, 2, 4, 1" in note for note in log.notes)
     assert any("half a turn about x" in note for note in log.notes)
@@ -256,26 +194,70 @@ def test_a_map_states_topics_frames_units_and_order(write, kind, pose, vehicle):
 
 @pytest.mark.parametrize("kind", ["bag", "mcap"])
 def test_an_imu_is_taken_in_the_frame_that_the_map_states(write, kind, vehicle):
-    topics = {
-        "/a": pose_topic(),
-        "/motors": actuator_topic(),
-        "/imu": ("sensor_msgs/msg/Imu", WIDE, lambda messages, t: messages.imu(t)),
-    }
-    path = write(kind, topics)
+    path = write(FLIGHT | {"/imu": imu(FLIP)}, kind)
     log = read_log(path, None, vehicle)  # REP 145 has an IMU forward, left, up
     np.testing.assert_allclose(log.gyro, inertial(log.t)[0] @ FLIP, atol=2e-3)
     assert "imu: body forward, left, up, as the bag has it" in log.notes
     path.with_name("flight.topics.yaml").write_text("imu: {topic: /imu, frame: ned}")
     log = read_log(path, "rosbag", vehicle)
-    gyro, force = inertial(log.t)
-    np.testing.assert_allclose(log.gyro, gyro, atol=2e-3)
-    np.testing.assert_allclose(log.accelerometer, force, atol=2e-3)
+    assert_inertial(log, log.t, 2e-3)
+
+
+@pytest.mark.parametrize("kind", ["mcap", "db3"])
+@pytest.mark.parametrize("variant", range(len(definitions())))
+def test_messages_of_px4_of_several_years(write, kind, variant):
+    log = read_log(write(px4_topics(variant == 0), kind, variant=variant))
+    assert_motion(log, log.t)
+    assert_inertial(log, log.t)
+    np.testing.assert_allclose(log.rotor_speeds[0], OURS, atol=0.06)
+    np.testing.assert_allclose(log.command, np.tile(SHARE, (len(T), 1)), atol=1e-6)
+    assert any("px4-x, which the bag does not state" in note for note in log.notes)
+
+
+@pytest.mark.parametrize("kind", ["bag", "mcap"])
+def test_messages_of_mavros(write, kind):
+    pulses = np.array([*(1000 + 1000 * SHARE[THEIRS]), 0, 0])
+    topics = {
+        "/mavros/local_position/pose": pose(),
+        "/mavros/setpoint_position/local": pose(),
+        "/mavros/imu/data": imu(),
+        "/mavros/imu/data_raw": imu(),
+        "/mavros/rc/out": of_mavros("RCOut", channels=np.round(pulses)),
+    }
+    log = read_log(write(topics, kind))
+    assert_motion(log, log.t)
+    assert_inertial(log, log.t)
+    np.testing.assert_allclose(log.command, np.tile(SHARE, (len(T), 1)), atol=1e-3)
+    assert not log.has_rotor_speeds
+    text = " ".join(log.notes)
+    assert "pulses of 1000 to 2000 us" in text
+    assert "/mavros/imu/data (sensor_msgs/msg/Imu), chosen by its name before" in text
+    items = [{"rpm": round(w * 30 / np.pi)} for w in PX4]
+    topics |= {"/mavros/esc_status": of_mavros("ESCStatus", esc_status=items)}
+    log = read_log(write(topics | {"/vrpn/drone/pose": pose()}, kind, name="second"))
+    np.testing.assert_allclose(log.rotor_speeds[0], OURS, atol=0.06)
+    assert any("/vrpn/drone/pose" in n and "chosen by its name before" in n for n in log.notes)
+
+
+def test_actuators_of_gazebo_and_a_named_order(write):
+    path = write({"/pose": pose(), "/motors": actuators()})
+    log = read_log(path)
+    np.testing.assert_allclose(log.rotor_speeds[0], OURS)
+    np.testing.assert_allclose(log.command[0], SHARE)
+    path.with_name("flight.topics.yaml").write_text("rotors: {topic: /motors, order: crazyflie}")
+    np.testing.assert_allclose(read_log(path).rotor_speeds[0], OURS[::-1])
+
+
+def test_without_a_pose_an_imu_will_do(write):
+    log = read_log(write({"/imu": imu(), "/motors": actuators()}))
+    assert not log.has_pose
+    assert_inertial(log, log.t + WIDE[0])
 
 
 def test_a_map_may_lie_elsewhere(write, tmp_path, vehicle):
-    path = write("bag", {"/a": pose_topic(), "/b": pose_topic(), "/motors": actuator_topic()})
+    path = write(FLIGHT | {"/b": pose()}, "bag")
     (tmp_path / "other.yaml").write_text("pose: /b\n")
-    assert_motion(read_log(path, f"rosbag:{tmp_path / 'other.yaml'}", vehicle))
+    assert_flight(read_log(path, f"rosbag:{tmp_path / 'other.yaml'}", vehicle))
     with pytest.raises(InputError, match=r"reader 'nanobench' takes no option, got 'x'"):
         read_log(path, "nanobench:x", vehicle)
     with pytest.raises(InputError, match=r"absent.yaml: cannot be read as a topic map"):
@@ -284,59 +266,37 @@ def test_a_map_may_lie_elsewhere(write, tmp_path, vehicle):
 
 def test_an_order_picks_four_of_more(write, vehicle):
     six = np.concatenate([[1.0], OURS[:2], [2.0], OURS[2:]])
-    path = write("bag", {"/a": pose_topic(), "/motors": actuator_topic(six)})
-    with pytest.raises(
-        InputError, match=r"topic /motors, message 1: 6 rotor speed.s.; expected 4, or an order"
-    ):
+    path = write({"/a": pose(), "/motors": motors(six)}, "bag")
+    with pytest.raises(InputError, match=r"/motors, message 1: 6 rotor speed.s.; expected 4, or"):
         read_log(path, "rosbag", vehicle)
     path.with_name("flight.topics.yaml").write_text("rotors: {order: [2, 3, 5, 6]}\n")
-    assert_motion(read_log(path, "rosbag", vehicle))
+    assert_flight(read_log(path, "rosbag", vehicle))
     path.with_name("flight.topics.yaml").write_text("rotors: {order: [2, 3, 5, 7]}\n")
     with pytest.raises(InputError, match="expected at least 7"):
         read_log(path, "rosbag", vehicle)
 
 
-def test_stamps_of_another_clock_are_not_mixed_with_the_bags(write, vehicle):
-    path = write("bag", {"/a": pose_topic(), "/motors": actuator_topic()}, delay=5.0)
-    log = read_log(path, "rosbag", vehicle)
-    assert_motion(log)
-    assert any("of another clock" in note for note in log.notes)
-
-
-def test_poses_without_stamps_take_the_time_of_recording(write, vehicle):
-    log = read_log(
-        write("mcap", {"/a": pose_topic(stamp=False), "/motors": actuator_topic()}),
-        "rosbag",
-        vehicle,
-    )
-    assert_motion(log)
-    assert any("no time stamps" in note for note in log.notes)
-
-
-def test_messages_out_of_order_are_left_out(write, vehicle):
-    path = write(
-        "bag",
-        {"/a": pose_topic(), "/motors": actuator_topic(times=[*WIDE[:50], WIDE[20], *WIDE[50:]])},
-    )
-    log = read_log(path, "rosbag", vehicle)
-    assert_motion(log)
-    assert any("1 of 164 samples repeat or go back" in note for note in log.notes)
+@pytest.mark.parametrize(
+    ("topics", "delay", "said"),
+    [
+        ({}, 5.0, "of another clock"),
+        ({"/a": pose(is_stamped=False)}, 0.0, "/a: no time stamps"),
+        ({"/motors": motors(times=[*WIDE[:50], WIDE[20], *WIDE[50:]])}, 0.0, "1 of 164 samples"),
+    ],
+)
+def test_times_that_are_no_use_are_replaced_or_left_out(write, vehicle, topics, delay, said):
+    log = read_log(write(FLIGHT | topics, "bag", delay=delay), "rosbag", vehicle)
+    assert_flight(log)
+    assert any(said in note for note in log.notes)
 
 
 @pytest.mark.parametrize(
     ("topic_map", "expected"),
     [
         ("pose: /nowhere", r"unknown topic '/nowhere'; expected one of /a, /motors, /n"),
-        (
-            "pose: /motors",
-            "pose: topic /motors is of type mav_msgs/msg/Actuators; expected "
-            "geometry_msgs/msg/PoseStamped",
-        ),
+        ("pose: /motors", r"pose: topic /motors is of type mav_msgs\S+; expected geometry_msgs"),
         ("pos: /a", "unknown key 'pos'; expected one of command, imu, pose, rotors, voltage"),
-        (
-            "pose: {topic: /a, frames: ned}",
-            "pose: unknown key 'frames'; expected one of frame, topic",
-        ),
+        ("pose: {topic: /a, frames: ned}", "pose: unknown key 'frames'; expected one of frame, t"),
         (
             "pose: {topic: /a, frame: enu}",
             "pose: frame: unknown frame 'enu'; expected one of flu, ned",
@@ -344,21 +304,23 @@ def test_messages_out_of_order_are_left_out(write, vehicle):
         ("pose: {topic: [1]}", r"pose: topic must be a name such as /motors, got \[1\]"),
         ("pose: 3", "pose: expected a mapping of fields such as topic, frame, got int"),
         ("rotors: {unit: [rpm]}", "rotors: unit: unknown unit"),
+        ("rotors: {unit: us}", "rotors: unknown unit 'us'; expected one of Hz, rad/s, rpm"),
         ("rotors: {order: [1, 2, 3, 3]}", "order: expected four different elements"),
         ("rotors: {order: [0, 1, 2, 3]}", "order: expected four different elements"),
         ("rotors: {order: 5}", "order: expected four different elements"),
-        ("rotors: /n", "states no unit; expected unit: rad/s, rpm, Hz"),
+        ("rotors: {order: dji}", "unknown order 'dji'"),
+        ("rotors: /n", "rotors: topic /n is .* states no unit; expected unit: rad/s, rpm, Hz"),
+        (
+            "command: {unit: us, range: [2, 1]}",
+            "command: range must be the values of the commands 0 and 1",
+        ),
         ("- pose", "expected a mapping of pose, rotors, command, voltage, imu to topics, got list"),
         ("pose: [", "not valid YAML"),
     ],
 )
 def test_a_wrong_map_is_named(write, topic_map, expected, vehicle):
-    path = write(
-        "bag", {"/a": pose_topic(), "/motors": actuator_topic(), "/n": array_topic(OURS)}, topic_map
-    )
-    with pytest.raises(
-        InputError, match=f"flight.(bag|topics.yaml): .*{expected}|flight.topics.yaml: {expected}"
-    ):
+    path = write(FLIGHT | {"/n": numbers(OURS)}, "bag", topic_map)
+    with pytest.raises(InputError, match=rf"flight.(bag|topics.yaml): (.*: )?{expected}"):
         read_log(path, "rosbag", vehicle)
 
 
@@ -366,44 +328,43 @@ def test_a_wrong_map_is_named(write, topic_map, expected, vehicle):
 @pytest.mark.parametrize(
     ("topics", "expected"),
     [
+        ({"/motors": motors()}, "pose: no topic of a type that fits; expected one of geometry_ms"),
+        ({"/a": pose()}, r"rotors: no topic .* in \S*flight.topics.yaml. The bag's topics: /a"),
+        (FLIGHT | {"/b": pose()}, r"pose: 2 topics could be it \(/a, /b\); expected one"),
+        (FLIGHT | {"/b": pose(), "/imu": imu()}, r"pose: 2 topics could be it \(/a, /b\)"),
         (
-            {"/motors": actuator_topic()},
-            "pose: no topic of a type that fits; expected one of geometry_msgs/msg/PoseStamped",
+            {"/goal_pose": pose(), "/motors": motors()},
+            r"no topic but set-points by their names \(/goal_pose\)",
         ),
         (
-            {"/a": pose_topic()},
-            r"rotors: no topic .* in \S*flight.topics.yaml. The bag's topics: /a",
+            {"/a": pose(), "/motors": numbers(OURS)},
+            r"rotors: /motors could be it, but a multi-array states no unit; expected in \S+"
+            r"flight.topics.yaml the line rotors: {topic: /motors, unit: rad/s}",
         ),
-        (
-            {"/a": pose_topic(), "/b": pose_topic(), "/motors": actuator_topic()},
-            r"pose: 2 topics could be it \(/a, /b\)",
-        ),
-        (
-            {"/a": pose_topic(times=[]), "/motors": actuator_topic()},
-            "pose: topic /a has no messages",
-        ),
-        (
-            {"/a": pose_topic(times=[0.0]), "/motors": actuator_topic()},
-            r"/a: 1 message\(s\); expected at least two",
-        ),
-        ({"/a": pose_topic(), "/motors": actuator_topic(times=WIDE + 9)}, "do not overlap"),
-        (
-            {"/a": pose_topic(), "/motors": actuator_topic([1, 2, np.nan, 3])},
-            "no two samples have four finite rotor speeds",
-        ),
+        (FLIGHT | {"/a": pose(times=[])}, "pose: topic /a has no messages"),
+        (FLIGHT | {"/a": pose(times=[0.0])}, r"/a: 1 message\(s\); expected at least two"),
+        (FLIGHT | {"/motors": motors(times=WIDE + 9)}, "do not overlap"),
+        (FLIGHT | {"/motors": motors([1, 2, np.nan, 3])}, "no two samples have four finite"),
+        ({}, "(cannot be read as a ROS|The bag's topics: none)"),
     ],
 )
 def test_what_is_missing_is_named(write, kind, topics, expected, vehicle):
     with pytest.raises(InputError, match=f"flight.*: .*{expected}"):
-        read_log(write(kind, topics), "rosbag", vehicle)
+        read_log(write(topics, kind), "rosbag", vehicle)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_an_empty_bag_is_refused(write, kind, vehicle):
-    with pytest.raises(
-        InputError, match=r"flight.*(cannot be read as a ROS|The bag's topics: none)"
-    ):
-        read_log(write(kind, {}), "rosbag", vehicle)
+@pytest.mark.parametrize(
+    ("line", "wanted"),
+    [
+        ("rotors: {topic: /motors, unit: rad/s}", OURS),
+        ("rotors: {topic: /motors, unit: rev/s}", OURS * 2 * np.pi),
+        ("command: {topic: /motors, unit: normalized, range: [0, 1000]}", SHARE),
+    ],
+)
+def test_an_array_is_what_the_map_says(write, line, wanted, vehicle):
+    log = read_log(write({"/a": pose(), "/motors": numbers(OURS, "Float64")}, "mcap", line))
+    found = log.command if log.command is not None else log.rotor_speeds
+    np.testing.assert_allclose(found[0], wanted)
 
 
 @pytest.mark.parametrize("name", ["flight.bag", "flight.db3", "flight.mcap"])
@@ -418,25 +379,21 @@ def test_what_is_no_bag_is_refused(tmp_path, name, content, vehicle):
 
 
 def test_what_is_not_there_is_refused(tmp_path, vehicle):
-    with pytest.raises(InputError, match=r"absent.bag: cannot be read as a ROS bag"):
-        read_log(tmp_path / "absent.bag", "rosbag", vehicle)
     (tmp_path / "flight.csv").write_text("t")
-    with pytest.raises(
-        InputError, match=r"flight.csv: unknown kind of bag; expected .bag, .db3, .mcap"
+    for path, reader_name, expected in (
+        (tmp_path / "absent.bag", "rosbag", r"absent.bag: cannot be read as a ROS bag"),
+        (tmp_path / "flight.csv", "rosbag", r"unknown kind of bag; expected .bag, .db3, .mcap"),
+        (tmp_path, "rosbag", r"cannot be read as a ROS 2 bag: .*metadata"),
+        (tmp_path, None, r"is a folder; expected a file, or .* ROS 2 bag, .*; found flight.csv"),
     ):
-        read_log(tmp_path / "flight.csv", "rosbag", vehicle)
-    with pytest.raises(InputError, match=r"cannot be read as a ROS 2 bag: .*metadata"):
-        read_log(tmp_path, "rosbag", vehicle)
-    with pytest.raises(
-        InputError, match=r"is a folder; expected a file, or .* ROS 2 bag, .*; found flight.csv"
-    ):
-        read_log(tmp_path, None, vehicle)
+        with pytest.raises(InputError, match=expected):
+            read_log(path, reader_name, vehicle)
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_cut_or_spoiled_bag_reads_or_is_refused(write, kind, vehicle):
-    path = write(kind, {"/a": pose_topic(), "/motors": actuator_topic()})
+    path = write(FLIGHT, kind)
     file = path if kind == "bag" else next(path.glob(f"*.{kind}"))
     data = file.read_bytes()
     rng = np.random.default_rng(0)
@@ -453,25 +410,15 @@ def test_a_cut_or_spoiled_bag_reads_or_is_refused(write, kind, vehicle):
 
 
 def test_another_definition_of_a_known_type_is_refused(write, vehicle):
-    path = write(
-        "bag",
-        {"/a": pose_topic(), "/motors": (*actuator_topic(), "float64[] angular_velocities\n")},
-    )
-    with pytest.raises(
-        InputError, match=r"topic /motors: its mav_msgs/msg/Actuators has another definition"
-    ):
+    path = write(FLIGHT | {"/motors": (*motors(), "float64[] angular_velocities\n")}, "bag")
+    with pytest.raises(InputError, match=r"/motors: its mav_msgs/msg/Actuators has another defin"):
         read_log(path, "rosbag", vehicle)
 
 
 def test_a_voltage_that_nobody_asked_for_may_be_unreadable(write, vehicle):
-    topics = {
-        "/a": pose_topic(),
-        "/motors": actuator_topic(),
-        "/battery": (*battery_topic(), "float32 voltage\n"),
-    }
-    path = write("bag", topics)
+    path = write(FLIGHT | {"/battery": (*battery(), "float32 voltage\n")}, "bag")
     log = read_log(path, "rosbag", vehicle)
-    assert_motion(log)
+    assert_flight(log)
     assert log.voltage is None
     assert any("no voltage: " in note and "another definition" in note for note in log.notes)
     path.with_name("flight.topics.yaml").write_text("voltage: /battery")
@@ -489,8 +436,8 @@ PACKED = {
 @pytest.mark.parametrize("way", PACKED)
 def test_packed_chunks_are_unpacked_up_to_a_limit(way, write, vehicle, monkeypatch):
     kind, packed = PACKED[way]
-    path = write(kind, {"/pose": pose_topic(), "/motors": actuator_topic()}, packed=packed)
-    assert_motion(read_log(path, "rosbag", vehicle))
+    path = write(FLIGHT, kind, packed=packed)
+    assert_flight(read_log(path, "rosbag", vehicle))
     before = dict(reader.decompressors)
     monkeypatch.setattr(unpacking, "LARGEST", 1000)
     with pytest.raises(InputError, match=r"flight.*a chunk unpacks to more than 1000 bytes"):
@@ -501,23 +448,23 @@ def test_packed_chunks_are_unpacked_up_to_a_limit(way, write, vehicle, monkeypat
 @pytest.mark.parametrize("way", PACKED)
 def test_chunks_are_counted_over_the_whole_bag(way, write, vehicle, monkeypatch):
     kind, packed = PACKED[way]
-    path = write(kind, {"/pose": pose_topic(), "/motors": actuator_topic()}, packed=packed)
+    path = write(FLIGHT, kind, packed=packed)
     monkeypatch.setattr(unpacking, "LIMITS", replace(LIMITS, bag_unpacked=20_000))
     with pytest.raises(InputError, match="its chunks unpack to more than 20000 bytes"):
         read_log(path, "rosbag", vehicle)
 
 
 def test_the_index_of_a_bag_is_counted(write, vehicle, monkeypatch):
-    path = write("bag", {"/pose": pose_topic(), "/motors": actuator_topic()})
+    path = write(FLIGHT, "bag")
     monkeypatch.setattr(unpacking, "LIMITS", replace(LIMITS, bag_index=100))
     with pytest.raises(InputError, match="its index has more than 100 entries"):
         read_log(path, "rosbag", vehicle)
 
 
 def test_messages_of_a_topic_are_counted(write, vehicle, monkeypatch):
-    path = write("mcap", {"/pose": pose_topic(), "/motors": actuator_topic()})
+    path = write(FLIGHT, "mcap")
     monkeypatch.setattr(rosbag, "LIMITS", replace(LIMITS, table_rows=10))
-    with pytest.raises(InputError, match="topic /pose: more than 10 messages; expected one flight"):
+    with pytest.raises(InputError, match="topic /a: more than 10 messages; expected one flight"):
         read_log(path, "rosbag", vehicle)
 
 
@@ -529,7 +476,7 @@ def test_messages_of_a_topic_are_counted(write, vehicle, monkeypatch):
     ],
 )
 def test_a_database_that_computes_what_it_holds_is_refused(change, write, vehicle):
-    path = write("db3", {"/pose": pose_topic(), "/motors": actuator_topic()})
+    path = write(FLIGHT, "db3")
     (file,) = path.glob("*.db3")
     with closing(sqlite3.connect(file)) as database:
         if "VIEW" in change:
@@ -543,8 +490,8 @@ def test_a_database_that_computes_what_it_holds_is_refused(change, write, vehicl
 @pytest.mark.parametrize("mode", [rosbag2.CompressionMode.FILE, rosbag2.CompressionMode.MESSAGE])
 def test_files_and_messages_packed_one_by_one_are_refused(mode, write, vehicle):
     path = write(
+        FLIGHT,
         "db3",
-        {"/pose": pose_topic(), "/motors": actuator_topic()},
         packed=(mode, rosbag2.CompressionFormat.ZSTD),
     )
     with pytest.raises(
