@@ -11,7 +11,7 @@ lateral force that the filter makes up.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from ..dynamics.vehicle import Vehicle
 from ..dynamics.vehicle_file import load_vehicle
 from ..envs.plant import PlantSettings
 from .drawing import COLOURS, only_ticks, styled
-from .hanging_mass import CALM, ROTOR_LOAD, THREAD, hover, with_noise
+from .hanging_mass import CALM, ROTOR_LOAD, THREAD, hover
 from .result import Progress, Result, compared, table
 
 TITLE = "Fig. 4: step response to a known mass"
@@ -116,7 +116,8 @@ def fly_step(
 ) -> Step:
     """Fly the step and its pair without the mass with each seed."""
     settings = PlantSettings() if actuator else CALM
-    flier = with_noise(vehicle, *noise)
+    seen = replace(vehicle.mocap, sigma_pos_m=noise[0], sigma_att_rad=noise[1])
+    flier = replace(vehicle, mocap=seen)
     hung, bare = (
         [hover(flier, load, _END, HANG, seed, tuned, settings, _EVERY) for seed in range(seeds)]
         for load in (ROTOR_LOAD, None)

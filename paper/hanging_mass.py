@@ -8,7 +8,7 @@ by up to 0.1 rad, and the load with it.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,10 +130,3 @@ def _heading(q: Array) -> Array:
     )
     nose /= math.hypot(nose[0], nose[1])
     return nose
-
-
-def with_noise(vehicle: Vehicle, position: float, attitude: float) -> Vehicle:
-    """Return the vehicle seen by a motion capture with these standard deviations, m and rad."""
-    return replace(
-        vehicle, mocap=replace(vehicle.mocap, sigma_pos_m=position, sigma_att_rad=attitude)
-    )

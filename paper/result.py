@@ -2,13 +2,14 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from jinja2 import Template
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+
+from ..runtime.page_files import page_template
 
 # An experiment calls it with the share of its work that is done, 0 to 1.
 Progress = Callable[[float], None]
@@ -48,17 +49,9 @@ def table(blocks: Sequence[Mapping[str, Any]]) -> Columns:
     }
 
 
-@cache
 def template(name: str) -> Template:
     """Return the template ``templates/NAME.md.j2``; a name without a value is an error."""
-    loader = PackageLoader(__package__, "templates")
-    return Environment(
-        loader=loader,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    ).get_template(f"{name}.md.j2")
+    return page_template(__package__, f"templates/{name}.md.j2", html=False)
 
 
 def compared(name: str, /, **values: Any) -> tuple[list[Comparison], list[str]]:
