@@ -174,14 +174,14 @@ def tune_to_log(log: FlightLog, vehicle: Vehicle) -> NoiseFit:
         InputError: the log is none to estimate a wrench from (``screen_for_estimate``), or too few
             poses are left to fit a tuning to.
     """
-    screened, _ = screen_for_estimate(log, vehicle)
-    if reads_imu(screened):
+    columns = _columns(log, vehicle)
+    if columns is None:
         raise InputError(
             f"{log.source or log.name}: has no pose, or one that is too slow, to fit a tuning to; "
             "expected 50 poses a second, or leave --tune out"
         )
     try:
-        return fit_noise(vehicle, *_columns(screened))
+        return fit_noise(vehicle, *columns)
     except InputError as error:
         raise InputError(f"{log.source or log.name}: {error}") from error
 
@@ -192,13 +192,17 @@ def tuning_note_of(log: FlightLog, vehicle: Vehicle) -> str | None:
     Raises:
         InputError: the log is none to estimate a wrench from.
     """
-    screened, _ = screen_for_estimate(log, vehicle)
-    if reads_imu(screened):
+    columns = _columns(log, vehicle)
+    return None if columns is None else tuning_note(vehicle, *columns)
+
+
+def _columns(
+    log: FlightLog, vehicle: Vehicle
+) -> tuple[Array, Array, Array, Array, Array | None] | None:
+    """Return what a tuning is judged by; None of a log whose motion is that of its IMU."""
+    log, _ = screen_for_estimate(log, vehicle)
+    if reads_imu(log):
         return None
-    return tuning_note(vehicle, *_columns(screened))
-
-
-def _columns(log: FlightLog) -> tuple[Array, Array, Array, Array, Array | None]:
     position = np.where(log.valid[:, None], log.position, np.nan)
     return log.t, log.rotor_speeds, position, log.quaternion, log.voltage
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...runtime.page_files import write_json, write_png
+from ...runtime.plain_values import plain
 from .change import CHANGES, NOWHERE, SOMETHING_ELSE, Change
 from .fault_channels import Samples
 from .fault_detection import ALL, NOTHING, OTHER, RotorFault
@@ -76,29 +77,32 @@ def change_data(change: Change) -> dict[str, Any]:
             {
                 "log": trim.name,
                 "seconds": trim.seconds,
-                "thrust_share": (trim.thrust / trim.total).tolist(),
+                "thrust_share": trim.thrust / trim.total,
                 "total": trim.total,
-                "std": np.sqrt(np.diagonal(trim.noise)).tolist(),
+                "std": np.sqrt(np.diagonal(trim.noise)),
                 "voltage": trim.voltage,
             }
             for trim in trims
         ]
 
     names = ("left_less_right", "front_less_rear", "diagonals", "log_total")
-    return {
-        "headline": change_headline(change),
-        "place": change.place,
-        "sure": change.sure,
-        "probabilities": change.places,
-        "weaker": change.weaker,
-        "carries_more": change.carries_more,
-        "amount": change.amount,
-        "amount_std": change.amount_std,
-        "difference": dict(zip(names, change.difference.tolist(), strict=True)),
-        "difference_std_if_unchanged": dict(zip(names, change.std.tolist(), strict=True)),
-        "before": flights(change.before),
-        "after": flights(change.after),
-    }
+    data: dict[str, Any] = plain(
+        {
+            "headline": change_headline(change),
+            "place": change.place,
+            "sure": change.sure,
+            "probabilities": change.places,
+            "weaker": change.weaker,
+            "carries_more": change.carries_more,
+            "amount": change.amount,
+            "amount_std": change.amount_std,
+            "difference": dict(zip(names, change.difference, strict=True)),
+            "difference_std_if_unchanged": dict(zip(names, change.std, strict=True)),
+            "before": flights(change.before),
+            "after": flights(change.after),
+        }
+    )
+    return data
 
 
 def write_change(change: Change, folder: Path) -> tuple[Path, Path]:

@@ -3,6 +3,7 @@
 """
 
 import json
+import math
 import shlex
 from dataclasses import asdict
 from importlib import resources
@@ -13,13 +14,18 @@ from ... import __version__
 from ...dynamics.vehicle_file import save_vehicle
 from ...runtime.plain_values import as_text, plain
 from ...runtime.whole_files import replaced
-from ..findings import Diagnosis, Errors
+from ..findings import Diagnosis, Errors, Probabilities
 from .page import report_page
 from .words import headline
 
 # MAJOR.MINOR of ``report.json``, which ``report.schema.json`` beside this file describes: a new key
 # is a new minor version, a key that goes or changes its meaning a new major one
 SCHEMA_VERSION = "1.2"
+# what ``report.json`` holds under the name that the diagnosis has for it
+_AS_FOUND = (
+    *("advice", "notes", "needs_pose", "candidates", "structure", "rotor_faults"),
+    *("logs", "test_logs", "seconds", "cutoff_hz"),
+)
 
 
 def write_report(
@@ -56,9 +62,8 @@ def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return what ``report.json`` holds: plain Python values, six significant digits, None for what
     is not finite. ``report_schema`` describes it.
     """
-    segments = [[start, end] for _, start, end in diagnosis.held_out_segments]
     error: dict[str, Any] = {
-        "held_out_segments": segments,
+        "held_out_segments": [[start, end] for _, start, end in diagnosis.held_out_segments],
         "before": _errors(diagnosis.before),
         "after": _errors(diagnosis.after),
         "floor": {
@@ -71,34 +76,24 @@ def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
         for log, start, end in diagnosis.held_out_segments:
             by_log.setdefault(log, []).append([start, end])
         error["held_out_by_log"] = by_log
-    stated = diagnosis.probabilities
-    names = stated.names if stated else {}
+    stated = diagnosis.probabilities or Probabilities({}, (), math.nan)
     data: dict[str, Any] = {
         "verdict": diagnosis.verdict,
         "remainder": diagnosis.remainder,
         "effects": [
-            asdict(effect) | {"probability": names.get(effect.name)} for effect in diagnosis.effects
+            asdict(x) | {"probability": stated.names.get(x.name)} for x in diagnosis.effects
         ],
-        "alternatives": [asdict(x) for x in stated.alternatives] if stated else [],
-        "unknown": stated.unknown if stated else None,
+        "alternatives": stated.alternatives,
+        "unknown": stated.unknown,
         "error": error,
-        "advice": diagnosis.advice,
-        "notes": diagnosis.notes,
+        **{name: getattr(diagnosis, name) for name in _AS_FOUND},
         "headline": headline(diagnosis),
         "floor_is_lower_bound": diagnosis.floor_is_bound,
-        "needs_pose": diagnosis.needs_pose,
-        "candidates": [asdict(candidate) for candidate in diagnosis.candidates],
-        "structure": [asdict(structure) for structure in diagnosis.structure],
         "gusts": [{"channel": g.channel, "rms": g.rms, "time_s": g.time} for g in diagnosis.gusts],
         "pushes": [
             {"channel": p.channel, "log": p.log, "t_s": p.t, "peak": p.peak}
             for p in diagnosis.pushes
         ],
-        "rotor_faults": diagnosis.rotor_faults,
-        "logs": diagnosis.logs,
-        "test_logs": diagnosis.test_logs,
-        "seconds": diagnosis.seconds,
-        "cutoff_hz": diagnosis.cutoff_hz,
         "vehicle": diagnosis.declared.name,
         "version": __version__,
         "schema_version": SCHEMA_VERSION,

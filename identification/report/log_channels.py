@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ...runtime.whole_files import replaced
+from ...runtime.page_files import write_png
 from ..logs.flight_log import FlightLog
 
 Array = NDArray[np.float64]
@@ -83,7 +83,7 @@ def plot_channels(name: str, channels: list[Channel], path: Path) -> Path:
     # matplotlib takes half a second to import, and most of the kit never draws
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11.0, 1.2 + 1.7 * len(channels)), dpi=100, layout="constrained")
+    figure = Figure(figsize=(10.0, 1.1 + 1.55 * len(channels)), layout="constrained")
     panels = np.atleast_1d(figure.subplots(len(channels), 1, sharex=True))
     figure.suptitle(name)
     for panel, channel in zip(panels, channels, strict=True):
@@ -94,6 +94,5 @@ def plot_channels(name: str, channels: list[Channel], path: Path) -> Path:
         if len(channel.series) > 1:
             panel.legend(loc="upper right", fontsize=7, ncols=len(channel.series))
     panels[-1].set_xlabel("time (s)")
-    with replaced(path) as temporary:
-        figure.savefig(temporary, format="png")
+    write_png(figure, path)
     return path

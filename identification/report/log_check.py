@@ -23,6 +23,8 @@ from ..logs.tables import is_table, open_table
 from ..motion.noise_spectrum import noise_spectra
 from .log_channels import Channel, log_channels
 
+_SAID = ("unit", "samples", "rate_hz", "gaps", "longest_gap_s")  # of each channel
+
 
 @dataclass(frozen=True)
 class LogCheck:
@@ -45,14 +47,7 @@ class LogCheck:
             "samples": len(log.t),
             "seconds": float(log.t[-1] - log.t[0]),
             "channels": {
-                c.name: {
-                    "unit": c.unit,
-                    "samples": c.samples,
-                    "rate_hz": c.rate_hz,
-                    "gaps": c.gaps,
-                    "longest_gap_s": c.longest_gap_s,
-                    "range": [c.low, c.high],
-                }
+                c.name: {key: getattr(c, key) for key in _SAID} | {"range": [c.low, c.high]}
                 for c in self.channels
             },
             "vehicle": log.vehicle or None,

@@ -9,7 +9,7 @@ is one of the log.
 import base64
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -368,14 +368,12 @@ def _table_over_time(traces: Sequence[Trace], i: int, factor: float, unit: str) 
     )
 
 
-@dataclass(frozen=True)
-class Bar:
+class Bar(NamedTuple):
     """One candidate effect in the chart of what each explains alone."""
 
     name: str
     share: str
-    named: bool
-    rival: bool  # these logs cannot tell it from a named effect
+    kind: str  # named; rival, which these logs cannot tell from a named effect; or empty
     left: float  # of the bar's ends, per cent of the chart's width
     width: float
 
@@ -385,27 +383,24 @@ def candidate_bars(diagnosis: Diagnosis, most: int = 14) -> list[Bar]:
     named or cannot be told from a named one.
     """
     rivals = {x for effect in diagnosis.effects for x in effect.indistinguishable_from}
-    shown = [
-        candidate
-        for i, candidate in enumerate(diagnosis.candidates)
-        if i < most or candidate.named or candidate.name in rivals
+    kinds = [
+        "named" if x.named else "rival" if x.name in rivals else "" for x in diagnosis.candidates
     ]
-    gains = [candidate.gain if np.isfinite(candidate.gain) else 0.0 for candidate in shown]
-    high, low = max([*gains, 0.05]), max(min([*gains, 0.0]), -0.25)
-
-    def place(gain: float) -> float:
-        return 100.0 * (max(gain, low) - low) / (high - low)
-
+    ranked = zip(diagnosis.candidates, kinds, strict=True)
+    shown = [(x, kind) for i, (x, kind) in enumerate(ranked) if i < most or kind]
+    gains = np.nan_to_num([x.gain for x, _ in shown], posinf=0.0, neginf=0.0)
+    high, low = np.max(gains, initial=0.05), max(np.min(gains, initial=0.0), -0.25)
+    places = 100.0 * (np.maximum([*gains, 0.0], low) - low) / (high - low)
+    zero = places[-1]
     return [
         Bar(
             candidate.name,
             percent(candidate.gain),
-            candidate.named,
-            candidate.name in rivals and not candidate.named,
-            round(min(place(gain), place(0.0)), 1),
-            round(abs(place(gain) - place(0.0)), 1),
+            kind,
+            round(float(min(place, zero)), 1),
+            round(float(abs(place - zero)), 1),
         )
-        for candidate, gain in zip(shown, gains, strict=True)
+        for (candidate, kind), place in zip(shown, places[:-1], strict=True)
     ]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
-from ...runtime.whole_files import replaced
+from ...runtime.page_files import write_png
 from ..logs.flight_log import FlightLog
 from ..logs.flight_phases import FLIGHT, GROUND, LANDING, TAKE_OFF, Phase, flight_phases
 from ..wrench_series import WrenchSeries
@@ -38,7 +38,6 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
         InputError: the file cannot be written.
     """
     # matplotlib takes half a second to import, and most of the kit never draws
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     path, vehicle = Path(path), series.vehicle
@@ -46,8 +45,7 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
     phases = (
         flight_phases(series.t, series.position[:, 2], log.rotor_speeds, vehicle) if known else []
     )
-    figure = Figure(figsize=(12.0, 9.0), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = Figure(figsize=(12.0, 9.0), layout="constrained")
     height, force, torque = figure.subplots(3, 1, sharex=True, height_ratios=[1.0, 1.5, 1.5])
     figure.suptitle(f"External wrench: {log.name}, {vehicle.name}")
 
@@ -81,8 +79,7 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
         middle = 0.5 * (phase.start + phase.end)
         place = height.get_xaxis_transform()
         height.text(middle, 1.03, phase.name, transform=place, ha="center", fontsize=9)
-    with replaced(path) as temporary:
-        figure.savefig(temporary, format="png")
+    write_png(figure, path)
     return path
 
 

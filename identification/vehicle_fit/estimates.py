@@ -13,6 +13,7 @@ from ...dynamics.effects import Role, get
 from .channels import MotionPiece, Sources
 from .effect_settings import effect_of, estimate_name
 from .geometry import USUAL, Geometry
+from .parameters import OPTIONAL
 from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, told
 from .solve import VehicleFit
 from .spectra import SPECTRUM
@@ -21,6 +22,16 @@ Values = Mapping[str, float]
 Function = Callable[[Values], float]
 Interval = tuple[float, float, float]  # value, low and high
 
+# of each further effect of the air: its role, its first coefficient there, and what shows it
+_AIR: dict[str, tuple[Role, int, str]] = {
+    "rotor drag": (Role.ROTOR_DRAG, 0, ""),
+    "linear drag": (Role.BODY_DRAG, 0, ""),
+    "quadratic drag": (Role.BODY_DRAG, 3, ""),
+    "vertical drag": (Role.BODY_DRAG, 2, ""),
+    "inflow": (Role.INFLOW_THRUST, 0, "z"),
+    "lift": (Role.TRANSLATIONAL_LIFT, 0, "z"),
+    **{f"damping {a}": (Role.RATE_DAMPING, i, "turning") for i, a in enumerate("xyz")},
+}
 UNKNOWN: Interval = (math.nan, math.nan, math.nan)
 
 
@@ -269,29 +280,16 @@ class _Estimates:
             return
         along = f"{self.sources.force} along body x and y against velocity"
         damped = f"{self.sources.rate} against its own derivative"
-        # a further effect's name; its role, and the coefficients there; the fit's parameters, and
-        # what they are multiplied by
-        drags = ("rotor drag", "linear drag", "quadratic drag")
-        rows: list[tuple[str, Role, int, str, float, str]] = []
-        for kind, role, first in zip(
-            drags, (Role.ROTOR_DRAG, Role.BODY_DRAG, Role.BODY_DRAG), (0, 0, 3), strict=True
-        ):
-            rows += [(kind, role, first + i, f"{kind} {a}", 1.0, along) for i, a in enumerate("xy")]
-        rows += [
-            ("vertical drag", Role.BODY_DRAG, 2, "linear drag z", 1.0, along),
-            ("inflow", Role.INFLOW_THRUST, 0, "rotor drag z", 1.0, "force along body z"),
-            ("lift", Role.TRANSLATIONAL_LIFT, 0, "lift", 0.25, "force along body z"),
-        ]
-        for i, a in enumerate("xyz"):
-            rows.append((f"damping {a}", Role.RATE_DAMPING, i, f"damping {a}", self.arm, damped))
-        for kind, role, index, parameter, factor, how in rows:
-            if kind in self.kept:
+        for kind, (role, first, channel) in _AIR.items():
+            how = {"": along, "z": "force along body z", "turning": damped}[channel]
+            for index, parameter in enumerate(OPTIONAL[kind] if kind in self.kept else (), first):
+                factor = {"lift": 0.25}.get(kind, self.arm if channel == "turning" else 1.0)
                 known = self.intervals.of(
                     lambda v, f=factor, n=parameter: f * v[n],  # type: ignore[misc]
-                    role == Role.RATE_DAMPING,
+                    channel == "turning",
                 )
                 unit = get(effect_of(role)).coefficients[index].unit
                 self.add(estimate_name(role, index), known, unit, how)
-        if not set(drags) & set(self.kept):
+        if not {"rotor drag", "linear drag", "quadratic drag"} & set(self.kept):
             known = (0.0, math.nan, math.nan)
             self.add("drag", known, "N/(m/s)", "none stands out of the disturbances", NOTHING)

@@ -3,21 +3,23 @@ against fitted force and torque.
 """
 
 import json
-import math
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.vehicle_file import save_vehicle
-from ...runtime.whole_files import replaced
+from ...runtime.page_files import write_png, write_text
+from ...runtime.plain_values import plain
 from ..motion.smoothing import low_pass
 from .channels import MotionPiece
 from .columns import air_columns, rotor_columns
 from .model import coefficients
 from .result import ASSUMED, NOTHING, Identified
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -26,31 +28,29 @@ _SHOWN_SECONDS = 10.0
 
 
 def identified_data(found: Identified) -> dict[str, Any]:
-    """Return the dictionary of ``identify.json``."""
-
-    def number(x: float) -> float | None:
-        return float(x) if math.isfinite(x) else None
-
-    return {
+    """Return the dictionary of ``identify.json``; None for what is not known."""
+    data: dict[str, Any] = {
         "vehicle": found.vehicle.name,
         "mass_kg": found.vehicle.mass,
         "flight_s": found.seconds,
         "segments": found.segments,
-        "channels": asdict(found.sources),
+        "channels": found.sources,
         "estimates": [
             {
                 "name": e.name,
-                "value": number(e.value),
-                "interval_95": [number(e.low), number(e.high)],
+                "value": e.value,
+                "interval_95": [e.low, e.high],
                 "unit": e.unit,
                 "status": e.status,
                 "how": e.how,
             }
             for e in found.estimates
         ],
-        "notes": list(found.notes),
-        "advice": list(found.advice),
+        "notes": found.notes,
+        "advice": found.advice,
     }
+    told: dict[str, Any] = plain(data)
+    return told
 
 
 def headline(found: Identified) -> str:
@@ -72,9 +72,8 @@ def write_identified(found: Identified, path: Path) -> tuple[Path, Path, Path]:
     """
     save_vehicle(found.vehicle, path)
     data, picture = (path.with_name(f"{path.stem}.identify.{end}") for end in ("json", "png"))
-    with replaced(data) as partial:
-        partial.write_text(json.dumps(identified_data(found), indent=1) + "\n", encoding="utf-8")
-    _picture(found, picture)
+    write_text(json.dumps(identified_data(found), indent=1) + "\n", data)
+    write_png(_picture(found), picture)
     return path, data, picture
 
 
@@ -100,7 +99,7 @@ def fitted(found: Identified, piece: MotionPiece) -> tuple[Array, Array]:
     )
 
 
-def _picture(found: Identified, path: Path) -> None:
+def _picture(found: Identified) -> "Figure":
     from matplotlib.figure import Figure
 
     mass, inertia = found.vehicle.mass, np.diag(found.vehicle.inertia)
@@ -121,5 +120,4 @@ def _picture(found: Identified, path: Path) -> None:
             plot.set_title(f"{what} {axis} ({unit}), residual {100 * left:.0f} %", fontsize=9)
         axes[1, i].set_xlabel("time (s)")
     axes[0, 0].legend(fontsize=8)
-    with replaced(path) as partial:
-        figure.savefig(partial, format="png", dpi=110)
+    return figure

@@ -102,26 +102,6 @@ def test_a_gap_widens_the_band_and_is_bridged(vehicle):
     np.testing.assert_allclose(series.force[1400:].mean(axis=0), [0, 0, 0.3], atol=0.05)
 
 
-@pytest.mark.parametrize("rows_between", [False, True])
-def test_after_a_long_gap_the_filter_starts_anew(vehicle, rows_between):
-    t = 0.005 * np.arange(2000)
-    lost = None
-    if rows_between:
-        lost = slice(1000, 1500)
-    else:
-        t[1000:] += 1e8  # s, which cost nothing
-    series = estimate_log(held_flight(vehicle, t, lost=lost), vehicle)
-    again = 1500 if rows_between else 1000
-    assert "the filter restarted" in series.notes[0]
-    assert series.status[again] == "restarted"
-    assert set(series.status[again + 1 :]) == {"tracking"}
-    error = np.abs(series.force[again] - [0, 0, 0.3])
-    assert np.all(error < 3.0 * series.std_force[again])
-    assert np.all(series.std_force[again] > 1.3 * series.std_force[999])
-    np.testing.assert_allclose(series.force[-100:].mean(axis=0), [0, 0, 0.3], atol=0.05)
-    assert finite(series)
-
-
 @pytest.mark.parametrize("smooth", [False, True])
 def test_wild_poses_are_refused_and_said(vehicle, smooth):
     log = held_flight(vehicle, 0.005 * np.arange(1200))

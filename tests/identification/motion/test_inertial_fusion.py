@@ -77,14 +77,3 @@ def test_ten_positions_a_second_show_heading_velocity_and_biases(
     assert 0.3 < np.sqrt(np.mean(z**2)) < 2.0
     assert np.abs(fused.gyro_bias[len(at) // 2] - GYRO_BIAS).max() < 0.002
     assert np.abs(fused.accelerometer_bias[len(at) // 2] - FORCE_BIAS).max() < 0.03
-
-
-def test_positions_between_knots_are_taken_at_their_own_time(
-    motion: dict[str, np.ndarray],
-) -> None:
-    """At 1.5 m/s a knot's 10 ms would be 15 mm."""
-    every = slice(7, None, 21)
-    positions = Readings(motion["t"][every], motion["position"][every], 0.002)
-    fused = fuse(motion["t"], motion["gyro"], motion["force"], GRAVITY, (0.005, 0.1), positions)
-    at = np.searchsorted(motion["t"], fused.t - 1e-9)
-    assert np.sqrt(np.mean(np.square(fused.position - motion["position"][at]))) < 0.003

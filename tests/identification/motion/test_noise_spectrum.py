@@ -4,13 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import butter, lfilter, sosfilt
+from scipy.signal import butter, sosfilt
 
 from windwrench.dynamics import load_vehicle
 from windwrench.envs.recording import record_flight
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.noise_spectrum import (
-    NOISE_SPECTRUM,
     filtering_notes,
     noise_spectra,
     pose_was_filtered,
@@ -53,30 +52,6 @@ def test_white_noise_is_level(seed):
         assert abs(x.slope) < 0.5
         assert abs(x.fall - 1.0) < 0.25
         assert not x.filtered
-
-
-@pytest.mark.parametrize("rate", [80.0, 200.0, 500.0])
-def test_the_slope_is_that_of_the_filter(rate):
-    """A first-order low-pass far below the band has a slope of one there, and the digital one that
-    has no zero at half the sampling rate flattens to sin, of which the slope is known.
-    """
-    rng = np.random.default_rng(0)
-    n = 40_000
-    x = lfilter([0.01], [1.0, -0.99], rng.standard_normal((n, 3)), axis=0)
-    (noise,) = (
-        found
-        for found in noise_spectra(
-            FlightLog(np.arange(n) / rate, x, np.tile([1.0, 0, 0, 0], (n, 1)), np.zeros((n, 4)))
-        )
-        if found.channel == "position"
-    )
-    share = np.linspace(*NOISE_SPECTRUM.band, 200)
-    slope = -np.polyfit(np.log(share), -np.log(np.sin(0.5 * np.pi * share)), 1)[0]
-    assert noise.slope == pytest.approx(slope, abs=0.06)
-    assert noise.band_hz == pytest.approx([0.25 * rate, 0.475 * rate])
-    # of a log at 80 Hz the lower band holds motion
-    assert np.isnan(noise.fall) == (rate < 200.0)
-    assert noise.filtered == (rate >= 200.0)
 
 
 def test_channels_are_asked_one_by_one(log):

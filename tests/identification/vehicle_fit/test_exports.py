@@ -52,19 +52,6 @@ def test_px4_and_ardupilot_predict_the_drag_that_the_vehicle_has():
     assert "not known from these logs: MPC_THR_HOVER, THR_MDL_FAC" in EXPORTS["px4"](it)
 
 
-def test_a_part_of_drag_that_was_not_found_is_turned_off_where_another_was():
-    """PX4 starts with 100 kg/m^2 and 0.15 1/s, which would act beside what was found."""
-    linear = EXPORTS["px4"](found(EffectSetting("rotor_drag", {"kdx": 2e-6, "kdy": 2e-6})))
-    assert "param set EKF2_BCOEF_X 0\nparam set EKF2_BCOEF_Y 0\n" in linear
-    quadratic = EXPORTS["px4"](found(EffectSetting("body_drag", {"cx": 4e-5, "cy": 4e-5})))
-    assert "param set EKF2_MCOEF 0\n" in quadratic
-    assert "# EKF2_BCOEF_X: its stated range ends at 200" in quadratic
-    assert "EKF2_DRAG_CTRL 1" in quadratic
-    nothing = EXPORTS["px4"](found())
-    assert "param set EKF2" not in nothing
-    assert "EKF2_DRAG_CTRL" not in nothing
-
-
 def test_the_thrust_curve_hovers_where_the_autopilot_thinks():
     full, bend = 0.15, 0.7
     it = found(curve=MotorCurve((0.0, (1 - bend) * full, bend * full)), commands=True)
