@@ -1,11 +1,12 @@
 """Rotor speeds of a log that has motor commands alone: by the vehicle's motor curve, or by an
 assumption that the log then states.
 
-Without a curve only the ratio of thrusts is assumed, ``f u^2 + (1 - f) u`` of a command u from 0 to
-1. The scale follows from flying: over a flight that begins and ends at rest the mean vertical
+Without a curve only the ratio of thrusts is assumed, ``f a^2 + (1 - f) a`` of a command a from 0 to
+1. The scale follows from flying. Where an accelerometer says what acts along the rotors' axis,
+thrust is the mass times its reading, on the median over the flight: a fault or a crash at the end
+does not move the median. Without one, over a flight that begins and ends at rest, the mean vertical
 thrust is the weight, so the thrust along each time's own rotor axis is counted by its vertical
-part; a tilted flight needs more than its weight. Where there is no pose, the accelerometer says
-what acts along the rotors' axis: in flight its mean, times the mass, is the mean thrust.
+part; a tilted flight needs more than its weight.
 """
 
 from dataclasses import replace
@@ -24,6 +25,7 @@ Array = NDArray[np.float64]
 # dips high thrusts alone would remain, whose mean is above the weight
 _DIP = 1.0
 _SATURATED = 0.9995  # of the full command
+_SPECIFIC_FORCE = 6.0, 16.0  # m/s2: a flight's median is within; outside its unit is another
 
 
 def with_commanded_speeds(
@@ -56,19 +58,23 @@ def with_commanded_speeds(
         return replace(log, rotor_speeds=speeds, commanded=True, notes=(*log.notes, note))
     if model is not None and model.thrust:
         return _with_stated_thrust(log, log.command, vehicle, model)
-    factor = 1.0 if model is None else model.thrust_factor
-    relative = factor * np.square(log.command) + (1.0 - factor) * log.command
-    if log.has_pose:
-        scale, where = _scale_by_weight(log, relative, vehicle), "a pose"
+    model = model or Commands(())
+    least, most = model.thrust_span
+    share = np.clip((log.command - least) / (most - least), 0.0, None)
+    relative = model.thrust_factor * np.square(share) + (1.0 - model.thrust_factor) * share
+    total = relative.sum(axis=1)
+    felt = _felt(log)
+    if felt is not None:
+        scale, where = _scale_by_accelerometer(log.t, total, felt, vehicle), "an accelerometer"
+        balance = (
+            f"the thrust in flight is, on the median, the mass of {vehicle.name} "
+            f"({vehicle.mass:.4g} kg) times the accelerometer along the rotors' axis"
+        )
+    elif log.has_pose:
+        scale, where = _scale_by_weight(log, total, vehicle), "a pose"
         balance = (
             f"the mean vertical thrust in flight is the weight of {vehicle.name} "
             f"({vehicle.weight:.4g} N)"
-        )
-    elif log.accelerometer is not None:
-        scale, where = _scale_by_accelerometer(log, relative, vehicle), "an accelerometer"
-        balance = (
-            f"the mean thrust in flight is the mass of {vehicle.name} ({vehicle.mass:.4g} kg) "
-            "times the accelerometer along the rotors' axis"
         )
     else:
         text = (
@@ -81,7 +87,7 @@ def with_commanded_speeds(
         return replace(log, notes=(*log.notes, text))
     note = (
         "thrust model: no rotor speeds in the log; the relative thrust of a motor command u is "
-        f"assumed to be {_words(factor)}, and its unknown scale is set so that {balance}: "
+        f"assumed to be {_words(model)}, and its unknown scale is set so that {balance}: "
         f"{scale:.4g} N a motor at full command. Mass or a factor on thrust cannot be found from "
         "this log, nor a thrust curve or the battery's sag; rotor speeds are sqrt(thrust / k) of "
         "commands, without the motors' lag. State motor_curve in the vehicle file to mend that"
@@ -134,33 +140,41 @@ def speeds_of_wrench(wrench: Array, vehicle: Vehicle) -> tuple[Array, list[str]]
     return np.sqrt(np.clip(square, 0.0, limit)), notes
 
 
-def _words(factor: float) -> str:
-    if factor == 0.0:
-        return "u"
-    return "u^2" if factor == 1.0 else f"{factor:g} u^2 + {1.0 - factor:.4g} u"
+def _words(model: Commands) -> str:
+    least, most = model.thrust_span
+    factor, a = model.thrust_factor, "u" if (least, most) == (0.0, 1.0) else "a"
+    words = f"{factor:g} {a}^2 + {1.0 - factor:.4g} {a}"
+    words = {0.0: a, 1.0: f"{a}^2"}.get(factor, words)
+    return words if a == "u" else f"{words} with a = (u - {least:g}) / {most - least:g}"
 
 
-def _scale_by_weight(log: FlightLog, relative: Array, vehicle: Vehicle) -> float | None:
+def _felt(log: FlightLog) -> Array | None:
+    """Return the accelerometer's readings (N,) in m/s2 along the rotors' axis, NaN where there is
+    none; None where it has none, or has another unit by its size.
+    """
+    if log.accelerometer is None:
+        return None
+    size = float(np.nanmedian(np.linalg.norm(log.accelerometer, axis=1)))
+    return log.accelerometer[:, 2] if _SPECIFIC_FORCE[0] <= size <= _SPECIFIC_FORCE[1] else None
+
+
+def _scale_by_weight(log: FlightLog, total: Array, vehicle: Vehicle) -> float | None:
     """Return N of a motor at full command, or None where no motor runs."""
     _, x, y, _ = log.quaternion[log.valid].T
-    total = relative[log.valid].sum(axis=1)
-    flying = _flying(log.t[log.valid], total)
-    vertical = total * (1.0 - 2.0 * (x * x + y * y))
+    vertical = total[log.valid] * (1.0 - 2.0 * (x * x + y * y))
+    flying = _flying(log.t[log.valid], total[log.valid])
     mean = float(np.mean(vertical[flying])) if flying.any() else 0.0
     return vehicle.weight / mean if mean > 0.0 else None
 
 
-def _scale_by_accelerometer(log: FlightLog, relative: Array, vehicle: Vehicle) -> float | None:
-    """Return N of a motor at full command, or None where no motor runs."""
-    assert log.accelerometer is not None
-    read = np.isfinite(log.accelerometer[:, 2])
-    if not read.any():
+def _scale_by_accelerometer(t: Array, total: Array, felt: Array, vehicle: Vehicle) -> float | None:
+    """Return N of a motor at full command, or None where no motor runs in flight."""
+    read = np.isfinite(felt)
+    t, total, felt = t[read], total[read], felt[read]
+    usable = _flying(t, total) & (total > 0.0) & (felt > 0.0)
+    if not usable.any():
         return None
-    total, sensed = relative[read].sum(axis=1), log.accelerometer[read, 2]
-    flying = _flying(log.t[read], total)
-    mean = float(np.mean(total[flying])) if flying.any() else 0.0
-    felt = float(np.mean(sensed[flying])) if flying.any() else 0.0
-    return vehicle.mass * felt / mean if mean > 0.0 and felt > 0.0 else None
+    return vehicle.mass * float(np.median(felt[usable] / total[usable]))
 
 
 def _flying(t: Array, total: Array) -> NDArray[np.bool_]:

@@ -85,13 +85,12 @@ class Recording:
     notes: list[str]
     extra: dict[str, Stream]  # what else is kept, by name
 
-    def log(self, vehicle: Vehicle | None, commanded: bool = False) -> FlightLog:
+    def log(self, vehicle: Vehicle | None) -> FlightLog:
         """Return the flight log.
 
         Args:
             vehicle: that flew, to turn commands into rotor speeds; None: the map's, where that
                 comes with the kit.
-            commanded: the rotor speeds were computed from commands.
 
         Raises:
             InputError: neither a pose nor gyro and accelerometer, or channels that do not overlap.
@@ -105,7 +104,6 @@ class Recording:
             self.log_map.vehicle,
             self.log_map.commands,
             extra=self.extra,
-            commanded=commanded,
             from_zero=self.log_map.time.offset is None,
         )
 

@@ -134,7 +134,6 @@ def flight_log(
     model: Commands | None = None,
     *,
     extra: Mapping[str, Stream] | None = None,
-    commanded: bool = False,
     from_zero: bool = True,
 ) -> FlightLog:
     """Return the log of some streams, by the names of a map's sections.
@@ -157,7 +156,6 @@ def flight_log(
         vehicle_name: the vehicle that flew, where the reader knows it.
         model: what commands are assumed to give where the vehicle states no motor curve.
         extra: what else is kept, by name.
-        commanded: ``rotors`` were computed from commands.
         from_zero: the log's time begins at 0; else it stays the file's.
 
     Raises:
@@ -192,11 +190,9 @@ def flight_log(
     speeds = np.full((len(t), 4), np.nan)
     if "rotors" in made:
         speeds = made["rotors"].at(t)
-    elif "wrench" in made:
-        commanded = True
-        if vehicle is not None:
-            speeds, wrench_notes = speeds_of_wrench(made["wrench"].at(t), vehicle)
-            notes += tuple(wrench_notes)
+    elif "wrench" in made and vehicle is not None:
+        speeds, wrench_notes = speeds_of_wrench(made["wrench"].at(t), vehicle)
+        notes += tuple(wrench_notes)
     measured = {name: x for name, s in sensors.items() if np.isfinite(x := s.between(t)).any()}
     truth = {name: made[name].at(t) for name in ("force", "torque") if name in made}
     kept = {name: stream.between(t) for name, stream in (extra or {}).items()}
@@ -214,7 +210,7 @@ def flight_log(
         notes=(*notes, *_gap_notes(times, valid, bool(measured))),
         valid=valid,
         extra={name: x[:, 0] if x.shape[1] == 1 else x for name, x in kept.items()},
-        commanded=commanded,
+        commanded="wrench" in made and "rotors" not in made,
         command=made["commands"].at(t) if "commands" in made else None,
         vehicle=vehicle_name,
         **truth,

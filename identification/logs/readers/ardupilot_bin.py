@@ -5,7 +5,7 @@ parameters the rest.
 motors 1 to 4 by SERVOn_FUNCTION, else of 1 to 4. MOT_PWM_MIN to MOT_PWM_MAX are 0 to 1. ArduPilot
 takes thrust as ``(1 - e) a + e a^2`` with e = MOT_THST_EXPO, where ``a`` is the command between
 MOT_SPIN_MIN and MOT_SPIN_MAX. A vehicle with a motor curve turns commands into thrust by its own;
-one without gets ArduPilot's (``balanced_thrust``).
+one without gets ArduPilot's (``commanded_speeds``).
 
 **Order.** By FRAME_TYPE: X and H (1 front-right, 2 rear-left, 3 front-left, 4 rear-right), those of
 Betaflight, of DJI, and clockwise from front-right; X is assumed where the log does not say.
@@ -27,7 +27,6 @@ from ..map_fit import wanted_columns, ways
 from ..mapped_log import channels_of_recording
 from ..rotor_orders import ORDERS, Order, order_words
 from ..streams import Stream
-from .balanced_thrust import with_balanced_speeds
 from .dataflash import BEGINS as BEGINS
 from .dataflash import Messages, read_dataflash
 
@@ -76,7 +75,7 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
     recording = channels_of_recording(
         path, [*recorded, *telemetry], log_map, "ardupilot_bin", notes
     )
-    return with_balanced_speeds(recording, vehicle).log(vehicle, "rotors" not in recording.streams)
+    return recording.log(vehicle)
 
 
 def _times(messages: Messages) -> Array:

@@ -6,7 +6,7 @@ which motor is which rotor (``px4_motors``).
 
 **Rotors.** Rotor speeds of ``esc_status`` where ESCs report them; commands, 0 to 1, of
 ``actuator_motors``, else of ``actuator_outputs``. Where there are commands alone, a vehicle with a
-``motor_curve`` turns them into thrust. One without gets relative thrusts (``balanced_thrust``):
+``motor_curve`` turns them into thrust. One without gets relative thrusts (``commanded_speeds``):
 ``actuator_motors`` itself (PX4 inverts its curve after it), or ``f x^2 + (1 - f) x`` of an output
 x, with f the parameter THR_MDL_FAC.
 """
@@ -30,8 +30,6 @@ from ..flight_log import FlightLog
 from ..log_map import recording_map
 from ..map_fit import ways
 from ..mapped_log import Recording, channels_of_recording
-from ..streams import Stream
-from .balanced_thrust import with_balanced_speeds
 from .px4_motors import motor_order, outputs_of_motors, slots_of_escs, with_motors
 from .ulog_counting import counting
 
@@ -40,7 +38,6 @@ Fields = Mapping[str, NDArray[Any]]
 BEGINS = (b"ULog\x01\x12\x35",)
 
 _WHAT = "a PX4 log (.ulg)"
-_LANDED = "vehicle_land_detected"
 _FILTER = "vehicle_local_position"
 _SENSORS = (  # field of an inertial sensor, and that of what it gained over a time
     ("gyro_rad", "delta_angle"),
@@ -65,19 +62,16 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         InputError: pyulog is missing, the file is no ULog, or lacks four motors, or a pose and
             inertial sensors.
     """
-    log = read_ulog(path)
-    recording = channels(path, log)
-    found = with_balanced_speeds(recording, vehicle, _landed(log))
-    return found.log(vehicle, "rotors" not in recording.streams)
+    return channels(path).log(vehicle)
 
 
-def channels(path: Path, log: ULog | None = None) -> Recording:
+def channels(path: Path) -> Recording:
     """Return a ULog's channels, each at its own rate.
 
     Raises:
         InputError: pyulog is missing, the file is no ULog, or lacks four motors.
     """
-    log = read_ulog(path) if log is None else log
+    log = read_ulog(path)
     order, order_note = motor_order(path, log.parameters)
     log_map = with_motors(recording_map("px4"), order, log.parameters)
     notes = [*log_map.notes, order_note]
@@ -126,7 +120,7 @@ def read_ulog(path: Path) -> ULog:
         with open_regular(path, _WHAT) as file:
             # pyulog prints its doubts; the notes say them
             with redirect_stdout(io.StringIO()):
-                parsed = counting(Parser)(file, [*sorted(wanted), _LANDED])
+                parsed = counting(Parser)(file, sorted(wanted))
             is_damaged = bool(parsed.file_corruption)
     except InputError:
         raise
@@ -228,12 +222,3 @@ def _sensor(
     if field == "accelerometer_m_s2" and np.all(np.abs(late) < 1e6):
         t = t + _MICROSECOND * late
     yield Samples(t, found, topic)
-
-
-def _landed(log: ULog) -> Stream | None:
-    """Return whether the vehicle stood (N, 1), logged at changes; None: the log does not say."""
-    for fields in log.topics.get(_LANDED, []):
-        if "landed" in fields:
-            values = _column(fields, "landed")[:, None]
-            return Stream(_LANDED, _MICROSECOND * _column(fields, "timestamp"), values)
-    return None
