@@ -2,6 +2,7 @@
 function states its name, type and default.
 """
 
+import os
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
@@ -11,6 +12,7 @@ import typer
 import yaml
 
 from ..runtime.errors import InputError, unknown_name
+from ..runtime.regular_files import check_regular
 
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # a fifth of the time, where it is built
 _OPTIONS = yaml.load(Path(__file__).with_name("options.yaml").read_bytes(), Loader=_LOADER)
@@ -30,7 +32,9 @@ def _described(command: str, name: str) -> dict[str, Any]:
 def declared(command: str, name: str, kind: Any) -> Any:
     """Return the type of a command's parameter with what typer is to make of it."""
     said = _described(command, name)
-    sources, _ = said.pop("names", None), said.pop("only", None)
+    sources = said.pop("names", None)
+    for key in ("only", "reads"):  # checked when the command runs
+        said.pop(key, None)
     if sources is not None:
         said["autocompletion"] = offering(sources)
     if said.pop("argument", False):
@@ -39,16 +43,21 @@ def declared(command: str, name: str, kind: Any) -> Any:
     return Annotated[kind, typer.Option(*flags, **said)]
 
 
-def check_names(command: str, options: Mapping[str, Any]) -> None:
-    """Check the options that take one of the listed names and nothing else.
+def check_values(command: str, options: Mapping[str, Any]) -> None:
+    """Check the options that take one of the listed names and nothing else, and the files that a
+    command reads: a wrong path is told before anything large is imported.
 
     Raises:
-        InputError: an option has another value.
+        InputError: an option has another value, or a file is not there.
     """
     for name, value in options.items():
         said = _described(command, name)
         if said.get("only") and value is not None and value not in names_of(said["names"]):
             raise unknown_name(name, value, names_of(said["names"]))
+        if "reads" in said:
+            for path in value if isinstance(value, list) else [value] if value else []:
+                if not os.path.exists(path):
+                    check_regular(path, said["reads"])  # says why
 
 
 def names_of(sources: str | list[str]) -> list[str]:

@@ -17,7 +17,7 @@ from .. import __version__
 from ..runtime.compile_notice import notice
 from ..runtime.page_files import write_text
 from ..runtime.plain_values import plain
-from .options import check_names, declared
+from .options import check_values, declared
 from .terminal import DryRun, command_line, console, errors, run
 
 Work = TypeVar("Work", bound=Callable[..., Any])
@@ -58,7 +58,7 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
         console.quiet, errors.quiet = as_json or quiet, quiet
         notice.quiet = quiet
         try:
-            check_names(name, options)
+            check_values(name, options)
             outcome: dict[str, Any] = {"result": work(**options)}
             if run.record is not None:
                 write_run(run.record, name, options)

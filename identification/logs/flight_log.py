@@ -25,9 +25,10 @@ numbers still reads one.
 """  # noqa: E501
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -219,25 +220,10 @@ def with_rows(log: FlightLog, keep: Mask) -> FlightLog:
     """
     if keep.all():
         return log
-
-    def cut(x: Array | None) -> Array | None:
-        return None if x is None else x[keep]
-
-    return replace(
-        log,
-        t=log.t[keep],
-        position=log.position[keep],
-        quaternion=log.quaternion[keep],
-        rotor_speeds=log.rotor_speeds[keep],
-        voltage=cut(log.voltage),
-        force=cut(log.force),
-        torque=cut(log.torque),
-        accelerometer=cut(log.accelerometer),
-        gyro=cut(log.gyro),
-        command=cut(log.command),
-        valid=log.valid[keep],
-        extra={name: x[keep] for name, x in log.extra.items()},
-    )
+    parts: dict[str, Any] = {
+        name: x[keep] for name, x in vars(log).items() if isinstance(x, np.ndarray)
+    }
+    return replace(log, **parts, extra={name: x[keep] for name, x in log.extra.items()})
 
 
 def write_log(log: FlightLog, path: str | Path) -> None:
@@ -247,24 +233,22 @@ def write_log(log: FlightLog, path: str | Path) -> None:
     Raises:
         InputError: the name's ending is unknown or the file cannot be written.
     """
-    columns = {"t": log.t}
     pose = np.where(log.valid[:, None], np.column_stack([log.position, log.quaternion]), np.nan)
+    parts: list[tuple[Sequence[str], Array | None]] = [(("t",), log.t)]
     if log.has_pose or log.accelerometer is None or log.gyro is None:
-        columns |= {name: pose[:, i] for i, name in enumerate(POSE)}
+        parts.append((POSE, pose))
     elif np.isfinite(log.position).any():
-        columns |= {name: log.position[:, i] for i, name in enumerate(POSE[:3])}
+        parts.append((POSE[:3], log.position))
     if log.has_rotor_speeds or log.command is None:
-        columns |= {name: log.rotor_speeds[:, i] for i, name in enumerate(ROTORS)}
-    if log.command is not None:
-        columns |= {name: log.command[:, i] for i, name in enumerate(COMMANDS)}
-    if log.voltage is not None:
-        columns["vbat"] = log.voltage
+        parts.append((ROTORS, log.rotor_speeds))
+    parts += [(COMMANDS, log.command), (("vbat",), log.voltage)]
     if log.force is not None and log.torque is not None:
-        truth = np.column_stack([log.force, log.torque])
-        columns |= {name: truth[:, i] for i, name in enumerate(TRUTH)}
-    for names, sensor in ((ACCELEROMETER, log.accelerometer), (GYRO, log.gyro)):
-        if sensor is not None:
-            columns |= {name: sensor[:, i] for i, name in enumerate(names)}
+        parts.append((TRUTH, np.column_stack([log.force, log.torque])))
+    parts += [(ACCELEROMETER, log.accelerometer), (GYRO, log.gyro)]
+    columns: dict[str, Array] = {}
+    for names, values in parts:
+        if values is not None:
+            columns |= zip(names, values.reshape(len(log.t), -1).T, strict=True)
     if VEHICLE.fullmatch(named := f"vehicle={log.vehicle}"):
         columns[named] = np.ones(len(log.t))
     write_table(columns, Path(path))

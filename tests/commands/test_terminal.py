@@ -92,9 +92,11 @@ def test_hostile_names_are_shown_and_never_sent(tmp_path):
     "arguments",
     [
         ["estimate", "LONG.csv"],
-        pytest.param(["estimate", "x.bag", "--reader", "rosbag:LONG.yaml"], marks=pytest.mark.slow),
+        pytest.param(
+            ["estimate", __file__, "--reader", "rosbag:LONG.yaml"], marks=pytest.mark.slow
+        ),
         pytest.param(["estimate", "LONG", "--reader", "rosbag"], marks=pytest.mark.slow),
-        ["estimate", "x.csv", "--vehicle", "LONG.yaml"],
+        ["estimate", __file__, "--vehicle", "LONG.yaml"],
         pytest.param(["record", "--seconds", "1", "--out", "LONG.csv"], marks=pytest.mark.slow),
         pytest.param(["fly", "--controller", "LONG.npz"], marks=pytest.mark.slow),
         pytest.param(["fly", "--controller", "LONG.py:A"], marks=pytest.mark.slow),
