@@ -86,6 +86,9 @@ def rcou(t, channels=(9, 10, 11, 12)):
     return "RCOU", "Q" + "H" * 14, {"TimeUS": micro(t), **pulses}
 
 
+POSE = (xkf1(T), xkq(T))
+
+
 def parm(**changes):
     values = {k: v for k, v in (PARAMETERS | changes).items() if v is not None}
     return (
@@ -113,13 +116,13 @@ def esc(t):
 
 
 @pytest.fixture
-def write(tmp_path):
-    def to_file(*messages):
+def read(tmp_path):
+    def of_messages(*messages, vehicle=None):
         path = tmp_path / "00000001.BIN"
         path.write_bytes(dataflash(messages))
-        return path
+        return read_log(path, None, vehicle)
 
-    return to_file
+    return of_messages
 
 
 @pytest.fixture(scope="module")
@@ -127,9 +130,9 @@ def vehicle():
     return load_vehicle("ardrone2")
 
 
-def test_frames_motors_and_commands(write, vehicle):
+def test_frames_motors_and_commands(read, vehicle):
     battery = "BAT", "QBf", {"TimeUS": micro(SLOW), "Inst": 0 * SLOW, "Volt": 16.0 - 0.1 * SLOW}
-    log = read_log(write(parm(), xkf1(T), xkq(T), imu(T), rcou(T), battery), None, vehicle)
+    log = read(parm(), *POSE, imu(T), rcou(T), battery, vehicle=vehicle)
     assert "reader ardupilot_bin" in log.source
     assert_motion(log, T, 1e-5)
     assert_inertial(log, T, 1e-4)
@@ -146,37 +149,35 @@ def test_frames_motors_and_commands(write, vehicle):
     assert any("e = 0.5 (MOT_THST_EXPO)" in note for note in log.notes)
 
 
-def test_a_motor_curve_stands_before_arducopters(write, vehicle):
+def test_a_motor_curve_stands_before_arducopters(read, vehicle):
     curve = MotorCurve(thrust=(0.0, 0.0, 3.0), voltage_exponent=0.0, command=(1100.0, 1900.0))
-    log = read_log(
-        write(parm(), xkf1(T), xkq(T), rcou(T)), None, replace(vehicle, motor_curve=curve)
-    )
+    log = read(parm(), *POSE, rcou(T), vehicle=replace(vehicle, motor_curve=curve))
     np.testing.assert_allclose(vehicle.k * log.rotor_speeds[3] ** 2, 3.0 * COMMAND**2, rtol=1e-9)
 
 
-def test_a_slow_pose_beside_a_fast_imu(write):
-    log = read_log(write(parm(), xkf1(SLOW), att(T), imu(FAST), rcou(T)))
+def test_a_slow_pose_beside_a_fast_imu(read):
+    log = read(parm(), xkf1(SLOW), att(T), imu(FAST), rcou(T))
     assert len(log.t) > 2000
     assert 50 < log.valid.sum() <= len(SLOW)
     assert_motion(log, log.t[log.valid] + 5.0, 2e-3)
 
 
-def test_escs_that_report_their_speed(write):
-    log = read_log(write(parm(), xkf1(T), xkq(T), rcou(T), esc(T)))
+def test_escs_that_report_their_speed(read):
+    log = read(parm(), *POSE, rcou(T), esc(T))
     ours = np.array([5200.0, 5100.0, 5300.0, 5000.0]) * 2 * np.pi / 60  # motors 3, 2, 4, 1
     np.testing.assert_allclose(log.rotor_speeds[7], ours, rtol=1e-6)
     assert not log.commanded
     assert log.command is not None
 
 
-def test_without_a_position_the_imu_is_read(write):
-    log = read_log(write(parm(), att(T), imu(FAST), rcou(T)))
+def test_without_a_position_the_imu_is_read(read):
+    log = read(parm(), att(T), imu(FAST), rcou(T))
     assert not log.has_pose
     assert not log.has_rotor_speeds
     np.testing.assert_allclose(log.gyro, inertial(log.t + 5.0)[0], atol=1e-3)
 
 
-def test_places_on_the_globe_become_metres(write):
+def test_places_on_the_globe_become_metres(read):
     position, _ = ned(T)
     lat, lng = 52.0, 10.0
     place = {
@@ -185,7 +186,7 @@ def test_places_on_the_globe_become_metres(write):
         "Lng": lng + np.degrees(position[:, 1] / 6_378_137.0 / np.cos(np.radians(lat))),
         "Alt": -position[:, 2],
     }
-    log = read_log(write(parm(), ("POS", "QLLf", place), att(T), imu(T), rcou(T)))
+    log = read(parm(), ("POS", "QLLf", place), att(T), imu(T), rcou(T))
     wanted = motion(T)[0] - motion(T[:1])[0] * [1.0, 1.0, 0.0]
     np.testing.assert_allclose(log.position, wanted, atol=0.02)
 
@@ -194,11 +195,11 @@ def test_places_on_the_globe_become_metres(write):
     ("kind", "order"),
     [(1, (3, 1, 0, 2)), (12, (3, 0, 2, 1)), (13, (3, 0, 1, 2)), (14, (3, 2, 1, 0))],
 )
-def test_frame_types_number_their_motors(write, kind, order):
+def test_frame_types_number_their_motors(read, kind, order):
     """``order``: which of our rotors, from 0, each motor of the frame is."""
     if kind == 12:  # rear-right, front-right, rear-left, front-left
         order = (2, 3, 1, 0)
-    log = read_log(write(parm(FRAME_TYPE=float(kind)), xkf1(T), xkq(T), rcou(T)))
+    log = read(parm(FRAME_TYPE=float(kind)), *POSE, rcou(T))
     sent = COMMAND[[3, 1, 0, 2]]  # by motor, as rcou has them
     wanted = np.empty(4)
     for motor, rotor in enumerate(order):
@@ -210,28 +211,27 @@ def test_frame_types_number_their_motors(write, kind, order):
     ("messages", "expected"),
     [
         (
-            (parm(), xkf1(T), xkq(T)),
+            (parm(), *POSE),
             "no motors that turn; expected ESC .* or RCOU .*, found XKF1, XKQ",
         ),
         ((parm(), rcou(T)), "no pose, and no accelerometer and no gyro; expected SIM2 or"),
         ((parm(FRAME_CLASS=2.0), rcou(T)), "FRAME_CLASS and FRAME_TYPE are 2 and 1; expected a"),
         ((parm(FRAME_TYPE=0.0), rcou(T)), "FRAME_CLASS and FRAME_TYPE are 1 and 0; expected a"),
         (
-            (parm(MOT_PWM_MIN=1900.0), xkf1(T), xkq(T), rcou(T)),
+            (parm(MOT_PWM_MIN=1900.0), *POSE, rcou(T)),
             "MOT_PWM_MIN and MAX are 1900 and 1900 us; expected MIN below MAX",
         ),
-        ((parm(), xkf1(T), xkq(T), rcou(T + 90.0)), "do not overlap"),
+        ((parm(), *POSE, rcou(T + 90.0)), "do not overlap"),
     ],
 )
-def test_what_is_missing_is_named(write, messages, expected):
+def test_what_is_missing_is_named(read, messages, expected):
     with pytest.raises(InputError, match=f"00000001.BIN: .*{expected}"):
-        read_log(write(*messages))
+        read(*messages)
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
-def test_a_cut_or_spoiled_log_reads_or_is_refused(write):
-    path = write(parm(), xkf1(T), xkq(T), imu(T), rcou(T))
-    data = path.read_bytes()
+def test_a_cut_or_spoiled_log_reads_or_is_refused(tmp_path):
+    path, data = tmp_path / "log.BIN", dataflash([parm(), *POSE, imu(T), rcou(T)])
     rng = np.random.default_rng(0)
     read = 0
     for k in range(60):
