@@ -273,15 +273,6 @@ def is_healthy(state: Array, qvel: Array) -> bool:
     return healthy
 
 
-@compiled
-def _mean_air(air: Array, mean: Array) -> None:
-    """Write the mean (3,) of winds (STATIONS, 3) at the stations."""
-    mean[:] = 0.0
-    for station in air:
-        for i in range(3):
-            mean[i] += station[i] / STATIONS
-
-
 def _compiled_stage(function: Callable[..., None]) -> Callable[["ClosedLoop"], None]:
     def run(loop: "ClosedLoop") -> None:
         function(loop.record, loop.world, loop.fan_path, loop.noise, loop.row)
@@ -402,7 +393,6 @@ class ClosedLoop:
         self._move_address = int(ctypes.cast(self._move, ctypes.c_void_p).value or 0)
         self._run_ticks = specialised(run_ticks, *given, 0)
         self._is_healthy = specialised(is_healthy, self.state, self.world.qvel)
-        self._mean_air = specialised(_mean_air, self.air, np.empty(3))
 
     @staticmethod
     def _pipeline(own: Sequence[Stage]) -> dict[str, Callable[["ClosedLoop"], object]]:
@@ -459,8 +449,7 @@ class ClosedLoop:
     @property
     def wind(self) -> Array:
         """Mean (3,) m/s, world, of the winds at the stations."""
-        mean = np.empty(3)
-        self._mean_air(self.air, mean)
+        mean: Array = np.add.reduce(self.air) / STATIONS
         return mean
 
     @property

@@ -12,7 +12,6 @@ from ..controllers.observation import OBSERVATION_SIZE
 from ..dynamics.motion import Array
 from ..runtime.compiled import compiled, specialised
 from ..runtime.errors import InputError
-from .closed_loop import ClosedLoop
 from .fan import Fan
 from .observing import LIMITS, View
 from .plant import TICK
@@ -46,7 +45,32 @@ def reward_terms(offset: float, change: float) -> tuple[float, float]:
     return 1.0 / (1.0 + ratio * ratio), -CHANGE_COST * change * change
 
 
-class FanTrackingEnv(Task):
+class FanTask(Task):
+    """What the tasks in front of a fan share: the fan moves along a path of y and height (n, 2) m,
+    a row a tick, and the agent commands velocities across its jet.
+    """
+
+    scenarios = SCENARIOS
+    decision_ticks = DECISION_TICKS
+
+    def __init__(self, *shared: Any, fan: Fan, **named: Any) -> None:
+        super().__init__(*shared, **named)
+        self.fan = replace(fan, turbulence=self.scenario.turbulence)
+        self.fan_motion = ""
+
+    def _start(self, path: Array, distance: float, settle: int, offset: Array) -> None:
+        """Hover ``offset`` (2,) m beside the fan's axis for ``settle`` ticks."""
+        self.path, self.distance = path, distance
+        start = np.array([distance, *(path[0] + offset)])
+        self.loop.reset(self.np_random, start, math.pi, fan_path=path[:1], settle=settle)
+
+    def _fly(self, noise: Array) -> None:
+        loop = self.loop
+        loop.setpoint[4 : 4 + self.action_size] = self.command
+        loop.run(noise, self.path[min(loop.ticks, len(self.path) - 1) :])
+
+
+class FanTrackingEnv(FanTask):
     """A quadrotor in the jet of a moving fan must stay on the fan's axis by feeling the wind alone.
 
     ## Description
@@ -133,8 +157,6 @@ class FanTrackingEnv(Task):
     """  # noqa: E501
 
     name = "FanTracking"
-    scenarios = SCENARIOS
-    decision_ticks = DECISION_TICKS
     action_size = 1
 
     def __init__(
@@ -145,46 +167,34 @@ class FanTrackingEnv(Task):
         observe: str = "wrench",
         **named: Any,
     ) -> None:
-        super().__init__(*shared, **named)
-        self.fan = replace(fan or Fan(), turbulence=self.scenario.turbulence)
+        super().__init__(*shared, fan=fan or Fan(), **named)
         self.fan_path = fan_path
         self.view = View(observe, self.normalize)
         bound = self.view.bound()
         self.observation_space = gym.spaces.Box(-bound, bound, bound.shape, np.float32)
-        self.fan_motion = ""
         frame = np.empty(OBSERVATION_SIZE, dtype=np.float32)
         self._see = specialised(see, np.empty(20), 0.0, frame)
 
-    def hover(self, settle: int = 0) -> tuple[float, ClosedLoop, Array]:
-        """Draw an episode and let the vehicle hover at its start for ``settle`` ticks.
+    def _begin(self) -> None:
+        self.hover(SETTLE_TICKS)
+        self.view.restart(self.loop.state)
 
-        Returns the vehicle's distance from the fan, m, the closed loop, and the fan's y (n,), m.
-        """
+    def hover(self, settle: int = 0) -> None:
+        """Draw an episode and let the vehicle hover at its start for ``settle`` ticks."""
         rng, scenario = self.np_random, self.scenario
         distance = self._draw_loop(self.fan).get("distance", DISTANCE)
         self.fan_motion, _, fan_y = draw_fan_path(scenario, rng, FAN_TIMES)
         if self.fan_path is not None:
             self.fan_motion = "given"
-            fan_y = np.ascontiguousarray(self.fan_path(FAN_TIMES), dtype=np.float64)
+            fan_y = np.asarray(self.fan_path(FAN_TIMES), dtype=np.float64)
             if fan_y.shape != FAN_TIMES.shape or not np.all(np.isfinite(fan_y)):
                 n = FAN_TIMES.size
                 raise InputError(
                     f"FanTracking: fan_path must return {n} finite numbers for {n} times"
                 )
         offset = float(rng.uniform(*scenario.offset) * rng.choice([-1.0, 1.0]))
-        start = np.array([distance, fan_y[0] + offset, self.fan.height])
-        self.loop.reset(rng, start, math.pi, fan_path=fan_y[:1], settle=settle)
-        return distance, self.loop, fan_y
-
-    def _begin(self) -> None:
-        self.distance, loop, fan_y = self.hover(SETTLE_TICKS)
-        self.path = np.column_stack([fan_y, np.full(len(fan_y), self.fan.height)])
-        self.view.restart(loop.state)
-
-    def _fly(self, noise: Array) -> None:
-        loop = self.loop
-        loop.setpoint[4] = self.command[0]
-        loop.run(noise, self.path[min(loop.ticks, len(self.path) - 1) :])
+        path = np.column_stack([fan_y, np.full(len(fan_y), self.fan.height)])
+        self._start(path, distance, settle, np.array([offset, 0.0]))
 
     def _get_obs(self) -> Frame:
         loop, frame = self.loop, np.empty(OBSERVATION_SIZE, dtype=np.float32)

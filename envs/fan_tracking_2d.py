@@ -1,7 +1,6 @@
 """Fan tracking in two directions: the fan moves sideways and up and down."""
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,10 +8,10 @@ import numpy as np
 from ..dynamics.motion import Array
 from ..dynamics.vehicle import Vehicle
 from .fan import Fan
-from .fan_tracking import AWAY, CHANGE_COST, DECISION_TICKS, DISTANCE, FAN_TIMES, TRACKING_WIDTH
+from .fan_tracking import AWAY, CHANGE_COST, DISTANCE, FAN_TIMES, TRACKING_WIDTH, FanTask
 from .plant import TICK
-from .scenarios import SCENARIOS, draw_fan_path
-from .task import LOST_OFFSET, SETTLE_TICKS, Frame, Task, keep_within
+from .scenarios import draw_fan_path
+from .task import LOST_OFFSET, SETTLE_TICKS, Frame, keep_within
 
 FAN_HEIGHT = 1.5  # m, of the fan's axis at the start
 CAGE = 0.6  # rad, of the cage's stations above and below the rotors' plane
@@ -21,7 +20,7 @@ _LIMITS = np.array([10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 5.0, 5.0, 1.0, 1.0])
 SCALES_2D = (0.5, 0.5, 0.5, 0.03, 0.03, 0.03, 0.5, 0.5, 1.0, 1.0)
 
 
-class FanTracking2DEnv(Task):
+class FanTracking2DEnv(FanTask):
     """A quadrotor in a spherical cage must stay on the axis of a fan that moves in y and z.
 
     ## Description
@@ -97,16 +96,12 @@ class FanTracking2DEnv(Task):
     """  # noqa: E501
 
     name = "FanTracking2D"
-    scenarios = SCENARIOS
-    decision_ticks = DECISION_TICKS
     action_size = 2
 
     def __init__(self, *shared: Any, fan: Fan | None = None, **named: Any) -> None:
-        super().__init__(*shared, **named)
         fan = fan or Fan(height=FAN_HEIGHT, hull_elevation=CAGE)
-        self.fan = replace(fan, turbulence=self.scenario.turbulence)
+        super().__init__(*shared, fan=fan, **named)
         self._observe(_LIMITS, SCALES_2D)
-        self.fan_motion = ""
 
     def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> Any:
         """Return the closed loop; its accelerometer, which nobody reads, uses three more normals of
@@ -116,20 +111,14 @@ class FanTracking2DEnv(Task):
 
     def _begin(self) -> None:
         rng, scenario = self.np_random, self.scenario
-        self._distance = self._draw_loop(self.fan).get("distance", DISTANCE)
+        distance = self._draw_loop(self.fan).get("distance", DISTANCE)
         sideways, _, y = draw_fan_path(scenario, rng, FAN_TIMES)
         upwards, _, z = draw_fan_path(scenario, rng, FAN_TIMES)
         self.fan_motion = f"{sideways} and {upwards}"
-        self._path = np.column_stack([y, self.fan.height + _VERTICAL * z])
+        path = np.column_stack([y, self.fan.height + _VERTICAL * z])
         offset, side = float(rng.uniform(*scenario.offset)), float(rng.uniform(-math.pi, math.pi))
-        start = self._path[0] + offset * np.array([math.cos(side), 0.5 * math.sin(side)])
-        at = np.array([self._distance, *start])
-        self.loop.reset(rng, at, math.pi, fan_path=self._path[:1], settle=SETTLE_TICKS)
-
-    def _fly(self, noise: Array) -> None:
-        loop = self.loop
-        loop.setpoint[4:6] = self.command
-        loop.run(noise, self._path[min(loop.ticks, len(self._path) - 1) :])
+        beside = offset * np.array([math.cos(side), 0.5 * math.sin(side)])
+        self._start(path, distance, SETTLE_TICKS, beside)
 
     def _get_obs(self) -> Frame:
         x = self.loop.state
@@ -138,7 +127,7 @@ class FanTracking2DEnv(Task):
         return frame / self._scales
 
     def _get_info(self) -> dict[str, Any]:
-        loop, path = self.loop, self._path
+        loop, path = self.loop, self.path
         k = min(loop.ticks, len(path) - 1)
         fan = path[max(k - 1, 0)]
         x, y, z = loop.position.tolist()
@@ -146,7 +135,7 @@ class FanTracking2DEnv(Task):
         flying = (
             self.is_flying()
             and offset <= LOST_OFFSET
-            and abs(x - self._distance) <= AWAY
+            and abs(x - self.distance) <= AWAY
             and z > 0.0
         )
         return {

@@ -18,7 +18,7 @@ from .wind import (
     low_altitude,
     switching,
 )
-from .wind.jets import sampled
+from .wind.jets import TABLE_PERIOD
 
 Range = tuple[float, float]
 
@@ -131,12 +131,12 @@ def draw_winds(
     if scenario.wash:
         period, turn = float(rng.uniform(4.0, 8.0)), float(rng.uniform(-math.pi, math.pi))
         above, phase = float(rng.uniform(1.0, 1.6)), float(rng.uniform(0.0, 2.0 * math.pi))
-        t = 0.02 * np.arange(math.ceil(seconds / 0.02) + 1)
+        t = TABLE_PERIOD * np.arange(math.ceil(seconds / TABLE_PERIOD) + 1)
         swing = 1.5 * np.sin(2.0 * math.pi * t / period + phase)
         path = START + np.column_stack(
             [swing * math.cos(turn), swing * math.sin(turn), np.full_like(t, above)]
         )
-        winds.append(VehicleWash(sampled(path, t, seconds), seed=rng))
+        winds.append(VehicleWash(path, seed=rng))
     return winds
 
 

@@ -110,8 +110,9 @@ class FanTrackingLanes(FanTrackingVectorEnv):
             self._generators[i], self._seeded[i] = np_random(seed)[0], True
         generator: np.random.Generator = self._generators[i]
         env.np_random = generator
-        self._distance[i], loop, self._paths[i] = env.hover()
-        self._settling.put(block, slice(lane, lane + 1), loop)
+        env.hover()
+        self._distance[i], self._paths[i] = env.distance, env.path[:, 0]
+        self._settling.put(block, slice(lane, lane + 1), env.loop)
         self._values["fan_motion"][i] = env.fan_motion
         return generator
 

@@ -15,8 +15,9 @@ from ...runtime.errors import InputError
 Array = NDArray[np.float64]
 Calls = NDArray[np.int64]
 
-# a compiled wind: the address of its record, a count of points, and the addresses of the time (1,)
-# in s, of the points (3, count) in m and of the velocities (3, count) in m/s, to which it adds
+# of a compiled wind's function: the address of its parameters, a count of points, and the addresses
+# of the time (1,) in s, of the points (3, count) in m and of the velocities (3, count) in m/s, to
+# which it adds
 SIGNATURE = types.void(*[types.int64] * 5)
 
 
@@ -35,7 +36,7 @@ class Wind(Protocol):
 def add_winds(calls: Calls, time: Array, points: Array, velocities: Array) -> None:
     """Add compiled winds at points (3, n) m and a time (1,) s to velocities (3, n) m/s.
 
-    ``calls`` (winds, 2) are the addresses of each wind's function and of its record.
+    ``calls`` (winds, 2) are the addresses of each wind's function and of its parameters.
     """
     for k in range(len(calls)):
         call_at(
@@ -49,22 +50,29 @@ def add_winds(calls: Calls, time: Array, points: Array, velocities: Array) -> No
 
 
 class CompiledWind:
-    """A wind of this room: a compiled function adds the air's velocity at many points.
+    """A wind of this room: its formula as a compiled function, and the formula's parameters.
+
+    A flight adds up the winds at the stations of a vehicle without Python: it holds the addresses
+    of the function and of the parameters alone, so that all kinds of winds are called alike.
 
     Args:
-        function: a plain function of ``SIGNATURE``, compiled at its first use.
-        record: an array of whole numbers or (1,) of a structured type, which the function reads.
-        kept: arrays whose addresses ``record`` holds.
+        function: the formula, a plain function of ``SIGNATURE``, compiled at its first use.
+        parameters: (1,) of a structured type, which states the fields and their units. A table is
+            held as the address of its first number.
+        tables: these tables; they live as long as the wind.
 
     Attributes:
         calls: as ``add_winds`` takes them.
     """
 
     def __init__(
-        self, function: Callable[..., None], record: np.ndarray, kept: tuple[np.ndarray, ...] = ()
+        self,
+        function: Callable[..., None],
+        parameters: np.ndarray,
+        tables: tuple[np.ndarray, ...] = (),
     ) -> None:
-        self._kept = record, kept
-        self.calls = np.array([[address_of(function, SIGNATURE), record.ctypes.data]])
+        self._kept = parameters, tables
+        self.calls = np.array([[address_of(function, SIGNATURE), parameters.ctypes.data]])
 
     def velocity(self, points: ArrayLike, time: float) -> Array:
         """Return the air's velocity (n, 3) m/s, world, at points (n, 3) m of the world and a time

@@ -25,10 +25,20 @@ AXES = ("t", "x", "y", "z")
 _LARGEST = 400_000_000  # bytes of a grid in memory
 
 
-def _grid(record: int, count: int, time: int, points: int, velocities: int) -> None:
-    w, now = carray(pointer_to(record), 7, np.int64), numbers_at(time, (1,))[0]
-    first, step = numbers_at(w[0], (4,)), numbers_at(w[1], (4,))
-    field = numbers_at(w[2], (w[3], w[4], w[5], w[6], 3))
+GRID = np.dtype(
+    [
+        ("first", "f8", (4,)),  # s and m, where the grid begins: t, x, y, z
+        ("step", "f8", (4,)),  # likewise, from point to point
+        ("field", "i8"),  # address of the velocities (*counts, 3) m/s
+        ("counts", "i8", (4,)),  # points along each
+    ]
+)
+
+
+def _grid(parameters: int, count: int, time: int, points: int, velocities: int) -> None:
+    w, now = carray(pointer_to(parameters), 1, GRID)[0], numbers_at(time, (1,))[0]
+    first, step, n = w.first, w.step, w.counts
+    field = numbers_at(w.field, (n[0], n[1], n[2], n[3], 3))
     p, out = numbers_at(points, (3, count)), numbers_at(velocities, (3, count))
     low, part = np.zeros(4, dtype=np.int64), np.zeros(4)
     for j in range(count):
@@ -85,13 +95,12 @@ class GridWind(CompiledWind):
             )
         if not np.all(np.isfinite(self.wind)):
             raise InputError(f"{where}: wind must be finite numbers in m/s")
-        first = np.array([axis[0] for axis in self.axes])
-        sizes = [
+        first = [axis[0] for axis in self.axes]
+        widths = [
             (axis[-1] - axis[0]) / (len(axis) - 1) if len(axis) > 1 else 1.0 for axis in self.axes
         ]
-        kept = first, np.array(sizes), self.wind
-        record = np.array([*[array.ctypes.data for array in kept], *shape[:4]])
-        super().__init__(_grid, record, kept)
+        parameters = np.array([(first, widths, self.wind.ctypes.data, shape[:4])], dtype=GRID)
+        super().__init__(_grid, parameters, (self.wind,))
 
 
 def on_grid(

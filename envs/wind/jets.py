@@ -6,7 +6,6 @@ draw in adds as velocity.
 """
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numba import carray
@@ -27,7 +26,7 @@ from ..fan import between
 from .field import Array, CompiledWind, number, vector
 from .turbulence import add_modes, waves
 
-_PERIOD = 0.02  # s, of the tables of places and speeds
+TABLE_PERIOD = 0.02  # s, of the tables of places and speeds
 _SLOWEST = 1e-3  # m/s, at which a jet counts as off
 
 
@@ -43,8 +42,8 @@ JETS = np.dtype(
 )
 
 
-def _jets(record: int, count: int, time: int, positions: int, velocities: int) -> None:
-    w, now = carray(pointer_to(record), 1, JETS)[0], numbers_at(time, (1,))[0]
+def _jets(parameters: int, count: int, time: int, positions: int, velocities: int) -> None:
+    w, now = carray(pointer_to(parameters), 1, JETS)[0], numbers_at(time, (1,))[0]
     axial, radial = (
         numbers_at(w.axial, (COUNT_X, COUNT_R)),
         numbers_at(w.radial, (COUNT_X, COUNT_R)),
@@ -55,7 +54,7 @@ def _jets(record: int, count: int, time: int, positions: int, velocities: int) -
     gusts = np.zeros((3, count))
     if w.waves > 0:
         add_modes(numbers_at(w.modes, (w.waves, 7)), w.advection, now, p, gusts)
-    at = min(max(now / _PERIOD, 0.0), 1e9)
+    at = min(max(now / TABLE_PERIOD, 0.0), 1e9)
     share = at - int(at)
     k, kp = min(int(at), len(speeds) - 1), min(int(at), len(places) - 1)
     after, after_p = min(k + 1, len(speeds) - 1), min(kp + 1, len(places) - 1)
@@ -116,16 +115,16 @@ class _Jets(CompiledWind):
         self.axes = _axes(direction)  # rows: along the jet, and two across
         self.places, self.speeds = np.ascontiguousarray(places), np.ascontiguousarray(speeds)
         self.radius = radius
-        record = np.zeros(1, dtype=JETS)
-        w = record[0]
-        kept = (*jet_table(radius, hub_radius), self.places, self.speeds, table)
-        for name, array in zip(JETS.names or (), kept, strict=False):
+        parameters = np.zeros(1, dtype=JETS)
+        w = parameters[0]
+        tables = (*jet_table(radius, hub_radius), self.places, self.speeds, table)
+        for name, array in zip(JETS.names or (), tables, strict=False):
             w[name] = array.ctypes.data
         w["place_steps"], (w["steps"], w["jets"]) = len(self.places), self.speeds.shape
         # gusts travel with the shear layer's eddies, at half the speed of the jet
         w["waves"], w["axes"] = len(table), self.axes
         w["advection"] = 0.5 * float(self.speeds.max()) * self.axes[0]
-        super().__init__(_jets, record, kept)
+        super().__init__(_jets, parameters, tables)
 
 
 class FanWall(_Jets):
@@ -219,14 +218,14 @@ def switching(
     Each fan by itself is on with probability ``on``, at a speed drawn from ``speed``, until it is
     drawn anew after a time drawn from ``every`` (s); it follows with a first-order ``lag`` (s).
     """
-    steps = math.ceil(seconds / _PERIOD) + 1
+    steps = math.ceil(seconds / TABLE_PERIOD) + 1
     table = np.zeros((steps, fans))
-    keep = math.exp(-_PERIOD / lag) if lag > 0 else 0.0
+    keep = math.exp(-TABLE_PERIOD / lag) if lag > 0 else 0.0
     for fan in range(fans):
         k = 0
         while k < steps:
             value = float(rng.uniform(*speed)) if rng.random() < on else 0.0
-            end = k + max(1, round(float(rng.uniform(*every)) / _PERIOD))
+            end = k + max(1, round(float(rng.uniform(*every)) / TABLE_PERIOD))
             table[k:end, fan] = value
             k = end
     for k in range(1, steps):
@@ -287,20 +286,3 @@ class VehicleWash(_Jets):
             gust_length,
             seed,
         )
-
-
-def sampled(path: Sequence[ArrayLike] | Array, times: ArrayLike, seconds: float) -> Array:
-    """Return places (steps, 3) m at the times of these winds' tables, from places (n, 3) at
-    ``times`` (n,) s.
-
-    Raises:
-        InputError: other shapes, or times that do not grow.
-    """
-    given, t = np.asarray(path, dtype=np.float64), np.asarray(times, dtype=np.float64)
-    if given.shape != (len(t), 3) or t.ndim != 1 or np.any(np.diff(t) <= 0.0):
-        raise InputError(
-            f"wind: expected places (n, 3) at growing times (n,), got shapes {given.shape} and "
-            f"{t.shape}"
-        )
-    when = _PERIOD * np.arange(math.ceil(seconds / _PERIOD) + 1)
-    return np.column_stack([np.interp(when, t, given[:, i]) for i in range(3)])

@@ -33,8 +33,8 @@ STEADY = np.dtype(
 )
 
 
-def _steady(record: int, count: int, time: int, points: int, velocities: int) -> None:
-    w, now = carray(pointer_to(record), 1, STEADY)[0], numbers_at(time, (1,))[0]
+def _steady(parameters: int, count: int, time: int, points: int, velocities: int) -> None:
+    w, now = carray(pointer_to(parameters), 1, STEADY)[0], numbers_at(time, (1,))[0]
     p, out = numbers_at(points, (3, count)), numbers_at(velocities, (3, count))
     for j in range(count):
         scale = 1.0
@@ -69,9 +69,9 @@ class Uniform(CompiledWind):
     """
 
     def __init__(self, velocity: ArrayLike) -> None:
-        record = np.zeros(1, dtype=STEADY)
-        record["velocity"] = vector(velocity, "velocity")
-        super().__init__(_steady, record)
+        parameters = np.zeros(1, dtype=STEADY)
+        parameters["velocity"] = vector(velocity, "velocity")
+        super().__init__(_steady, parameters)
 
 
 class Shear(CompiledWind):
@@ -102,8 +102,8 @@ class Shear(CompiledWind):
     ) -> None:
         if law not in ("log", "power"):
             raise unknown_name("law", law, ("log", "power"), "wind: Shear")
-        record = np.zeros(1, dtype=STEADY)
-        w = record[0]
+        parameters = np.zeros(1, dtype=STEADY)
+        w = parameters[0]
         w["velocity"], w["law"] = vector(velocity, "velocity"), _LAWS[law]
         w["reference"] = number(reference, "reference", 0.0)
         if law == "log":
@@ -115,7 +115,7 @@ class Shear(CompiledWind):
                 )
         else:
             w["roughness"] = number(exponent, "exponent", 0.0)
-        super().__init__(_steady, record)
+        super().__init__(_steady, parameters)
 
 
 class Gust(CompiledWind):
@@ -148,8 +148,8 @@ class Gust(CompiledWind):
         front: ArrayLike = (0.0, 0.0, 0.0),
         falls: bool = True,
     ) -> None:
-        record = np.zeros(1, dtype=STEADY)
-        w = record[0]
+        parameters = np.zeros(1, dtype=STEADY)
+        w = parameters[0]
         w["velocity"] = vector(velocity, "velocity")
         travel = vector(velocity if direction is None else direction, "direction")
         size = float(np.linalg.norm(travel))
@@ -158,4 +158,4 @@ class Gust(CompiledWind):
         w["travel"], w["front"] = travel / size, vector(front, "front")
         w["speed"], w["length"] = number(speed, "speed", 0.0), number(length, "length", 0.0)
         w["start"], w["falls"] = number(start, "start"), bool(falls)
-        super().__init__(_steady, record)
+        super().__init__(_steady, parameters)

@@ -65,11 +65,20 @@ def add_modes(table: Array, advection: Array, time: float, p: Array, out: Array)
             out[2, j] += az * c
 
 
-def _turbulence(record: int, count: int, time: int, points: int, velocities: int) -> None:
-    w = carray(pointer_to(record), 3, np.int64)
+TURBULENCE = np.dtype(
+    [
+        ("waves", "i8"),  # address of the table (count, 7) of ``add_modes``
+        ("count", "i8"),
+        ("advection", "f8", (3,)),  # m/s
+    ]
+)
+
+
+def _turbulence(parameters: int, count: int, time: int, points: int, velocities: int) -> None:
+    w = carray(pointer_to(parameters), 1, TURBULENCE)[0]
     add_modes(
-        numbers_at(w[0], (w[1], 7)),
-        numbers_at(w[2], (3,)),
+        numbers_at(w.waves, (w.count, 7)),
+        w.advection,
         numbers_at(time, (1,))[0],
         numbers_at(points, (3, count)),
         numbers_at(velocities, (3, count)),
@@ -202,8 +211,8 @@ class Turbulence(CompiledWind):
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         table[:, :3], table[:, 4:] = table[:, :3] @ turn.T, table[:, 4:] @ turn.T
         table = np.ascontiguousarray(table)
-        record = np.array([table.ctypes.data, len(table), carried.ctypes.data])
-        super().__init__(_turbulence, record, (table, carried))
+        parameters = np.array([(table.ctypes.data, len(table), carried)], dtype=TURBULENCE)
+        super().__init__(_turbulence, parameters, (table,))
 
 
 def _three(value: ArrayLike, name: str, at_least_zero: bool) -> NDArray[np.float64]:

@@ -89,9 +89,7 @@ def test_sixteen_threads_at_once_fly_the_same_trajectories():
 
 
 @pytest.mark.slow
-def test_sixteen_processes_at_once_fly_the_same_trajectories():
+def test_four_processes_at_once_fly_the_same_trajectories():
     alone = [flown(seed) for seed in range(4)]
-    with ProcessPoolExecutor(16, mp_context=multiprocessing.get_context("spawn")) as pool:
-        assert list(pool.map(flown, [i % 4 for i in range(16)])) == [
-            alone[i % 4] for i in range(16)
-        ]
+    with ProcessPoolExecutor(4, mp_context=multiprocessing.get_context("spawn")) as pool:
+        assert list(pool.map(flown, range(4))) == alone

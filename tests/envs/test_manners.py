@@ -62,19 +62,14 @@ def test_the_pose_alone_tells_no_wrench():
     assert abs(frame[6]) < 0.2
 
 
+def test_an_unknown_view_is_named():
+    with pytest.raises(InputError, match="Did you mean 'wrench'"):
+        FanTrackingEnv(observe="wrnech")
+
+
 @pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ({"observe": "wrnech"}, "Did you mean 'wrench'"),
-        ({"normalize": "yes"}, "normalize must be True or False"),
-    ],
+    "given", [{}, {"observe": "history"}, {"observe": "pose", "normalize": True}]
 )
-def test_an_unknown_view_is_named(given, words):
-    with pytest.raises(InputError, match=words):
-        FanTrackingEnv(**given)
-
-
-@pytest.mark.parametrize("given", [{"observe": "history"}, {"observe": "pose", "normalize": True}])
 def test_many_see_what_each_alone_would(given):
     envs = gym.make_vec(
         NAME, num_envs=2, vectorization_mode="vector_entry_point", scenario="fast", **given
@@ -148,9 +143,7 @@ import gymnasium as gym
 from gymnasium.utils.env_checker import check_env
 import windwrench
 warnings.simplefilter("error")
-for name in NAMES:
-    check_env(gym.make(name).unwrapped)
-    check_env(gym.make(name, render_mode="rgb_array").unwrapped)
+check_env(gym.make("windwrench/FanTracking-v0", render_mode="rgb_array").unwrapped)
 """
 
 
@@ -158,11 +151,10 @@ for name in NAMES:
     not ctypes.util.find_library("EGL") and not ctypes.util.find_library("OSMesa"),
     reason="neither libEGL nor libOSMesa is installed: apt-get install libegl1 libgl1-mesa-dri",
 )
-@pytest.mark.parametrize("name", [NAME])
-def test_gymnasium_s_checker_finds_nothing_with_rendering_and_without_a_display(tmp_path, name):
+def test_gymnasium_s_checker_finds_nothing_with_rendering_and_without_a_display(tmp_path):
     without = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
     done = subprocess.run(
-        [sys.executable, "-c", CHECK.replace("NAMES", repr([name]))],
+        [sys.executable, "-c", CHECK],
         cwd=tmp_path,
         env=without,
         capture_output=True,

@@ -214,9 +214,12 @@ def test_the_truth_in_a_log_is_the_wrench_that_was_applied():
 
 
 @pytest.mark.parametrize(
-    "inertia", [None, [[0.0022, 3e-4, 0], [3e-4, 0.003, -2e-4], [0, -2e-4, 0.0048]]]
+    ("com", "inertia"),
+    [
+        ((0.01, -0.02, 0.0), None),
+        ((0.0, 0.0, 0.05), [[0.0022, 3e-4, 0], [3e-4, 0.003, -2e-4], [0, -2e-4, 0.0048]]),
+    ],
 )
-@pytest.mark.parametrize("com", [(0.01, -0.02, 0.0), (0.0, 0.0, 0.05)])
 def test_a_centre_of_mass_off_the_rotors_moves_as_in_the_filter_s_model(com, inertia):
     vehicle = VEHICLE if inertia is None else replace(VEHICLE, inertia=np.array(inertia))
     vehicle = replace(vehicle, mocap=Mocap(200.0, 1e-4, 5e-4))

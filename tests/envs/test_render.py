@@ -32,10 +32,14 @@ pytestmark = pytest.mark.skipif(
     reason="neither libEGL nor libOSMesa is installed: apt-get install libegl1 libgl1-mesa-dri",
 )
 
-PICTURES = """
+# one process draws all: it is told neither of a display nor how to draw
+DRAWN = """
+from pathlib import Path
 import numpy as np
 from windwrench.envs import FanTrackingEnv, Scenario
-env = FanTrackingEnv(Scenario("still", motions=("still",), offset=(0.3, 0.3)), "rgb_array", width=320, height=240)
+from windwrench.envs.video import Film
+still = Scenario("still", motions=("still",), offset=(0.3, 0.3))
+env = FanTrackingEnv(still, "rgb_array", width=320, height=240)
 env.reset(seed=0)
 env.step(np.zeros(1, np.float32))
 pictures = {"jet": env.render()}
@@ -50,24 +54,58 @@ for body in ("vehicle", "fan"):
     loop.model.geom_rgba[geoms], loop.model.geom_matid[geoms] = kept
 loop.data.qpos[1] += 0.3
 pictures["moved"] = env.render()
-env.close()
 np.savez("pictures.npz", **pictures)
+env.reset(seed=0)
+for kind in KINDS:
+    with Film(Path("film." + kind), 320, 240, longest=0.4) as film:
+        for _ in range(7):
+            env.step(np.zeros(1, np.float32))
+            film.add(env.render())
+    assert film.is_full
+    try:
+        with Film(Path("broken." + kind), 320, 240) as film:
+            film.add(env.render())
+            raise KeyError("on the way")
+    except KeyError:
+        pass
+env.close()
+import mujoco  # after the kit, which tells MuJoCo how to draw
+def broken(*arguments):
+    raise RuntimeError("no display")
+mujoco.Renderer = broken
+try:
+    env.render()
+except Exception as error:
+    print(type(error).__name__, error)
 """
+KINDS = ["gif", *(["mp4"] if find_spec("imageio_ffmpeg") else [])]
 
 
-def run(folder, *command, **changes):
-    environment = {**os.environ, "MUJOCO_GL": BACKEND, **changes}
+def run(folder, code, **changes):
+    environment = {**os.environ, **changes}
     return subprocess.run(
-        command, cwd=folder, env=environment, capture_output=True, text=True, check=False
+        [sys.executable, "-c", code],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
     )
 
 
 @pytest.fixture(scope="module")
-def pictures(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("pictures")
-    done = run(folder, sys.executable, "-c", PICTURES)
+def drawn(tmp_path_factory):
+    """Folder of pictures and films, and what a machine that cannot draw is told."""
+    folder = tmp_path_factory.mktemp("drawn")
+    no_screen = {"MUJOCO_GL": "", "DISPLAY": "", "WAYLAND_DISPLAY": ""}
+    done = run(folder, DRAWN.replace("KINDS", repr(KINDS)), **no_screen)
     assert done.returncode == 0, done.stderr
-    return np.load(folder / "pictures.npz")
+    return folder, done.stdout
+
+
+@pytest.fixture(scope="module")
+def pictures(drawn):
+    return np.load(drawn[0] / "pictures.npz")
 
 
 def changed(a, b):
@@ -97,51 +135,27 @@ def test_a_picture_shows_the_jet_in_blue(pictures):
     assert blue(pictures["jet"]) > 1.1 * blue(pictures["still"])
 
 
-FILM = """
-from pathlib import Path
-import numpy as np
-from windwrench.envs import FanTrackingEnv
-from windwrench.envs.video import Film
-env = FanTrackingEnv(render_mode="rgb_array", width=320, height=240)
-env.reset(seed=0)
-with Film(Path("film.KIND"), 320, 240, longest=0.4) as film:
-    for _ in range(7):
-        env.step(np.zeros(1, np.float32))
-        film.add(env.render())
-assert film.is_full
-try:
-    with Film(Path("broken.KIND"), 320, 240) as film:
-        film.add(env.render())
-        raise KeyError("on the way")
-except KeyError:
-    print("broken off")
-"""
-
-
-def film(folder, kind):
-    done = run(folder, sys.executable, "-c", FILM.replace("KIND", kind))
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.strip() == "broken off"
-    assert [p.name for p in folder.iterdir()] == [f"film.{kind}"]
-    return folder / f"film.{kind}"
+def test_a_film_is_written_whole_or_not_at_all(drawn):
+    folder, _ = drawn
+    assert {p.name for p in folder.iterdir()} == {"pictures.npz", *(f"film.{k}" for k in KINDS)}
 
 
 @pytest.mark.skipif(
-    find_spec("imageio_ffmpeg") is None,
+    "mp4" not in KINDS,
     reason="imageio-ffmpeg is not installed: pip install 'windwrench[video]'",
 )
-def test_a_film_is_written_whole_or_not_at_all(tmp_path):
+def test_an_mp4_has_a_picture_a_decision(drawn):
     import imageio_ffmpeg
 
-    frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(film(tmp_path, "mp4")))
+    frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(drawn[0] / "film.mp4"))
     assert frames == 5
     assert seconds == pytest.approx(0.4, abs=0.05)
 
 
-def test_a_gif_keeps_the_colours_of_the_arrows(tmp_path):
+def test_a_gif_keeps_the_colours_of_the_arrows(drawn):
     from PIL import Image
 
-    with Image.open(film(tmp_path, "gif")) as gif:
+    with Image.open(drawn[0] / "film.gif") as gif:
         assert gif.n_frames == 5
         assert gif.info["duration"] == 80
         assert gif.size == (320, 240)
@@ -151,39 +165,51 @@ def test_a_gif_keeps_the_colours_of_the_arrows(tmp_path):
     assert np.count_nonzero((red - green > 60) & (red - blue > 60)) > 3  # the estimated force
 
 
+def test_a_machine_that_cannot_draw_is_told_what_to_install(drawn):
+    said = drawn[1]
+    assert said.startswith("InputError")
+    assert "no display" in said
+    assert "MUJOCO_GL" in said
+
+
 def test_a_film_without_its_extra_is_refused(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(InputError, match=r"windwrench\[video\]"):
         Film(tmp_path / "film.mp4", 320, 240)
 
 
-def test_commands_write_films_and_replays(tmp_path):
-    def windwrench(arguments):
-        code = "from windwrench.cli import main; main()"
-        return run(tmp_path, sys.executable, "-c", code, *arguments.split())
+COMMANDS = """
+import sys
+from windwrench.cli import main
+for line in LINES:
+    try:
+        sys.argv = ["windwrench", *line.split()]
+        main()
+    except SystemExit as end:
+        print("exit", end.code)
+"""
+LINES = (
+    "fly --scenario static --gif --film-seconds 0.2 --out out",
+    "record --seconds 3 --trajectory circle --vehicle crazyflie --effect constant_force:fx=0.1 "
+    "--out log.csv",
+    "estimate log.csv --film --vehicle crazyflie --from 2 --film-seconds 0.5 --json --out again",
+    "estimate log.csv --film --from 4 --out late",
+)
 
+
+def test_commands_write_films_and_replays(tmp_path):
     def files(folder):
         return {p.name for p in (tmp_path / folder).iterdir()}
 
-    done = windwrench("fly --scenario static --gif --film-seconds 0.2 --out out")
-    assert done.returncode == 0, done.stderr
-    assert files("out") == {"fly.gif", "fly.png", "fly.scene.png", "run.json"}
-    done = windwrench(
-        "record --seconds 3 --trajectory circle --vehicle crazyflie "
-        "--effect constant_force:fx=0.1 --out log.csv"
-    )
-    assert done.returncode == 0, done.stderr
-    done = windwrench(
-        "estimate log.csv --film --vehicle crazyflie --from 2 --film-seconds 0.5 --json --out again"
-    )
-    assert done.returncode == 0, done.stderr
+    done = run(tmp_path, COMMANDS.replace("LINES", repr(LINES)), MUJOCO_GL=BACKEND)
+    assert files("out") == {"fly.gif", "fly.png", "fly.scene.png", "run.json"}, done.stderr
     assert files("again") == {"film.gif", "film.png", "run.json", "wrench.csv", "wrench.png"}
-    assert json.loads(done.stdout)["result"]["force_mean_N"][0] > 0.02
+    told = next(line for line in done.stdout.splitlines() if '"force_mean_N"' in line)
+    assert json.loads(told)["result"]["force_mean_N"][0] > 0.02
     picture = matplotlib.image.imread(tmp_path / "again" / "film.png")
     red, green, blue = np.moveaxis(picture[..., :3], 2, 0)
     assert np.count_nonzero((red - green > 0.25) & (red - blue > 0.25)) > 30  # path and force
-    done = windwrench("estimate log.csv --film --from 4 --out late")
-    assert done.returncode == 2
+    assert done.stdout.splitlines()[-1] == "exit 2"
     assert "--from 4" in done.stderr
     assert not (tmp_path / "late").exists()
 
@@ -238,29 +264,3 @@ def test_a_rerun_recording_without_its_extra_is_refused(tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"windwrench\[rerun\]"):
         write_rrd(a_flight(), load_vehicle("ardrone2"), tmp_path / "flight.rrd")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_without_a_screen_it_draws_without_being_told_how(tmp_path):
-    code = (
-        "from windwrench.envs import FanTrackingEnv\n"
-        "env = FanTrackingEnv(render_mode='rgb_array', width=320, height=240); env.reset(seed=0)\n"
-        "print(env.render().shape)"
-    )
-    done = run(tmp_path, sys.executable, "-c", code, MUJOCO_GL="", DISPLAY="", WAYLAND_DISPLAY="")
-    assert done.stdout.strip() == "(240, 320, 3)", done.stderr
-
-
-def test_a_machine_that_cannot_draw_is_told_what_to_install(tmp_path):
-    code = (
-        "import mujoco\n"
-        "def broken(*arguments): raise RuntimeError('no display')\n"
-        "mujoco.Renderer = broken\n"
-        "from windwrench.envs import FanTrackingEnv\n"
-        "env = FanTrackingEnv(render_mode='rgb_array'); env.reset(seed=0)\n"
-        "try: env.render()\n"
-        "except Exception as error: print(type(error).__name__, error)"
-    )
-    done = run(tmp_path, sys.executable, "-c", code)
-    assert done.stdout.startswith("InputError")
-    assert "no display" in done.stdout
-    assert "MUJOCO_GL" in done.stdout

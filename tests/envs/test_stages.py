@@ -31,6 +31,21 @@ def test_stage_by_stage_the_flight_is_that_of_the_compiled_call_bit_for_bit(name
     assert np.all(np.diff(seen) == 1)
 
 
+def test_so_it_flies_in_a_vector_of_environments():
+    def push(loop):
+        loop.applied[2] = -0.2
+
+    given = {"stages": [Stage("push", push, before="actuate")]}
+    envs = gym.make_vec(
+        "windwrench/FanTracking-v0", 2, vectorization_mode="vector_entry_point", **given
+    )
+    envs.reset(seed=[3, 4])
+    for _ in range(4):
+        frames, _, _, _, infos = envs.step(np.full((2, 1), 0.2, np.float32))
+    alone = np.concatenate([frames[0], infos["force"][0], infos["torque"][0]])
+    np.testing.assert_array_equal(alone, fly("FanTracking", **given))
+
+
 def test_a_sensor_an_actuator_and_a_wind_of_one_s_own_change_the_flight():
     def offset(loop):
         loop.sample[4] += 0.02
