@@ -24,12 +24,9 @@ def read_flights(
             comes with the kit, or several.
     """
     from ..dynamics.vehicle_file import load_vehicle, preset_names
-    from ..identification.logs.reading import read_log
 
     model = None if vehicle is None else load_vehicle(vehicle)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # the notes say the same
-        flights = [read_log(path, reader, model, log_map) for path in paths]
+    flights = read_logs(paths, reader, model, log_map)
     if model is not None:
         return flights, model
     expected = f"--vehicle {', '.join(preset_names())} or the path of a YAML file"
@@ -47,6 +44,21 @@ def read_flights(
                 f"expected {expected}"
             )
     return flights, load_vehicle(flights[0].vehicle)
+
+
+def read_logs(
+    paths: Iterable[Path], reader: str | None, vehicle: "Vehicle | None", log_map: str | None
+) -> "list[FlightLog]":
+    """Read flight logs. What a reader warns of stands in the notes of its log.
+
+    Raises:
+        InputError: a log cannot be read.
+    """
+    from ..identification.logs.reading import read_log
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        return [read_log(path, reader, vehicle, log_map) for path in paths]
 
 
 def log_notes(texts: Iterable[str]) -> None:

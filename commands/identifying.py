@@ -3,13 +3,11 @@
 import math
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..runtime.errors import InputError
-from .terminal import console, note, run, say, show_table, working
-
-if TYPE_CHECKING:
-    from ..identification.logs.flight_log import FlightLog
+from .flight_logs import log_notes, read_logs
+from .terminal import console, run, say, show_table, working
 
 _WINDOW = re.compile(r"(.+):(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?)")
 
@@ -27,16 +25,6 @@ def parse_window(text: str) -> tuple[Path, tuple[float, float]]:
     if not begin < end:
         raise InputError(f"{text}: expected LOG:FROM-TO with FROM before TO, in s")
     return Path(match[1]), (begin, end)
-
-
-def _read(path: Path, reader: str | None, log_map: str | None) -> "FlightLog":
-    import warnings
-
-    from ..identification.logs.reading import read_log
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # the notes say the same
-        return read_log(path, reader, map=log_map)
 
 
 def identify(
@@ -70,16 +58,13 @@ def identify(
     if not common[0] < common[1]:
         raise InputError(f"--to {end:g}: expected a time after --from {begin:g}")
     parts = [parse_window(text) for text in logs]
-    flights = [_read(path, reader, map) for path, _ in parts]
+    flights = read_logs([path for path, _ in parts], reader, None, map)
     windows = [w if math.isfinite(w[1]) else common for _, w in parts]
     with working("identifying") as progress:
         found = fit(flights, mass, where, windows, out.stem, report=progress)
     run.record = out.with_name(f"{out.stem}.run.json")
     written = write_identified(found, out)
-    for text in dict.fromkeys(text for flight in flights for text in flight.notes):
-        note(text)
-    for text in found.notes:
-        note(text)
+    log_notes(text for one in (*flights, found) for text in one.notes)
     console.print(
         f"{found.seconds:.0f} s of flight, mass {mass:g} kg: {headline(found)}.",
     )
