@@ -91,15 +91,12 @@ def fly(
         )
         write_rrd(flight, env.truth, folder / "fly.rrd")
         paths.append(folder / "fly.rrd")
-    columns = {
-        "controller": shown,
-        "scenario": scenario,
-        "motion": episode.motion,
-        "RMSE (m)": f"{episode.rmse:.3f}",
-        "lost": "yes" if episode.lost else "no",
-        "reward": f"{episode.total_reward:.1f}",
-    }
-    show_table(tuple(columns), [tuple(columns.values())])
+    rmse, reward = f"{episode.rmse:.3f}", f"{episode.total_reward:.1f}"
+    lost = "yes" if episode.lost else "no"
+    show_table(
+        ("controller", "scenario", "motion", "RMSE (m)", "lost", "reward"),
+        [(shown, scenario, episode.motion, rmse, lost, reward)],
+    )
     say(*paths)
     return {
         "task": task,

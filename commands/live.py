@@ -48,8 +48,7 @@ def live(
     from ..live.sources.open import kind_of, make_source
     from ..live.tallies import Tallies
 
-    kind = kind_of(source)
-    if vehicle is None and kind != "sim":
+    if vehicle is None and kind_of(source) != "sim":
         raise InputError(
             f"--vehicle: {source} does not say which vehicle flies; expected "
             f"{', '.join(preset_names())} or the path of a YAML file"
@@ -156,8 +155,7 @@ def _summary(session: "Session") -> dict[str, Any]:
         lines.append(f"the filter restarted {now.restarts} time(s): after gaps or jumps")
     if median == median:
         lines.append(f"latency: median {median:.2f} ms, 99 % within {most:.2f} ms")
-    force = " ".join(f"{x:+.4g}" for x in mean[:3])
-    torque = " ".join(f"{x:+.4g}" for x in mean[3:])
+    force, torque = (" ".join(f"{x:+.4g}" for x in part) for part in (mean[:3], mean[3:]))
     lines.append(f"mean force {force} N, mean torque {torque} Nm")
     for text in lines:
         errors.print(text, soft_wrap=True)

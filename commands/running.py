@@ -64,21 +64,11 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
                 write_run(run.record, name, options)
         except DryRun as stopped:
             outcome = {"dry_run": True, "would": stopped.plan, "out": stopped.out}
-            lines = [
-                f"  {key}: {_words(value)}"
-                for key, value in stopped.plan.items()
-                if value is not None
-            ]
-            console.print(
-                "\n".join(
-                    [
-                        f"{name} would do",
-                        *lines,
-                        f"  and write to {stopped.out}",
-                    ]
-                ),
-                soft_wrap=True,
-            )
+            console.print(f"{name} would do")
+            for key, value in stopped.plan.items():
+                if value is not None:
+                    console.print(f"  {key}: {_words(value)}", soft_wrap=True)
+            console.print(f"  and write to {stopped.out}", soft_wrap=True)
         except BaseException:
             run.undo()
             raise

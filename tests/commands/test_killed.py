@@ -14,6 +14,9 @@ from pathlib import Path
 
 import pytest
 
+from windwrench.dynamics import load_vehicle
+from windwrench.envs.recording import record_flight
+from windwrench.identification.logs.flight_log import FlightLog, write_log
 from windwrench.runtime.whole_files import replaced
 
 START = "from windwrench.cli import main; main()"
@@ -25,41 +28,22 @@ if __name__ == "__main__":
     Path("out").mkdir(exist_ok=True)
     run_trials(trials, Path("out"), jobs=2)
 """
-BENCHMARK = (
-    "benchmark",
-    "--controllers",
-    "hover",
-    "--scenarios",
-    "static",
-    "--episodes",
-    "6",
-    "--jobs",
-    "2",
-    "--out",
-    "out",
-)
-DIAGNOSE = ("diagnose", "flight.csv", "--out", "out")
-FLEET = ("fleet", ".", "--jobs", "1", "--out", "out")
-REPRODUCE = ("reproduce", "fig6", "--seeds", "1", "--out", "out")
+COMMANDS = {
+    "benchmark": "benchmark --controllers hover --scenarios static --episodes 6 --jobs 2 --out out",
+    "diagnose": "diagnose flight.csv --out out",
+    "fleet": "fleet . --jobs 1 --out out",
+    "reproduce": "reproduce fig6 --seeds 1 --out out",
+}
 
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/stat").exists(), reason="looks for processes in Linux's /proc"
 )
 
 
-def start(folder, *arguments):
-    if arguments == ("trials",):
-        (folder / "trials.py").write_text(TRIALS)
-        words = [sys.executable, "trials.py"]
-    else:
-        words = [sys.executable, "-c", START, *arguments]
-    return subprocess.Popen(
-        words,
-        cwd=folder,
-        start_new_session=True,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
+def start(folder, name, **options):
+    words = ["-c", START, *COMMANDS[name].split()] if name in COMMANDS else ["trials.py"]
+    streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL} | options
+    return subprocess.Popen([sys.executable, *words], cwd=folder, start_new_session=True, **streams)
 
 
 def processes_of(session):
@@ -123,47 +107,38 @@ def timeless(value):
 @pytest.fixture(scope="module")
 def flight(tmp_path_factory):
     """The bytes of a short flight log."""
-    folder = tmp_path_factory.mktemp("flight")
-    assert (
-        start(
-            folder, "record", "--seconds", "12", "--trajectory", "gentle", "--out", "flight.csv"
-        ).wait()
-        == 0
-    )
-    return (folder / "flight.csv").read_bytes()
+    path = tmp_path_factory.mktemp("flight") / "flight.csv"
+    flown = record_flight(load_vehicle("ardrone2"), trajectory="gentle", seconds=12.0)
+    write_log(FlightLog(**flown, vehicle="ardrone2"), path)
+    return path.read_bytes()
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [BENCHMARK, DIAGNOSE, FLEET, REPRODUCE, ("trials",)],
-    ids=lambda a: a[2].strip("-") if a == FLEET else a[0],
-)
+@pytest.mark.parametrize("name", [*COMMANDS, "trials"])
 @pytest.mark.slow
-def test_a_killed_run_leaves_nothing_half_and_can_be_run_again(tmp_path, flight, arguments):
+def test_a_killed_run_leaves_nothing_half_and_can_be_run_again(tmp_path, flight, name):
     whole, cut = tmp_path / "whole", tmp_path / "cut"
     for folder in (whole, cut):
         folder.mkdir()
         (folder / "flight.csv").write_bytes(flight)
+        (folder / "trials.py").write_text(TRIALS)
     begun = time.monotonic()
-    assert start(whole, *arguments).wait() == 0
+    assert start(whole, name).wait() == 0
     lasted = time.monotonic() - begun
-    run = start(cut, *arguments)
+    run = start(cut, name)
     time.sleep(random.uniform(0.3, 0.95) * lasted)
-    os.kill(
-        run.pid, signal.SIGKILL
-    )  # the command alone: what becomes of its workers is the question
+    # the command alone: what becomes of its workers is the question
+    os.kill(run.pid, signal.SIGKILL)
     run.wait()
     assert_whole(cut)
     assert_ends(run.pid)
-    assert start(cut, *arguments).wait() == 0
+    assert start(cut, name).wait() == 0
     assert results(cut) == results(whole)
 
 
 def test_a_reader_who_goes_away_costs_no_results(tmp_path, flight):
     """As a pipe to ``head`` does: what is written comes before what is said."""
     (tmp_path / "flight.csv").write_bytes(flight)
-    words = [sys.executable, "-c", START, *DIAGNOSE]
-    run = subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    run = start(tmp_path, "diagnose", stdout=subprocess.PIPE)
     run.stdout.close()
     run.wait()
     assert {path.name for path in (tmp_path / "out").iterdir()} >= {
