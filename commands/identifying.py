@@ -64,7 +64,7 @@ def identify(
         found = fit(flights, mass, where, windows, out.stem, report=progress)
     run.record = out.with_name(f"{out.stem}.run.json")
     written = write_identified(found, out)
-    log_notes(text for one in (*flights, found) for text in one.notes)
+    log_notes([*(text for flight in flights for text in flight.notes), *found.notes])
     console.print(
         f"{found.seconds:.0f} s of flight, mass {mass:g} kg: {headline(found)}.",
     )

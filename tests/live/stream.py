@@ -3,15 +3,14 @@
 import socket
 import threading
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 
 from windwrench.dynamics import load_vehicle
 from windwrench.envs.recording import record_flight
 from windwrench.identification.logs.flight_log import FlightLog
-from windwrench.live.clocks import Clocks
-from windwrench.live.filtering import LiveFilter, LiveSettings
-from windwrench.live.rows import Joiner
+from windwrench.live.filtering import LiveSettings
 from windwrench.live.session import Session
 from windwrench.live.sources.open import make_source
 from windwrench.live.tallies import Tallies
@@ -29,15 +28,7 @@ def flight(seconds=8.0, trajectory="excite", vehicle="ardrone2", imu=False):
 
 
 def log_of(flown):
-    return FlightLog(
-        flown["t"],
-        flown["position"],
-        flown["quaternion"],
-        flown["rotor_speeds"],
-        flown.get("voltage"),
-        name="flight",
-        source="flight",
-    )
+    return FlightLog(**flown, name="flight", source="flight")
 
 
 def as_objects(flown):
@@ -65,23 +56,24 @@ def wrench_of(outputs):
 
 
 class Pipeline:
-    """Samples in, estimates out, without a source and without time passing."""
+    """Samples in, estimates out, by a session without a source and without time passing."""
 
-    def __init__(self, vehicle="ardrone2", paced=True, **settings):
-        self.vehicle = load_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
-        self.tallies = Tallies()
-        self.filter = LiveFilter(self.vehicle, self.tallies, LiveSettings(**settings))
-        self.clocks = Clocks(self.tallies, self.filter.settings.horizon, paced)
-        self.joiner = Joiner(self.vehicle, self.tallies)
-        self.rows, self.outputs = [], []
+    def __init__(self, **settings):
+        self.tallies, self.outputs = Tallies(), []
+        source = SimpleNamespace(
+            vehicle=VEHICLE, tallies=self.tallies, paced=True, send=lambda output: None
+        )
+        self.session = Session(
+            source,
+            LiveSettings(**settings),
+            recorder=SimpleNamespace(rows=0),
+            tell=self.outputs.append,
+        )
+        self.rows = self.session._unrecorded
 
     def take(self, samples):
         for sample in samples:
-            t = self.clocks.time(sample)
-            row = None if t is None else self.joiner.take(sample, t)
-            if row is not None:
-                self.rows.append(row)
-                self.outputs += self.filter.take(row)
+            self.session.take(sample)
         return self
 
     def wrench(self):

@@ -108,23 +108,5 @@ def test_given_the_same_random_numbers_it_commands_the_same(c):
     assert np.max(apart) < 0.1
 
 
-def test_with_its_own_numbers_it_commands_as_python_does_in_the_mean(c):
-    """Over 20 flights, no farther apart than two trackers in Python with other random numbers."""
-    rng = np.random.default_rng(2)
-    seen = observations(fans(20, 60, rng), BRIEFING, rng).astype(np.float32)
-    law, many = Tracker(particles=PARTICLES), Tracker(particles=1000)
-    apart, usual = [], []
-    for one in seen:
-        runs = []
-        for tracker in (law, many):
-            tracker.brief(BRIEFING)
-            tracker.reset()
-            runs.append(np.array([float(tracker(row)[0]) for row in one])[10:])
-        apart.append(np.sqrt(np.mean(np.square(commands(c, one)[10:] - runs[1]))))
-        usual.append(np.sqrt(np.mean(np.square(runs[0] - runs[1]))))
-    assert np.mean(apart) < 1.5 * np.mean(usual)
-    assert np.mean(usual) < 0.1
-
-
 def test_it_says_how_much_memory_it_takes(c):
     assert 90 * PARTICLES < c.policy_bytes < 110 * PARTICLES + 100
