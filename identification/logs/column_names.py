@@ -8,51 +8,33 @@ Names are read as people write them: ``pos_x``, ``Position.X [mm]``, ``qw``, ``q
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
 
-# a unit, and how it is written in brackets, at the end of a name, or in a line of units
-_SPELLINGS = {
-    "s": "s sec seconds",
-    "ms": "ms msec",
-    "us": "us usec µs",
-    "ns": "ns nsec",
-    "m": "m",
-    "mm": "mm",
-    "cm": "cm",
-    "deg": "deg degrees °",
-    "rad": "rad radians",
-    "rad/s": "rad/s radps rads rad_s",
-    "deg/s": "deg/s °/s degps dps deg_s",
-    "m/s2": "m/s2 m/s^2 m/s² mps2 ms2 m_s2",
-    "g": "g",
-    "rpm": "rpm",
-    "eRPM": "erpm",
-    "Hz": "hz",
-    "V": "v",
-    "mV": "mv",
-    "cV": "cv",
-    "percent": "% percent",
-}
-_UNITS = {word: unit for unit, words in _SPELLINGS.items() for word in words.split()}
-_OTHER_UNITS = ("", "-", "1", "m/s", "n", "nm")  # of columns that no map uses
+from ...runtime.yaml_file import read_yaml
+
+
+@cache
+def words() -> dict[str, Any]:
+    """Return the words of ``column_words.yaml``."""
+    found: dict[str, Any] = read_yaml(Path(__file__).with_name("column_words.yaml"), "words")
+    return found
+
+
+@cache
+def _units() -> dict[str, str]:
+    """Return the units by their spellings; nothing for one that no map uses."""
+    return {word: unit for unit, spellings in words()["units"].items() for word in spellings}
+
+
+@cache
+def _ending() -> re.Pattern[str]:
+    plain = [word for word, unit in _units().items() if unit and re.fullmatch("[a-z0-9_]+", word)]
+    return re.compile(rf"[_ ]({'|'.join(plain)})$", re.IGNORECASE)
+
+
 _BRACKETS = re.compile(r"\s*[\[(]\s*([^\[\]()\d][^\[\]()]*?)\s*[\])]\s*$")
-_ENDING = re.compile(
-    rf"[_ ]({'|'.join(word for word in _UNITS if re.fullmatch('[a-z0-9_]+', word))})$",
-    re.IGNORECASE,
-)
-
-# endings of the names of rotors at the front left, rear left, rear right and front right
-PLACES = [
-    (front + gap + left, rear + gap + left, rear + gap + right, front + gap + right)
-    for front, rear, gap, left, right in (
-        ("front", "rear", "_", "left", "right"),
-        ("front", "back", "_", "left", "right"),
-        ("front", "rear", "", "left", "right"),
-        ("front", "back", "", "left", "right"),
-        ("f", "r", "", "l", "r"),
-        ("f", "b", "", "l", "r"),
-    )
-]
-_NOT_MEASURED = re.compile(r"(^|_)(set|sp|setpoint|target|des|desired|ref|goal)(_|$)|setpoint")
 
 
 @dataclass(frozen=True)
@@ -79,12 +61,12 @@ def take_apart(header: Sequence[str], units: Sequence[str] = ()) -> list[Name]:
     out = []
     for i, column in enumerate(header):
         text, unit = column.strip(), ""
-        found = _BRACKETS.search(text) or _ENDING.search(text)
+        found = _BRACKETS.search(text) or _ending().search(text)
         if found and found.start() > 0:
-            unit = _UNITS.get(found[1].lower(), "")
+            unit = _units().get(found[1].lower(), "")
             text = text[: found.start()]
         if not unit and i < len(units):
-            unit = _UNITS.get(_bare(units[i]), "")
+            unit = _units().get(_bare(units[i]), "")
         base = re.sub(r"[^0-9a-zA-Z]+", "_", text).strip("_").lower()
         out.append(Name(column, base or column.lower(), unit))
     return out
@@ -92,7 +74,7 @@ def take_apart(header: Sequence[str], units: Sequence[str] = ()) -> list[Name]:
 
 def is_unit(text: str) -> bool:
     """Return whether a field is a unit, as one stands in a line of units."""
-    return _bare(text) in _UNITS or _bare(text) in _OTHER_UNITS
+    return _bare(text) in _units()
 
 
 def _bare(text: str) -> str:
@@ -124,19 +106,16 @@ def groups_of(names: Iterable[Name], endings: Sequence[str], numbered: bool = Fa
             group = Group(tuple(name.column for name in named), key, unit, numbered)
             if group not in out:
                 out.append(group)
-    return [group for group in out if not _NOT_MEASURED.search(group.key)]
+    return [group for group in out if not re.search(words()["not_measured"], group.key)]
 
 
-def best_group(groups: Iterable[Group], words: Sequence[str]) -> tuple[Group | None, int]:
-    """Return the group whose key fits the first of ``words`` (regular expressions of a whole key)
+def best_group(groups: Iterable[Group], keys: Sequence[str]) -> tuple[Group | None, int]:
+    """Return the group whose key fits the first of ``keys`` (regular expressions of a whole key)
     that any fits, and how many fit at all.
     """
     groups = list(groups)
     fitting = [
-        (i, group)
-        for group in groups
-        for i, word in enumerate(words)
-        if re.fullmatch(word, group.key)
+        (i, group) for group in groups for i, key in enumerate(keys) if re.fullmatch(key, group.key)
     ]
     if not fitting:
         return None, 0

@@ -1,5 +1,5 @@
 """How well a flight agrees with each reading of its columns: one physics, one set of filters, one
-set of thresholds.
+rule.
 
 Three balances hold in any flight, whatever small effects a vehicle's model lacks:
 
@@ -11,12 +11,14 @@ Three balances hold in any flight, whatever small effects a vehicle's model lack
 
 Each balance leaves a share of the motion's variance unexplained, and shares make a likelihood: with
 Gaussian residuals of unknown size, ``log L = -n/2 sum(log share)``. Undeclared effects last, so a
-flight counts for few independent samples ``n``. A hover tells nothing: all shares are near 1.
+flight counts for few independent samples ``n``. A hover tells nothing: all shares are near 1. The
+likeliest reading is taken, less what it must make up for being less usual.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,16 +27,9 @@ from scipy.spatial.transform import Rotation
 from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import CUTOFFS, continuous, derivative, low_pass, resampled, unbroken
 from .flight_log import FlightLog
+from .flight_phases import usual_thrust
 from .log_map import LENGTH_UNITS
-from .readings import (
-    AS_DECLARED,
-    DECLARED,
-    Reading,
-    as_written,
-    gyro_readings,
-    pose_readings,
-    rotor_readings,
-)
+from .readings import DECLARED, Reading, as_written, log_readings
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -53,39 +48,24 @@ class EvidenceSettings:
     gap: float = 0.1  # s (or 3.5 periods) without a sample, which end a piece
     shortest: float = 3.0  # s of a piece
     fewest: int = 60  # samples in flight that decide something
-    flying: float = 0.5  # of the median thrust: less is take-off, landing or ground
 
-    # what undeclared effects may make of a gain, of a delay (s) and of the vertical (cosine)
+    # what undeclared effects may make of a gain and of a delay (s)
     force_gain: tuple[float, float] = (0.6, 1.6)
     torque_gain: tuple[float, float] = (0.4, 2.5)  # and of thrust in commands
     most_thrust: float = 1.5  # of its 99th percentile: more is a wrong reading of a sensor
     delays: tuple[float, ...] = tuple(0.02 * k for k in range(-5, 6))
-    upright: float = 0.9
-    not_upright: float = 0.77
 
     samples: float = 20.0  # independent samples of one component that a flight counts for, at most
     least_share: float = 0.01  # a smaller share says no more: no model is better
     most_share: float = 2.0  # a larger share says no more
-    unusual: float = 1.0  # log-likelihood ratio that a reading must make up for being less usual
+    fallen: float = 60.0  # log-likelihood ratio that a flight must make up for lying on its side
     below: float = 3.0  # the same for a flight below its origin
     good: float = 0.5  # share up to which a reading is believed, and from which on it is not
-    good_torque: float = 0.65  # the same of torques without a vehicle, and of shifted rotors
+    good_torque: float = 0.65  # the same of torques without a vehicle
     certain: float = 3.4  # log-likelihood ratio over the next best: 30 to 1
-    refused: float = 8.0  # the same over the reading as declared, which is right far more often
-    shifted: float = 16.0  # the same of one in 200 time offsets
-    decisive: float = 30.0  # the same, where the reading as declared is not bad by itself
-    some: float = 0.2  # share from which undeclared effects may be all that is wrong
-    contradicts: float = 1.15  # share of one torque alone that contradicts, be the two others right
-    upside_down: float = 1.0  # share of the vertical force alone: more than there was
-    worse: float = 0.15  # share by which a reading may be worse in another balance
-    says_nothing: float = 0.8  # a share beyond as declared cannot be made worse: commanded rotors
     # rad/s of roll and pitch in the band of turning: in hovers (0.03 in a simulated one) rotors
     # answer disturbances more than they turn the body, and the mirrored order may explain more
     turning: float = 0.06
-
-    longest_shift: float = 2.0  # s, of rotor speeds against the motion
-    shift_step: float = 0.02  # s
-    longest_delay: float = 0.1  # s, of motors and radio
 
 
 EVIDENCE = EvidenceSettings()
@@ -94,45 +74,35 @@ _G = 9.81
 _SIDES = np.array([[1.0, 1.0, -1.0, -1.0], [-1.0, 1.0, 1.0, -1.0]])
 
 
+def likelihood(shares: Sequence[float]) -> float:
+    """Return the log-likelihood, up to a constant, of shares of one component each."""
+    left = np.clip(shares, EVIDENCE.least_share, EVIDENCE.most_share)
+    return -0.5 * EVIDENCE.samples * float(np.log(left).sum())
+
+
+def share(total: float, power: float, cross: float, gain: tuple[float, float]) -> float:
+    """Return the share of a variance ``total`` that a signal of variance ``power`` and covariance
+    ``cross``, times a gain in range, leaves.
+    """
+    if not (total > 0.0 and power > 0.0):
+        return 1.0
+    factor = min(max(cross / power, gain[0]), gain[1])
+    return float(min(1.0 - factor * (2.0 * cross - factor * power) / total, EVIDENCE.most_share))
+
+
 @dataclass(frozen=True)
 class Fit:
-    """Shares of variance that a reading leaves unexplained, and whether it flies upright."""
+    """Shares of variance that a reading leaves unexplained, and its score."""
 
     horizontal: float  # of the specific force
     vertical: float
     torques: tuple[float, ...]  # about x, y and, with a vehicle, z
-    upright: float  # cosine of the mean thrust's angle from the vertical
+    score: float  # log-likelihood less what the reading must make up for being less usual
 
     @property
     def torque(self) -> float:
         """Mean share of the torques."""
         return float(np.mean(self.torques)) if self.torques else 1.0
-
-    @property
-    def log_likelihood(self) -> float:
-        """Logarithm of the likelihood, up to a constant."""
-        shares = np.array([self.horizontal, self.horizontal, self.vertical, *self.torques])
-        left = np.clip(shares, EVIDENCE.least_share, EVIDENCE.most_share)
-        fallen = 0.0 if self.upright > EVIDENCE.good else 2.0 * EVIDENCE.decisive
-        return -0.5 * EVIDENCE.samples * float(np.log(left).sum()) - fallen
-
-
-def share(needed: Array, given: Array, gain: tuple[float, float]) -> float:
-    """Return the share of the variance of ``needed`` (n, m) that ``given`` (n, m), times a gain in
-    range, leaves.
-    """
-    needed, given = needed - needed.mean(axis=0), given - given.mean(axis=0)
-    total, power = float(np.sum(needed * needed)), float(np.sum(given * given))
-    if not (total > 0.0 and power > 0.0):
-        return 1.0
-    factor = float(np.clip(np.sum(needed * given) / power, *gain))
-    return min(float(np.sum(np.square(needed - factor * given))) / total, EVIDENCE.most_share)
-
-
-def ratio(other: float, best: float, components: int) -> float:
-    """Return the log-likelihood ratio of two shares of the same components."""
-    least = EVIDENCE.least_share
-    return 0.5 * EVIDENCE.samples * components * float(np.log(max(other, least) / max(best, least)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,14 +125,14 @@ class _Piece:
             return np.full((len(self.t), x.shape[1]), np.nan)
         return resampled(self.t, at[there], x[there])
 
+    def slow(self, x: Array) -> Array:
+        """Return columns (m, k), low-passed as a trajectory's motion is."""
+        return low_pass(x, CUTOFFS.convention_hz, self.period)
 
-@dataclass(frozen=True, eq=False)
-class _Turning:
-    """Motion by one way to turn the attitude's columns into rotations."""
-
-    frame: Array  # (n, 3, 3) body to world times specific thrust, m/s2, at the samples compared
-    rates: Sequence[Array]  # per piece (m, 3) rad/s, body
-    inverse: Sequence[Array]  # per piece (m, 3) the same of the inverse rotation
+    def band(self, x: Array) -> Array:
+        """Return columns (m, k) in the bands of roll and pitch and of yaw, (m, 2, k)."""
+        low, high, yaw = (low_pass(x, hz, self.period) for hz in EVIDENCE.turn_hz)
+        return np.stack([high - low, yaw - low], axis=1)
 
 
 class Evidence:
@@ -170,10 +140,10 @@ class Evidence:
 
     Args:
         t: (N,) s.
-        thrusts: (N, 4) of the rotors' columns, in any unit that grows with thrust; None: unknown.
+        thrusts: (N, 4) of the rotors' columns, in any unit that grows with thrust.
         position: (N, 3) in the columns' unit; None: unknown.
         attitude: (N, 4) or (N, 3) as in the columns; None: unknown.
-        gyro: (N, 3) rad/s, in the kit's body axes; turns are told from it where it is there.
+        gyro: (N, 3) rad/s, in the kit's body axes, where no attitude tells turns.
         along: (N,) m/s2, specific force along the body's z axis, where no pose tells it.
         vehicle: as declared; ``thrusts`` are squared rotor speeds then. None: unknown.
     """
@@ -181,35 +151,36 @@ class Evidence:
     def __init__(
         self,
         t: Array,
-        thrusts: Array | None,
+        thrusts: Array,
         position: Array | None = None,
         attitude: Array | None = None,
         gyro: Array | None = None,
         along: Array | None = None,
         vehicle: Vehicle | None = None,
     ) -> None:
-        self._t, self._vehicle = t, vehicle
-        self._position, self._attitude = position, attitude
+        self._t, self._position, self._attitude = t, position, attitude
         self._gyro, self._along = gyro, along
+        self._k, self._inertia, self._mixing = np.ones(4), np.eye(3), _SIDES
+        self._gains = EVIDENCE.torque_gain, (0.0, np.inf)  # of thrust and of torques
+        if vehicle is not None:
+            self._k, self._inertia, self._mixing = vehicle.k, vehicle.inertia, vehicle.mixing[1:]
+            self._gains = EVIDENCE.force_gain, EVIDENCE.torque_gain
         self._thrusts = thrusts
-        if thrusts is not None and np.isfinite(thrusts).any():
+        if np.isfinite(thrusts).any():
             most = EVIDENCE.most_thrust * float(np.nanquantile(thrusts, 0.99))
             self._thrusts = np.minimum(thrusts, most)
-        self._k = np.ones(4) if vehicle is None else vehicle.k
-        self._turnings: dict[object, _Turning] = {}
-        self._needed: dict[object, Array] = {}
-        self._torques: dict[object, tuple[float, ...]] = {}
-        known = [x for x in (position, attitude) if x is not None]
-        moving = known or [x for x in (gyro,) if x is not None]
+        moving = [x for x in (position, attitude, gyro) if x is not None]
         there = np.isfinite(t) & np.all([np.isfinite(x).all(axis=1) for x in moving], axis=0)
         self._pieces = self._cut(np.flatnonzero(there))
+        self._motion, self._delayed = lru_cache(self._moving), lru_cache(16)(self._pushes)
+        self._moved = lru_cache(2)(self._balances)
+        self._covaried = lru_cache(16)(self._covariances)
 
     @classmethod
     def of_log(cls, log: FlightLog, vehicle: Vehicle, by_imu: bool = False) -> "Evidence":
         """Return the evidence of a log: of its pose, or of its IMU."""
         squares = np.square(log.rotor_speeds)
         if by_imu:
-            assert log.gyro is not None
             assert log.accelerometer is not None
             force = log.accelerometer[:, 2]
             return cls(log.t, squares, gyro=log.gyro, along=force, vehicle=vehicle)
@@ -224,27 +195,24 @@ class Evidence:
             return []
         step = float(np.median(np.diff(self._t[rows])))
         period = max(step, EVIDENCE.period)
-        pieces = []
+        pieces, totals = [], []
         for part in unbroken(self._t, rows, max(EVIDENCE.gap, 3.5 * step)):
             begin, end = self._t[part[0]], self._t[part[-1]]
             if end - begin > EVIDENCE.shortest and len(part) > 8:
                 t = np.arange(begin, end, period)
                 edge, every = round(EVIDENCE.edge / period), 1.0 / (EVIDENCE.rate_hz * period)
                 compared = np.arange(edge, len(t) - edge, max(1, round(every)))
-                pieces.append(_Piece(part, t, period, compared))
-        if self._thrusts is None or not pieces:
-            return pieces
-        totals = [
-            low_pass(p.even(self._t, self._thrusts), CUTOFFS.convention_hz, p.period) @ self._k
-            for p in pieces
-        ]
-        total = np.nan_to_num(np.concatenate(totals))
-        turning = total[total > 0.1 * float(np.quantile(total, 0.9))]
-        least = EVIDENCE.flying * float(np.median(turning)) if turning.size else np.inf
+                piece = _Piece(part, t, period, compared)
+                total = piece.slow(piece.even(self._t, self._thrusts)) @ self._k
+                if np.isfinite(total).all():
+                    pieces.append(piece)
+                    totals.append(total)
+        if not pieces:
+            return []
+        least = 0.5 * usual_thrust(np.concatenate(totals))
         return [
             replace(p, compared=p.compared[x[p.compared] > least])
             for p, x in zip(pieces, totals, strict=True)
-            if np.isfinite(x).all()
         ]
 
     @property
@@ -253,19 +221,13 @@ class Evidence:
         return self._attitude is not None
 
     @property
-    def samples(self) -> int:
-        """Number of samples in flight."""
-        return sum(len(p.compared) for p in self._pieces)
-
-    @property
     def enough(self) -> bool:
         """Whether the flight is long enough to decide something."""
-        return self.samples >= EVIDENCE.fewest
+        return sum(len(p.compared) for p in self._pieces) >= EVIDENCE.fewest
 
-    def _at(self, values: Callable[[_Piece], Array]) -> Array:
-        """Return values on the pieces' clocks, low-passed, at the samples compared."""
-        hz = CUTOFFS.convention_hz
-        return np.concatenate([low_pass(values(p), hz, p.period)[p.compared] for p in self._pieces])
+    def _compared(self, values: Callable[[_Piece], Array]) -> Array:
+        """Return values on the pieces' clocks at the samples compared."""
+        return np.concatenate([values(p)[p.compared] for p in self._pieces])
 
     @cached_property
     def _acceleration(self) -> Array:
@@ -275,324 +237,212 @@ class Evidence:
 
         def second(p: _Piece) -> Array:
             smooth = low_pass(p.even(self._t, position), CUTOFFS.pose_hz, p.period)
-            return derivative(smooth, p.period, 2)
+            return p.slow(derivative(smooth, p.period, 2))
 
-        return self._at(second)
+        return self._compared(second)
 
     @cached_property
     def _middle(self) -> Array:
-        """Median position (3,) in the columns' world and unit."""
-        assert self._position is not None
+        """Median position (3,) in the columns' world and unit; zero where it is unknown."""
+        if self._position is None:
+            return np.zeros(3)
         rows = np.concatenate([p.rows for p in self._pieces])
         return np.asarray(np.median(self._position[rows], axis=0))
 
-    def score(self, reading: Reading, fit: Fit) -> float:
-        """Return a fit's log-likelihood less what is unusual: of the reading, of its height."""
-        placed = self._position is not None
-        below = placed and (reading.frames.position @ self._middle)[2] < 0.0
-        unusual = EVIDENCE.unusual * reading.unusual + EVIDENCE.below * below
-        return fit.log_likelihood - float(unusual)
-
     @cached_property
-    def _specific(self) -> list[Array]:
-        """Specific thrust (m,) of each piece in m/s2; the median of all is scaled to gravity."""
-        thrusts = self._thrusts
-        if thrusts is None:
-            return [np.full(len(p.t), _G) for p in self._pieces]
-        totals = [p.even(self._t, thrusts) @ self._k for p in self._pieces]
-        flown = [x[p.compared] for x, p in zip(totals, self._pieces, strict=True)]
-        level = float(np.median(np.concatenate(flown)))
-        return [x * (_G / max(level, 1e-300)) for x in totals]
-
-    def _turning(self, reading: Reading) -> _Turning:
-        """Return the motion by a reading's way to turn columns into rotations."""
-        if reading.attitude not in self._turnings:
-            self._turnings[reading.attitude] = self._turned(reading)
-        return self._turnings[reading.attitude]
-
-    def _turned(self, reading: Reading) -> _Turning:
-        assert self._attitude is not None
-        good, rotation = as_written(self._attitude, reading)
-        quaternion = np.full((len(good), 4), np.nan)
-        quaternion[good] = continuous(rotation.as_quat(scalar_first=True))
-        frames, rates, inverse = [], [], []
-        for p, thrust in zip(self._pieces, self._specific, strict=True):
-            q = low_pass(p.even(self._t, quaternion), CUTOFFS.pose_hz, p.period)
-            q /= np.linalg.norm(q, axis=1, keepdims=True)
-            matrices = Rotation.from_quat(q, scalar_first=True).as_matrix()
-            dq = derivative(q, p.period)
-            w, v, dw, dv = q[:, :1], q[:, 1:], dq[:, :1], dq[:, 1:]
-            rates.append(2.0 * (w * dv - dw * v - np.cross(v, dv)))
-            inverse.append(-np.einsum("nij,nj->ni", matrices, rates[-1]))
-            pushed = thrust[:, None] * matrices.reshape(-1, 9)
-            smooth = low_pass(pushed, CUTOFFS.convention_hz, p.period)
-            frames.append(smooth[p.compared].reshape(-1, 3, 3))
-        return _Turning(np.concatenate(frames), rates, inverse)
-
-    def _push(self, reading: Reading) -> Array:
-        """Return the specific thrust (n, 3) in m/s2 and the kit's world."""
-        frame = self._turning(reading).frame
-        if reading.sense == "world_to_body":
-            frame = frame.transpose(0, 2, 1)
-        push: Array = np.einsum(
-            "ij,njk,k->ni", reading.frames.world, frame, reading.frames.body[:, 2]
-        )
-        return push
-
-    def _force(self, reading: Reading) -> Array:
-        """Return the specific force (n, 3) in m/s2 and the kit's world."""
-        scale = LENGTH_UNITS[reading.length]
-        force: Array = self._acceleration @ reading.frames.position.T * scale + [0.0, 0.0, _G]
-        return force
-
-    def fit(self, reading: Reading, torques: bool = True) -> Fit:
-        """Return how well a reading explains the flight; without an attitude, by torques alone."""
-        if self._attitude is None:
-            return Fit(0.0, 0.0, self.torques(reading), 1.0)
-        push, force = self._push(reading), self._force(reading)
-        mean = push.mean(axis=0)
-        vertical = EVIDENCE.torque_gain if self._vehicle is None else EVIDENCE.force_gain
-        return Fit(
-            share(force[:, :2], push[:, :2], EVIDENCE.force_gain),
-            share(force[:, 2:], push[:, 2:], vertical),
-            self.torques(reading) if torques and self._thrusts is not None else (),
-            float(mean[2] / max(float(np.linalg.norm(mean)), 1e-9)),
-        )
-
-    def _rates(self, reading: Reading) -> Sequence[Array]:
-        """Return the angular velocity of each piece, (m, 3) rad/s, in the kit's body axes."""
-        gyro = self._gyro
-        if gyro is not None:
-            return [p.even(self._t, gyro) for p in self._pieces]
-        turning = self._turning(reading)
-        # a pseudovector: a mirrored body frame turns its sign as well
-        turn = reading.frames.body * np.linalg.det(reading.frames.body)
-        rates = turning.inverse if reading.sense == "world_to_body" else turning.rates
-        return [x @ turn for x in rates]
-
-    def _band(self, x: Array, period: float) -> Array:
-        """Return columns (m, k) in the band of turning; the third (yaw) has a band of its own."""
-        low, high, yaw = EVIDENCE.turn_hz
-        band = low_pass(x, high, period) - low_pass(x, low, period)
-        band[:, 2:] = low_pass(x[:, 2:], yaw, period) - low_pass(x[:, 2:], low, period)
-        return band
-
-    def _needed_torques(self, reading: Reading) -> Array:
-        """Return the torques (n, 3) in Nm that the motion needs, in the band of turning; without a
-        vehicle, the angular accelerations (n, 2) about x and y.
+    def _driving(self) -> list[Array]:
+        """Thrusts of each piece (m, 10): of four rotors in the band of roll and pitch, in that of
+        yaw, and of all together, low-passed and as they are, in m/s2; their median in flight is
+        gravity.
         """
-        key = reading.attitude, reading.sense, id(reading.frames.body), id(reading.gyro)
-        if key in self._needed:
-            return self._needed[key]
-        parts = []
-        for p, rate in zip(self._pieces, self._rates(reading), strict=True):
-            w = rate if reading.gyro is AS_DECLARED else rate @ reading.gyro.turn.T
-            alpha = derivative(w, p.period)
-            if self._vehicle is None:
-                torque = alpha[:, :2]
-            else:
-                J = self._vehicle.inertia
-                torque = alpha @ J.T + np.cross(w, w @ J.T)
-            parts.append(self._band(torque, p.period)[p.compared])
-        self._needed[key] = np.concatenate(parts)
-        return self._needed[key]
-
-    @cached_property
-    def _delayed(self) -> list[tuple[Array, Array]]:
-        return [(self._pushes(delay), self._pushes(delay, kind=1)) for delay in EVIDENCE.delays]
-
-    @cached_property
-    def _filtered(self) -> list[tuple[Array, Array, Array]]:
-        """Thrusts (m, 4) of each piece: in the band of turning, in that of yaw, and low-passed."""
-        thrusts = self._thrusts
-        assert thrusts is not None
-        low, high, yaw = EVIDENCE.turn_hz
+        thrusts = [p.even(self._t, self._thrusts) for p in self._pieces]
+        totals = np.concatenate([(x @ self._k)[p.compared] for x, p in self._each(thrusts)])
+        scale = _G / max(float(np.median(totals)), 1e-300)
         out = []
-        for p in self._pieces:
-            x = p.even(self._t, thrusts)
-            slow, *others = (
-                low_pass(x, hz, p.period) for hz in (low, high, yaw, CUTOFFS.convention_hz)
-            )
-            out.append((others[0] - slow, others[1] - slow, others[2]))
+        for x, p in self._each(thrusts):
+            total = scale * (x @ self._k)
+            out.append(np.column_stack([p.band(x).reshape(-1, 8), p.slow(total), total]))
         return out
 
-    def _pushes(self, delay: float, kind: int = 0) -> Array:
-        """Return the thrusts (n, 4) of one kind of ``_filtered``, at the samples compared less a
-        delay; NaN outside their piece.
+    def _each(self, values: list[Array]) -> Iterator[tuple[Array, _Piece]]:
+        return zip(values, self._pieces, strict=True)
+
+    def _pushes(self, delay: float) -> Array:
+        """Return the first thrusts (n, 9) of ``_driving`` at the samples compared less a delay; NaN
+        outside their piece.
         """
         out = []
-        for p, filtered in zip(self._pieces, self._filtered, strict=True):
+        for x, p in self._each(self._driving):
             at = p.t[p.compared] - delay
-            out.append([np.interp(at, p.t, column, np.nan, np.nan) for column in filtered[kind].T])
-        return np.concatenate([np.column_stack(columns) for columns in out])
+            out.append(np.column_stack([np.interp(at, p.t, c, np.nan, np.nan) for c in x[:, :9].T]))
+        return np.concatenate(out)
 
-    def torques(self, reading: Reading) -> tuple[float, ...]:
-        """Return the shares of the torques that the rotors leave, at the delay that suits them
-        best.
+    def _moving(self, *attitude: Any) -> tuple[Array, Array]:
+        """Return what moves the body by one way to turn columns into rotations: specific thrust
+        times the body's axes (n, 3, 3) in m/s2, in the world; and, in two bands, angular
+        velocity, angular acceleration and products of the angular velocity (n, 2, 15).
         """
-        key = (
-            *(reading.attitude, reading.sense, id(reading.frames.body)),
-            *(reading.rotors, reading.mirrored, id(reading.gyro)),
-        )
-        if key not in self._torques:
-            needed = self._needed_torques(reading)
-            self._torques[key] = min(
-                (self._shares(needed, pushes, reading) for pushes in self._delayed), key=sum
-            )
-        return self._torques[key]
+        quaternion = None
+        if self._attitude is not None:
+            good, rotation = as_written(self._attitude, Reading(*attitude))
+            quaternion = np.full((len(good), 4), np.nan)
+            quaternion[good] = continuous(rotation.as_quat(scalar_first=True))
+        axes, turning = [], []
+        for thrusts, p in self._each(self._driving):
+            if quaternion is None:
+                assert self._gyro is not None
+                w = p.even(self._t, self._gyro)
+                matrices = np.zeros((len(w), 9))
+            else:
+                q = low_pass(p.even(self._t, quaternion), CUTOFFS.pose_hz, p.period)
+                q /= np.linalg.norm(q, axis=1, keepdims=True)
+                dq = derivative(q, p.period)
+                w = 2.0 * (q[:, :1] * dq[:, 1:] - dq[:, :1] * q[:, 1:])
+                w -= 2.0 * np.cross(q[:, 1:], dq[:, 1:])
+                matrices = Rotation.from_quat(q, scalar_first=True).as_matrix().reshape(-1, 9)
+            axes.append(p.slow(thrusts[:, 9:] * matrices)[p.compared])
+            products = np.einsum("ni,nj->nij", w, w).reshape(-1, 9)
+            columns = np.column_stack([w, derivative(w, p.period), products])
+            turning.append(p.band(columns)[p.compared])
+        return np.concatenate(axes).reshape(-1, 3, 3), np.concatenate(turning)
 
-    def _shares(
-        self, needed: Array, pushes: tuple[Array, Array], reading: Reading
-    ) -> tuple[float, ...]:
-        there = np.isfinite(pushes[0][:, 0])
-        columns = np.argsort(reading.rotors)
-        mixing = _SIDES if self._vehicle is None else self._vehicle.mixing[1:]
-        gain = (0.0, np.inf) if self._vehicle is None else EVIDENCE.torque_gain
-        out = []
-        for i, row in enumerate(mixing):
-            given = pushes[i == 2][there][:, columns] @ row
-            sign = -1.0 if i == 2 and reading.mirrored else 1.0
-            out.append(share(needed[there, i : i + 1], sign * given[:, None], gain))
-        return tuple(out)
+    def _torques(self, reading: Reading) -> Array:
+        """Return the torques (n, 3) in Nm that the motion needs, in the band of turning; without a
+        vehicle, the angular acceleration.
+        """
+        columns = self._motion(*reading.attitude)[1]
+        # a pseudovector: a mirrored body frame turns its sign as well
+        body = reading.frames.body
+        turn, inertia = reading.gyro.turn @ body.T * np.linalg.det(body), self._inertia
+        products = inertia @ turn @ columns[..., 6:].reshape(-1, 2, 3, 3) @ turn.T
+        torque: Array = columns[..., 3:6] @ (inertia @ turn).T
+        for i, (j, k) in enumerate(((2, 1), (0, 2), (1, 0))):
+            torque[..., i] += products[..., j, k] - products[..., k, j]
+        return np.column_stack([torque[:, 0, :2], torque[:, 1, 2]])
+
+    def _balances(self, *moves: Any) -> tuple[float, float, Array]:
+        """Return what a reading's motion says whatever the rotors: the share of the horizontal
+        force that is left, the log-likelihood ratio that a flight must make up for its place, and
+        the force along the thrust axis in m/s2 beside the torques in Nm (n, 4).
+        """
+        reading = Reading(*moves)
+        if self._attitude is None:
+            return 0.0, 0.0, np.column_stack([self._felt, self._torques(reading)])
+        frames, axes = reading.frames, self._motion(*reading.attitude)[0]
+        push = np.einsum("ij,njk,k->ni", frames.world, axes, frames.body[:, 2])
+        force = self._acceleration @ frames.position.T * LENGTH_UNITS[reading.length]
+        force += np.array([0.0, 0.0, _G])
+        needed, given = (np.ravel(x[:, :2] - x[:, :2].mean(axis=0)) for x in (force, push))
+        variances = float(needed @ needed), float(given @ given), float(needed @ given)
+        mean, size = push.mean(axis=0), np.linalg.norm(push, axis=1)
+        along = np.sum(force * push, axis=1) / np.maximum(size, 1e-9)
+        cost = EVIDENCE.fallen * (mean[2] <= EVIDENCE.good * np.linalg.norm(mean))
+        cost += EVIDENCE.below * ((frames.position @ self._middle)[2] < 0.0)
+        motion = np.column_stack([along, self._torques(reading)])
+        return share(*variances, EVIDENCE.force_gain), float(cost), motion
+
+    def _covariances(self, delay: float, *moves: Any) -> Array:
+        """Return the covariances (13, 13) of the thrusts at a delay (s) and the motion; of thrusts
+        that fit nothing where too little of the flight is left.
+        """
+        columns = np.column_stack([self._delayed(delay), self._moved(*moves)[2]])
+        there = np.isfinite(columns[:, 0])
+        if there.sum() < EVIDENCE.fewest:
+            return np.eye(13)
+        return np.asarray(np.cov(columns[there].T))
+
+    def fit(self, reading: Reading, torques: bool = True) -> Fit:
+        """Return how well a reading explains the flight; without torques, by forces alone."""
+        mixing = self._mixing if torques else self._mixing[:0]
+        mixing = mixing[:, [rotor - 1 for rotor in reading.rotors]]
+        rows = np.zeros((1 + len(mixing), 9))  # what drives: all together along, and each torque
+        rows[0, 8], rows[1:3, :4], rows[3:, 4:8] = 1.0, mixing[:2], mixing[2:]
+        if reading.mirrored:
+            rows[3:] *= -1.0
+        gains = [self._gains[0], *[self._gains[1]] * len(mixing)]
+
+        def left(delay: float) -> list[float]:
+            c = self._covaried(delay, *reading.moves)
+            powers = np.sum(rows @ c[:9, :9] * rows, axis=1)
+            crosses = np.sum(rows * c[9 : 9 + len(rows), :9], axis=1)
+            variances = zip(np.diag(c)[9:], powers, crosses, gains, strict=False)
+            return [share(*each) for each in variances]
+
+        delays = (-reading.late,) if reading.late or not torques else EVIDENCE.delays
+        vertical, *others = max((left(delay) for delay in delays), key=likelihood)
+        horizontal, cost, _ = self._moved(*reading.moves)
+        score = likelihood([horizontal, horizontal, vertical, *others]) - cost - reading.unlikely
+        return Fit(horizontal, vertical, tuple(others), score)
+
+    @cached_property
+    def _felt(self) -> Array:
+        """Specific force (n,) in m/s2 along the body's z axis, as an accelerometer reads it."""
+        force = np.zeros(len(self._t)) if self._along is None else self._along
+        return self._compared(lambda p: p.slow(p.even(self._t, force[:, None])))[:, 0]
 
     def turns(self, reading: Reading) -> float:
         """Return the root mean square of roll and pitch rates in the band of turning, rad/s."""
-        parts = [
-            self._band(rate[:, :2], p.period)[p.compared]
-            for p, rate in zip(self._pieces, self._rates(reading), strict=True)
-        ]
-        return float(np.sqrt(np.mean(np.square(np.concatenate(parts)))))
-
-    @cached_property
-    def shift(self) -> tuple[float, Fit] | None:
-        """Time offset of the rotor speeds against the motion (s, positive: they come late), where
-        it is clearly over 0.1 s, and how well they fit with it; None elsewhere.
-
-        Motor lag, latency and radio make rotor speeds early by less.
-        """
-        if not self.enough:
-            return None
-        if self._along is None:
-            axis = self._push(DECLARED)
-            axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
-            along = np.sum(axis * self._force(DECLARED), axis=1)[:, None]
-        else:
-            force = self._along[:, None]
-            along = self._at(lambda p: p.even(self._t, force))
-        count = round(EVIDENCE.longest_shift / EVIDENCE.shift_step)
-        shifts = EVIDENCE.shift_step * np.arange(-count, count + 1)
-        needed = self._needed_torques(DECLARED)
-        fits = [self._shifted(-shift, needed, along) for shift in shifts]
-        scores = np.array([fit.log_likelihood for fit in fits])
-        near = np.flatnonzero(np.abs(shifts) <= EVIDENCE.longest_delay + 1e-9)
-        best, declared = int(np.argmax(scores)), int(near[np.argmax(scores[near])])
-        clear = scores[best] - scores[declared] >= EVIDENCE.shifted
-        far = abs(shifts[best]) > EVIDENCE.longest_delay + EVIDENCE.shift_step + 1e-9
-        believed = fits[best].torque <= EVIDENCE.good_torque
-        return (float(shifts[best]), fits[best]) if clear and believed and far else None
-
-    def _shifted(self, delay: float, needed: Array, along: Array) -> Fit:
-        """Return how well rotors fit at a delay: the torques, and the thrust along its axis."""
-        pushes = self._pushes(delay), self._pushes(delay, kind=1)
-        there = np.isfinite(pushes[0][:, 0])
-        if there.sum() < EVIDENCE.fewest:
-            return Fit(1.0, EVIDENCE.most_share, (EVIDENCE.most_share,) * 3, 1.0)
-        total = self._pushes(delay, kind=2)[there] @ self._k[:, None]
-        total *= _G / float(np.median(total))
-        thrust = share(along[there], total, EVIDENCE.force_gain)
-        return Fit(1.0, thrust, self._shares(needed, pushes, DECLARED), 1.0)
+        rates = self._motion(*reading.attitude)[1][:, 0, :2]
+        return float(np.sqrt(np.mean(np.square(rates))))
 
 
 @dataclass(frozen=True, eq=False)
 class Ranking:
-    """Readings of a pose, the likeliest first, each with its fit and its log-likelihood."""
+    """Readings, the likeliest first, each with its fit."""
 
-    ranked: Sequence[tuple[float, Reading, Fit]]
+    ranked: Sequence[tuple[Reading, Fit]]
 
     @classmethod
-    def of(
-        cls, evidence: Evidence, readings: Sequence[Reading], torques: bool = False
-    ) -> "Ranking":
+    def of(cls, evidence: Evidence, readings: Sequence[Reading], torques: bool = True) -> "Ranking":
         """Return the ranking of readings; where a flight does not tell, the usual come first."""
-        if not evidence.enough:
-            nothing = Fit(1.0, 1.0, (), 1.0)
-            return cls([(0.0, r, nothing) for r in sorted(readings, key=lambda r: r.unusual)])
-        fits = [(r, evidence.fit(r, torques)) for r in readings]
-        ranked = [(evidence.score(reading, fit), reading, fit) for reading, fit in fits]
-        ranked.sort(key=lambda item: -item[0])
-        if ranked[0][2].horizontal > EVIDENCE.good:
-            ranked.sort(key=lambda item: item[1].unusual)
-        return cls(ranked)
+        nothing = Fit(1.0, 1.0, (), 0.0)
+        fits = [
+            evidence.fit(r, torques) if evidence.enough else replace(nothing, score=-r.unlikely)
+            for r in readings
+        ]
+        return cls(
+            sorted(zip(readings, fits, strict=True), key=lambda item: item[1].score, reverse=True)
+        )
 
     @property
     def best(self) -> Reading:
         """The reading that is taken."""
-        return self.ranked[0][1]
+        return self.ranked[0][0]
 
     @property
     def fit(self) -> Fit:
         """How well the best reading explains the flight."""
-        return self.ranked[0][2]
+        return self.ranked[0][1]
+
+    @property
+    def alike(self) -> list[Reading]:
+        """The best reading, and those that explain the flight hardly less."""
+        least = self.fit.score - EVIDENCE.certain
+        return [reading for reading, fit in self.ranked if fit.score >= least]
 
     def other(self, name: str) -> tuple[object, float]:
         """Return the next best value of a property, and the log-likelihood ratio of the best over
         that value (0 where the flight tells nothing, infinite where there is no other value).
         """
-        score, best, fit = self.ranked[0]
-        for other_score, reading, _ in self.ranked[1:]:
-            if getattr(reading, name) != getattr(best, name):
-                tells = fit.horizontal <= EVIDENCE.good
-                return getattr(reading, name), score - other_score if tells else 0.0
-        return None, np.inf if fit.horizontal <= EVIDENCE.good else 0.0
+        tells = self.fit.horizontal <= EVIDENCE.good
+        for reading, fit in self.ranked:
+            if getattr(reading, name) != getattr(self.best, name):
+                return getattr(reading, name), self.fit.score - fit.score if tells else 0.0
+        return None, np.inf if tells else 0.0
 
     def certain(self, *names: str) -> bool:
         """Return whether every other value of properties explains the flight clearly less."""
         return all(self.other(name)[1] >= EVIDENCE.certain for name in names)
 
 
-def recognise(evidence: Evidence) -> tuple[Reading, ...]:
+def departures(evidence: Evidence) -> list[Reading]:
     """Return the readings that explain a log where the log as declared does not: none, one, or
     several that fit alike.
     """
-    if not evidence.enough:
-        return ()
-    declared = evidence.fit(DECLARED)
-    readings = pose_readings() if evidence.has_pose else gyro_readings()
-    if contradicted(declared.torques):
-        readings += rotor_readings()
-    fits = [(reading, evidence.fit(reading)) for reading in readings]
-    winners = [(evidence.score(r, fit), r, fit) for r, fit in fits if _wins(fit, declared)]
-    if any(r.turns_rotors for _, r, _ in winners) and evidence.shift is not None:
-        # a shift by half a period of the motion looks like exchanged rotors
-        best = replace(declared, torques=evidence.shift[1].torques).log_likelihood
-        winners = [w for w in winners if not w[1].turns_rotors or w[2].log_likelihood > best]
-    least = max((score for score, _, _ in winners), default=0.0) - EVIDENCE.certain
-    return tuple(reading for score, reading, _ in winners if score >= least)
-
-
-def contradicted(torques: Sequence[float]) -> bool:
-    """Return whether shares of torques say that rotors do not turn the body as declared."""
-    return float(np.mean(torques)) >= EVIDENCE.good or max(torques) >= EVIDENCE.contradicts
-
-
-def _wins(fit: Fit, declared: Fit) -> bool:
-    """Return whether a reading wins clearly in one balance and loses in none."""
-    ratio = fit.log_likelihood - declared.log_likelihood
-    if fit.upright < EVIDENCE.upright or ratio < EVIDENCE.refused:
-        return False
-    good, bad = EVIDENCE.good, EVIDENCE.good
-    if declared.upright < EVIDENCE.not_upright and fit.horizontal <= good:
-        return True
-    by_force = declared.horizontal >= bad and fit.horizontal <= good
-    by_height = declared.vertical >= EVIDENCE.upside_down and fit.vertical <= good
-    by_torque = contradicted(declared.torques) and fit.torque <= good
-    decisive = ratio >= EVIDENCE.decisive and declared.horizontal >= EVIDENCE.some
-    loses = any(
-        new > old + EVIDENCE.worse and old <= EVIDENCE.says_nothing
-        for new, old in (
-            (fit.horizontal, declared.horizontal),
-            (fit.vertical, declared.vertical),
-            (fit.torque, declared.torque),
-        )
-    )
-    return (by_force or by_height or by_torque or decisive) and not loses
+    ranking = Ranking.of(evidence, log_readings(evidence.has_pose))
+    best, left, most = ranking.best, ranking.fit.torque, EVIDENCE.good_torque
+    if evidence.has_pose and best.moves != DECLARED.moves:  # forces tell, not torques
+        left, most = ranking.fit.horizontal, EVIDENCE.good
+    if best is DECLARED or left > most:
+        return []
+    return [reading for reading in ranking.alike if reading is not DECLARED]

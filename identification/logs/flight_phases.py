@@ -27,6 +27,14 @@ def flying(total: Array) -> NDArray[np.bool_]:
     return np.asarray(total > 0.5 * np.quantile(total, 0.9))
 
 
+def usual_thrust(total: Array) -> float:
+    """Return the median thrust of rotors that turn, by their thrust (N,) in any unit; infinite
+    where none does.
+    """
+    turning = total[total > 0.3 * np.quantile(total, 0.95)]
+    return float(np.median(turning)) if turning.size else np.inf
+
+
 class Phase(NamedTuple):
     """One stretch of a flight, from ``start`` to ``end`` in s."""
 

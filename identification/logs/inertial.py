@@ -11,6 +11,7 @@ are enough for everything. Without a pose, gravity alone is left to show the acc
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +19,9 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation, Slerp
 
 from ..motion.smoothing import resampled
-from .evidence import EVIDENCE, ratio
+from .evidence import EVIDENCE, likelihood
 from .flight_log import ACCELEROMETER, GYRO, FlightLog
-from .readings import ACCELEROMETER_READINGS, AS_DECLARED, GYRO_READINGS, SensorReading
+from .readings import ACCELEROMETER_READINGS, AS_DECLARED, GYRO_READINGS, OTHER, SensorReading
 
 Array = NDArray[np.float64]
 
@@ -55,21 +56,20 @@ def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, tu
         if values is None:
             continue
         t, measured = (x[np.isfinite(values[:, 0])] for x in (log.t, values))
-        if field == "gyro":
-            turns = [reading.turn for reading in (AS_DECLARED, *GYRO_READINGS)]
-            shares, readings = gyro_shares(t, measured, *pose, turns), GYRO_READINGS
-            otherwise = "contradict the attitude's rate"
-        else:
-            shares = _force_shares(t, measured, *pose, log.position[seen], gravity)
-            readings = ACCELEROMETER_READINGS
-            otherwise = "contradict the position's acceleration and gravity"
-        doubt = sensor_doubt(shares, readings, otherwise)
         if is_stuck(measured):
             doubt = f"never change: the {field} was not read"
+        elif field == "gyro":
+            turns = [reading.turn for reading in (AS_DECLARED, *GYRO_READINGS)]
+            shares = gyro_shares(t, measured, *pose, turns)
+            doubt = sensor_doubt(shares, GYRO_READINGS, "contradict the attitude's rate")
+        else:
+            shares = _force_shares(t, measured, *pose, log.position[seen], gravity)
+            otherwise = "contradict the position's acceleration and gravity"
+            doubt = sensor_doubt(shares, ACCELEROMETER_READINGS, otherwise)
         if doubt:
             notes.append(f"{', '.join(names)} {doubt}. They were left out")
-            is_gyro = field == "gyro"
-            log = replace(log, gyro=None) if is_gyro else replace(log, accelerometer=None)
+            left_out: dict[str, Any] = {field: None}
+            log = replace(log, **left_out)
     return log, tuple(notes)
 
 
@@ -91,14 +91,11 @@ def sensor_doubt(
     """
     if shares is None or shares[0] <= EVIDENCE.good:
         return ""
-    best = min(shares[1:])
-    if best > EVIDENCE.good or ratio(shares[0], best, 3) < EVIDENCE.refused:
+    declared, *others = (likelihood([share] * 3) for share in shares)
+    best = max(others)
+    if min(shares[1:]) > EVIDENCE.good or best - declared < OTHER:
         return otherwise
-    alike = [
-        reading.says
-        for share, reading in zip(shares[1:], readings, strict=True)
-        if ratio(share, best, 3) < EVIDENCE.unusual
-    ]
+    alike = [r.says for score, r in zip(others, readings, strict=True) if score > best - 1.0]
     return "; or ".join(alike[:3])
 
 

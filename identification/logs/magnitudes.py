@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from .flight_log import ACCELEROMETER, GYRO, POSE, ROTORS, TRUTH, FlightLog
-from .log_map import ROTOR_UNITS, TIME_UNITS
+from .flight_phases import usual_thrust
+from .log_map import ROTOR_UNITS, TIME_UNITS, VOLTAGE_UNITS
 
 Array = NDArray[np.float64]
 
@@ -28,6 +29,8 @@ class Magnitudes:
         largest: of all other numbers, in SI units; logs in millimetres or rpm stay far below.
         rates: Hz of rows, in which a unit of time is likely.
         sure_rates: the same, in which the unit is certain.
+        voltages: V of a battery, in which a unit of voltage is likely.
+        sure_voltages: the same, in which the unit is certain.
         widest: m, over which the positions of one flight spread.
         carries: thrust by weight of rotors in their right unit; mass and thrust curve may be off.
         flies: median thrust by weight beyond which a log is not of this vehicle.
@@ -40,6 +43,8 @@ class Magnitudes:
     largest: float = 1e9
     rates: tuple[float, float] = (5.0, 5000.0)
     sure_rates: tuple[float, float] = (15.0, 2500.0)
+    voltages: tuple[float, float] = (2.7, 100.0)
+    sure_voltages: tuple[float, float] = (2.7, 60.0)
     widest: float = 300.0
     carries: tuple[float, float] = (0.55, 1.8)
     flies: tuple[float, float] = (0.2, 5.0)
@@ -66,8 +71,23 @@ def time_unit(step: float) -> tuple[str, bool]:
     that is certain.
     """
     rates = {unit: 1.0 / max(step * TIME_UNITS[unit], 1e-300) for unit in _TIMES}
-    unit = next((unit for unit in _TIMES if within(rates[unit], MAGNITUDES.rates)), "s")
-    return unit, within(rates[unit], MAGNITUDES.sure_rates)
+    return _likely_unit(rates, MAGNITUDES.rates, MAGNITUDES.sure_rates)
+
+
+def voltage_unit(median: float) -> tuple[str, bool]:
+    """Return the unit in which a median voltage is a battery's, and whether that is certain."""
+    volts = {unit: median * size for unit, size in VOLTAGE_UNITS.items()}
+    return _likely_unit(volts, MAGNITUDES.voltages, MAGNITUDES.sure_voltages)
+
+
+def _likely_unit(
+    sizes: dict[str, float], likely: tuple[float, float], sure: tuple[float, float]
+) -> tuple[str, bool]:
+    """Return the first unit in which a size is likely, or the first of all, and whether the size is
+    sure to be in it.
+    """
+    unit = next((unit for unit in sizes if within(sizes[unit], likely)), next(iter(sizes)))
+    return unit, within(sizes[unit], sure)
 
 
 def time_doubt(step: float) -> str:
@@ -89,8 +109,7 @@ def thrust_by_weight(rotor_speeds: Array, vehicle: Vehicle) -> float:
         return 1.0
     with np.errstate(over="ignore"):
         thrust = np.square(rotor_speeds) @ vehicle.k / vehicle.weight
-    turning = thrust[thrust > 0.3 * float(np.quantile(thrust, 0.95))]
-    return float(np.median(turning)) if turning.size else 1.0
+    return usual if np.isfinite(usual := usual_thrust(thrust)) else 1.0
 
 
 def carrying_units(thrust: float) -> list[str]:

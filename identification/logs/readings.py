@@ -1,18 +1,19 @@
 """What the columns of a flight may mean, enumerated: each reading writes its own sentence.
 
-A reading assigns frames, the order and sense of the attitude, a unit of length and rotors to
-columns. ``evidence`` says how well a flight agrees with each.
+A reading assigns frames, the order and sense of the attitude, a unit of length, rotors and a clock
+to columns. ``evidence`` says how well a flight agrees with each.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import permutations, product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from .log_map import ANGLE_UNITS
+from .log_map import ANGLE_UNITS, LENGTH_UNITS, SENSES
 from .rotor_orders import ORDERS, Order
 
 Array = NDArray[np.float64]
@@ -21,6 +22,8 @@ _I = np.eye(3)
 _DOWN = np.diag([1.0, -1.0, -1.0])  # forward, left, up <-> forward, right, down; the worlds alike
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # from a world with y up
 _SWAP_YZ = _I[[0, 2, 1]]
+_PLACE, _QUATERNION = ("px", "py", "pz"), ("qw", "qx", "qy", "qz")
+BODY_AXES = {"flu": _I, "frd": _DOWN}  # by which the readings of a sensor are multiplied
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,70 +32,62 @@ class Frames:
 
     Attributes:
         fact: words for the axes; empty for the kit's own.
-        advice: words for the columns that were expected.
         position: (3, 3) from the columns' world to the kit's (z up), of positions.
         world: (3, 3) the same, of the attitude.
         body: (3, 3) from the kit's body axes (forward, left, up) to those of the attitude.
         names: of world and body in a map; empty where a map has no names for the axes.
+        unusual: whether its axes do not belong together in any usual convention.
     """
 
     fact: str = ""
-    advice: str = ""
     position: Array = field(default_factory=lambda: _I)
     world: Array = field(default_factory=lambda: _I)
     body: Array = field(default_factory=lambda: _I)
     names: tuple[str, str] = ("", "")
+    unusual: bool = False
 
 
-_ROTATE = "expected z up: p = (px, -pz, py)"
 PLAIN = Frames(names=("enu", "flu"))
 NED = Frames(
     "the world is z down (north, east, down) and the body z down (forward, right, down)",
-    "expected z up: turn py, pz, qy and qz over (their signs) if the body axes are forward, right, "
-    "down",
     *(_DOWN, _DOWN, _DOWN),
     ("ned", "frd"),
 )
-Z_DOWN = Frames(
-    "the world is z down while the body axes are forward, left, up",
-    "expected z up: negate py and pz, and take (-qx, qw, -qz, qy) as the quaternion "
-    "(qw, qx, qy, qz)",
-    *(_DOWN, _DOWN, _I),
-    ("ned", "flu"),
+MAP_FRAMES = (  # that a map has names for
+    PLAIN,
+    NED,
+    Frames(
+        "the body axes are forward, right, down in a world that is z up",
+        *(_I, _I, _DOWN),
+        ("enu", "frd"),
+        unusual=True,
+    ),
+    Frames(
+        "the world is z down while the body axes are forward, left, up",
+        *(_DOWN, _DOWN, _I),
+        ("ned", "flu"),
+        unusual=True,
+    ),
 )
-FRD_BODY = Frames(
-    "the body axes are forward, right, down in a world that is z up",
-    "expected forward, left, up: take (-qx, qw, qz, -qy) as the quaternion (qw, qx, qy, qz)",
-    *(_I, _I, _DOWN),
-    ("enu", "frd"),
+_USUAL_FRAMES = (
+    *MAP_FRAMES,
+    Frames(
+        "the attitude is z down (north, east, down; forward, right, down) but the position z up",
+        *(_I, _DOWN, _DOWN),
+    ),
+    Frames(
+        "the world is y up, as motion capture often is, with body axes forward, left, up",
+        *(_Y_UP, _Y_UP, _I),
+    ),
+    Frames("the world and the body are y up, as motion capture often is", *(_Y_UP, _Y_UP, _Y_UP.T)),
 )
-MAP_FRAMES = (PLAIN, NED, FRD_BODY, Z_DOWN)  # that a map has names for
-_Y_UP_WORLD = Frames(
-    "the world is y up, as motion capture often is, with body axes forward, left, up",
-    f"{_ROTATE}, and the attitude turned by 90 degrees about x likewise",
-    *(_Y_UP, _Y_UP, _I),
-)
-_Y_UP_BODY = Frames(
-    "the world and the body are y up, as motion capture often is",
-    f"{_ROTATE} and the quaternion (qw, qx, -qz, qy)",
-    *(_Y_UP, _Y_UP, _Y_UP.T),
-)
-_NED_ATTITUDE = Frames(
-    "the attitude is z down (north, east, down; forward, right, down) but the position z up",
-    "expected z up: negate qy and qz",
-    *(_I, _DOWN, _DOWN),
-)
-_YZ_SWAPPED = Frames(
-    "y and z are swapped, in position and quaternion",
-    "expected z up: swap py and pz, and qy and qz",
-    *(_SWAP_YZ, _SWAP_YZ, _SWAP_YZ),
-)
+_YZ_SWAPPED = Frames("y and z are swapped, in position and quaternion", *(_SWAP_YZ,) * 3)
 _POSITION_FACTS = {  # by the columns that are x, y, z of the attitude's world
     "px, -py, -pz": "the position is z down (north, east, down) but the attitude z up",
     "px, -pz, py": "the position is y up but the attitude z up",
-    "px, py, -pz": "the position's z points down: negate pz",
-    "-px, py, pz": "px points the other way than the attitude's world: negate px",
-    "px, -py, pz": "py points the other way than the attitude's world: negate py",
+    "px, py, -pz": "the position's z points down",
+    "-px, py, pz": "px points the other way than the attitude's world",
+    "px, -py, pz": "py points the other way than the attitude's world",
     "px, pz, py": "py and pz are swapped, the attitude is not",
     "py, px, pz": "px and py are swapped against the attitude",
     "pz, py, px": "px and pz are swapped, the attitude is not",
@@ -106,18 +101,11 @@ def _positions() -> Iterator[Frames]:
     """Yield the 47 other ways in which px, py, pz may lie along axes of the attitude's world."""
     for columns, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
         turn = np.diag(signs) @ _I[list(columns)]
-        if np.array_equal(turn, _I):
-            continue
-        axes = ", ".join(
-            f"{'-' if sign < 0 else ''}p{'xyz'[column]}"
-            for sign, column in zip(signs, columns, strict=True)
-        )
+        fact = _POSITION_FACTS.get(_combined(turn, _PLACE)[1:-1], "")
         other = "px, py, pz lie along other axes than the attitude's world"
-        fact = _POSITION_FACTS.get(axes, other)
-        yield Frames(fact, f"expected both in one world frame, z up: p = ({axes})", position=turn)
+        if not np.array_equal(turn, _I):
+            yield Frames(fact or other, turn, unusual=not fact)
 
-
-POSITION_FRAMES = tuple(_positions())
 
 # rotors (1 front-left, 2 rear-left, 3 rear-right, 4 front-right) in the order in which others count
 # them
@@ -147,19 +135,15 @@ class SensorReading:
 
 
 AS_DECLARED = SensorReading()
-BODY_AXES = {"flu": _I, "frd": _DOWN}  # by which the readings of a sensor are multiplied
 _FRD = "those of body axes forward, right, down; expected forward, left, up: negate y and z"
 
 
 def _sensor_readings(units: dict[str, float], inverted: str = "") -> tuple[SensorReading, ...]:
     """Return the readings of a sensor in units of other sizes and in other axes."""
-    found = [SensorReading(f"look like {name}", size * _I) for name, size in units.items()]
-    found.append(SensorReading(f"look like {_FRD}", _DOWN))
-    found += [
-        SensorReading(f"look like {name}, and like {_FRD}", size * _DOWN)
-        for name, size in units.items()
-    ]
-    return (*found, SensorReading(f"look inverted{inverted}: negate all three", -_I))
+    scaled = {f"look like {name}": size * _I for name, size in units.items()}
+    turned = {f"{says}, and like {_FRD}": turn @ _DOWN for says, turn in scaled.items()}
+    other = {f"look like {_FRD}": _DOWN, f"look inverted{inverted}: negate all three": -_I}
+    return tuple(SensorReading(says, turn) for says, turn in (scaled | turned | other).items())
 
 
 GYRO_READINGS = _sensor_readings(
@@ -193,10 +177,11 @@ class Reading:
         sense: of the attitude.
         frames: axes of worlds and body.
         length: unit of the position.
+        gyro: reading of the gyro's columns.
         rotors: the kit's rotor, from 1, in each column.
         mirrored: rotors turn against the declared spin.
-        gyro: reading of the gyro's columns.
-        unusual: how many of these are less usual than their alternatives.
+        late: s, by which the rotors' columns come late against the motion.
+        unlikely: log-likelihood ratio that the reading must make up for being less usual.
     """
 
     order: str = "wxyz"
@@ -206,15 +191,21 @@ class Reading:
     sense: str = "body_to_world"
     frames: Frames = PLAIN
     length: str = "m"
+    gyro: SensorReading = AS_DECLARED
     rotors: Order = ROTORS
     mirrored: bool = False
-    gyro: SensorReading = AS_DECLARED
-    unusual: int = 0
+    late: float = 0.0
+    unlikely: float = 0.0
 
     @property
-    def attitude(self) -> tuple[str, str, str, int]:
-        """What turns columns into rotations."""
-        return self.order, self.euler, self.unit, self.pitch_sign
+    def attitude(self) -> tuple[Any, ...]:
+        """What turns columns into rotations: the first five fields."""
+        return self.order, self.euler, self.unit, self.pitch_sign, self.sense
+
+    @property
+    def moves(self) -> tuple[Any, ...]:
+        """What turns columns into motion: the first eight fields."""
+        return *self.attitude, self.frames, self.length, self.gyro
 
     @property
     def world(self) -> str:
@@ -227,11 +218,6 @@ class Reading:
         return self.frames.names[1]
 
     @property
-    def turns_rotors(self) -> bool:
-        """Whether the rotors are others than the declared ones."""
-        return self.rotors != ROTORS or self.mirrored
-
-    @property
     def motors(self) -> Order:
         """Motor, from 1, of each of the kit's rotors."""
         a, b, c, d = (self.rotors.index(rotor) + 1 for rotor in ROTORS)
@@ -242,28 +228,39 @@ class Reading:
         """What the columns look like, what was expected, and what to do."""
         if self.gyro.says:
             return f"gx, gy, gz {self.gyro.says}"
-        if self.length != "m":
-            name, divisor = {"mm": ("milli", 1000), "cm": ("centi", 100)}[self.length]
-            return f"px, py, pz look like {name}metres; expected metres: divide them by {divisor}"
-        if self.turns_rotors:
-            return "; ".join(self._rotor_words())
-        facts, advice = [], []
-        if self.order == "xyzw":
-            facts.append("the quaternion is scalar last")
-            advice.append(
-                "expected scalar first: qx, qy, qz, qw stand in the columns qw, qx, qy, qz; "
-                "reorder the columns"
+        if self.late:
+            late, sooner = ("late", "earlier") if self.late > 0.0 else ("early", "later")
+            return (
+                f"the rotor speeds come {abs(self.late):.2f} s too {late} against the motion; "
+                f"expected both on one clock: put omega1..omega4 {abs(self.late):.2f} s {sooner}"
             )
-        if self.order == "zwxy":
-            facts.append("the quaternion is scalar first under the headers of scalar last")
-            advice.append("qw, qx, qy, qz stand in the columns qx, qy, qz, qw; rename the columns")
-        if self.sense == "world_to_body":
-            facts.append("world to body" if facts else "the quaternion is world to body")
-            advice.append("expected body to world: negate qx, qy and qz")
-        if self.frames.fact:
-            facts.append(self.frames.fact)
-            advice.append(self.frames.advice)
-        return f"{' and '.join(facts)}; {', then '.join(advice)}"
+        if self.length != "m":
+            name = {"mm": "milli", "cm": "centi"}[self.length]
+            return (
+                f"px, py, pz look like {name}metres; expected metres: divide them by "
+                f"{1.0 / LENGTH_UNITS[self.length]:.0f}"
+            )
+        return "; ".join([*self._pose_words(), *self._rotor_words()])
+
+    def _pose_words(self) -> list[str]:
+        orders = {
+            "xyzw": "the quaternion is scalar last",
+            "zwxy": "the quaternion is scalar first under the headers of scalar last",
+        }
+        sense = "world to body" if self.order in orders else "the quaternion is world to body"
+        facts = [orders.get(self.order, ""), sense if self.sense != SENSES[0] else ""]
+        facts = [fact for fact in (*facts, self.frames.fact) if fact]
+        if not facts:
+            return []
+        position, quaternion = _combined(self.frames.position, _PLACE), _quaternion(self)
+        take = [f"{position} as the position"] if position != f"({', '.join(_PLACE)})" else []
+        if quaternion != f"({', '.join(_QUATERNION)})":
+            take.append(f"{quaternion} as the quaternion (qw, qx, qy, qz)")
+        return [
+            " and ".join(facts),
+            "expected one world, z up, body axes forward, left, up, and a quaternion scalar first, "
+            f"body to world: take {' and '.join(take)}",
+        ]
 
     def _rotor_words(self) -> list[str]:
         words = []
@@ -286,43 +283,80 @@ class Reading:
         return words
 
 
-DECLARED = Reading()
-
-
-def pose_readings() -> list[Reading]:
-    """Return the readings of a pose in the kit's columns, the one as declared left out."""
-    usual = (PLAIN, NED, Z_DOWN, FRD_BODY, _NED_ATTITUDE, _Y_UP_WORLD, _Y_UP_BODY)
-    found = [
-        Reading(order=order, sense=sense, frames=frames)
-        for order, sense, frames in product(
-            ("wxyz", "xyzw", "zwxy"), ("body_to_world", "world_to_body"), usual
+def _combined(matrix: Array, columns: Sequence[str]) -> str:
+    """Return in words what the rows of a matrix make of columns, up to one positive factor."""
+    rows = []
+    for row in np.round(matrix, 6):
+        terms = "".join(
+            f" {'-' if x < 0 else '+'} {name}" for x, name in zip(row, columns, strict=True) if x
         )
-    ][1:]
-    # an exchange of two axes mirrors the rotation, too: its inverse is what turns as the body does
-    found.append(Reading(sense="world_to_body", frames=_YZ_SWAPPED))
-    found += [Reading(frames=frames) for frames in POSITION_FRAMES]
-    found += [Reading(length=length) for length in ("cm", "mm")]
-    return [replace(reading, unusual=_unusual(reading)) for reading in found]
+        rows.append(f"{'-' if terms[1] == '-' else ''}{terms[3:]}")
+    return f"({', '.join(rows)})"
 
 
-def _unusual(reading: Reading) -> int:
-    departs = (reading.order != "wxyz") + (reading.sense != "body_to_world")
-    other = "lie along other axes" in reading.frames.fact
-    return departs + (reading.frames is not PLAIN) + other
+def _quaternion(reading: Reading) -> str:
+    """Return in words the kit's quaternion of the columns qw, qx, qy, qz."""
+    frames = reading.frames
+    mirror = np.linalg.det(frames.world)  # of the body as well: a mirrored rotation is one again
+    world, body = (Rotation.from_matrix(mirror * turn) for turn in (frames.world, frames.body))
+    columns = as_written(np.eye(4), reading)[1]
+    made = (world * columns * body).as_quat(scalar_first=True).T
+    first = made[0][np.abs(made[0]) > 0.1][0]
+    text = _combined(made * np.sign(first), _QUATERNION)
+    return text if abs(first) > 0.9 else f"0.7071 {text}"
 
 
-def gyro_readings() -> list[Reading]:
-    """Return the other readings of a gyro."""
-    return [Reading(gyro=reading) for reading in GYRO_READINGS]
+DECLARED = Reading()
+# log-likelihood ratios that readings must make up: one as declared is right far more often, and of
+# time offsets there are 200
+OTHER, _OFFSET = 8.0, 16.0
+_LATEST, _OFFSET_STEP = 2.0, 0.02  # s, of the rotor speeds against the motion
 
 
-def rotor_readings() -> list[Reading]:
-    """Return the 47 other orders and senses of the rotors."""
+def _each(**aspects: Sequence[Any]) -> list[Reading]:
+    """Return the readings of all combinations of aspects."""
+    return [Reading(**dict(zip(aspects, each, strict=True))) for each in product(*aspects.values())]
+
+
+def _weighed(found: Sequence[Reading], least: float, world: str = "enu") -> list[Reading]:
+    """Return readings that must make up ``least``, and 1 for each convention that is less usual.
+
+    Args:
+        found: the readings.
+        least: log-likelihood ratio.
+        world: the usual one.
+    """
     return [
-        Reading(rotors=(a, b, c, d), mirrored=mirrored)
-        for mirrored in (False, True)
-        for a, b, c, d in permutations(ROTORS)
-    ][1:]
+        replace(
+            r,
+            unlikely=least
+            + (r.order != "wxyz")
+            + (r.euler == "xyz")
+            + (r.pitch_sign < 0)
+            + (r.sense != "body_to_world")
+            + (r.world != world)
+            + r.frames.unusual,
+        )
+        for r in found
+    ]
+
+
+def log_readings(has_pose: bool) -> list[Reading]:
+    """Return the readings of the kit's own columns, the one as declared first.
+
+    Args:
+        has_pose: whether the motion is that of a pose; else it is that of a gyro.
+    """
+    others = _each(gyro=GYRO_READINGS)
+    if has_pose:
+        others = _each(order=("wxyz", "xyzw", "zwxy"), sense=SENSES, frames=_USUAL_FRAMES)[1:]
+        # an exchange of two axes mirrors the rotation: its inverse is what turns as the body does
+        others.append(Reading(sense="world_to_body", frames=_YZ_SWAPPED))
+        others += _each(frames=tuple(_positions())) + _each(length=("cm", "mm"))
+    others += _each(mirrored=(False, True), rotors=tuple(permutations(ROTORS)))[1:]
+    count = round(_LATEST / _OFFSET_STEP)
+    offsets = _each(late=[_OFFSET_STEP * k for k in range(-count, count + 1) if k])
+    return [DECLARED, *_weighed(others, OTHER), *_weighed(offsets, _OFFSET)]
 
 
 def table_readings(
@@ -336,23 +370,11 @@ def table_readings(
         lengths: units of the position.
         hint: the world that names speak for; empty: none.
     """
-    attitudes: list[tuple[str, str, str, int]] = [(order, "", "rad", 1) for order in orders]
+    attitudes: dict[str, Sequence[Any]] = {"order": orders}
     if not orders:
-        attitudes = [("wxyz", *a) for a in product(("zyx", "xyz"), units, (1, -1))]
-    found = []
-    for (order, euler, unit, sign), sense, frames, length in product(
-        attitudes, ("body_to_world", "world_to_body"), MAP_FRAMES, lengths
-    ):
-        unusual = (
-            (bool(orders) and order != orders[0])
-            + (euler == "xyz")
-            + (sign < 0)
-            + (sense != "body_to_world")
-            + (frames.names[0] != (hint or "enu"))
-            + (frames not in (PLAIN, NED))
-        )
-        found.append(Reading(order, euler, unit, sign, sense, frames, length, unusual=unusual))
-    return found
+        attitudes = {"euler": ("zyx", "xyz"), "unit": units, "pitch_sign": (1, -1)}
+    found = _each(**attitudes, sense=SENSES, frames=MAP_FRAMES, length=lengths)
+    return _weighed(found, 0.0, hint or "enu")
 
 
 def rotations(columns: Array, reading: Reading) -> tuple[NDArray[np.bool_], Rotation]:
@@ -360,18 +382,18 @@ def rotations(columns: Array, reading: Reading) -> tuple[NDArray[np.bool_], Rota
     rows by a reading, body to world in the kit's frames.
     """
     good, rotation = as_written(columns, reading)
-    if reading.sense == "world_to_body":
-        rotation = rotation.inv()
     frames = reading.frames
     return good, Rotation.from_matrix(frames.world @ rotation.as_matrix() @ frames.body)
 
 
 def as_written(columns: Array, reading: Reading) -> tuple[NDArray[np.bool_], Rotation]:
-    """Return the same in the columns' own frames and sense."""
+    """Return the same, body to world, in the columns' own frames."""
     good: NDArray[np.bool_] = np.asarray(np.isfinite(columns).all(axis=1))
     if reading.euler:
         angles = columns[good] * ANGLE_UNITS[reading.unit] * [1.0, reading.pitch_sign, 1.0]
         axes = ["xyz".index(axis) for axis in reading.euler]
-        return good, Rotation.from_euler(reading.euler.upper(), angles[:, axes])
-    good &= np.linalg.norm(np.nan_to_num(columns), axis=1) > 0.5
-    return good, Rotation.from_quat(columns[good][:, [reading.order.index(a) for a in "xyzw"]])
+        rotation = Rotation.from_euler(reading.euler.upper(), angles[:, axes])
+    else:
+        good &= np.linalg.norm(np.nan_to_num(columns), axis=1) > 0.5
+        rotation = Rotation.from_quat(columns[good][:, [reading.order.index(a) for a in "xyzw"]])
+    return good, rotation if reading.sense == "body_to_world" else rotation.inv()

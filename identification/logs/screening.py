@@ -22,12 +22,13 @@ from ...runtime.errors import InputError
 from ..motion.inertial_signals import inertial_pieces, reads_imu
 from ..motion.signals import SIGNALS
 from ..motion.smoothing import CUTOFFS, low_pass, runs_of, unbroken
-from .evidence import Evidence, recognise
+from .evidence import Evidence, departures
 from .excerpt import excerpt
 from .flight_log import FlightLog, Mask
-from .flight_phases import flying
+from .flight_phases import flying, usual_thrust
 from .inertial import INERTIAL, gravity_doubt, is_stuck
 from .magnitudes import MAGNITUDES, rotor_doubt, thrust_by_weight, time_doubt, within
+from .readings import Reading
 from .stuck_channels import stretches, stuck_notes
 
 Array = NDArray[np.float64]
@@ -74,7 +75,7 @@ def screen_log(
             jumps, its pose leaps, nothing flew, or it follows another convention than it declares;
             the message names the file, what was found and what to do.
     """
-    return _Screening(log, vehicle, refuses_parts=True).run(least_seconds)[1]
+    return _Screening(log, vehicle, least_seconds).run()[1]
 
 
 def screen_for_estimate(log: FlightLog, vehicle: Vehicle) -> tuple[FlightLog, tuple[str, ...]]:
@@ -96,72 +97,78 @@ def screen_for_estimate(log: FlightLog, vehicle: Vehicle) -> tuple[FlightLog, tu
         InputError: every number of an estimate would be wrong: other units or conventions than the
             log declares, nothing flew, or no pose is another one.
     """
-    return _Screening(log, vehicle, refuses_parts=False).run(None)
+    return _Screening(log, vehicle, None).run()
 
 
 class _Screening:
-    """The checks in their order; a fault of a part of the log is refused or noted."""
+    """The checks in their order.
 
-    def __init__(self, log: FlightLog, vehicle: Vehicle, refuses_parts: bool) -> None:
+    Args:
+        log: the flight.
+        vehicle: as declared.
+        least: s of unbroken flight that a diagnosis needs; None: for an estimate.
+    """
+
+    def __init__(self, log: FlightLog, vehicle: Vehicle, least: float | None) -> None:
         self.log, self.vehicle = log, vehicle
-        self.where = log.source or log.name or "log"
-        self.refuses_parts = refuses_parts
+        self.diagnosed, self.least = least is not None, least or 0.0
+        self.by_imu = reads_imu(log)
         self.notes: list[str] = []
 
     def refuse(self, text: str) -> None:
         """Refuse the log for what a text says, where it says anything."""
         if text:
-            raise InputError(f"{self.where}: {text}")
+            raise InputError(f"{self.log.source or self.log.name or 'log'}: {text}")
+
+    def need(self, text: str) -> None:
+        """Refuse the log for what a diagnosis needs and an estimate does not."""
+        self.refuse(text if self.diagnosed else "")
 
     def fault(self, text: str) -> None:
         """Refuse or note what spoils a part of the log alone."""
-        if self.refuses_parts:
-            self.refuse(text)
-        elif text:
-            self.notes.append(f"warning: {text}")
+        self.need(text)
+        self.notes += [f"warning: {text}"] if text else []
 
-    def run(self, least_seconds: float | None) -> tuple[FlightLog, tuple[str, ...]]:
+    def run(self) -> tuple[FlightLog, tuple[str, ...]]:
         """Return the log without held poses, and the notes."""
-        vehicle, by_imu = self.vehicle, reads_imu(self.log)
-        if not by_imu and not self.log.valid.any():
+        self.channels()
+        self.rotors()
+        pieces = self.imu() if self.by_imu else self.pose()
+        self.notes += stuck_notes(self.log, self.vehicle)
+        others: list[Reading] = []
+        if pieces or self.by_imu:
+            evidence = Evidence.of_log(excerpt([self.log])[0], self.vehicle, self.by_imu)
+            others = departures(evidence)[:3]
+        says = "; or ".join(dict.fromkeys(reading.says for reading in others))
+        if others and not others[0].late:
+            contradicted = "the motion contradicts the rotor speeds and gravity"
+            if self.by_imu:
+                contradicted = "the gyro contradicts the rotors' torques"
+            self.refuse(f"{says}. As logged, {contradicted}")
+        if not self.by_imu:
+            self.steps()
+            if self.diagnosed:
+                self.length(pieces)
+        self.fault(others[0].says if others else "")
+        return self.log, tuple(self.notes)
+
+    def channels(self) -> None:
+        """Check that there are a motion, rotor speeds and the declared vehicle."""
+        if not self.by_imu and not self.log.valid.any():
             self.refuse(
                 "no row has a pose; expected at least one to start from, or gyro and accelerometer "
                 "(gx, gy, gz and ax, ay, az)"
             )
         if not self.log.has_rotor_speeds:
             self.refuse(
-                f"has motor commands and no rotor speeds, and the vehicle {vehicle.name} states no "
-                "motor_curve; expected one, to turn commands into thrust"
+                f"has motor commands and no rotor speeds, and the vehicle {self.vehicle.name} "
+                "states no motor_curve; expected one, to turn commands into thrust"
             )
-        if self.log.vehicle and self.log.vehicle != vehicle.name:
+        if self.log.vehicle and self.log.vehicle != self.vehicle.name:
             self.notes.append(
                 f"warning: the log names the vehicle {self.log.vehicle}; it is read as "
-                f"{vehicle.name}"
+                f"{self.vehicle.name}"
             )
-        self.rotors()
-        times = self.log.t if by_imu or self.log.valid.sum() < 2 else self.log.t[self.log.valid]
-        self.refuse(time_doubt(float(np.median(np.diff(times)))))
-        self.fault(_stopped(self.log, vehicle))
-        self.interpolate_racing()
-        pieces: list[Rows] = []
-        if by_imu:
-            self.imu(least_seconds)
-            self.notes += stuck_notes(self.log, vehicle)
-        else:
-            pieces = self.pose(least_seconds)
-        evidence = None
-        if by_imu or pieces:
-            evidence = Evidence.of_log(excerpt([self.log])[0], vehicle, by_imu)
-            says = "; or ".join(dict.fromkeys(r.says for r in recognise(evidence)[:3]))
-            against = "the gyro contradicts the rotors' torques"
-            if not by_imu:
-                against = "the motion contradicts the rotor speeds and gravity"
-            self.refuse(f"{says}. As logged, {against}" if says else "")
-        if not by_imu:
-            self.steps(pieces, least_seconds)
-        if evidence is not None:
-            self.fault(_shift(evidence))
-        return self.log, tuple(self.notes)
 
     def rotors(self) -> None:
         """Check that all four rotors turned, at speeds (rad/s) that carry the vehicle."""
@@ -170,6 +177,7 @@ class _Screening:
             thrust = np.square(speeds) @ vehicle.k / vehicle.weight
         most = float(np.quantile(thrust, 0.95))
         hover = f"(about {vehicle.hover_rate:.3g} when {vehicle.name} hovers)"
+        zero, all_four = "is 0 while the other rotors turn", "expected the rotor speeds of all four"
         if most < _AT_REST:
             self.refuse(
                 "omega1..omega4 are at rest all the time, so nothing flew; expected rotor speeds "
@@ -181,10 +189,7 @@ class _Screening:
             )
         for i, column in enumerate(speeds[thrust > 0.3 * most].T):
             if float(np.max(column)) <= 0.0:
-                self.refuse(
-                    f"omega{i + 1} is 0 while the other rotors turn; expected the rotor speeds of "
-                    "all four"
-                )
+                self.refuse(f"omega{i + 1} {zero}; {all_four}")
         ratio = thrust_by_weight(speeds, vehicle)
         self.refuse(rotor_doubt(ratio, vehicle))
         if not within(ratio, MAGNITUDES.doubtful):
@@ -192,6 +197,14 @@ class _Screening:
                 f"the rotor speeds make a median thrust of {ratio:.2g} times the weight of "
                 f"{vehicle.name}: is it this vehicle, and did it fly?"
             )
+        times = self.log.t
+        if not self.by_imu and self.log.valid.sum() > 1:
+            times = times[self.log.valid]
+        self.refuse(time_doubt(float(np.median(np.diff(times)))))
+        for i, column in enumerate(speeds.T):
+            stopped = stretches((column == 0.0) & _carrying(self.log), self.log.t, _STOPPED)
+            self.fault(f"omega{i + 1} {zero}, for {stopped}; {all_four}" if stopped else "")
+        self.interpolate_racing()
 
     def interpolate_racing(self) -> None:
         """Interpolate rotor speeds that no rotor reaches, where they are no more than a note."""
@@ -207,14 +220,15 @@ class _Screening:
             f"{log.t[row]:.6g} s ({int(above.sum())} such value(s)), faster than {vehicle.name} "
             f"turns its rotors; expected at most {most:.4g} rad/s"
         )
-        self.fault(found if self.refuses_parts else f"{found}. They were interpolated")
+        self.need(found)
+        self.fault(f"{found}. They were interpolated")
         speeds = log.rotor_speeds.copy()
         for column, bad in zip(speeds.T, above.T, strict=True):
             column[bad] = np.interp(log.t[bad], log.t[~bad], column[~bad])
         self.log = replace(log, rotor_speeds=speeds)
 
-    def imu(self, least_seconds: float | None) -> None:
-        """Check rate, length, unit and axes of an IMU.
+    def imu(self) -> list[Rows]:
+        """Check rate, length, unit and axes of an IMU, and return the rows of each unbroken run.
 
         Gravity shows the accelerometer's unit and axes, and the rotors the gyro's. What neither
         shows (an accelerometer turned about z) stays the log's word.
@@ -237,29 +251,31 @@ class _Screening:
                 f"{rate:.3g} IMU readings a second and no pose as fast; expected at least "
                 f"{_LEAST_IMU_HZ:g}: a quadrotor turns within a tenth of a second"
             )
-        there = sum(float(log.t[p[-1]] - log.t[p[0]]) for p in inertial_pieces(log))
-        if least_seconds is not None and there < least_seconds - 1e-9:
-            self.refuse(
+        pieces = inertial_pieces(log)
+        there = sum(float(log.t[piece[-1]] - log.t[piece[0]]) for piece in pieces)
+        if there < self.least - 1e-9:
+            self.need(
                 f"{there:.3g} s of unbroken gyro and accelerometer; expected at least "
-                f"{least_seconds:g} s of flight, in runs of more than 3 s"
+                f"{self.least:g} s of flight, in runs of more than 3 s"
             )
         thrust = np.square(log.rotor_speeds[rows]) @ self.vehicle.k
         doubt = gravity_doubt(log.accelerometer[rows[flying(thrust)]], self.vehicle.gravity)
         self.refuse(f"ax, ay, az {doubt}" if doubt else "")
+        return pieces
 
-    def pose(self, least_seconds: float | None) -> list[Rows]:
+    def pose(self) -> list[Rows]:
         """Check the clock of a pose, leave held poses out, and return the rows of each unbroken run
         that is long enough to say something.
         """
-        log, vehicle = self.log, self.vehicle
-        if self.refuses_parts:  # a filter predicts over steps of any length
+        log = self.log
+        if self.diagnosed:  # a filter predicts over steps of any length
             self.uneven_steps()
         seen = np.flatnonzero(log.valid)
         pose = np.column_stack([log.position, log.quaternion])[seen]
         same = np.append(False, np.all(pose[1:] == pose[:-1], axis=1))  # it was held
         if log.t[seen[-1]] - log.t[seen[0]] > _NEVER and np.all(pose == pose[0]):
             self.refuse("the pose never changes, to the last digit; expected the poses of a flight")
-        held = stretches(same & _carrying(log, vehicle)[seen], log.t[seen], _HELD)
+        held = stretches(same & _carrying(log)[seen], log.t[seen], _HELD)
         if held:
             self.notes.append(
                 f"warning: the pose is frozen for {held}: it repeats to the last digit while the "
@@ -268,11 +284,10 @@ class _Screening:
         valid = log.valid.copy()
         valid[seen[same]] = False
         self.log = log = replace(log, valid=valid)
-        self.notes += stuck_notes(log, vehicle)
         seen = np.flatnonzero(valid)
         period = float(np.median(np.diff(log.t[seen]))) if len(seen) > 1 else np.inf
-        if self.refuses_parts and period * _LEAST_RATE_HZ > _SLACK:
-            self.refuse(
+        if period * _LEAST_RATE_HZ > _SLACK:
+            self.need(
                 f"{1 / period:.3g} new poses a second; expected at least {_LEAST_RATE_HZ:g}: "
                 "accelerations come from differences of poses that are low-passed at 15 Hz, and a "
                 "quadrotor turns within a tenth of a second"
@@ -284,10 +299,10 @@ class _Screening:
             for run, length in zip(runs, lengths, strict=True)
             if len(run) > 8 and length > _LEAST_PIECE
         ]
-        if not pieces and least_seconds is not None:
-            self.refuse(
+        if not pieces:
+            self.need(
                 f"{_lost_words(log)}the longest unbroken run of poses is {max(lengths):.3g} s; "
-                f"expected at least {least_seconds:g} s in flight, in runs of more than "
+                f"expected at least {self.least:g} s in flight, in runs of more than "
                 f"{_LEAST_PIECE:g} s"
             )
         return pieces
@@ -307,9 +322,9 @@ class _Screening:
         if uneven > _UNEVEN_NOTE:
             self.notes.append(f"time steps are uneven: {words}")
 
-    def steps(self, pieces: list[Rows], least_seconds: float | None) -> None:
-        """Check that no pose is farther from the one before than a quadrotor gets, that the clock
-        does not jump, and that enough of the flight is left.
+    def steps(self) -> None:
+        """Check that no pose is farther from the one before than a quadrotor gets, and that the
+        clock does not jump.
         """
         log = self.log
         seen = np.flatnonzero(log.valid)
@@ -332,24 +347,21 @@ class _Screening:
             self.refuse(says if leaps.mean() > _MOST_LEAPS else "")
             self.fault(says)
         self.fault(_jump(log.t[seen], log.position[seen], way, angle))
-        if least_seconds is not None:
-            self.length(pieces, least_seconds)
 
-    def length(self, pieces: list[Rows], least: float) -> None:
+    def length(self, pieces: list[Rows]) -> None:
         """Check that enough is left in unbroken runs in flight, and note where much is not."""
         log = self.log
         thrust = np.square(log.rotor_speeds) @ self.vehicle.k
-        thrust = low_pass(thrust, CUTOFFS.flying_hz, log.period) if len(log.t) > 30 else 0 * thrust
-        turning = thrust[thrust > 0.3 * float(np.quantile(thrust, 0.95))]
-        aloft = thrust > 0.5 * float(np.median(turning))
+        thrust = low_pass(thrust, CUTOFFS.flying_hz, log.period)
+        aloft = thrust > 0.5 * usual_thrust(thrust)
         step = np.minimum(np.diff(log.t, append=log.t[-1] + log.period), max(0.1, 3.5 * log.period))
         step = np.where(aloft, step, 0.0)
         left = sum(float(step[piece[0] : piece[-1] + 1].sum()) for piece in pieces)
         whole = float(step.sum())
-        if left < least - 1e-9:
+        if left < self.least - 1e-9:
             self.refuse(
                 f"{_lost_words(log)}{left:.3g} s of flight in unbroken runs of poses; expected at "
-                f"least {least:g} s, in runs of more than {_LEAST_PIECE:g} s"
+                f"least {self.least:g} s, in runs of more than {_LEAST_PIECE:g} s"
             )
         if left < (1.0 - _LOST_SHARE) * whole:
             self.notes.append(
@@ -358,38 +370,10 @@ class _Screening:
             )
 
 
-def _shift(evidence: Evidence) -> str:
-    """Return what says that rotor speeds and pose are not on one clock, or nothing."""
-    if evidence.shift is None:
-        return ""
-    shift = evidence.shift[0]
-    late, sooner = ("late", "earlier") if shift > 0 else ("early", "later")
-    return (
-        f"the rotor speeds come {abs(shift):.2f} s too {late} against the motion; expected both on "
-        f"one clock: put omega1..omega4 {abs(shift):.2f} s {sooner}"
-    )
-
-
-def _carrying(log: FlightLog, vehicle: Vehicle) -> Mask:
-    """Return in which rows (N,) the fastest rotors make half of the thrust that they usually
-    make.
-    """
-    fastest = np.square(log.rotor_speeds).max(axis=1) * float(vehicle.k.mean())
-    turning = fastest > 0.1 * float(np.quantile(fastest, 0.9))
-    level = float(np.median(fastest[turning])) if turning.any() else np.inf
-    return np.asarray(fastest > 0.5 * level)
-
-
-def _stopped(log: FlightLog, vehicle: Vehicle) -> str:
-    """Return which rotor reads 0 for long while the others carry the vehicle, or nothing."""
-    carrying = _carrying(log, vehicle)
-    for i, column in enumerate(log.rotor_speeds.T):
-        if stopped := stretches((column == 0.0) & carrying, log.t, _STOPPED):
-            return (
-                f"omega{i + 1} is 0 while the other rotors turn, for {stopped}; expected the rotor "
-                "speeds of all four"
-            )
-    return ""
+def _carrying(log: FlightLog) -> Mask:
+    """Return in which rows (N,) the fastest rotors turn as in flight."""
+    fastest = np.square(log.rotor_speeds).max(axis=1)
+    return np.asarray(fastest > 0.5 * usual_thrust(fastest))
 
 
 def _lost_words(log: FlightLog) -> str:

@@ -12,6 +12,7 @@ from ..motion.smoothing import runs_of
 from .flight_log import FlightLog
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 LEAST_SECONDS = 0.5  # that a channel stands still; a busy link repeats a few samples
 # changes of each sister meanwhile: of channels that change equally often, the chance that one does
@@ -28,82 +29,74 @@ def stuck_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
         log: the flight.
         vehicle: whose rotors may stand at their limit.
     """
-    seen = np.flatnonzero(log.valid)
-    thrust = np.square(log.rotor_speeds) @ vehicle.k
-    flying = thrust > 0.3 * vehicle.weight
+    rotors, seen = log.rotor_speeds, np.flatnonzero(log.valid)
+    aloft = np.square(rotors) @ vehicle.k > 0.3 * vehicle.weight
+    turning = (rotors > 0.0) & (rotors < (_AT_LIMIT * vehicle.omega_max or np.inf))
     notes = []
-    rotors = [log.rotor_speeds[:, i] for i in range(4)]
-    for i, speeds in enumerate(rotors):
-        still = np.append(False, speeds[1:] == speeds[:-1]) & flying & (speeds > 0.0)
-        if vehicle.omega_max > 0.0:
-            still &= speeds < _AT_LIMIT * vehicle.omega_max
-        notes += _note(f"omega{i + 1}", "the other rotor speeds", log.t, still, rotors, i)
-    axes = [log.position[seen, i] for i in range(3)]
-    turning = [log.quaternion[seen, i] for i in range(4)]
-    for i, position in enumerate(axes):
-        still = np.append(False, position[1:] == position[:-1]) & flying[seen]
-        notes += _note(f"p{'xyz'[i]}", "the other coordinates", log.t[seen], still, axes, i)
-    held = np.append(False, np.all(np.diff(np.column_stack(turning), axis=0) == 0.0, axis=1))
+    for i in range(4):
+        rows = aloft & turning[:, i]
+        sisters = np.delete(rotors, i, axis=1)
+        notes += _note(
+            f"omega{i + 1} stands still for {{}} while the other rotor speeds",
+            log.t,
+            rows,
+            rotors[:, [i]],
+            sisters,
+        )
+    t, rows, position = log.t[seen], aloft[seen], log.position[seen]
+    for i, axis in enumerate("xyz"):
+        sisters = np.delete(position, i, axis=1)
+        notes += _note(
+            f"p{axis} stands still for {{}} while the other coordinates",
+            t,
+            rows,
+            position[:, [i]],
+            sisters,
+        )
     notes += _note(
-        "the attitude", "the coordinates", log.t[seen], held & flying[seen], [turning[0], *axes], 0
+        "the attitude stands still for {} while the coordinates",
+        t,
+        rows,
+        log.quaternion[seen],
+        position,
     )
-    return (*notes, *_doubled(rotors))
-
-
-def _doubled(rotors: list[Array]) -> list[str]:
-    """Return a note where two rotors have the same speeds to the last digit in every row and the
-    two others have not: a flight in one plane without noise has two such pairs.
-    """
+    # in every row; a flight in one plane without noise has two such pairs
     alike = [
-        (i, j)
+        (i + 1, j + 1)
         for i, j in combinations(range(4), 2)
-        if np.count_nonzero(np.diff(rotors[i])) >= SISTERS_CHANGE
-        and np.array_equal(rotors[i], rotors[j])
+        if np.count_nonzero(np.diff(rotors[:, i])) >= SISTERS_CHANGE
+        and np.array_equal(rotors[:, i], rotors[:, j])
     ]
-    if len(alike) != 1:
-        return []
-    ((i, j),) = alike
-    return [
-        f"warning: the columns omega{i + 1} and omega{j + 1} are the same in every row: if one is "
-        "written under both names, force and torque are wrong"
-    ]
+    if len(alike) == 1:
+        notes.append(
+            "warning: the columns omega{} and omega{} are the same in every row: if one is written "
+            "under both names, force and torque are wrong".format(*alike[0])
+        )
+    return tuple(notes)
 
 
-def _note(
-    name: str, others: str, t: Array, still: NDArray[np.bool_], sisters: list[Array], own: int
-) -> list[str]:
-    """Return a note on the longest stretch (s) in which a channel stands still and its sisters do
-    not, if there is one.
+def _note(says: str, t: Array, rows: Mask, channel: Array, sisters: Array) -> list[str]:
+    """Return a note on the stretches of rows (N,) in which a channel (N, k) stands still and its
+    sisters (N, m) do not, if there is one.
     """
-    changes = [
-        np.append(0, np.cumsum(np.diff(other) != 0.0))
-        for i, other in enumerate(sisters)
-        if i != own
-    ]
-    found = []
+    still = np.append(False, np.all(np.diff(channel, axis=0) == 0.0, axis=1)) & rows
+    changes = np.cumsum(np.diff(sisters, axis=0, prepend=sisters[:1]) != 0.0, axis=0)
     for first, end in runs_of(still):
-        seconds = float(t[end - 1] - t[first])
-        changed = min(int(count[end - 1] - count[first]) for count in changes)
-        if seconds >= LEAST_SECONDS and changed >= SISTERS_CHANGE:
-            found.append((seconds, float(t[first])))
-    if not found:
-        return []
-    return [
-        f"warning: {name} stands still for {_longest(found)} while {others} change: what depends "
-        "on it there is wrong if its sensor hung"
-    ]
+        if np.min(changes[end - 1] - changes[first]) < SISTERS_CHANGE:
+            still[first:end] = False
+    found = stretches(still, t, LEAST_SECONDS)
+    text = says.format(found)
+    wrong = "what depends on it there is wrong if its sensor hung"
+    return [f"warning: {text} change: {wrong}"] if found else []
 
 
-def stretches(rows: NDArray[np.bool_], t: Array, least: float) -> str:
-    """Return the longest run of rows (N,) that lasts more than ``least`` s, and how many do, in
+def stretches(rows: Mask, t: Array, least: float) -> str:
+    """Return the longest run of rows (N,) that lasts at least ``least`` s, and how many do, in
     words; nothing where none does.
     """
     runs = [(float(t[end - 1] - t[first]), float(t[first])) for first, end in runs_of(rows)]
-    found = [run for run in runs if run[0] > least]
-    return _longest(found) if found else ""
-
-
-def _longest(found: list[tuple[float, float]]) -> str:
-    """Return runs (s, and their beginnings) in words."""
+    found = [run for run in runs if run[0] >= least]
+    if not found:
+        return ""
     seconds, begin = max(found, key=lambda run: run[0])
     return f"{seconds:.3g} s from t = {begin:.6g} s ({len(found)} such stretch(es))"

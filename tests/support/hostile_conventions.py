@@ -77,9 +77,12 @@ as_last = partial(of_log, then=scalar_first_as_last)
 HOSTILE = {
     "scalar last": (
         scalar_last,
-        "quaternion is scalar last; expected scalar first.*reorder the columns",
+        r"quaternion is scalar last; expected .* take \(qz, qw, qx, qy\) as the quaternion",
     ),
-    "scalar first as last": (scalar_first_as_last, f"quaternion is {AS_LAST}rename the columns"),
+    "scalar first as last": (
+        scalar_first_as_last,
+        rf"quaternion is {AS_LAST}take \(qx, qy, qz, qw\) as the quaternion",
+    ),
     "scalar first as last, conjugate": (as_last(conjugate), f"{AS_LAST}world to body"),
     "scalar first as last, NED": (as_last(framed, *NED), f"{AS_LAST}world is z down"),
     "scalar first as last, y up": (as_last(framed, *Y_UP_WORLD), f"{AS_LAST}world is y up"),
@@ -87,7 +90,10 @@ HOSTILE = {
         as_last(framed, *Y_UP_BODY),
         f"{AS_LAST}world and the body are y up",
     ),
-    "conjugate": (conjugate, "quaternion is world to body; expected body to world"),
+    "conjugate": (
+        conjugate,
+        r"quaternion is world to body; expected .* take \(qw, -qx, -qy, -qz\) as the quaternion",
+    ),
     "scalar last, conjugate": (
         of_log(conjugate, then=scalar_last),
         "quaternion is scalar last and world to body",
@@ -116,11 +122,11 @@ HOSTILE = {
     "x, y swapped": (of_log(placed, [1, 0, 2]), "px and py are swapped"),
     "px negated": (
         of_log(placed, [0, 1, 2], (-1.0, 1.0, 1.0)),
-        "px points the other way .* negate px",
+        r"px points the other way .* take \(-px, py, pz\) as the position",
     ),
     "py negated": (
         of_log(placed, [0, 1, 2], (1.0, -1.0, 1.0)),
-        "py points the other way .* negate py",
+        r"py points the other way .* take \(px, -py, pz\) as the position",
     ),
     "position turned by 180": (
         of_log(placed, [0, 1, 2], (-1.0, -1.0, 1.0)),

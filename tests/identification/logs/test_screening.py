@@ -16,7 +16,7 @@ from tests.support.parameters import mostly_slow
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
 from windwrench.envs.recording import record_flight
-from windwrench.identification.logs.evidence import Evidence, recognise
+from windwrench.identification.logs.evidence import Evidence, departures
 from windwrench.identification.logs.flight_log import FlightLog, with_rows, write_log
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.readings import DECLARED
@@ -28,7 +28,7 @@ VEHICLE = load_vehicle("ardrone2")
 CLEAN = ("excite", "gentle", "circle", "yaw")
 # one effect of each kind
 SHOWN = ("motor_lag", "rotor_drag", "slung_payload", "marker_offset", "clock_offset")
-EXCITED = [CLEAN[0], *(pytest.param(name, marks=pytest.mark.slow) for name in CLEAN[1:])]
+EXCITED = [CLEAN[0], pytest.param("yaw", marks=pytest.mark.slow)]
 
 
 @cache
@@ -62,7 +62,7 @@ def test_every_order_of_rotors_is_told_apart(trajectory, step):
     for order in list(permutations(range(4)))[::step]:
         for mirrored in (False, True):
             vehicle = replace(VEHICLE, spin=-VEHICLE.spin) if mirrored else VEHICLE
-            found = recognise(
+            found = departures(
                 Evidence.of_log(replace(log, rotor_speeds=log.rotor_speeds[:, order]), vehicle)
             )
             rotors = tuple(i + 1 for i in order)
@@ -82,10 +82,10 @@ def test_rotors_that_work_against_a_cord_turn_as_declared():
     ("columns", "signs", "expected"),
     [
         ((2, 1, 0), (1, 1, 1), "px and pz are swapped"),
-        ((1, 2, 0), (1, 1, 1), r"p = \(pz, px, py\)"),
-        ((2, 0, 1), (1, 1, 1), r"p = \(py, pz, px\)"),
-        ((1, 0, 2), (-1, -1, 1), r"p = \(-py, -px, pz\)"),
-        ((0, 1, 2), (1, 1, -1), "position's z points down: negate pz; expected .* z up"),
+        ((1, 2, 0), (1, 1, 1), r"take \(pz, px, py\) as the position"),
+        ((2, 0, 1), (1, 1, 1), r"take \(py, pz, px\) as the position"),
+        ((1, 0, 2), (-1, -1, 1), r"take \(-py, -px, pz\) as the position"),
+        ((0, 1, 2), (1, 1, -1), r"position's z points down; expected .* take \(px, py, -pz\)"),
     ],
 )
 @pytest.mark.parametrize("trajectory", EXCITED)
