@@ -127,7 +127,7 @@ def _of_ulog(path: Path) -> tuple[Channels, tuple[str, ...]] | None:
     reader = reader_by_content(path)
     if reader is None or reader.name != "px4_ulog":
         return None
-    recording = px4_ulog.channels(path)
+    recording = px4_ulog.channels(path, has_ranges=False)
     streams = [readable(recording.streams.get(part)) for part in _CHANNELS]
     gyro, accelerometer, command = streams
     if gyro is None or accelerometer is None or command is None:

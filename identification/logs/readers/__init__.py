@@ -3,7 +3,8 @@ in the log's notes.
 
 A table needs no code: a file in ``identification/logs/maps/`` that says what its columns mean, and
 its name in ``TABLES``. A reader of another form is a file in this folder with a function
-``read(path, vehicle)`` that returns a FlightLog, and a line in ``READERS``.
+``read(path, vehicle)`` that returns a FlightLog, and a line in ``READERS``. It decodes the file
+into named columns, each group with its clock; a map in ``maps/recordings/`` says what they mean.
 
 Which reader a log needs is told from what is in it: the first bytes of a file, or the columns of a
 table. A file's name decides nothing but how a table is packed.

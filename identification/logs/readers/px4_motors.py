@@ -72,6 +72,12 @@ def with_motors(log_map: LogMap, order: Order, parameters: Parameters) -> LogMap
     )
 
 
+def without_ranges(parameters: Parameters) -> Parameters:
+    """Return the parameters but for the ranges of pulses."""
+    ends = ("_MIN", "_MAX")
+    return {n: x for n, x in parameters.items() if n.rstrip("0123456789")[-4:] not in ends}
+
+
 def slots_of_escs(fields: Mapping[str, Any]) -> list[int]:
     """Return the ESCs, from 0, of motors 1 to 4: by the function that each states, if all do."""
     functions = [f"esc[{i}].actuator_function" for i in range(_ESCS)]

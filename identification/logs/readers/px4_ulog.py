@@ -30,7 +30,7 @@ from ..flight_log import FlightLog
 from ..log_map import recording_map
 from ..map_fit import ways
 from ..mapped_log import Recording, channels_of_recording
-from .px4_motors import motor_order, outputs_of_motors, slots_of_escs, with_motors
+from .px4_motors import motor_order, outputs_of_motors, slots_of_escs, with_motors, without_ranges
 from .ulog_counting import counting
 
 Fields = Mapping[str, NDArray[Any]]
@@ -65,15 +65,21 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
     return channels(path).log(vehicle)
 
 
-def channels(path: Path) -> Recording:
+def channels(path: Path, has_ranges: bool = True) -> Recording:
     """Return a ULog's channels, each at its own rate.
+
+    Args:
+        path: the file.
+        has_ranges: pulses are 0 to 1 in the range that parameters state; False: from 1000 to 2000
+            us, for what finds the thrust of idling rotors itself.
 
     Raises:
         InputError: pyulog is missing, the file is no ULog, or lacks four motors.
     """
     log = read_ulog(path)
+    parameters = log.parameters if has_ranges else without_ranges(log.parameters)
     order, order_note = motor_order(path, log.parameters)
-    log_map = with_motors(recording_map("px4"), order, log.parameters)
+    log_map = with_motors(recording_map("px4"), order, parameters)
     notes = [*log_map.notes, order_note]
     if log.is_damaged:
         notes.append("the file is damaged; what could be read of it was used")
@@ -81,7 +87,7 @@ def channels(path: Path) -> Recording:
         samples
         for topic, instances in log.topics.items()
         for fields in instances
-        for samples in _samples(path, topic, fields, log.parameters)
+        for samples in _samples(path, topic, fields, parameters)
     ]
     recording = channels_of_recording(path, recorded, log_map, "px4_ulog", notes)
     position = recording.log_map.position
