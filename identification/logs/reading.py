@@ -112,6 +112,8 @@ def _read(
     if not missing:
         return map_table(table, load_map(OWN_MAP), vehicle)
     chosen = reader_by_columns(path, table.header)
+    if chosen is not None and chosen.log_map:
+        return map_table(table, load_map(chosen.log_map), vehicle, chosen.name)
     if chosen is not None:
         return chosen.read(path, vehicle)
     raise InputError(

@@ -140,11 +140,11 @@ def _encoded(encoding: int, values: list[int]) -> bytes:
         there = sum(1 << k for k, value in enumerate(values) if value)
         return bytes([there]) + b"".join(_signed(value) for value in values if value)
     if encoding == 7:
-        return _three(values)
+        return _three(values, _EQUAL)
     if encoding == 8:
         return _four(values)
     if encoding == 10:
-        return _variable(values)
+        return _three(values, _VARIABLE)
     return b""
 
 
@@ -165,37 +165,24 @@ def _fits(values: Sequence[int], widths: Sequence[int]) -> bool:
     return all(-(1 << (w - 1)) <= v < 1 << (w - 1) for v, w in zip(values, widths, strict=True))
 
 
-def _three(values: list[int]) -> bytes:
-    a, b, c = values
-    if _fits(values, (2, 2, 2)):
-        return bytes([(a & 3) << 4 | (b & 3) << 2 | c & 3])
-    if _fits(values, (4, 4, 4)):
-        return bytes([0x40 | a & 15, (b & 15) << 4 | c & 15])
-    if _fits(values, (6, 6, 6)):
-        return bytes([0x80 | a & 63, b & 63, c & 63])
-    return _wide(values)
+# three fields together: their widths in bits, and the lowest bit of each, of one to three bytes
+_EQUAL = (((2, 2, 2), (4, 2, 0)), ((4, 4, 4), (8, 4, 0)), ((6, 6, 6), (16, 8, 0)))
+_VARIABLE = (((2, 2, 2), (4, 2, 0)), ((5, 5, 4), (9, 4, 0)), ((8, 7, 7), (14, 7, 0)))
 
 
-def _wide(values: list[int]) -> bytes:
+def _three(values: list[int], layouts: Sequence[tuple[Sequence[int], Sequence[int]]]) -> bytes:
+    for kind, (widths, places) in enumerate(layouts):
+        if _fits(values, widths):
+            bits = kind << (8 * kind + 6)
+            for value, width, place in zip(values, widths, places, strict=True):
+                bits |= (value & ((1 << width) - 1)) << place
+            return bits.to_bytes(kind + 1, "big")
     selector, out = 0xC0, b""
     for i, value in enumerate(values):
         width = next(w for w in (1, 2, 3, 4) if _fits([value], [8 * w]))
         selector |= (width - 1) << (2 * i)
         out += (value & ((1 << 8 * width) - 1)).to_bytes(width, "little")
     return bytes([selector]) + out
-
-
-def _variable(values: list[int]) -> bytes:
-    a, b, c = values
-    if _fits(values, (2, 2, 2)):
-        return bytes([(a & 3) << 4 | (b & 3) << 2 | c & 3])
-    if _fits(values, (5, 5, 4)):
-        bits = 1 << 14 | (a & 31) << 9 | (b & 31) << 4 | c & 15
-        return bits.to_bytes(2, "big")
-    if _fits(values, (8, 7, 7)):
-        bits = 2 << 22 | (a & 255) << 14 | (b & 127) << 7 | c & 127
-        return bits.to_bytes(3, "big")
-    return _wide(values)
 
 
 def _four(values: list[int]) -> bytes:

@@ -43,6 +43,7 @@ class Reader:
     signature: tuple[str, ...] = ()  # columns of a table
     begins: tuple[bytes, ...] = ()  # first bytes of a file
     takes_option: bool = False  # ``read`` takes ``option``: the words behind the name's colon
+    log_map: str = ""  # by which ``read`` reads a table, where a map is enough
 
 
 # maps of tables that are known by their columns
@@ -107,7 +108,8 @@ def find_reader(name: str) -> Reader:
     name, colon, option = name.partition(":")
     if name in TABLES:
         found = load_map(TABLES[name])
-        reader = Reader(name, found.about, partial(_read_table, name=name), found.recognise)
+        read = partial(_read_table, name=name)
+        reader = Reader(name, found.about, read, found.recognise, log_map=TABLES[name])
     elif name in READERS:
         reader = READERS[name]
     else:

@@ -22,6 +22,9 @@ ENCODINGS = (0, 1, 3, 6, 7, 8, 9, 10)
 PREDICTORS = (*range(12), 256)
 LONGEST = 1024  # bytes of a frame
 _TOO_DAMAGED = 1_000_000  # frames that cannot be decoded, after which a log is given up
+# three fields together, by the first two bits: further bytes, lowest bits, widths in bits
+_EQUAL = np.array([[0, 4, 2, 0, 2, 2, 2], [1, 8, 4, 0, 4, 4, 4], [2, 16, 8, 0, 6, 6, 6]])
+_VARIABLE = np.array([[0, 4, 2, 0, 2, 2, 2], [1, 9, 4, 0, 5, 5, 4], [2, 14, 7, 0, 8, 7, 7]])
 
 
 class Layout(NamedTuple):
@@ -68,71 +71,40 @@ def _signed_vb(data: Bytes, at: Ints) -> int:
 
 
 @compiled
-def _three(data: Bytes, at: Ints, out: Ints, variable: bool) -> None:
-    """Read three fields: of equal widths, or, ``variable``, of 5, 5, 4 and 8, 7, 7 bits."""
-    lead = _byte(data, at)
-    kind = lead >> 6
-    if kind == 0:
+def _three(data: Bytes, at: Ints, out: Ints, layouts: Ints) -> None:
+    """Read three fields, packed as one of three ``layouts`` (3, 7), or of whole bytes each."""
+    packed = _byte(data, at)
+    kind = packed >> 6
+    if kind == 3:
         for i in range(3):
-            out[i] = _signed((lead >> (4 - 2 * i)) & 3, 2)
-    elif kind == 1 and variable:
-        second = _byte(data, at)
-        out[0] = _signed((lead & 0x3E) >> 1, 5)
-        out[1] = _signed(((lead & 1) << 4) | (second >> 4), 5)
-        out[2] = _signed(second & 15, 4)
-    elif kind == 1:
-        second = _byte(data, at)
-        out[0] = _signed(lead & 15, 4)
-        out[1] = _signed(second >> 4, 4)
-        out[2] = _signed(second & 15, 4)
-    elif kind == 2 and variable:
-        second, third = _byte(data, at), _byte(data, at)
-        out[0] = _signed(((lead & 0x3F) << 2) | (second >> 6), 8)
-        out[1] = _signed(((second & 0x3F) << 1) | (third >> 7), 7)
-        out[2] = _signed(third & 0x7F, 7)
-    elif kind == 2:
-        out[0] = _signed(lead & 0x3F, 6)
-        out[1] = _signed(_byte(data, at) & 0x3F, 6)
-        out[2] = _signed(_byte(data, at) & 0x3F, 6)
-    else:
-        for i in range(3):
-            width = ((lead >> (2 * i)) & 3) + 1
-            value = 0
+            out[i] = 0
+            width = ((packed >> (2 * i)) & 3) + 1
             for k in range(width):
-                value |= _byte(data, at) << (8 * k)
-            out[i] = _signed(value, 8 * width)
+                out[i] |= _byte(data, at) << (8 * k)
+            out[i] = _signed(out[i], 8 * width)
+        return
+    for _ in range(layouts[kind, 0]):
+        packed = packed << 8 | _byte(data, at)
+    for i in range(3):
+        width = layouts[kind, 4 + i]
+        out[i] = _signed((packed >> layouts[kind, 1 + i]) & ((1 << width) - 1), width)
 
 
 @compiled
 def _four(data: Bytes, at: Ints, out: Ints) -> None:
     """Read four fields of 0, 4, 8 or 16 bits, packed by half bytes."""
     selector = _byte(data, at)
-    half, held = False, 0  # is half a byte left over, and the byte that it is of
+    is_left, held = False, 0  # is half a byte left over, and the byte that it is of
     for i in range(4):
-        kind = (selector >> (2 * i)) & 3
-        if kind == 0:
-            out[i] = 0
-        elif kind == 1:
-            if not half:
+        halves = (1 << ((selector >> (2 * i)) & 3)) >> 1
+        out[i] = 0
+        for _ in range(halves):
+            if not is_left:
                 held = _byte(data, at)
-                out[i] = _signed(held >> 4, 4)
-            else:
-                out[i] = _signed(held & 15, 4)
-            half = not half
-        elif kind == 2:
-            first = _byte(data, at)
-            if half:
-                out[i] = _signed(((held & 15) << 4) | (first >> 4), 8)
-                held = first
-            else:
-                out[i] = _signed(first, 8)
-        else:
-            first, second = _byte(data, at), _byte(data, at)
-            if half:
-                out[i] = _signed(((held & 15) << 12) | (first << 4) | (second >> 4), 16)
-                held = second
-            else:
-                out[i] = _signed((first << 8) | second, 16)
+            out[i] = out[i] << 4 | (held & 15 if is_left else held >> 4)
+            is_left = not is_left
+        if halves:
+            out[i] = _signed(out[i], 4 * halves)
 
 
 @compiled
@@ -163,7 +135,7 @@ def _fields(data: Bytes, at: Ints, encodings: Ints, count: int, out: Ints) -> No
                     out[i + k] = _signed_vb(data, at) if there & (1 << k) else 0
             i += size
         elif encoding == 7 or encoding == 10:
-            _three(data, at, group, encoding == 10)
+            _three(data, at, group, _VARIABLE if encoding == 10 else _EQUAL)
             for k in range(min(3, count - i)):
                 out[i + k] = group[k]
             i += 3

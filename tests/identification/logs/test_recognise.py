@@ -3,10 +3,9 @@
 import gzip
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from tests.fuzz.forms import _crazyswarm2, _nanobench, _own_log, _text_table
+from tests.fuzz.forms import _crazyswarm2, _nanobench, _own_log
 from tests.support.data_paths import data_file
 from windwrench.dynamics import InputError
 from windwrench.identification.logs.readers import (
@@ -117,27 +116,3 @@ def test_tables_are_known_by_their_columns(tmp_path, make, reader):
     assert f"reader {reader}" in read_log(path).source
     (tmp_path / "own.csv").write_bytes(_own_log("own.csv"))
     assert "reader" not in read_log(tmp_path / "own.csv").source
-
-
-@pytest.mark.parametrize("wrong", ["quat_w", "rpm_rear_left"])
-def test_the_racers_table(tmp_path, wrong):
-    t = 0.005 * np.arange(50)
-    zero = ("pos_x", "pos_y", "quat_x", "quat_y", "quat_z", "gyro_x", "gyro_y", "gyro_z")
-    columns = {"timestamp_s": t, **dict.fromkeys(zero, 0.0 * t), "pos_z": 1.0 + t}
-    columns |= {"quat_w": 1.0 + 0.0 * t, "battery_v": 16.0 - t}
-    columns |= {
-        f"rpm_{place}": np.full(50, 6000.0 + i)
-        for i, place in enumerate(("rear_right", "front_right", "rear_left", "front_left"))
-    }
-    path = tmp_path / "flight.csv"
-    path.write_bytes(_text_table(columns))
-    log = read_log(path)
-    wanted = np.array([6003.0, 6002.0, 6000.0, 6001.0]) * np.pi / 30.0
-    np.testing.assert_allclose(log.rotor_speeds[0], wanted)
-    np.testing.assert_allclose(log.voltage, 16.0 - t)
-    del columns[wrong]
-    path.write_bytes(_text_table(columns))
-    with pytest.raises(
-        InputError, match=rf"missing column\(s\) {wrong}; expected those of a table"
-    ):
-        read_log(path, "racer")
