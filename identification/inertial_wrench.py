@@ -110,7 +110,10 @@ def _piece(
     for i in range(3):
         variance = (body.mass * noise[1]) ** 2 + miss_force[i] ** 2 / steps
         walk = walk_force[i] ** 2 * steps
-        force[:, i], spread[i] = _smoothed_force(residual[:, i], walk, variance)
+        # a walk that white noise of this variance hides
+        y = residual[:, i, None]
+        walked, std = _two_sided(y, np.zeros_like(y), np.eye(1), np.diag([walk]), variance)
+        force[:, i], spread[i] = walked[:, 0], std[0]
         own = inverse[i, i]
         torque[:, i], spread[3 + i] = _smoothed_turning(
             s.angular_velocity[:, i],
@@ -131,15 +134,6 @@ def _piece(
     state[:, TORQUE] = np.einsum("nij,nj->ni", s.rotation, torque @ body.inertia.T)
     state[:, FORCE] = force
     return state, np.column_stack([std_torque, std_force])
-
-
-def _smoothed_force(y: Array, walk: float, variance: float) -> tuple[Array, float]:
-    """Return a walk (n,) that white noise of this variance hides, from both sides in time, and its
-    standard deviation; ``walk`` is its variance in a step.
-    """
-    model = np.eye(1)
-    out, std = _two_sided(y[:, None], np.zeros((len(y), 1)), model, np.diag([walk]), variance)
-    return out[:, 0], float(std[0])
 
 
 def _smoothed_turning(

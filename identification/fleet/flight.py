@@ -6,7 +6,6 @@ import hashlib
 import os
 import traceback
 import warnings
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,15 +28,6 @@ _KEPT = (
     *("verdict", "remainder", "headline", "effects", "error"),
     *("notes", "seconds", "vehicle", "floor_is_lower_bound"),
 )
-
-
-@dataclass(frozen=True)
-class LogTask:
-    """A log that is diagnosed, and where its outcome lies."""
-
-    log: FleetLog
-    key: str
-    without: tuple[str, ...] = ()  # effects taken out of the library
 
 
 def key_of(log: FleetLog, without: tuple[str, ...]) -> str:
@@ -75,36 +65,32 @@ def key_of(log: FleetLog, without: tuple[str, ...]) -> str:
     return digest.hexdigest()
 
 
-def refusal(key: str, kind: str, reason: str) -> dict[str, Any]:
+def refusal(kind: str, reason: str) -> dict[str, Any]:
     """Return the outcome of a log that was refused.
 
     Args:
-        key: of the outcome.
         kind: input (the log or its vehicle), memory, time, died, or error (a fault of the kit).
         reason: one line.
     """
-    text = " ".join(as_text(reason).split())
-    return {"key": key, "status": "refused", "kind": kind, "reason": text}
+    return {"status": "refused", "kind": kind, "reason": " ".join(as_text(reason).split())}
 
 
-def diagnose_one(job: LogTask) -> dict[str, Any]:
+def diagnose_one(log: FleetLog, without: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return the outcome of a log: what was found, or why it was refused. Raises nothing."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # a log's notes say what matters
-            flight, vehicle = _read(job.log)
-            data = report_data(diagnose([flight], vehicle, without=job.without))
+            flight, vehicle = _read(log)
+            data = report_data(diagnose([flight], vehicle, without=without))
     except InputError as error:
-        return refusal(job.key, "input", str(error))
+        return refusal("input", str(error))
     except MemoryError:
-        return refusal(job.key, "memory", f"{job.log.path}: needs more memory than there is")
+        return refusal("memory", f"{log.path}: needs more memory than there is")
     except Exception as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
         where = f"{os.path.basename(place.filename)}, line {place.lineno}"
-        return refusal(
-            job.key, "error", f"{job.log.path}: {type(error).__name__} ({where}): {error}"
-        )
-    return {"key": job.key, "status": "diagnosed", **{name: data[name] for name in _KEPT}}
+        return refusal("error", f"{log.path}: {type(error).__name__} ({where}): {error}")
+    return {"status": "diagnosed", **{name: data[name] for name in _KEPT}}
 
 
 def _read(log: FleetLog) -> tuple[FlightLog, Vehicle]:

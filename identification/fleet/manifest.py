@@ -56,6 +56,7 @@ class FleetLog:
     reader: str | None = None
     map: str | None = None  # a map's name or file, in place of a reader
     time: float | None = None  # s; orders the flights of an individual; None: their names do
+    key: str = ""  # of its outcome
 
 
 _MOMENT: TypeAdapter[float | datetime] = TypeAdapter(

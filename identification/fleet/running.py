@@ -5,13 +5,14 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from ...dynamics.vehicle_file import load_vehicle
 from ...runtime.errors import InputError
 from ...runtime.plain_values import as_text
 from ...runtime.workers import Lost, each
-from .flight import LogTask, diagnose_one, key_of, refusal
+from .flight import diagnose_one, key_of, refusal
 from .manifest import FleetLog, natural
 from .outcomes import Outcome, Outcomes
 
@@ -27,7 +28,7 @@ def run_fleet(
     jobs: int | None = None,
     cluster: str | None = None,
     report: Callable[[Mapping[str, int]], None] = lambda counts: None,
-) -> list[LogTask]:
+) -> list[FleetLog]:
     """Diagnose every log that has no outcome yet; return all logs with the keys of their outcomes.
 
     A refusal for want of time, or of a process that died, is tried again where the limit is higher
@@ -48,41 +49,40 @@ def run_fleet(
         InputError: an outcome cannot be written, or there is no such cluster.
     """
     counts = {"kept": 0, "diagnosed": 0, "refused": 0}
-    done: list[LogTask] = []
+    done: list[FleetLog] = []
     first: dict[str, str] = {}  # the first log of each key: another one is its copy
 
-    def keep(outcome: Outcome) -> None:
-        if outcomes.get(outcome["key"]) != outcome:
-            outcomes.add(outcome)
+    def keep(key: str, outcome: Outcome) -> None:
+        if outcomes.get(key) != {"key": key, **outcome}:
+            outcomes.add({"key": key, **outcome})
         counts[outcome["status"]] += 1
         report(counts)
 
-    def pending() -> Iterator[LogTask]:
+    def pending() -> Iterator[FleetLog]:
         for log in logs:
+            unread = None
             try:
                 key = key_of(log, without)
-                unread = None
             except InputError as error:
                 key, unread = _key_of_name(log), str(error)
             if key in first:
                 unread = f"{log.path}: the same flight as {first[key]}, byte for byte"
                 key = _key_of_name(log)
             first.setdefault(key, log.name)
-            done.append(LogTask(log, key, without))
+            done.append(replace(log, key=key))
             if unread is not None:
-                keep(refusal(key, "input", unread))
+                keep(key, refusal("input", unread))
             elif key in outcomes and not _again(outcomes[key], limit_s):
                 counts["kept"] += 1
                 report(counts)
             else:
-                yield done[-1] if cluster is None else LogTask(_absolute(log), key, without)
+                yield done[-1] if cluster is None else _absolute(done[-1])
 
-    for job, result in each(diagnose_one, pending(), limit_s, jobs, cluster):
+    work = partial(diagnose_one, without=without)
+    for log, result in each(work, pending(), limit_s, jobs, cluster):
         if isinstance(result, Lost):
-            why = f"{job.log.path}: {result.words}"
-            keep(refusal(job.key, result.kind, why) | {"limit_s": limit_s})
-        else:
-            keep(result)
+            result = refusal(result.kind, f"{log.path}: {result.words}") | {"limit_s": limit_s}
+        keep(log.key, result)
     return done
 
 
@@ -109,30 +109,28 @@ def _absolute(log: FleetLog) -> FleetLog:
     return replace(log, path=path, vehicle=file(log.vehicle), reader=reader, map=file(log.map))
 
 
-def rows(done: Sequence[LogTask], outcomes: Outcomes) -> list[dict[str, Any]]:
+def rows(done: Sequence[FleetLog], outcomes: Outcomes) -> list[dict[str, Any]]:
     """Return each flight: its log, the individual, its place among that one's flights, its outcome;
     in the order of individuals and flights.
     """
-    models: dict[str, str] = {}
-    for file in {one.log.vehicle for one in done if one.log.vehicle}:
-        models[file] = load_vehicle(file).name
+    models = {file: load_vehicle(file).name for file in {log.vehicle for log in done} if file}
     named = []
-    for one in done:
-        flown = models.get(one.log.vehicle or "") or outcomes[one.key].get("vehicle", "unknown")
-        named.append((one.log.id or flown, one))
-    untimed = {name for name, one in named if one.log.time is None}
+    for log in done:
+        flown = models.get(log.vehicle or "") or outcomes[log.key].get("vehicle", "unknown")
+        named.append((log.id or flown, log))
+    untimed = {name for name, log in named if log.time is None}
 
-    def place(pair: tuple[str, LogTask]) -> tuple[object, ...]:
-        name, one = pair
-        time = 0.0 if name in untimed else one.log.time or 0.0
-        return natural(name), time, natural(one.log.name)
+    def place(pair: tuple[str, FleetLog]) -> tuple[object, ...]:
+        name, log = pair
+        time = 0.0 if name in untimed else log.time or 0.0
+        return natural(name), time, natural(log.name)
 
     flights: Counter[str] = Counter()
     found = []
-    for name, one in sorted(named, key=place):
+    for name, log in sorted(named, key=place):
         flights[name] += 1
-        known = {"id": as_text(name), "flight": flights[name], "log": as_text(one.log.name)}
-        found.append({**known, "time": one.log.time, **outcomes[one.key]})
+        known = {"id": as_text(name), "flight": flights[name], "log": as_text(log.name)}
+        found.append({**known, "time": log.time, **outcomes[log.key]})
         for key in ("key", "limit_s"):
             found[-1].pop(key, None)
     return found

@@ -8,7 +8,7 @@ from pebble import ProcessExpired
 
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.envs.recording import record_flight
-from windwrench.identification.fleet.flight import LogTask, diagnose_one, key_of
+from windwrench.identification.fleet.flight import diagnose_one, key_of
 from windwrench.identification.fleet.manifest import find_logs
 from windwrench.identification.fleet.outcomes import Outcomes
 from windwrench.identification.fleet.running import OUTCOMES, run_fleet
@@ -51,9 +51,9 @@ class Here:
 
     def start(self, task):
         future = workers.Future()
-        if "killer" in task.log.name:
+        if "killer" in task.name:
             future.set_exception(ProcessExpired("gone", -9))
-        elif "endless" in task.log.name:
+        elif "endless" in task.name:
             future.set_exception(TimeoutError("Task timeout"))
         else:
             future.set_result(self.work(task))
@@ -138,7 +138,7 @@ def test_processes_find_what_one_diagnosis_finds(tmp_path, cluster):
     outcomes = Outcomes(tmp_path / OUTCOMES)
     done = run_fleet(logs, outcomes, jobs=1, cluster=cluster)
     for one in done:
-        alone = diagnose_one(LogTask(one.log, one.key))
+        alone = {"key": one.key, **diagnose_one(one)}
         there = outcomes[one.key]
         there["reason"] = there.get("reason", "").rpartition("/")[2]
         alone["reason"] = alone.get("reason", "").rpartition("/")[2]

@@ -6,7 +6,7 @@ import pytest
 from tests.support.imu_flights import imu_flight, pose_removed
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
-from windwrench.identification.inertial_wrench import _smoothed_force
+from windwrench.identification.inertial_wrench import _two_sided
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.wrench_series import estimate_log, truth_rmse, tune_to_log
 from windwrench.runtime.errors import InputError
@@ -53,10 +53,10 @@ def test_the_force_is_the_posterior_of_a_walk() -> None:
     rng = np.random.default_rng(0)
     n, walk, variance = 400, 0.01, 1.0
     y = np.cumsum(np.sqrt(walk) * rng.standard_normal(n)) + rng.standard_normal(n)
-    found, std = _smoothed_force(y, walk, variance)
+    found, std = _two_sided(y[:, None], np.zeros((n, 1)), np.eye(1), np.diag([walk]), variance)
     between = np.diff(np.eye(n), axis=0)
     precision = np.eye(n) / variance + between.T @ between / walk
     covariance = np.linalg.inv(precision)
     inner = slice(150, 250)
-    np.testing.assert_allclose(found[inner], (covariance @ y / variance)[inner], atol=1e-5)
-    assert std == pytest.approx(np.sqrt(covariance[200, 200]), rel=1e-4)
+    np.testing.assert_allclose(found[inner, 0], (covariance @ y / variance)[inner], atol=1e-5)
+    assert std[0] == pytest.approx(np.sqrt(covariance[200, 200]), rel=1e-4)

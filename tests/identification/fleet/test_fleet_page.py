@@ -11,7 +11,6 @@ import pytest
 from tests.support.browser import look, needs_browser
 from windwrench.identification.fleet.drift import fleet_of
 from windwrench.identification.fleet.files import fleet_data, write_fleet
-from windwrench.identification.fleet.flight import LogTask
 from windwrench.identification.fleet.manifest import FleetLog
 from windwrench.identification.fleet.outcomes import Outcomes
 from windwrench.identification.fleet.page import change_in_words, changes, headline
@@ -186,7 +185,7 @@ def test_flights_are_in_the_order_of_times_else_of_names(tmp_path):
         outcomes.add(
             {"key": key, "status": "refused", "kind": "input", "reason": "?", "limit_s": 1}
         )
-        done.append(LogTask(FleetLog(name, name, "ardrone2", who, time=time), key))
+        done.append(FleetLog(name, name, "ardrone2", who, time=time, key=key))
     found = [(row["id"], row["flight"], row["log"]) for row in rows(done, outcomes)]
     assert found == [
         ("a", 1, "a2"),

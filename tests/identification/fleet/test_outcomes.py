@@ -5,7 +5,7 @@ import json
 import pytest
 
 from windwrench.dynamics import InputError
-from windwrench.identification.fleet.flight import LogTask, diagnose_one, key_of
+from windwrench.identification.fleet.flight import diagnose_one, key_of
 from windwrench.identification.fleet.manifest import FleetLog
 from windwrench.identification.fleet.outcomes import Outcomes
 
@@ -75,7 +75,7 @@ def test_an_error_of_any_kind_is_an_outcome(monkeypatch, error, kind):
         raise error
 
     monkeypatch.setattr("windwrench.identification.fleet.flight.read_log", fails)
-    found = diagnose_one(LogTask(FleetLog("a.csv", "a.csv"), A))
+    found = diagnose_one(FleetLog("a.csv", "a.csv"))
     assert (found["status"], found["kind"]) == ("refused", kind)
     assert "\n" not in found["reason"]
     assert kind != "error" or "ZeroDivisionError (test_outcomes.py" in found["reason"]
