@@ -1,4 +1,3 @@
-import gzip
 import sys
 import warnings
 
@@ -91,31 +90,11 @@ def change(rows, k, **fields):
 @pytest.mark.parametrize(
     ("name", "value", "expected"),
     [
-        ("px", "nan", "column px, row 4 .line 5. is empty or NaN; expected a finite number"),
         ("pz", "", "column pz, row 4 .line 5. is empty or NaN.*all seven pose columns"),
-        ("omega3", "inf", "column omega3, row 4 .line 5. is infinite; expected a finite number"),
         ("t", "-inf", "column t, row 4 .line 5. is infinite"),
-        ("t", "", "column t, row 4 .line 5. is empty or NaN"),
-        (
-            "qx",
-            "0.5",
-            "columns qw, qx, qy, qz, row 4 .line 5.: a quaternion of length 1.118; expected 1",
-        ),
         ("qw", "0", "columns qw, qx, qy, qz, row 4 .line 5.: a quaternion of length 0; expected 1"),
-        (
-            "t",
-            "0.010",
-            "column t, row 4 .line 5.: 0.01 s repeats the time 0.01 s .* strictly increasing",
-        ),
-        (
-            "t",
-            "0.009",
-            "column t, row 4 .line 5.: 0.009 s goes back from 0.01 s .* strictly increasing",
-        ),
-        ("omega1", "fast", "column omega1, row 4 .line 5.: 'fast' is not a number"),
         ("omega1", "1_0", "column omega1, row 4 .line 5.: '1_0' is not a number"),
         ("omega1", "0x10", "column omega1, row 4 .line 5.: '0x10' is not a number"),
-        ("omega4", "-376", "column omega4, row 4 .line 5.: -376 is negative; expected a rotor sp"),
     ],
 )
 def test_a_bad_number_is_named(path, rows, name, value, expected):
@@ -136,15 +115,6 @@ def test_a_missing_column_is_named(path, rows, name):
 @pytest.mark.parametrize(
     ("content", "expected"),
     [
-        (b"", "empty file; expected a header"),
-        (",".join(REQUIRED).encode() + b"\n", "no table of numbers in its first 1 line"),
-        (b"\xff\xfe\x00binary", "not a text file"),
-        (b"t\0px", "not a text file .it holds zero bytes"),
-        ((",".join(REQUIRED) + "\n1,2,3\n").encode(), "row 1 .line 2. has 3 field.s.; expected 12"),
-        (
-            (",".join(REQUIRED) + "\n0,0,0,1,1,0,0,0,9,9,9,9\n").encode(),
-            "only one row; expected at least two",
-        ),
         (
             (",".join(REQUIRED) + ",t\n" + "1," * 12 + "1\n").encode(),
             "column t stands there more than once",
@@ -159,40 +129,9 @@ def test_a_file_that_is_no_log_is_refused(path, content, expected):
         read_log(path)
 
 
-def test_unreadable_files_are_refused(tmp_path):
-    with pytest.raises(InputError, match=r"absent.csv: cannot be read as .*No such file"):
-        read_log(tmp_path / "absent.csv")
-    (tmp_path / "flight.xyz").write_text("t px\n")
-    with pytest.raises(
-        InputError, match=r"flight.xyz: unknown kind of file: .* a name that ends in \.csv"
-    ):
-        read_log(tmp_path / "flight.xyz")
-    (tmp_path / "flight.csv.gz").write_bytes(b"t,px\n")
-    with pytest.raises(InputError, match=r"flight.csv.gz: cannot be read"):
-        read_log(tmp_path / "flight.csv.gz")
-    (tmp_path / "cut.csv.gz").write_bytes(gzip.compress(b"t,px\n" * 100)[:-9])
-    with pytest.raises(InputError, match=r"cut.csv.gz: cannot be read"):
-        read_log(tmp_path / "cut.csv.gz")
-    (tmp_path / "flight.parquet").write_bytes(b"t,px\n")
-    with pytest.raises(InputError, match=r"flight.parquet: cannot be read as Parquet"):
-        read_log(tmp_path / "flight.parquet")
-
-
 def test_parquet_without_pyarrow_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(InputError, match=r"pip install 'windwrench\[parquet\]'"):
-        read_log(tmp_path / "flight.parquet")
-
-
-def test_parquet_columns_must_be_numbers(tmp_path):
-    pyarrow = pytest.importorskip(
-        "pyarrow", reason="pyarrow is not installed: pip install 'windwrench[parquet]'"
-    )
-    from pyarrow import parquet
-
-    columns = {name: [0.0, 1.0] if name != "px" else ["here", "there"] for name in REQUIRED}
-    parquet.write_table(pyarrow.table(columns), tmp_path / "flight.parquet")
-    with pytest.raises(InputError, match=r"column px cannot be read.*expected numbers"):
         read_log(tmp_path / "flight.parquet")
 
 
@@ -343,21 +282,7 @@ def test_a_failed_write_keeps_the_old_file(tmp_path, rows, path):
 
 # NanoBench
 
-NANOBENCH_COLUMNS = (
-    "t",
-    "px",
-    "py",
-    "pz",
-    "qx",
-    "qy",
-    "qz",
-    "qw",
-    "motor_motor_m1",
-    "motor_motor_m2",
-    "motor_motor_m3",
-    "motor_motor_m4",
-    "pwr_pm_vbat",
-)
+NANOBENCH_COLUMNS = ("t", *POSE, *(f"motor_motor_m{i}" for i in (1, 2, 3, 4)), "pwr_pm_vbat")
 
 
 def nanobench_rows(**fields):
@@ -366,37 +291,22 @@ def nanobench_rows(**fields):
 
 
 def test_nanobench_conventions(path):
-    half = np.sqrt(0.5)
-    write_text(
-        path,
-        nanobench_rows(qz=str(half), qw=str(half), motor_motor_m1="10000", motor_motor_m4="40000"),
-    )
-    vehicle = load_vehicle("crazyflie")
-    log = read_log(path, reader="nanobench", vehicle=vehicle)
+    half, vehicle = np.sqrt(0.5), load_vehicle("crazyflie")
+    commands = {"motor_motor_m1": "10000", "motor_motor_m4": "40000"}
+    turned = nanobench_rows(qz=str(half), qw=str(half), **commands)
+    log = read_log(write_text(path, turned), reader="nanobench", vehicle=vehicle)
     np.testing.assert_allclose(log.t, [0, 0.01, 0.02], atol=1e-6)
     np.testing.assert_allclose(log.quaternion[0], [half, 0, 0, half], atol=1e-15)
+    # m4 is front-left, our first rotor; m1 is front-right, our fourth; at the vehicle's reference
+    # voltage, whatever the battery's, which is passed on
+    full = vehicle.voltage_ref / 4.2 * np.array([4e4, 1e4])
     thrust = vehicle.k * log.rotor_speeds[0] ** 2
-    # m4 is front-left, our first rotor; m1 is front-right, our fourth
     np.testing.assert_allclose(thrust[[1, 2]], 0.0)
-    # at the vehicle's reference voltage, whatever the battery's, which is passed on
-    full = vehicle.voltage_ref / 4.2
-    assert thrust[0] == pytest.approx(
-        2.130295e-11 * (4e4 * full) ** 2 + 1.032633e-6 * 4e4 * full + 5.484560e-4
+    np.testing.assert_allclose(
+        thrust[[0, 3]], 2.130295e-11 * full**2 + 1.032633e-6 * full + 5.484560e-4
     )
-    assert thrust[3] == pytest.approx(
-        2.130295e-11 * (1e4 * full) ** 2 + 1.032633e-6 * 1e4 * full + 5.484560e-4
-    )
-    write_text(
-        path,
-        nanobench_rows(
-            qz=str(half),
-            qw=str(half),
-            motor_motor_m1="10000",
-            motor_motor_m4="40000",
-            pwr_pm_vbat="3.3",
-        ),
-    )
-    low = read_log(path, reader="nanobench", vehicle=vehicle)
+    low = nanobench_rows(**commands, pwr_pm_vbat="3.3")
+    low = read_log(write_text(path, low), reader="nanobench", vehicle=vehicle)
     np.testing.assert_array_equal(low.rotor_speeds, log.rotor_speeds)
     np.testing.assert_allclose(low.voltage, 3.3)
     assert log.commanded

@@ -80,52 +80,29 @@ def test_each_map_that_ships_is_a_map(name: str) -> None:
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        ({"tim": {}}, "unknown key 'tim'; expected one of .*Did you mean 'time'"),
-        (
-            {"time": {"column": "t", "unit": "h"}},
-            "map: time: unit: unknown unit 'h'; expected one of",
-        ),
         ({"time": {"unit": "s"}}, "map: time must have one column of the table, or rate_hz"),
-        (
-            {"position": {"columns": ["x", "y"]}},
-            r"position must have a list of 3 columns of the table, got \['x', 'y'\]",
-        ),
-        ({"position": None}, "no section position; expected position and attitude"),
         ({"attitude": {"columns": ["a", "b", "c"]}}, "attitude must have a list of 4 columns"),
-        (
-            {"rotors": {**GOOD["rotors"], "order": "px4"}},
-            "rotors: order: unknown rotor order",
-        ),
         ({"rotors": {**GOOD["rotors"], "order": [1, 2, 3, 3]}}, "rotors: order: .*numbers of the"),
         ({"rotors": {**GOOD["rotors"], "unit": "eRPM"}}, "eRPM without pole_pairs"),
-        (
-            {"rotors": {**GOOD["rotors"], "scale": 0}},
-            "rotors.scale must be a factor that is not zero, got 0",
-        ),
-        (
-            {"rotors": {**GOOD["rotors"], "signs": [1, 2, 1, 1]}},
-            "rotors.signs.entry 2 must be 1 or -1, got 2",
-        ),
-        ({"rotors": None}, "no motors; expected a section rotors or commands"),
-        (
-            {"extra": {"sent": {"columns": []}}},
-            "extra.sent must have some columns of the table, got",
-        ),
+        ({"rotors": {**GOOD["rotors"], "signs": [1, -1]}}, "signs of 4 times 1 or -1, got .1, -1"),
+        ({"extra": {"sent": {"columns": []}}}, "extra.sent must have some columns of the table"),
         ({"rows": "some"}, "rows must be mixed, whole, streams or messages, got 'some'"),
-        ({"world": "esu"}, "unknown world 'esu'; expected one of enu"),
         (
             {"gyro": {"columns": ["a", "b", "c"], "unit": "raw"}},
-            "gyro has unit raw without a scale",
+            "gyro has unit raw without a sc",
         ),
         (
-            {"commands": {"columns": list("abcd"), "unit": "us", "range": [1, 1]}},
-            "commands.range must be two numbers",
+            {"commands": {"columns": list("abcd"), "range": [1, 1]}},
+            "commands.range must be two",
         ),
+        ({"battery": {"columns": ["u", "v"]}}, "battery must have one column of the table"),
+        ({"position": [GOOD["position"], {"columns": ["x"]}]}, "position must have a list of 3"),
     ],
 )
 def test_a_map_that_is_none_says_what_was_expected(
     change: dict[str, object], expected: str
 ) -> None:
+    """What the golden lines of the command do not hold."""
     with pytest.raises(InputError, match=expected):
         parse_map({**GOOD, **change}, "map")
 

@@ -1,5 +1,6 @@
 """Text tables as people write them."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -53,12 +54,34 @@ def test_a_last_line_that_was_cut_off_is_left_out(tmp_path: Path) -> None:
     assert table.read(["y"])["y"].tolist() == [2.0, 3.0]
 
 
-def test_another_line_that_is_short_is_an_error_with_its_line(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("# c\nt;x;y\n0;1;2\n1;2\n2;3;4\n3;4;5\n", "row 2 (line 4) has 2 field(s); expected 3"),
+        ("t,x\n0,1\n\n1,2\n \n2,a\n3,4\n", "column x, row 3 (line 6): 'a' is not a number"),
+        ("t;x\n0,5;1,5\n1,5;1.5\n2,5;2,5\n", "column x, row 2 (line 3): '1.5' is not a number"),
+        ('t,x\n0,1\n1,"2"3\n2,3\n', "row 2 (line 3) has 0 field(s)"),
+        ("t,x,x\n0,1,2\n1,2,3\n", "column x stands there more than once"),
+    ],
+)
+def test_a_wrong_row_is_named_with_its_line(tmp_path: Path, text: str, expected: str) -> None:
     path = tmp_path / "a.csv"
-    path.write_text("# c\nt;x;y\n0;1;2\n1;2\n2;3;4\n3;4;5\n")
+    path.write_text(text)
     table = open_table(path)
-    with pytest.raises(InputError, match=r"row 2 \(line 4\) has 2 field\(s\); expected 3"):
-        table.read(["t"])
+    with pytest.raises(InputError, match=re.escape(expected)):
+        table.read(["t", "x"])
+
+
+def test_rows_with_few_numbers_at_the_start_are_rows(tmp_path: Path) -> None:
+    """A pose that comes late: the header is before all rows, not before the first that is full."""
+    path = tmp_path / "a.csv"
+    late = "".join(f"{k},,,,{k}\n" for k in range(20))
+    path.write_text("t,x,y,z,m\n" + late + "".join(f"{k},1,2,3,{k}\n" for k in range(20, 60)))
+    table = open_table(path)
+    assert (table.header, table.rows, table.notes) == (("t", "x", "y", "z", "m"), 60, ())
+    values = table.read(["m", "x"])
+    np.testing.assert_array_equal(values["m"], np.arange(60))
+    np.testing.assert_array_equal(np.isnan(values["x"]), np.arange(60) < 20)
 
 
 def test_decimal_commas_between_commas_are_refused(tmp_path: Path) -> None:
