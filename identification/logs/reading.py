@@ -69,7 +69,12 @@ def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
     check_magnitudes(log)
     if vehicle is None and log.vehicle in preset_names():
         vehicle = load_vehicle(log.vehicle)
-    return _with_doubts(log, vehicle)
+    doubts = unit_doubts(log, vehicle)
+    log, wrong = check_inertial(log, 9.81 if vehicle is None else vehicle.gravity)
+    doubts += wrong
+    for doubt in doubts:
+        warnings.warn(f"{log.source}: {doubt}", UserWarning, stacklevel=3)
+    return replace(log, notes=(*log.notes, *(f"warning: {doubt}" for doubt in doubts)))
 
 
 def missing_columns(table: Table) -> list[str]:
@@ -122,13 +127,3 @@ def _read(
         f"other columns is read with a map: windwrench check {path.name} --write-map map.yaml "
         "proposes one"
     )
-
-
-def _with_doubts(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
-    """Warn where numbers look as if they were in other units, and add the warnings to the notes."""
-    doubts = unit_doubts(log, vehicle)
-    log, wrong = check_inertial(log, 9.81 if vehicle is None else vehicle.gravity)
-    doubts += wrong
-    for doubt in doubts:
-        warnings.warn(f"{log.source}: {doubt}", UserWarning, stacklevel=4)
-    return replace(log, notes=(*log.notes, *(f"warning: {doubt}" for doubt in doubts)))
