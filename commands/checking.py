@@ -37,7 +37,7 @@ def check(
         raise InputError(
             f"--write-map {write_map}: {log} is read by {found.read_by} and needs no map"
         )
-    written, said = [], []
+    written, said = [], ""
     if write is not None:
         said = _write(found.log, log, write)
         written.append(write)
@@ -79,13 +79,13 @@ def check(
             console.print(text)
     for text in found.doubts:
         note(f"warning: {text.removeprefix('warning: ')}")
-    for text in said:
-        note(text)
+    if said:
+        note(said)
     say(*written)
     return found.as_dict()
 
 
-def _write(flight: "FlightLog", log: Path, path: Path) -> list[str]:
+def _write(flight: "FlightLog", log: Path, path: Path) -> str:
     """Write a flight in the kit's own format; return what is to be said of it."""
     import numpy as np
 
@@ -93,11 +93,11 @@ def _write(flight: "FlightLog", log: Path, path: Path) -> list[str]:
 
     if path.exists() and path.samefile(log):
         raise InputError(f"--write {path}: is the log itself; expected another file")
-    said = []
+    said = ""
     if flight.commanded and flight.command is not None:
         # what a command makes is the vehicle's to say each time the log is read
         flight = replace(flight, rotor_speeds=np.full_like(flight.rotor_speeds, np.nan))
-        said.append("the motor commands are written, and not the rotor speeds that follow them")
+        said = "the motor commands are written, and not the rotor speeds that follow them"
     with working("writing"):
         write_log(flight, path)
     return said

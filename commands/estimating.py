@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from .flight_logs import log_notes, read_flights
-from .terminal import console, gate_of, note, results_folder, say, show_table, working
+from .terminal import console, film_kinds, gate_of, note, results_folder, say, show_table, working
 
 
 def estimate(
@@ -38,7 +38,6 @@ def estimate(
         tuning_note_of,
         write_wrench,
     )
-    from .filming import film_kinds
     from .log_film import draw_film, shown_rows
 
     level = gate_of(gate)
@@ -82,12 +81,11 @@ def estimate(
         (("force", series.force, "N"), ("torque", series.torque, "Nm"))
     ):
         measures = {"mean": values.mean(axis=0), "std": values.std(axis=0)}
-        table += [(f"{name}, mean ({unit})", *(f"{v:+.4g}" for v in measures["mean"]))]
-        table += [(f"{name}, std ({unit})", *(f"{v:.4g}" for v in measures["std"]))]
         if truth is not None:
-            measures["rmse_to_truth"] = truth[i]
-            table += [(f"{name}, RMSE to truth ({unit})", *(f"{v:.4g}" for v in truth[i]))]
-        result |= {f"{name}_{measure}_{unit}": value for measure, value in measures.items()}
+            measures["RMSE to truth"] = truth[i]
+        for measure, value in measures.items():
+            table.append((f"{name}, {measure} ({unit})", *(f"{v:+.4g}" for v in value)))
+            result[f"{name}_{measure.lower().replace(' ', '_')}_{unit}"] = value
     show_table(("", "x", "y", "z"), table)
     say(*written)
     return result

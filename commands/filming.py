@@ -12,7 +12,6 @@ from ..envs.captions import Caption, with_caption
 from ..envs.drawing import SCALES
 from ..envs.video import FPS, Film, save_picture
 from ..envs.wind_drawing import WIND_SCALES
-from ..runtime.errors import InputError
 
 SIZE = 960, 540  # pixels
 
@@ -55,20 +54,6 @@ def caption_of(
         viewer.pixels_per_metre(loop.position),
         SCALES if wind is None else WIND_SCALES,
     )
-
-
-def film_kinds(view: bool, video: bool, gif: bool, gif_option: str) -> list[str]:
-    """Return the kinds of films that are wanted, ``mp4`` and ``gif``.
-
-    Raises:
-        InputError: beside a window.
-    """
-    kinds = [kind for kind, wanted in (("mp4", video), ("gif", gif)) if wanted]
-    if view and kinds:
-        raise InputError(
-            f"--view shows the flight in a window; expected it without --video and {gif_option}"
-        )
-    return kinds
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from .terminal import console, results_folder, run, say, show_table, working
+from .terminal import console, film_kinds, results_folder, run, say, show_table, working
 
 
 def fly(
@@ -33,7 +33,7 @@ def fly(
     from ..evaluation.episodes import fly_episode, loop_of, time_series
     from ..evaluation.pictures import draw_episode
     from ..evaluation.tasks import make_pilot, short_names, task_of
-    from .filming import SIZE, Tally, caption_of, film_kinds, films, written
+    from .filming import SIZE, Tally, caption_of, films, written
 
     kinds = film_kinds(view, video, gif, "--gif")
     effects = [parse_setting(e) for e in effect or []]

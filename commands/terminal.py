@@ -98,6 +98,20 @@ def gate_of(gate: float | None) -> float | None:
     return gate or None
 
 
+def film_kinds(view: bool, video: bool, gif: bool, gif_option: str) -> list[str]:
+    """Return the kinds of films that are wanted, ``mp4`` and ``gif``.
+
+    Raises:
+        InputError: beside a window.
+    """
+    kinds = [kind for kind, wanted in (("mp4", video), ("gif", gif)) if wanted]
+    if view and kinds:
+        raise InputError(
+            f"--view shows the flight in a window; expected it without --video and {gif_option}"
+        )
+    return kinds
+
+
 def results_folder(out: Path, **plan: object) -> Path:
     """Make the results' folder, before the work starts, so that no result is lost for want of it.
 
