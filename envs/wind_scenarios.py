@@ -1,7 +1,7 @@
 """The scenarios of the tasks in the wind, as data, and the winds that are drawn from them."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,18 +55,20 @@ class WindScenario:
     variation: WindVariation = WindVariation()
 
 
+_BASE = WindScenario(
+    "Dryden's turbulence in 1-2.5 m/s, and a wall of fans of up to 4.5 m/s that switch",
+    mean=(1.0, 2.5),
+    turbulence="dryden",
+    wall=(1.5, 4.5),
+)
+
 WIND_SCENARIOS: dict[str, WindScenario] = {
     "calm": WindScenario("still air; only the actuators disturb"),
     "turbulent": WindScenario(
         "a mean wind of 3-5 m/s with Dryden's turbulence", mean=(3.0, 5.0), turbulence="dryden"
     ),
     "fan-wall": WindScenario("a wall of fans of up to 6 m/s that switch", wall=(2.0, 6.0)),
-    "base": WindScenario(
-        "Dryden's turbulence in 1-2.5 m/s, and a wall of fans of up to 4.5 m/s that switch",
-        mean=(1.0, 2.5),
-        turbulence="dryden",
-        wall=(1.5, 4.5),
-    ),
+    "base": _BASE,
     "gusts": WindScenario(
         "von Karman's turbulence in 2-3 m/s, and gusts of 2-3.5 m/s",
         mean=(2.0, 3.0),
@@ -74,21 +76,13 @@ WIND_SCENARIOS: dict[str, WindScenario] = {
         gusts=(2.0, 3.5),
     ),
     "wash": WindScenario("the wash of a vehicle that crosses above", wash=True),
-    "noisy": WindScenario(
-        "base, with a pose noise of 0.01 m and 0.05 rad",
-        mean=(1.0, 2.5),
-        turbulence="dryden",
-        wall=(1.5, 4.5),
+    "noisy": replace(
+        _BASE,
+        summary="base, with a pose noise of 0.01 m and 0.05 rad",
         sigma_position=0.01,
         sigma_attitude=0.05,
     ),
-    "varied": WindScenario(
-        "base, with the vehicle drawn anew",
-        mean=(1.0, 2.5),
-        turbulence="dryden",
-        wall=(1.5, 4.5),
-        varied=True,
-    ),
+    "varied": replace(_BASE, summary="base, with the vehicle drawn anew", varied=True),
 }
 
 HEIGHT = 1.5  # m, of the vehicle

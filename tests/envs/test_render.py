@@ -32,10 +32,15 @@ pytestmark = pytest.mark.skipif(
     reason="neither libEGL nor libOSMesa is installed: apt-get install libegl1 libgl1-mesa-dri",
 )
 
-# one process draws all: it is told neither of a display nor how to draw
+# One process draws all, and is told neither of a display nor how to draw. Gymnasium's checker must
+# not even warn.
 DRAWN = """
+import warnings
 from pathlib import Path
+import gymnasium as gym
 import numpy as np
+from gymnasium.utils.env_checker import check_env
+import windwrench
 from windwrench.envs import FanTrackingEnv, Scenario
 from windwrench.envs.video import Film
 still = Scenario("still", motions=("still",), offset=(0.3, 0.3))
@@ -69,6 +74,8 @@ for kind in KINDS:
     except KeyError:
         pass
 env.close()
+warnings.simplefilter("error")
+check_env(gym.make("windwrench/FanTracking-v0", render_mode="rgb_array").unwrapped)
 import mujoco  # after the kit, which tells MuJoCo how to draw
 def broken(*arguments):
     raise RuntimeError("no display")
