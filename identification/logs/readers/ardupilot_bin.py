@@ -209,7 +209,7 @@ def _telemetry(
         one = messages.where(which == slot)
         if len(one.rows) < 2 or not np.any(one.column("RPM") > 0.0):
             return [], ["ESC telemetry: not of all four motors, or without rpm; left out"]
-        each.append(Stream("ESC", _times(one), one.columns(("RPM",))).forward()[0])
+        each.append(Stream("ESC", _times(one), one.column("RPM")[:, None]).forward()[0])
     t = each[0].t
     columns = {f"RPM {motor}": stream.at(t)[:, 0] for motor, stream in enumerate(each, 1)}
     poles = parameters.get("SERVO_BLH_POLES", 14.0)

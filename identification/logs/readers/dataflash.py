@@ -70,10 +70,6 @@ class Messages:
         with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
             return np.asarray(self.rows[name].astype(np.float64) * self.units[name])
 
-    def columns(self, names: Collection[str]) -> Array:
-        """Return columns (N, len(names))."""
-        return np.column_stack([self.column(name) for name in names])
-
     def where(self, mask: NDArray[np.bool_]) -> "Messages":
         """Return the messages of a mask (N,)."""
         return Messages(self.name, self.rows[mask], self.units)

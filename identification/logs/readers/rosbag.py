@@ -51,7 +51,7 @@ from ..mapped_log import map_recording
 from .ros_messages import definitions, stamp
 from .topic_choice import chosen_topics
 from .topic_map import Topic, joined, topic_map
-from .unpacking import check_bag_files, limited_unpacking, refuse_packed_files
+from .unpacking import check_bag_files, limited_unpacking
 
 SUFFIXES = (".bag", ".db3", ".mcap")
 _ROS1 = b"#ROSBAG V2.0"
@@ -168,7 +168,6 @@ def _opened(path: Path) -> Iterator[_Bag]:
         check_regular(path, "a ROS 1 bag")
     else:
         check_bag_files(path)
-        refuse_packed_files(path)
     limits = ExitStack()
     reader: Any = None
     try:

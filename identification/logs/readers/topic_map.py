@@ -4,7 +4,7 @@ part; and the sections of a log map that follow from it.
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
@@ -44,8 +44,19 @@ KEYS = {  # what may be said of a part
 }
 _FRAMES = ("flu", "ned")
 _LARGEST_COMMAND = 1e5
-_POSITION, _ATTITUDE = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
-_FORCE, _RATE = ("ax", "ay", "az"), ("gx", "gy", "gz")
+_SECTIONS: Mapping[str, Mapping[str, Columns]] = {  # of a log map, that a part fills
+    "pose": {
+        "position": Position(("x", "y", "z"), "m"),
+        "attitude": Attitude(("qw", "qx", "qy", "qz")),
+    },
+    "rotors": {"rotors": Rotors(())},
+    "command": {"commands": Commands(())},
+    "voltage": {"battery": Battery(("voltage",), "V")},
+    "imu": {
+        "accelerometer": Sensor(("ax", "ay", "az"), "m/s2"),
+        "gyro": Sensor(("gx", "gy", "gz"), "rad/s"),
+    },
+}
 
 
 def _elements(value: Any) -> tuple[int, ...]:
@@ -160,29 +171,21 @@ class Topic:
     @cached_property
     def log_map(self) -> LogMap:
         """What the columns of its messages mean."""
-        is_ned = self.frame == "ned" and self.part in ("pose", "imu")
-        world, body = ("ned", "frd") if is_ned else ("enu", "flu")
-        parts: dict[str, Columns] = {}
-        if self.part == "pose":
-            parts["position"] = Position(_POSITION, "m", topic=self.name)
-            parts["attitude"] = Attitude(_ATTITUDE, topic=self.name, of=(self.name,))
-        elif self.part == "imu":
-            parts["accelerometer"] = Sensor(_FORCE, "m/s2", topic=self.name, body=body)
-            parts["gyro"] = Sensor(_RATE, "rad/s", topic=self.name, body=body)
-        elif self.part == "voltage":
-            parts["battery"] = Battery(("voltage",), "V", topic=self.name)
-        else:
+        world, body = ("ned", "frd") if self.frame == "ned" else ("enu", "flu")
+        stated: dict[str, Any] = {"topic": self.name}
+        if self.part == "imu":
+            stated["body"] = body
+        elif self.part in UNITS:
             picked = sorted(self.elements)
-            names = tuple(f"{self.part} {element}" for element in picked)
-            a, b, c, d = (picked.index(element) + 1 for element in self.elements)
-            order = (a, b, c, d)
-            if self.part == "rotors":
-                parts["rotors"] = Rotors(names, self.unit, topic=self.name, order=order)
-            else:
-                parts["commands"] = Commands(
-                    names, self.unit, topic=self.name, order=order, range=self.range
-                )
-        return LogMap(TimeColumn("stamp", "ns"), world, body, rows="messages", **parts)  # type: ignore[arg-type]
+            stated["columns"] = tuple(f"{self.part} {element}" for element in picked)
+            stated["order"] = tuple(picked.index(element) + 1 for element in self.elements)
+            stated["unit"] = self.unit
+        if self.part == "command":
+            stated["range"] = self.range
+        parts: dict[str, Any] = {
+            name: replace(part, **stated) for name, part in _SECTIONS[self.part].items()
+        }
+        return LogMap(TimeColumn("stamp", "ns"), world, body, rows="messages", **parts)
 
     @cached_property
     def columns(self) -> tuple[str, ...]:
@@ -213,13 +216,7 @@ class Topic:
 
 
 def joined(topics: Mapping[str, Topic]) -> LogMap:
-    """Return the map of several topics, by their parts, each with its own columns."""
+    """Return the map of several topics, by their parts, in the frames of the pose."""
     parts = {name: way for topic in topics.values() for name, way in topic.log_map.sections.items()}
-    pose = topics["pose"].log_map if "pose" in topics else LogMap(TimeColumn())
-    return LogMap(
-        TimeColumn(),
-        pose.world,
-        pose.body,
-        rows="messages",
-        **parts,  # type: ignore[arg-type]
-    )
+    first = topics.get("pose") or next(iter(topics.values()))
+    return replace(first.log_map, **parts)  # type: ignore[arg-type]

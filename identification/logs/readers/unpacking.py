@@ -20,7 +20,7 @@ _METADATA = 1_000_000  # bytes
 _TABLES = 100  # a bag has four or five
 _COMPUTED = re.compile(r"\bAS\s*\(|\bVIRTUAL\b", re.IGNORECASE)
 _LISTED = re.compile(r"^\s*-\s*['\"]?(.+\.(?:db3|mcap))['\"]?\s*$", re.MULTILINE)
-_WHOLE = re.compile(rb"compression_mode:\s*['\"]?(file|message)", re.IGNORECASE)
+_WHOLE = re.compile(r"compression_mode:\s*['\"]?(file|message)", re.IGNORECASE)
 
 
 def _at_most(make: Callable[[], Any], spent: list[int]) -> Callable[..., bytes]:
@@ -85,23 +85,28 @@ def check_bag_files(path: Path) -> None:
     """Check the files of a ROS 2 bag, a file or a folder, before a library opens them by name.
 
     Raises:
-        InputError: one is no regular file, or a database that computes what it holds.
+        InputError: one is no regular file, or a database that computes what it holds; or the files
+            or messages are packed one by one, so that what they unpack to cannot be limited.
     """
-    if not os.path.isdir(path):
-        check_regular(path, "a ROS 2 bag")
-        files = [path]
-    else:
-        files = [file for file in path.iterdir() if not file.is_dir()]
-        metadata = path / "metadata.yaml"
-        if metadata in files:
-            check_regular(metadata, "the metadata of a ROS 2 bag", _METADATA)
-            text = metadata.read_bytes().decode("utf-8", "replace")
-            files += [path / name for name in _LISTED.findall(text) if (path / name).exists()]
-        for file in files:
-            check_regular(file, "a file of a ROS 2 bag")
+    is_folder = os.path.isdir(path)
+    folder = path if is_folder else path.parent
+    metadata = folder / "metadata.yaml"
+    files = [file for file in folder.iterdir() if not file.is_dir()] if is_folder else [path]
+    text = ""
+    if metadata.exists():
+        check_regular(metadata, "the metadata of a ROS 2 bag", _METADATA)
+        text = metadata.read_bytes().decode("utf-8", "replace")
+    if is_folder:
+        files += [path / name for name in _LISTED.findall(text) if (path / name).exists()]
     for file in files:
+        check_regular(file, "a file of a ROS 2 bag")
         if file.suffix.lower() == ".db3":
             _check_database(file)
+    if found := _WHOLE.search(text):
+        raise InputError(
+            f"{metadata}: compression_mode {found.group(1).lower()}: expected a bag that is not "
+            "packed, or by chunks (MCAP); `ros2 bag convert` makes one"
+        )
 
 
 def _check_database(path: Path) -> None:
@@ -121,25 +126,3 @@ def _check_database(path: Path) -> None:
                 f"{path}: its {kind} {name!r} is computed; expected a ROS 2 bag, whose tables hold "
                 f"what was recorded"
             )
-
-
-def refuse_packed_files(path: Path) -> None:
-    """Refuse a ROS 2 bag whose files or messages are packed one by one: what they unpack to cannot
-    be limited.
-
-    Raises:
-        InputError: it is one.
-    """
-    metadata = path / "metadata.yaml" if os.path.isdir(path) else path.with_name("metadata.yaml")
-    try:
-        with metadata.open("rb") as file:
-            found = _WHOLE.search(file.read(_METADATA))
-    except OSError:
-        return  # the reader says what is missing
-    if found:
-        mode = found.group(1).decode().lower()
-        raise InputError(
-            f"{metadata}: compression_mode {mode}: expected a bag that is not packed, or by chunks "
-            f"(MCAP); "
-            "`ros2 bag convert` makes one"
-        )
