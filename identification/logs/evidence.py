@@ -414,12 +414,6 @@ class Ranking:
         """How well the best reading explains the flight."""
         return self.ranked[0][1]
 
-    @property
-    def alike(self) -> list[Reading]:
-        """The best reading, and those that explain the flight hardly less."""
-        least = self.fit.score - EVIDENCE.certain
-        return [reading for reading, fit in self.ranked if fit.score >= least]
-
     def other(self, name: str) -> tuple[object, float]:
         """Return the next best value of a property, and the log-likelihood ratio of the best over
         that value (0 where the flight tells nothing, infinite where there is no other value).
@@ -445,4 +439,5 @@ def departures(evidence: Evidence) -> list[Reading]:
         left, most = ranking.fit.horizontal, EVIDENCE.good
     if best is DECLARED or left > most:
         return []
-    return [reading for reading in ranking.alike if reading is not DECLARED]
+    least = ranking.fit.score - EVIDENCE.certain
+    return [r for r, fit in ranking.ranked if fit.score >= least and r is not DECLARED]

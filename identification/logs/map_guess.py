@@ -98,16 +98,6 @@ class Guess:
         return tuple(reason for reason in self.reasons if not reason.certain)
 
 
-# a part of the table, and the field of the map that names its columns
-_COLUMN_FIELDS = {
-    "position": ("position", "columns"),
-    "quaternion": ("attitude", "order"),
-    "angles": ("attitude", "columns"),
-    "accelerometer": ("accelerometer", "columns"),
-    "gyro": ("gyro", "columns"),
-}
-
-
 def guess_map(table: Table, vehicle: Vehicle | None = None, name: str = "guess") -> Guess:
     """Return a guessed map of a table.
 
@@ -131,12 +121,8 @@ def guess_map(table: Table, vehicle: Vehicle | None = None, name: str = "guess")
         found.motors("motors")
         found.motors("commands")
         found.battery()
-    wanted = found.data
-    return Guess(
-        LogMap(**found.sections, name=name),
-        tuple(found.reasons),
-        tuple(column for column in table.header if column not in wanted),
-    )
+    unused = tuple(column for column in table.header if column not in found.data)
+    return Guess(LogMap(**found.sections, name=name), tuple(found.reasons), unused)
 
 
 def _time_column(table: Table, names: list[Name]) -> Name:
@@ -209,10 +195,8 @@ class _Guessing:
         self.table, self.vehicle = table, vehicle
         self.clock = _time_column(table, names)
         self.parts, rivals = _groups([n for n in names if n.column != self.clock.column])
-        has_pose = "position" in self.parts and bool({"quaternion", "angles"} & set(self.parts))
-        for part in ("angles",) if has_pose else ("position", "quaternion", "angles"):
-            if not has_pose or "quaternion" in self.parts:
-                self.parts.pop(part, None)
+        if not {"position", "attitude"} <= set(self.parts):
+            self.parts = {k: v for k, v in self.parts.items() if k not in ("position", "attitude")}
         _check_enough(table, self.parts)
         wanted = [self.clock.column, *(c for g in self.parts.values() for c in g.columns)]
         self.data = table.read(list(dict.fromkeys(wanted)))
@@ -223,11 +207,12 @@ class _Guessing:
         self.sections: dict[str, Any] = {}
         self.reasons: list[Reason] = []
         self.ranking: Ranking | None = None  # of the pose
-        for part, (section, name) in _COLUMN_FIELDS.items():
+        for part in ("position", "attitude", "accelerometer", "gyro"):
             if part in self.parts and rivals[part] > 1:
-                first = self.parts[part].columns[0]
-                why = f"{rivals[part]} groups of columns look like it; taken: {first} ..."
-                self.say(section, name, False, why)
+                columns = self.parts[part].columns
+                field = "order" if len(columns) == 4 else "columns"
+                why = f"{rivals[part]} groups of columns look like it; taken: {columns[0]} ..."
+                self.say(part, field, False, why)
 
     def say(self, section: str, name: str, certain: bool, why: str) -> None:
         """Keep why a field is what it is."""
@@ -275,9 +260,12 @@ class _Guessing:
 
     def pose(self) -> None:
         """Find frames, units, order and sense of the pose."""
-        place = self.parts["position"]
-        kind = "quaternion" if "quaternion" in self.parts else "angles"
-        group, attitude = self.parts[kind], self.values[kind]
+        place, group, attitude = (
+            self.parts["position"],
+            self.parts["attitude"],
+            self.values["attitude"],
+        )
+        is_quaternion = len(group.columns) == 4
         units: tuple[str, ...] = ("deg", "rad")
         if group.unit in units:
             units = (group.unit,)
@@ -285,7 +273,7 @@ class _Guessing:
             units = ("deg",)
         orders = ("wxyz", "xyzw") if group.numbered else ("wxyz",)
         readings = table_readings(
-            orders if kind == "quaternion" else (),
+            orders if is_quaternion else (),
             units,
             lengths=(place.unit,) if place.unit in LENGTH_UNITS else ("m", "cm", "mm"),
             hint="ned" if re.search("ned|down", "".join(place.columns).lower()) else "",
@@ -297,7 +285,7 @@ class _Guessing:
         self.unit("position", place.unit, LENGTH_UNITS, lambda: self.by_motion("length"))
         told = [("world", "", "world"), ("body", "", "body"), ("attitude", "sense", "sense")]
         made = Attitude(group.columns, order=best.order, sense=best.sense)
-        if kind == "angles":
+        if not is_quaternion:
             signs = (1, best.pitch_sign, 1) if best.pitch_sign < 0 else ()
             made = replace(made, unit=best.unit, euler=best.euler, signs=signs)
             beyond = best.unit, True, "angles beyond pi"
@@ -375,8 +363,7 @@ class _Guessing:
     def gyro_by_pose(self, values: Array, units: Sequence[str]) -> tuple[str, _Choice]:
         """Return a gyro's body axes and unit, whether they are sure, and why."""
         assert self.ranking is not None
-        attitude = self.values["quaternion" if "quaternion" in self.parts else "angles"]
-        good, rotation = rotations(attitude, self.ranking.best)
+        good, rotation = rotations(self.values["attitude"], self.ranking.best)
         times = self.t[good]
         seen = np.isfinite(times)
         ways = list(product(units, BODY_AXES))
@@ -427,8 +414,8 @@ class _Guessing:
             evidence = Evidence(self.t, np.square(values), gyro=rates)
         elif self.ranking is not None and self.turning_known:
             best = self.ranking.best
-            attitude = self.values["quaternion" if "quaternion" in self.parts else "angles"]
-            evidence = Evidence(self.t, np.square(values), self.values["position"], attitude)
+            pose = self.values["position"], self.values["attitude"]
+            evidence = Evidence(self.t, np.square(values), *pose)
         if evidence is None or not evidence.enough:
             return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
         ways = [replace(best, rotors=(a, b, c, d)) for a, b, c, d in permutations(ROTORS)]

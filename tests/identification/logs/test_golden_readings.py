@@ -46,7 +46,7 @@ def test_a_measured_file_raises_the_doubts_that_it_raised(case):
 @pytest.mark.parametrize("case", cases("hostile"))
 def test_a_flight_in_another_convention_is_named(case):
     def by_kind(said, use):
-        return {k: v for v, kinds in said.get(use, said.get("both")).items() for k in kinds}
+        return {kind: told for told, kinds in said[use].items() for kind in kinds}
 
     said = found(case)
     for use in ("diagnosis", "estimate"):
