@@ -74,7 +74,7 @@ class Session:
         self._tell, self._flush = tell, flush
         self._stop = threading.Event()
         self._first = self._last = time.monotonic_ns()  # of messages
-        self._begin_t: float | None = None
+        self._begun = 0.0  # s, stream's time of the first estimate
         self._unrecorded: list[Row] = []
         self._fresh: list[int] = []  # ns, arrivals whose estimates are being told
         self.output: Output | None = None
@@ -173,6 +173,8 @@ class Session:
             self._unrecorded.clear()
 
     def _out(self, output: Output) -> None:
+        if not self.estimates:
+            self._begun = output.t
         self.estimates += 1
         self.output = output
         try:
@@ -183,10 +185,8 @@ class Session:
         self._tell(output)
         if not self._recent or output.t - self._recent[-1].t >= 1.0 / _VIEWED - 1e-6:
             self._recent.append(output)
-        if self._begin_t is None:
-            self._begin_t = output.t
         seconds = self._settings.seconds
-        if seconds is not None and output.t - self._begin_t >= seconds - 1e-9:
+        if seconds is not None and output.t - self._begun >= seconds - 1e-9:
             self.ended = f"{seconds:g} s have passed"
             self._stop.set()
 
@@ -201,13 +201,6 @@ class Session:
         else:
             found = f"{came} came, which is no estimate yet"
         return InputError(f"{self.source.name}: {found} {when}; expected {self.source.expected()}")
-
-    @property
-    def seconds(self) -> float:
-        """How long the stream has run, s of its own time."""
-        if self.output is None or self._begin_t is None:
-            return 0.0
-        return self.output.t - self._begin_t
 
     def snapshot(self) -> Snapshot:
         """Return what there is to show, from any thread."""
@@ -225,7 +218,7 @@ class Session:
             estimates=self.estimates,
             restarts=self.filter.restarts,
             recorded=0 if self.recorder is None else self.recorder.rows,
-            seconds=self.seconds,
+            seconds=0.0 if self.output is None else self.output.t - self._begun,
         )
 
 

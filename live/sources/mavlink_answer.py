@@ -30,7 +30,7 @@ class WrenchSender:
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
-        self._wind = Wind(vehicle)
+        self._vehicle = vehicle
         self._due_plot = 0  # ns
 
     def send(self, mav: Any, output: Output) -> None:
@@ -53,7 +53,7 @@ class WrenchSender:
         for name, values in (("force", force), ("torque", torque)):
             for axis, value in zip("ned", values, strict=True):
                 mav.named_value_float_send(milliseconds, f"{name}_{axis}".encode(), float(value))
-        wind = self._wind.of(output)
+        wind = wind_of(self._vehicle, output)
         if wind is not None:
             velocity, std = wind[0] * HALF_TURN, wind[1]
             horizontal = float(math.hypot(std[0], std[1]) / math.sqrt(2.0))
@@ -68,32 +68,23 @@ class WrenchSender:
             )
 
 
-class Wind:
-    """From a wrench to a wind.
-
-    Args:
-        vehicle: that may declare ``rotor_drag``.
+def wind_of(vehicle: Vehicle, output: Output) -> tuple[Array, Array] | None:
+    """Return the wind (3,) in m/s, world, and its standard deviation (3,), of which the vertical
+    ones are zero: none is assumed; None where the vehicle declares no ``rotor_drag``.
     """
-
-    def __init__(self, vehicle: Vehicle) -> None:
-        given = next((e.coefficients for e in vehicle.effects if e.name == "rotor_drag"), {})
-        self._drag = np.array([given.get("kdx", 0.0), given.get("kdy", 0.0), 0.0])
-
-    def of(self, output: Output) -> tuple[Array, Array] | None:
-        """Return the wind (3,) in m/s, world, and its standard deviation (3,), of which the
-        vertical ones are zero: none is assumed; None where the vehicle declares no drag.
-        """
-        if not np.all(self._drag[:2] > 0.0):
-            return None
-        R = matrix_of(output.estimate.quaternion)
-        total = float(np.sum(output.row.rotor_speeds))
-        drag = (total * (R * self._drag) @ R.T)[:2, :2]
-        level = total * float(np.min(self._drag[:2]))
-        if not level > 0.0 or float(np.linalg.eigvalsh(drag)[0]) < _TILTED * level:
-            return None
-        inverse = np.linalg.inv(drag)
-        wind, std = np.zeros(3), np.zeros(3)
-        wind[:2] = inverse @ output.estimate.force[:2]
-        covariance = inverse @ output.estimate.covariance[15:17, 15:17] @ inverse.T
-        std[:2] = np.sqrt(np.diagonal(covariance))
-        return wind, std
+    given = next((e.coefficients for e in vehicle.effects if e.name == "rotor_drag"), {})
+    still = np.array([given.get("kdx", 0.0), given.get("kdy", 0.0), 0.0])
+    if not np.all(still[:2] > 0.0):
+        return None
+    R = matrix_of(output.estimate.quaternion)
+    total = float(np.sum(output.row.rotor_speeds))
+    drag = (total * (R * still) @ R.T)[:2, :2]
+    level = total * float(np.min(still[:2]))
+    if not level > 0.0 or float(np.linalg.eigvalsh(drag)[0]) < _TILTED * level:
+        return None
+    inverse = np.linalg.inv(drag)
+    wind, std = np.zeros(3), np.zeros(3)
+    wind[:2] = inverse @ output.estimate.force[:2]
+    covariance = inverse @ output.estimate.covariance[15:17, 15:17] @ inverse.T
+    std[:2] = np.sqrt(np.diagonal(covariance))
+    return wind, std

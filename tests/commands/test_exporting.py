@@ -56,11 +56,3 @@ def test_declared_effects_are_in_it_or_refused(call, tmp_path):
     )
     assert code == 0
     assert json.loads(out)["result"]["effects"] == []
-
-
-def test_the_tracker_comes_with_its_particles(call, tmp_path):
-    code, _, _ = call(
-        "export-c", "--vehicle", "ardrone2", "--policy", "tracker", "--out", tmp_path / "x"
-    )
-    assert code == 0
-    assert "ww_policy" in (tmp_path / "x" / "windwrench_filter.c").read_text()
