@@ -323,6 +323,14 @@ class Diagnosis:
     ranking: Ranking | None = None
     probabilities: Probabilities | None = None
 
+    @property
+    def held_out_by_log(self) -> dict[str, list[tuple[float, float]]]:
+        """The held-out segments, from and to (s), of each log that has some."""
+        blocks: dict[str, list[tuple[float, float]]] = {}
+        for log, start, end in self.held_out_segments:
+            blocks.setdefault(log, []).append((start, end))
+        return blocks
+
     def __repr__(self) -> str:
         names = ", ".join(e.name + (" (tentative)" if e.tentative else "") for e in self.effects)
         return (

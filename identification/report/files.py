@@ -72,10 +72,7 @@ def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
         },
     }
     if len(diagnosis.logs) + len(diagnosis.test_logs) > 1:
-        by_log: dict[str, list[list[float]]] = {}
-        for log, start, end in diagnosis.held_out_segments:
-            by_log.setdefault(log, []).append([start, end])
-        error["held_out_by_log"] = by_log
+        error["held_out_by_log"] = diagnosis.held_out_by_log
     stated = diagnosis.probabilities or Probabilities({}, (), math.nan)
     data: dict[str, Any] = {
         "verdict": diagnosis.verdict,

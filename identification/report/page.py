@@ -43,7 +43,6 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
         table=error_table(diagnosis),
         missing=words.MISSING,
         alike=[words.confusion(e) for e in diagnosis.effects if e.indistinguishable_from],
-        held_out=_held_out(diagnosis),
         plots=plots,
         bars=bars,
         more_candidates=[c for c in diagnosis.candidates if c.name not in shown],
@@ -107,11 +106,3 @@ def error_table(diagnosis: Diagnosis) -> list[dict[str, str]]:
         least = (least if unit else "6") if told and math.isfinite(floor) else ""
         table.append({"what": what, "unit": unit, "before": old, "after": new, "floor": least})
     return table
-
-
-def _held_out(diagnosis: Diagnosis) -> list[str]:
-    """Return a line a log with the blocks that were held out of it."""
-    lines: dict[str, list[str]] = {}
-    for log, start, end in diagnosis.held_out_segments:
-        lines.setdefault(log, []).append(f"{start:.1f}–{end:.1f}")
-    return [f"{log}: {', '.join(blocks)} s" for log, blocks in lines.items()]

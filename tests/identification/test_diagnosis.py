@@ -215,12 +215,6 @@ CASES = {
         where=r"resonant mode at (0\.|1 Hz)",
         without=("slung_payload",),
     ),
-    # air that rises in one place: in all of the flight it is worth too little for a name
-    "a thermal": Case(
-        drawn("outsider", ("thermal_column",), "small", None, 1782317122, 60.0),
-        **UNEXPLAINED,
-        remainder="random",
-    ),
     # a sixtieth of the weight, to and fro, under the noise of the pose: the residual is at the
     # floor, and yet not calm
     "a force in the noise": Case(
@@ -237,11 +231,6 @@ CASES = {
         ),
         **UNEXPLAINED,
         remainder="random",
-    ),
-    # a hull's drag far above the centre of mass is two effects' in good part; the third is faint
-    "names are sure together or not at all": Case(
-        held_back("high_hull", "small", 2838459735, 60.0),
-        dict.fromkeys(("flapping_moment", "inflow_thrust", "rotor_drag"), True),
     ),
 }
 
