@@ -38,6 +38,8 @@ class Viewer:
     """
 
     _close = True  # a wide picture shows as much from side to side as one of 4:3
+    _scales = SCALES
+    _trail = 0  # pictures back that the path is shown for; 0: all
 
     def __init__(self, mode: str, width: int = 640, height: int = 480) -> None:
         if mode == "human":
@@ -101,17 +103,25 @@ class Viewer:
                 "install Debian's libegl1 or libosmesa6"
             ) from error
 
-    def draw(self, loop: ClosedLoop, fan_y: float) -> NDArray[np.uint8] | None:
-        """Draw the loop as it is now; return the picture (height, width, 3) unless it went to a
-        window.
+    def draw(self, loop: ClosedLoop, scenery: Any) -> NDArray[np.uint8] | None:
+        """Draw the loop as it is now, in a ``scenery``: where the fan is along y, m; return the
+        picture (height, width, 3) unless it went to a window.
         """
         self.open_world(loop.model, loop.data)
         self.begin_frame(loop)
-        fan = loop.record[0]["fan"]
-        loop.data.mocap_pos[0] = (0.0, fan_y, float(fan["height"]) or 1.2)
+        self._drift(loop, scenery)
         mujoco.mj_kinematics(loop.model, loop.data)
-        self._drift(loop, fan_y)
-        return self.show(loop.data, lambda scene: self._mark(scene, loop, fan_y), "chase")
+
+        def mark(scene: Any) -> None:
+            self._mark(scene, loop, scenery)
+            at = loop.position
+            add_shadow(scene, at, 0.22)
+            add_path(scene, self._path[-self._trail :])
+            true, seen = loop.external, loop.state
+            add_wrench(scene, at, true[:3], true[5], self._scales, 0.22, true=True)
+            add_wrench(scene, at, seen[16:19], seen[15], self._scales, 0.22)
+
+        return self.show(loop.data, mark, "chase")
 
     def begin_frame(self, loop: ClosedLoop) -> None:
         """Wait for the loop's time where a window shows it, and remember where the vehicle is."""
@@ -160,8 +170,9 @@ class Viewer:
             else self._renderer is not None
         )
 
-    def _drift(self, loop: ClosedLoop, fan_y: float) -> None:
-        """Carry the tracers with the mean wind for one frame."""
+    def _drift(self, loop: ClosedLoop, scenery: Any) -> None:
+        """Place the fan, and carry the tracers with the mean wind for one frame."""
+        loop.data.mocap_pos[0] = (0.0, scenery, float(loop.record[0]["fan"]["height"]) or 1.2)
         axial, radial = loop.jet_table
         fan = loop.record["fan"][0:1].copy()
         fan["y"] = 0.0
@@ -173,24 +184,13 @@ class Viewer:
         gone = self._tracers[:, 0] > 3.6
         self._tracers[gone] = self._new_tracers(int(gone.sum()))
 
-    def _mark(self, scene: Any, loop: ClosedLoop, fan_y: float) -> None:
-        """Add tracers and arrows to a scene."""
+    def _mark(self, scene: Any, loop: ClosedLoop, scenery: Any) -> None:
+        """Add the tracers to a scene."""
         height = float(loop.record[0]["fan"]["height"])
-        if float(loop.record[0]["fan"]["speed"]) > 0:
-            for tracer in self._tracers:
-                fade = 0.55 * (1.0 - tracer[0] / 3.8)
-                add_shape(
-                    scene,
-                    mujoco.mjtGeom.mjGEOM_SPHERE,
-                    np.full(3, 0.014),
-                    tracer + np.array([0.0, fan_y, height]),
-                    np.array([0.25, 0.55, 0.95, fade]),
-                )
-        at = loop.position
-        add_shadow(scene, at, 0.22)
-        add_path(scene, self._path)
-        add_wrench(scene, at, loop.external[:3], loop.external[5], SCALES, 0.22, true=True)
-        add_wrench(scene, at, loop.state[16:19], loop.state[15], SCALES, 0.22)
+        for tracer in self._tracers if float(loop.record[0]["fan"]["speed"]) > 0 else ():
+            colour = np.array([0.25, 0.55, 0.95, 0.55 * (1.0 - tracer[0] / 3.8)])
+            at = tracer + np.array([0.0, scenery, height])
+            add_shape(scene, mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, 0.014), at, colour)
 
     def close(self) -> None:
         """Close the window or free the renderer."""

@@ -271,13 +271,9 @@ class Task(gym.Env[Frame, Frame], ABC):
 
         return Viewer(self.render_mode or "", self.width, self.height)
 
-    def _picture(self) -> NDArray[np.uint8] | None:
-        """Draw the world as it is now."""
-        loop = self.loop
-        picture: NDArray[np.uint8] | None = self.viewer.draw(
-            loop, float(loop.record["fan"]["y"][0])
-        )
-        return picture
+    def _scenery(self) -> Any:
+        """Return what the viewer draws beside the loop: where the fan is along y, m."""
+        return float(self.loop.record["fan"]["y"][0])
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture (height, width, 3) of vehicle, wind and wrench, or show it in a window.
@@ -292,7 +288,8 @@ class Task(gym.Env[Frame, Frame], ABC):
             )
         if self.viewer is None:
             self.viewer = self._make_viewer()
-        return self._picture()
+        picture: NDArray[np.uint8] | None = self.viewer.draw(self.loop, self._scenery())
+        return picture
 
     def close(self) -> None:
         """Close the window, if there is one."""

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..controllers.flight import FlightGains
 from ..controllers.wind_observation import (
@@ -23,7 +22,7 @@ from .closed_loop import ClosedLoop
 from .fan import STATIONS, Fan
 from .plant import TICK
 from .task import EPISODE_SECONDS, LOST_OFFSET, SETTLE_TICKS, Frame, Task, keep_within
-from .wind import FanWall, Sum, Wind
+from .wind import Sum, Wind
 from .wind_scenarios import HEIGHT, START, WIND_SCENARIOS, draw_reference, draw_winds
 
 WIND_DECISION_TICKS = 8  # 25 Hz
@@ -265,12 +264,8 @@ class WindHoverEnv(Task):
 
         return WindViewer(self.render_mode or "", self.width, self.height)
 
-    def _picture(self) -> NDArray[np.uint8] | None:
-        walls = [wind for wind in self.blowing if isinstance(wind, FanWall)]
-        picture: NDArray[np.uint8] | None = self.viewer.draw_winds(
-            self.loop, self.blowing, walls, self._row()[:3], self.loop.time
-        )
-        return picture
+    def _scenery(self) -> Any:
+        return self.blowing, self._row()[:3], self.loop.time
 
 
 class WindTrajectoryEnv(WindHoverEnv):
