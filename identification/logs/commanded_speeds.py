@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 # dips high thrusts alone would remain, whose mean is above the weight
 _DIP = 1.0
 _SATURATED = 0.9995  # of the full command
-_SPECIFIC_FORCE = 6.0, 16.0  # m/s2: a flight's median is within; outside its unit is another
+_SPECIFIC_FORCE = 6.0, 16.0  # m/s2: the median of most flights; outside a unit may be another
 
 
 def with_commanded_speeds(
@@ -150,12 +150,13 @@ def _words(model: Commands) -> str:
 
 def _felt(log: FlightLog) -> Array | None:
     """Return the accelerometer's readings (N,) in m/s2 along the rotors' axis, NaN where there is
-    none; None where it has none, or has another unit by its size.
+    none; None where it has none, or a pose is there and its size is not usual in flight.
     """
     if log.accelerometer is None:
         return None
     size = float(np.nanmedian(np.linalg.norm(log.accelerometer, axis=1)))
-    return log.accelerometer[:, 2] if _SPECIFIC_FORCE[0] <= size <= _SPECIFIC_FORCE[1] else None
+    is_usual = _SPECIFIC_FORCE[0] <= size <= _SPECIFIC_FORCE[1]
+    return log.accelerometer[:, 2] if is_usual or not log.has_pose else None
 
 
 def _scale_by_weight(log: FlightLog, total: Array, vehicle: Vehicle) -> float | None:

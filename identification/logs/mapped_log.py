@@ -29,7 +29,6 @@ from .tables import open_table
 _IMU = ("accelerometer", "gyro")
 _ATTITUDE_GAP = 0.1  # s, across which an attitude is not interpolated
 _OUTSIDE = 0.5  # share of commands beyond their range from which on the range is wrong
-_SPECIFIC_FORCE = 6.0, 16.0  # m/s2: a flight's median is within; outside a scale is wrong
 
 
 def read_mapped(
@@ -68,10 +67,7 @@ def map_table(
     samples, rows, words = rows_of(table, columns, log_map)
     log_map, _ = chosen([samples], log_map)
     notes += [*words, *check_rows(table, samples, rows, log_map)]
-    log = map_recording(table.path, [samples], log_map, vehicle, reader, notes)
-    if not (reader or log_map.is_own):
-        log = replace(log, notes=(*log.notes, *_scale_doubts(log)))
-    return log
+    return channels_of_recording(table.path, [samples], log_map, reader, notes).log(vehicle)
 
 
 @dataclass(frozen=True)
@@ -113,20 +109,6 @@ def _flown(vehicle: Vehicle | None, log_map: LogMap) -> Vehicle | None:
     if vehicle is None and log_map.vehicle in preset_names():
         return load_vehicle(log_map.vehicle)
     return vehicle
-
-
-def map_recording(
-    path: Path,
-    recorded: Sequence[Samples],
-    log_map: LogMap,
-    vehicle: Vehicle | None,
-    reader: str,
-    notes: Sequence[str],
-) -> FlightLog:
-    """Return the flight log that a map makes of columns whose groups have a clock each; arguments
-    and errors as of ``channels_of_recording`` and ``Recording.log``.
-    """
-    return channels_of_recording(path, recorded, log_map, reader, notes).log(vehicle)
 
 
 def channels_of_recording(
@@ -325,15 +307,3 @@ def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream
 def _order_note(order: tuple[int, int, int, int]) -> str:
     names = order_names(order)
     return f"{order_words(order)}{f' ({names[0]})' if names else ''}"
-
-
-def _scale_doubts(log: FlightLog) -> tuple[str, ...]:
-    if log.accelerometer is None:
-        return ()
-    size = float(np.nanmedian(np.linalg.norm(log.accelerometer, axis=1)))
-    if _SPECIFIC_FORCE[0] <= size <= _SPECIFIC_FORCE[1]:
-        return ()
-    return (
-        f"warning: the accelerometer's median size is {size:.3g} m/s2; expected about 9.8 "
-        "in flight: check its unit and scale in the map",
-    )

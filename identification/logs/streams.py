@@ -176,8 +176,8 @@ def flight_log(
         )
     t, pose, words = _rows(path, made.get("position"), motors, [*sensors.values()])
     notes += words
-    between = ~np.isin(t, motors.t)
-    steps = np.diff(motors.t)[np.searchsorted(motors.t, t[between]) - 1]
+    after = np.searchsorted(motors.t, t)  # rows lie within the motors' span
+    steps = np.diff(motors.t)[after[motors.t[after] != t] - 1]
     if (longest := float(steps.max(initial=0.0))) > _ROTOR_GAP:
         notes += (
             f"{motors.name}: up to {longest:.2g} s between messages; the {_MOTORS[of_motors[0]]} "

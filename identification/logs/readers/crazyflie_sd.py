@@ -12,8 +12,7 @@ The map ``cflib`` says what the variables become.
 
 import struct
 import zlib
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -27,24 +26,17 @@ from ....runtime.regular_files import read_bytes
 from ..channels import Samples
 from ..flight_log import FlightLog
 from ..log_map import load_map
-from ..mapped_log import map_recording
+from ..mapped_log import channels_of_recording
 
 BEGINS = (b"\xbc\x01\x00", b"\xbc\x02\x00")
+
+Layout = np.dtype[Any]  # of one event: its number, time and variables
 
 _WHAT = "a Crazyflie's SD-card log"
 _TYPES = frozenset("bBhHiIqQefd")
 _TEXT = 200  # bytes of a name
 _RUN = 4096  # events looked at together
 _TIMES = {1: ("<u4", 1e-3), 2: ("<u8", 1e-6)}  # of a version: type, and s per unit
-
-
-@dataclass(frozen=True)
-class _Kind:
-    """A type of event: its name and the layout of one."""
-
-    name: str
-    layout: np.dtype[Any]
-    variables: tuple[str, ...]
 
 
 def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
@@ -64,19 +56,19 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
             "are left); what stands before was used"
         )
     events: list[Samples] = []
-    for number, kind in kinds.items():
-        rows = found.get(number)
-        if rows is None or len(rows) < 2:
+    for rows in found:
+        if len(rows) < 2:
             continue
         t = _TIMES[version][1] * rows["time"].astype(np.float64)
         with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
-            columns = {name: rows[name].astype(np.float64) for name in kind.variables}
+            columns = {name: rows[name].astype(np.float64) for name in (rows.dtype.names or ())[2:]}
         events.append(Samples(t, columns))
     if not events:
         raise InputError(f"{path}: no event twice; expected at least two samples")
     first = min(float(samples.t[0]) for samples in events)
     notes.append(f"times: the vehicle's clock, which stood at {first:.6g} s at the first event")
-    return map_recording(path, events, load_map("cflib"), vehicle, "crazyflie_sd", tuple(notes))
+    recording = channels_of_recording(path, events, load_map("cflib"), "crazyflie_sd", notes)
+    return recording.log(vehicle)
 
 
 def _whole(data: bytes, end: int) -> bool:
@@ -88,8 +80,8 @@ def _whole(data: bytes, end: int) -> bool:
     return len(data) - end == 4 and zlib.crc32(data[:end]) == int.from_bytes(data[end:], "little")
 
 
-def _header(path: Path, data: bytes) -> tuple[int, dict[int, _Kind], int]:
-    """Return the version, the types of events by number, and where the events begin.
+def _header(path: Path, data: bytes) -> tuple[int, dict[int, Layout], int]:
+    """Return the version, the layouts of the types of events by number, and where the events begin.
 
     Raises:
         InputError: the header is cut or says something else.
@@ -121,7 +113,7 @@ def _header(path: Path, data: bytes) -> tuple[int, dict[int, _Kind], int]:
             f"expected bc and the version 1 or 2"
         )
     version, count = struct.unpack_from("<HH", data, 1)
-    kinds: dict[int, _Kind] = {}
+    kinds: dict[int, Layout] = {}
     for _ in range(count):
         number, name = word(), text()
         fields: list[tuple[str, str]] = []
@@ -143,44 +135,34 @@ def _header(path: Path, data: bytes) -> tuple[int, dict[int, _Kind], int]:
                 f"{path}: event {name[:60]!r}: a number or a variable stands there twice; "
                 "expected each once"
             )
-        layout = np.dtype([("event", "<u2"), ("time", _TIMES[version][0]), *fields])
-        kinds[number] = _Kind(name, layout, tuple(names))
+        kinds[number] = np.dtype([("event", "<u2"), ("time", _TIMES[version][0]), *fields])
     return version, kinds, place
 
 
 def _events(
-    path: Path, data: bytes, kinds: Mapping[int, _Kind], begin: int
-) -> tuple[dict[int, NDArray[Any]], int]:
+    path: Path, data: bytes, kinds: Mapping[int, Layout], begin: int
+) -> tuple[list[NDArray[Any]], int]:
     """Return the events of each type, and the place of the first byte that is none."""
-    pieces: dict[int, list[NDArray[Any]]] = {}
-    end, count, numbers = begin, 0, 0
-    for number, rows, after in _runs(data, kinds, begin):
-        pieces.setdefault(number, []).append(rows)
-        end, count = after, count + len(rows)
-        numbers += len(rows) * len(kinds[number].variables)
+    runs: dict[int, list[NDArray[Any]]] = {number: [] for number in kinds}
+    place, count, numbers = begin, 0, 0
+    while place + 2 <= len(data):
+        number = data[place] | data[place + 1] << 8
+        if number not in kinds:
+            break
+        layout = kinds[number]
+        whole = min((len(data) - place) // layout.itemsize, _RUN)
+        rows = np.frombuffer(data, layout, whole, place)
+        other = np.flatnonzero(rows["event"] != number)
+        rows = rows[: other[0]] if other.size else rows
+        if not len(rows):
+            break
+        runs[number].append(rows)
+        place += len(rows) * layout.itemsize
+        count += len(rows)
+        numbers += len(rows) * len((layout.names or ())[2:])
         if count > LIMITS.table_rows or numbers > LIMITS.table_numbers:
             raise InputError(
                 f"{path}: more than {LIMITS.table_rows} events or {LIMITS.table_numbers} numbers; "
                 "expected one flight"
             )
-    return {number: np.concatenate(rows) for number, rows in pieces.items()}, end
-
-
-def _runs(
-    data: bytes, kinds: Mapping[int, _Kind], begin: int
-) -> Iterator[tuple[int, NDArray[Any], int]]:
-    """Yield runs of events of one type, each with its number and the place where it ends."""
-    place = begin
-    while place + 2 <= len(data):
-        number = data[place] | data[place + 1] << 8
-        kind = kinds.get(number)
-        if kind is None:
-            return
-        whole = min((len(data) - place) // kind.layout.itemsize, _RUN)
-        rows = np.frombuffer(data, kind.layout, whole, place)
-        other = np.flatnonzero(rows["event"] != number)
-        rows = rows[: other[0]] if other.size else rows
-        if not len(rows):
-            return
-        place += len(rows) * kind.layout.itemsize
-        yield number, rows, place
+    return [np.concatenate(rows) for rows in runs.values() if rows], place

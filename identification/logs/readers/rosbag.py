@@ -47,7 +47,7 @@ from ....runtime.file_limits import LIMITS
 from ....runtime.regular_files import check_regular, open_regular
 from ..channels import Array, Samples
 from ..flight_log import FlightLog
-from ..mapped_log import map_recording
+from ..mapped_log import channels_of_recording
 from .ros_messages import definitions, stamp
 from .topic_choice import chosen_topics
 from .topic_map import Topic, joined, topic_map
@@ -104,7 +104,8 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
         )
         for part, topic in topics.items()
     ]
-    return map_recording(path, recorded, joined(topics), vehicle, "rosbag", (*notes, *doubts))
+    found = channels_of_recording(path, recorded, joined(topics), "rosbag", (*notes, *doubts))
+    return found.log(vehicle)
 
 
 def _notes(topic: Topic, kind: str) -> Iterator[str]:
