@@ -45,18 +45,23 @@ def load_imu(f: np.void, tuning: UKFTuning, gate: float | None) -> None:
         ("prior", tuning.gyro_bias_std, tuning.accelerometer_bias_std),
     ):
         imu[where][:3], imu[where][3:] = np.square(gyro), np.square(accelerometer)
+    imu["bound"][:3], imu["bound"][3:] = tuning.gyro_bias_bound, tuning.accelerometer_bias_bound
     imu["gate"] = _FARTHEST
     if gate is not None:
         from scipy.stats import chi2
 
         imu["gate"] = chi2.ppf(gate, (3, 6, 3 * (AGREEING - 1)))
-    _forget(f)
+    forget_biases(f)
 
 
 @compiled
-def _forget(f: Record) -> None:
+def forget_biases(f: Record) -> None:
+    """Give the biases their prior, and forget the step before: what its rotors did is unknown.
+
+    So do a start, and a restart at a pose: the poses that it contradicts have gone into the biases.
+    """
     imu = f.imu
-    imu.known, imu.refused, imu.in_row = 0, 0, 0
+    imu.known, imu.in_row = 0, 0
     imu.doubt[:] = -1.0
     imu.mean[:], imu.rest[:], imu.regression[:] = 0.0, 0.0, 0.0
     # a bias is in its sensor from the first sample on; the noise of a step, from the first step on
@@ -68,8 +73,9 @@ def _forget(f: Record) -> None:
 
 @compiled
 def reset_imu(record: Record) -> None:
-    """Give the biases their prior, and forget the step before: what its rotors did is unknown."""
-    _forget(record[0])
+    """Start without an inertial measurement."""
+    forget_biases(record[0])
+    record[0].imu.refused = 0
 
 
 @compiled
@@ -80,23 +86,18 @@ def begin_imu(record: Record) -> None:
     since; else an accelerometer says something from the next step on.
     """
     f = record[0]
-    _forget(f)
+    reset_imu(record)
     f.imu.used = 1
     if f.time > 0.0 and math.isnan(f.x[NIS]):
         carry_companions(f, f.rotors[STEP], np.zeros((N, BIASES)))
 
 
 @compiled
-def restart_biases(f: Record) -> None:
-    """Keep the biases with their covariance, independent of pose, twist and wrench: an error before
-    a restart at a new pose says nothing of the errors after it.
-    """
+def bound_biases(f: Record) -> None:
+    """Keep the biases within what a sensor of their class can have."""
     imu = f.imu
-    imu.rest[:], imu.regression[:], imu.mean[BIASES:] = 0.0, 0.0, 0.0
-    imu.rest[:BIASES, :BIASES] = imu.bias_covariance
-    for i in range(BIASES, COMPANIONS):
-        imu.rest[i, i] = 1.0
-    imu.known = 0
+    for i in range(BIASES):
+        imu.mean[i] = min(max(imu.mean[i], -imu.bound[i]), imu.bound[i])
 
 
 @compiled
@@ -212,6 +213,7 @@ def correct_companions(f: Record, before: Array) -> None:
     imu, error = f.imu, np.empty(N)
     error_from(f.x, before, error)
     imu.mean[:] += imu.regression.T @ error
+    bound_biases(f)
     biases = np.ascontiguousarray(imu.regression[:, :BIASES])
     imu.bias_covariance[:] = imu.rest[:BIASES, :BIASES] + biases.T @ (f.P @ biases)
 

@@ -29,6 +29,7 @@ IMU = np.dtype(
         ("doubt", "f8", (2,)),  # s for which a sensor was refused; negative: it was not
         ("prior", "f8", (BIASES,)),  # variances
         ("walk", "f8", (BIASES,)),  # likewise, a period
+        ("bound", "f8", (BIASES,)),  # largest bias of a sensor of its class
         ("mean", "f8", (COMPANIONS,)),
         ("regression", "f8", (N, COMPANIONS)),  # on the error state
         ("rest", "f8", (COMPANIONS, COMPANIONS)),  # covariance of what that leaves
@@ -46,10 +47,13 @@ FILTER = np.dtype(
         ("restarts", "f8"),  # since the reset
         ("P", "f8", (N, N)),
         # gaps, refusals and restarts: estimator.recovery
-        ("gap", "f8", (3,)),  # s since a position, an attitude was believed, and one was refused
+        # s since a position, an attitude was believed, and since each was refused
+        ("gap", "f8", (4,)),
         ("seen", "f8", (7,)),  # position and quaternion that were believed last
         ("doubted", "f8", (7,)),  # and those refused last
         ("refused", "f8"),  # measurements in a row
+        ("stride", "f8", (2,)),  # s between the last two positions, attitudes refused; 0: not two
+        ("pace", "f8", (6,)),  # motion of (rho, x) over that time, per second
         ("lasting", "f8"),  # s for which those refused have agreed with each other
         ("in_row", "f8"),  # of those refused: how many went on from each other, up to the last
         # of (rho, x): what those from one to the next add up to, and what these may miss by
@@ -59,6 +63,7 @@ FILTER = np.dtype(
         ("alarm", "f8", (2,)),  # largest NIS taken in unseen: of three numbers, of six
         ("restart_at", "f8"),  # NIS beyond which no linear correction is made
         ("patience", "f8"),  # s
+        ("give_up", "f8"),  # s
         ("prior", "f8", (N,)),  # variances of what nothing is known of
         ("reason", "f8", (6,)),  # squares of torque and force beyond which none is believed
         ("lost", "f8", (N,)),  # variances beyond which what is not measured is given up

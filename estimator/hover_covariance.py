@@ -76,7 +76,8 @@ def turn_world(f: Record, sample: Array, w: float, z: float) -> None:
     """
     cosine, sine = w * w - z * z, 2.0 * w * z
     x, seen, doubted = f.x, f.seen, f.doubted
-    for v in (x[0:3], x[7:10], x[13:16], x[16:19], sample[4:7], seen[0:3], doubted[0:3]):
+    poses, moved = (sample[4:7], seen[0:3], doubted[0:3]), (f.pace[0:3], f.pace[3:6])
+    for v in (x[0:3], x[7:10], x[13:16], x[16:19], *poses, *moved):
         v[0], v[1] = cosine * v[0] - sine * v[1], sine * v[0] + cosine * v[1]
     for q in (x[3:7], sample[7:11], seen[3:7], doubted[3:7]):
         q[0], q[3] = w * q[0] - z * q[3], w * q[3] + z * q[0]

@@ -20,7 +20,7 @@ from ..dynamics.model import apply_effects
 from ..dynamics.motion import accelerations
 from ..dynamics.rotation import quaternion_to_matrix
 from ..runtime.compiled import Record, compiled
-from .bias_states import cross_covariance, restore_bias_prior, split
+from .bias_states import bound_biases, cross_covariance, restore_bias_prior, split
 from .covariance import divide, root_of
 from .error_state import displace, fold, symmetrise
 from .estimate import NIS, Array
@@ -194,4 +194,5 @@ def _correct(
     move = (V.T @ y)[:, 0]
     for i in range(COMPANIONS):
         imu.mean[i] += move[i]
+    bound_biases(f)
     split(f, covariances, joint)

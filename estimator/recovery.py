@@ -11,8 +11,12 @@ A Kalman filter's model knows none of four events. Each breaks something else:
   blur also exceeds a vehicle's motion by a little.
 * A *push* is harder than the random walk of the wrench expects. The pose is far from the
   expectation, yet goes on from the pose before. The filter takes the pose in, gate or not.
-* A *jump for good* is an outlier whose successors all agree with it. The filter restarts there
-  after ``Recovery.patience``, without a gate at once.
+* A *jump for good* is an outlier whose successors all agree with each other. The filter restarts
+  there after ``Recovery.patience``, without a gate at once. Poses that do not even agree with each
+  other restart it after ``Recovery.give_up``, known no better than they disagree.
+
+Whether refused poses agree is asked of the poses alone. A filter that took in a wrong attitude has
+a velocity that runs away, and by that velocity two poses at one spot would not agree.
 
 A restart sets pose and twist anew with a prior's covariance. Force and torque keep their estimates,
 with variances so wide that there may be no wrench at all. A wrench that the model took for
@@ -49,6 +53,7 @@ class Recovery:
     Attributes:
         patience: s, after which refused poses in a row that agree with each other are believed;
             longer than the bursts of motion capture (0.1 to 0.5 s)
+        give_up: s, after which refused poses are believed even though they do not agree.
         jump_at: standard deviations of an innovation beyond which a filter without a gate asks
             whether the pose jumped; a consistent filter never sees them.
         restart_at: standard deviations beyond which the filter restarts instead of following a
@@ -67,6 +72,7 @@ class Recovery:
     """
 
     patience: float = 0.6
+    give_up: float = 1.5
     jump_at: float = 10.0
     restart_at: float = 100.0
     attitude_std: float = 0.4
@@ -96,7 +102,7 @@ def load_recovery(record: np.void, vehicle: Vehicle, gate: float | None, given: 
     jump_at = given.jump_at**2
     record["alarm"] = jump_at if gate is None else [largest_nis(gate, dof) for dof in (3, 6)]
     record["restart_at"] = given.restart_at**2
-    record["patience"] = given.patience
+    record["patience"], record["give_up"] = given.patience, given.give_up
     torque = given.torque_std * weight * vehicle.arm_l
     # attitudes do not tell a rate from one that is faster by a turn from each to the next: sigma
     # points that lie further out than half a turn would find such rates, and torques that make them
@@ -139,7 +145,7 @@ def after_prediction(f: Record, dt: float) -> None:
     """
     x, P, gap = f.x, f.P, f.gap
     f.status = COASTING
-    for i in range(3):
+    for i in range(4):
         gap[i] += dt
     # over a gap variances grow without an end; at 16 times the prior's they have long lost their
     # meaning
@@ -260,18 +266,25 @@ def judge(
     aliased = with_attitude & turns_between(f)
     contradicted = alarming & (going_on & ((nis > f.restart_at) | aliased))
     if f.gated > 0:
-        lasting = choose(f.in_row > 1.5, f.lasting + gap[2], 0.0)
+        lasting = choose(f.in_row > 1.5, f.lasting + min(gap[2], gap[3]), 0.0)
         f.lasting = choose(refused > 0.5, lasting, f.lasting)
+        position_doubted = (refused > 0.5) & with_position
+        attitude_doubted = (refused > 0.5) & with_attitude
         for i in range(3):
-            f.doubted[i] = choose((refused > 0.5) & with_position, position[i], f.doubted[i])
+            f.doubted[i] = choose(position_doubted, position[i], f.doubted[i])
         for i in range(4):
-            f.doubted[3 + i] = choose(
-                (refused > 0.5) & with_attitude, quaternion[i], f.doubted[3 + i]
-            )
-        gap[2] = choose(refused > 0.5, 0.0, gap[2])
-        contradicted = contradicted | ((refused > 0.5) & (f.lasting > f.patience))
+            f.doubted[3 + i] = choose(attitude_doubted, quaternion[i], f.doubted[3 + i])
+        gap[2] = choose(position_doubted, 0.0, gap[2])
+        gap[3] = choose(attitude_doubted, 0.0, gap[3])
+        waited = choose(with_position, gap[0], gap[1])
+        at_odds = (refused > 0.5) & (waited > f.give_up)
+        contradicted = contradicted | at_odds | ((refused > 0.5) & (f.lasting > f.patience))
+        for i in range(6):
+            f.mean[12 + i] = choose(at_odds, f.mean[12 + i], 0.0)
     else:
         contradicted = contradicted | (refused > 0.5)
+        for i in range(6):
+            f.mean[12 + i] = 0.0
     refused = choose(contradicted, 0.0, refused)
     restarted = taken & (lost | contradicted)
     f.refused = choose(refused > 0.5, f.refused + 1.0, f.refused)
@@ -312,21 +325,20 @@ def _returned(
     taken, first = with_position | with_attitude, f.refused < 0.5
     for i in range(7):
         f.doubted[i] = choose(first, f.seen[i], f.doubted[i])
-    for i in range(6):
-        for k in range(2):
+    for k in range(2):
+        gap[2 + k] = choose(first, gap[k], gap[2 + k])
+        f.stride[k] = choose(first, 0.0, f.stride[k])
+        for i in range(6):
             jumps[k, i] = choose(first, 0.0, jumps[k, i])
-    follows = continues(
-        f,
-        position,
-        quaternion,
-        f.doubted,
-        choose(first, gap[0], gap[2]),
-        choose(first, gap[1], gap[2]),
-        with_position,
-        with_attitude,
-    )
-    in_row = choose(first, 1.0, choose(follows, f.in_row + 1.0, 1.0))
+    agreed = _agrees(f, position, quaternion, with_position, with_attitude)
+    in_row = choose(first, 1.0, choose(agreed, f.in_row + 1.0, 1.0))
     f.in_row = choose(taken, in_row, f.in_row)
+    for k in range(2):
+        known = choose(first, 0.0, choose(agreed, gap[2 + k], 0.0))
+        f.stride[k] = choose(with_position if k == 0 else with_attitude, known, f.stride[k])
+    follows = continues(
+        f, position, quaternion, f.doubted, gap[2], gap[3], with_position, with_attitude
+    )
     jumped = choose(follows, 0.0, 1.0) > 0.5
     for i in range(6):
         counts = jumped & (with_attitude if i < 3 else with_position)
@@ -350,6 +362,43 @@ def _returned(
     likely = choose(alarming, 0.0, 1.0) > 0.5
     back: bool = (f.refused > 0.5) & over & (sure & (likely | reachable))
     return back
+
+
+@compiled
+def _agrees(
+    f: Record, position: Array, quaternion: Array, with_position: bool, with_attitude: bool
+) -> bool:
+    """Return whether a pose goes on from the poses that were refused before it, whatever the filter
+    believes of the vehicle's motion.
+
+    Two poses lie no farther apart than a vehicle gets at six times the prior's deviation of its
+    speed. A third goes on with the motion from the first to the second, give or take six deviations
+    of the three measurements and a push. Leaves that motion, per second, in ``f.pace``, and in the
+    last third of ``f.mean`` by how much the pose misses.
+    """
+    moved, pace, noise = f.mean[12:18], f.pace, f.noise
+    attitude_error(quaternion, f.doubted[3:7], moved[0:3])
+    apart = choose(with_position, 0.0, 0.0)
+    for i in range(6):
+        if i < 3:
+            measured, k, lever = with_attitude, 1, 0.25  # an MRP is a quarter of an angle
+        else:
+            measured, k, lever = with_position, 0, 1.0
+            moved[i] = position[i - 3] - f.doubted[i - 3]
+        age, stride = f.gap[2 + k], f.stride[k]
+        has_pace = stride > 0.0
+        ratio = age / max(stride, 1e-9)
+        variances = choose(has_pace, 1.0 + (1.0 + ratio) * (1.0 + ratio) + ratio * ratio, 2.0)
+        fastest = 6.0 * math.sqrt(f.prior[3 + i if i < 3 else 6 + i])
+        pushed = 0.5 * (stride + age) * f.push[1 - k]
+        reach = lever * age * choose(has_pace, pushed, fastest)
+        slack = 6.0 * math.sqrt(variances * noise[i]) + reach
+        miss = moved[i] - choose(has_pace, age * pace[i], 0.0)
+        apart += choose(measured & (miss * miss > slack * slack), 1.0, 0.0)
+        pace[i] = choose(measured, moved[i] / max(age, 1e-9), pace[i])
+        moved[i] = miss
+    near: bool = apart < 0.5
+    return near
 
 
 @compiled
@@ -414,16 +463,20 @@ def _restart(
     at_position: bool,
     at_attitude: bool,
 ) -> None:
-    """Start pose and twist anew at what was measured, and doubt the wrench."""
-    x, P, prior = f.x, f.P, f.prior
+    """Start pose and twist anew at what was measured, and doubt the wrench. The last third of
+    ``f.mean`` is by how much poses disagree with each other.
+    """
+    x, P, prior, miss = f.x, f.P, f.prior, f.mean[12:18]
     restarted = at_position | at_attitude
     aliased = at_attitude & turns_between(f)
     _forget(f, at_position, at_attitude)
     for i in range(4):
         x[3 + i] = choose(at_attitude, quaternion[i], x[3 + i])
     for i in range(3):
-        P[i, i] = choose(at_attitude, f.noise[i], P[i, i])
-        P[6 + i, 6 + i] = choose(at_position, f.noise[3 + i], P[6 + i, 6 + i])
+        variance = min(f.noise[i] + miss[i] * miss[i], prior[i])
+        P[i, i] = choose(at_attitude, variance, P[i, i])
+        variance = min(f.noise[3 + i] + miss[3 + i] * miss[3 + i], prior[6 + i])
+        P[6 + i, 6 + i] = choose(at_position, variance, P[6 + i, 6 + i])
         x[i] = choose(at_position, position[i], x[i])
         # the twist is still the best guess, unless none of such a vehicle
         for k in (7 + i, 10 + i):
@@ -463,3 +516,26 @@ def remember(
         unmeasured = choose(with_attitude if i < 3 else with_position, 0.0, 1.0) > 0.5
         away += choose(unmeasured & (abs(jumps[0, i]) > jumps[1, i]), 1.0, 0.0)
     f.refused = choose((with_position | with_attitude) & (away < 0.5), 0.0, f.refused)
+
+
+@compiled
+def doubted_variance(f: Record, out: Array) -> None:
+    """Write into ``out`` (18,) what refused poses add to the variances of the error state.
+
+    Either the poses are wrong or the filter is. Over ``Recovery.patience`` the weight of the second
+    grows to one: a restart there would move the pose to the refused one, and leave twist and wrench
+    a prior's variance.
+    """
+    x, doubted, weight = f.x, f.doubted, choose(f.refused > 0.5, 1.0 / f.patience, 0.0)
+    attitude_error(doubted[3:7], x[3:7], out[0:3])
+    # a part is in doubt where it was refused since it was believed last
+    at_position = weight * choose(f.gap[2] < f.gap[0], min(f.gap[0], f.patience), 0.0)
+    at_attitude = weight * choose(f.gap[3] < f.gap[1], min(f.gap[1], f.patience), 0.0)
+    for i in range(3):
+        away = doubted[i] - x[i]
+        out[i] = at_attitude * min(out[i] * out[i], f.prior[i])
+        out[6 + i] = at_position * min(away * away, f.prior[6 + i])
+        out[3 + i] = at_attitude * f.prior[3 + i]
+        out[9 + i] = at_position * f.prior[9 + i]
+    for i in range(12, N):
+        out[i] = max(at_position, at_attitude) * f.prior[i]

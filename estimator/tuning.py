@@ -29,7 +29,8 @@ class UKFTuning:
 
     The biases of an IMU begin with the deviations of PX4's EKF2 (``GBIAS_INIT`` 0.1 rad/s,
     ``ABIAS_INIT`` 0.2 m/s2). They walk within a factor of five of its process noise, 7e-6 rad/s and
-    2e-5 m/s2 in 5 ms; the accelerometer's faster, for temperature and vibration.
+    2e-5 m/s2 in 5 ms; the accelerometer's faster, for temperature and vibration. Their bounds are
+    what the data sheet of the MPU-6000 allows of a sensor's zero: 20 deg/s and 80 mg.
 
     Attributes:
         motor_torque_noise: Nm, body frame: torque that the rotor model misses, new each step.
@@ -45,6 +46,8 @@ class UKFTuning:
         accelerometer_bias_walk: m/s2: change of the accelerometer's in a step.
         gyro_bias_std: rad/s: of the gyro's bias, before it is estimated.
         accelerometer_bias_std: m/s2: of the accelerometer's, likewise.
+        gyro_bias_bound: rad/s: largest bias of the gyro that is believed.
+        accelerometer_bias_bound: m/s2: of the accelerometer, likewise.
     """
 
     motor_torque_noise: ArrayLike = 0.03
@@ -60,6 +63,8 @@ class UKFTuning:
     accelerometer_bias_walk: ArrayLike = 1e-4
     gyro_bias_std: ArrayLike = 0.1
     accelerometer_bias_std: ArrayLike = 0.2
+    gyro_bias_bound: ArrayLike = 0.35
+    accelerometer_bias_bound: ArrayLike = 0.8
 
     def __post_init__(self) -> None:
         for f in fields(self):

@@ -35,10 +35,10 @@ from .bias_states import (
     carry_with_points,
     correct_companions,
     cross_covariance,
+    forget_biases,
     joint_covariance,
     load_imu,
     reset_imu,
-    restart_biases,
 )
 from .covariance import (
     add_more_pairs,
@@ -60,12 +60,23 @@ from .estimate import (
     STATE_SIZE,
     TRACKING,
     VELOCITY,
+    WITHOUT_COVARIANCE,
     Array,
     WrenchEstimate,
 )
-from .filter_record import BIASES, ESTIMATE, FILTER, N, drive, filter_record, move, propagate
+from .filter_record import (
+    BIASES,
+    ESTIMATE,
+    FILTER,
+    N,
+    drive,
+    fields_between,
+    filter_record,
+    move,
+    propagate,
+)
 from .imu import take_in_imu
-from .recovery import NOISE, Recovery, after_prediction, judge, remember
+from .recovery import NOISE, Recovery, after_prediction, doubted_variance, judge, remember
 from .sample import Sample, check_sample, undo_first_pose, undo_sensing
 from .sigma_points import PAIRS, errors_of_points, halve_pairs, propagate_points, spread_points
 from .tuning import UKFTuning
@@ -339,11 +350,11 @@ def step_with_biases_by(
             predict_with(f, sample[0:4], dt, voltage)
             carry_companions(f, dt, carry_with(f, dt, cross))
             if f.restarts > restarts:
-                restart_biases(f)
+                forget_biases(f)
         x, restarts = f.x.copy(), f.restarts
         correct_parts(f, sample, usable)
         if f.restarts > restarts:
-            restart_biases(f)
+            forget_biases(f)
         else:
             correct_companions(f, x)
     return usable
@@ -352,6 +363,15 @@ def step_with_biases_by(
 @compiled
 def _step_with_biases(record: Record, parts: int, dt: float, voltage: float) -> int:
     return step_with_biases_by(record[0], parts, dt, voltage, predict, carry_with_points)
+
+
+@compiled
+def _add_doubt(record: Record, diagonal: Array) -> None:
+    """Add to the variances (18,) in ``diagonal`` what refused poses add."""
+    f = record[0]
+    doubted_variance(f, f.mean)
+    for i in range(N):
+        diagonal[i] += f.mean[i]
 
 
 def _step_at(pointer: Any, parts: int, dt: float, voltage: float) -> int:
@@ -425,13 +445,15 @@ class WrenchUKF:
         """Lay what Python reads and writes in a step over the record."""
         self._sample = Sample(self.record["z"][0])
         self._now: Array = np.ndarray(ESTIMATE_SIZE, buffer=self.record, offset=ESTIMATE)
+        # read at a third of an array's cost
+        self._refused = memoryview(np.asarray(self.record["refused"]))  # type: ignore[arg-type]
         self._call: Callable[..., int] | None = None
 
     def __getstate__(self) -> dict[str, object]:
         return {
             name: value
             for name, value in self.__dict__.items()
-            if name not in ("_sample", "_now", "_call")
+            if name not in ("_sample", "_now", "_refused", "_call")
         }
 
     def __setstate__(self, state: dict[str, object]) -> None:
@@ -493,7 +515,7 @@ class WrenchUKF:
         reset_imu(self.record)
         reset_model(f)
         undo_first_pose(self.record)
-        for name in ("status", "restarts", "gap", "refused", "lasting", "in_row", "jumps"):
+        for name in (*fields_between("status", "restarts"), *fields_between("gap", "jumps")):
             f[name] = 0.0
         f["seen"] = f["x"][:7]
         self._begin()
@@ -522,7 +544,12 @@ class WrenchUKF:
         """Covariance (18, 18) of the error state (rho, omega, x, v, torque, force), rho being a
         world-frame MRP.
         """
-        return np.array(self.record[0]["P"])
+        return self.estimate.covariance
+
+    @property
+    def dead_reckoning(self) -> float:
+        """How long, s, the wrench has been a prediction: since a whole pose was taken in."""
+        return float(np.max(self.record[0]["gap"][:2]))
 
     @property
     def covariance_with_biases(self) -> Array:
@@ -558,8 +585,11 @@ class WrenchUKF:
 
     @property
     def estimate(self) -> WrenchEstimate:
-        """What the filter believes now."""
-        return WrenchEstimate(self._now.copy())
+        """What the filter believes now. While poses are refused, its covariance widens."""
+        numbers = self._now.copy()
+        if self._refused[0] > 0.0:
+            _add_doubt(self.record, numbers[WITHOUT_COVARIANCE :: N + 1])
+        return WrenchEstimate(numbers)
 
     def step(
         self,
@@ -636,7 +666,7 @@ class WrenchUKF:
             call = self._call = specialised(step, self.record, parts, dt, 0.0)
         if call(self.record, parts, dt, self._voltage if voltage is None else voltage) < 0:
             raise self._sample.bad_quaternion()
-        return WrenchEstimate(self._now.copy())
+        return self.estimate
 
 
 def _finite(what: str, value: ArrayLike, size: int) -> Array:

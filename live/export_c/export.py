@@ -147,6 +147,7 @@ def export_c(
         "gated": gate is not None,
         "gate": 0.0 if gate is None else gate,
         "patience": f"{made.recovery.patience:g}",
+        "give_up": f"{made.recovery.give_up:g}",
         "rate": rate,
         "period": literal(period),
         "mass": literal(float(f["body"]["mass"])),

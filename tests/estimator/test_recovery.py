@@ -33,9 +33,9 @@ def hover(vehicle):
 class Flight:
     """A hover that is seen with faults, and an estimator that is fed from it."""
 
-    def __init__(self, kind, vehicle, dt, gate, turn=0.0):
+    def __init__(self, kind, vehicle, dt, gate, turn=0.0, imu=False):
         """``turn`` (rad) is by how much the filter's start is off."""
-        self.vehicle, self.dt, self.gate = VEHICLES[vehicle], dt, gate
+        self.vehicle, self.dt, self.gate, self.imu = VEHICLES[vehicle], dt, gate, imu
         self.estimator = FILTERS[kind](self.vehicle, period=dt, gate=gate)
         self.speeds = hover(self.vehicle)
         self.position = np.array([0.0, 0.0, HEIGHT])
@@ -45,6 +45,9 @@ class Flight:
         """Step the estimator and check what it says."""
         self.estimator.predict(speeds, dt)
         estimate = self.estimator.correct(position, quaternion)
+        if self.imu:
+            gravity = [0.0, 0.0, self.vehicle.gravity]
+            estimate = self.estimator.correct_imu([0.0, 0.0, 0.0], gravity)
         self.check(estimate)
         return estimate
 
@@ -78,6 +81,8 @@ class Flight:
                 position = before + away
             elif kind == "inverted":
                 quaternion = np.array([0.0, 1.0, 0.0, 0.0])
+            elif kind == "tilted":
+                quaternion = np.array([np.cos(size / 2), np.sin(size / 2), 0.0, 0.0])
             elif kind in ("random attitudes", "random poses"):
                 drawn = rng.standard_normal(4)
                 quaternion = drawn / np.linalg.norm(drawn)
@@ -104,8 +109,8 @@ class Flight:
         assert np.all(np.abs(wrench) < 3.0 * np.sqrt(np.diag(estimate.covariance)[12:18]))
 
 
-def live_through(kind, vehicle, dt, gate, fault=None, turn=0.0):
-    flight = Flight(kind, vehicle, dt, gate, turn)
+def live_through(kind, vehicle, dt, gate, fault=None, turn=0.0, imu=False):
+    flight = Flight(kind, vehicle, dt, gate, turn, imu)
     flight.recover(RISE)
     if fault is not None:
         flight.suffer(*fault)
@@ -162,6 +167,73 @@ def test_nothing_makes_numbers_overflow_or_a_covariance_indefinite(kind, example
 )
 def test_the_wrench_is_right_again_after_two_rise_times(kind, gate, fault):
     live_through(kind, "ardrone2", 0.005, gate, fault)
+
+
+@pytest.mark.parametrize("kind", ["ukf", "ekf"])
+@pytest.mark.parametrize(
+    "fault",
+    [
+        *(("tilted", 200, np.radians(tilt), 0) for tilt in (45, 90, 180)),
+        ("inverted", 400, 1.0, 1),
+        ("random attitudes", 400, 1.0, 2),
+        ("random poses", 400, 1.0, 3),
+        ("jump", 1, 2.0, 4),
+        ("jump for good", 1, 30.0, 5),
+        ("back and forth", 300, 1.0, 6),
+        ("gap", 400, 1.0, 7),
+    ],
+    ids=lambda fault: f"{fault[0]} {fault[1]} {fault[2]:.2g}",
+)
+def test_an_imu_does_not_lock_good_poses_out(kind, fault):
+    """A second of tilted attitudes beside an IMU makes the velocity run away. Poses that are good
+    again agree with each other, and whatever was wrong has not stayed in the biases.
+    """
+    vehicle = "crazyflie" if fault[1] % 400 else "ardrone2"
+    live_through(kind, vehicle, 0.005, 0.9999, fault, imu=True)
+
+
+def test_poses_that_never_agree_restart_the_filter_as_uncertain_as_they_are():
+    """Poses that jump by 10 m each are not believed before ``give_up``, 1.5 s."""
+    flight, rng = Flight("ukf", "ardrone2", 0.005, 0.9999, imu=True), np.random.default_rng(0)
+    flight.recover(RISE)
+    said = []
+    for _ in range(400):
+        e = flight.feed(flight.speeds, 10.0 * rng.standard_normal(3), STILL, 0.005)
+        said.append(e.status)
+        if e.status == "restarted":
+            break
+    assert 295 <= len(said) <= 305
+    assert set(said[:-1]) == {"rejected"}
+    assert np.all(e.std[6:9] > 0.1)
+
+
+def test_what_is_claimed_widens_while_poses_are_refused():
+    flight = Flight("ukf", "ardrone2", 0.005, 0.9999, imu=True)
+    calm = flight.recover(RISE)
+    away, said = np.array([3.0, 0.0, HEIGHT]), []
+    for _ in range(100):
+        said.append(flight.feed(flight.speeds, away, STILL, 0.005))
+    forces = np.array([e.std_force[0] for e in said])
+    assert {e.status for e in said} == {"rejected"}
+    assert np.all(np.diff(forces) > 0.0)
+    assert forces[-1] == pytest.approx(0.5 * flight.vehicle.weight, rel=0.1)
+    assert said[-1].std[6] == pytest.approx(3.0, rel=0.1)
+    assert flight.estimator.dead_reckoning == pytest.approx(0.5)
+    back = flight.recover(0.025)  # three poses that go on from each other
+    assert back.status == "tracking"
+    np.testing.assert_allclose(back.std_force, calm.std_force, rtol=0.2)
+
+
+def test_a_bias_stays_within_its_bound():
+    """An accelerometer that shows 7.6 m/s2 too much is no sensor with a bias."""
+    vehicle, tuning = VEHICLES["ardrone2"], UKFTuning()
+    ukf = WrenchUKF(vehicle, tuning)
+    ukf.reset([0.0, 0.0, 1.0], STILL)
+    for _ in range(1000):
+        ukf.step(np.full(4, vehicle.hover_rate), [0.0, 0.0, 1.0], STILL)
+        ukf.correct_imu([0.5, 0.0, 0.0], [7.6, 0.0, vehicle.gravity])
+    assert ukf.accelerometer_bias[0] == tuning.accelerometer_bias_bound
+    assert ukf.gyro_bias[0] == tuning.gyro_bias_bound
 
 
 @pytest.mark.parametrize("kind", ["ukf", "ekf"])
