@@ -56,8 +56,10 @@ class _Belief(ABC):
         self.reset()
 
     def brief(self, briefing: Briefing) -> None:
-        """Take what is known of vehicle, sensors and fan; it counts from the next ``reset`` on."""
-        self._briefing = briefing
+        """Take what is known of vehicle, sensors, fan and its motions, but not of its gusts; it
+        counts from the next ``reset`` on.
+        """
+        self._briefing = nominal(briefing)
 
     def reset(self) -> None:
         """Forget the last episode."""
@@ -146,10 +148,6 @@ class Tracker(_Belief):
     speed: float = 0.28  # m/s, standard deviation of a fresh velocity
     reach: float = 1.6  # m, on either side, where the fan may be at first
 
-    def brief(self, briefing: Briefing) -> None:
-        """Take what is known of vehicle, sensors and fan, but neither its motions nor its gusts."""
-        super().brief(nominal(briefing))
-
     def _begin(self) -> None:
         rng, n = self._rng, self.particles
         self._place = rng.uniform(-self.reach, self.reach, n)
@@ -183,10 +181,6 @@ class InformedTracker(_Belief):
         *("_level", "_memory", "_place", "_velocity"),
         *("_kind", "_sign", "_side", "_motion", "_free"),
     )
-
-    def brief(self, briefing: Briefing) -> None:
-        """Take what is known of vehicle, sensors, fan and its motions, but not of its gusts."""
-        super().brief(nominal(briefing))
 
     def _begin(self) -> None:
         rng, n, known = self._rng, self.particles, self._briefing.motions

@@ -29,8 +29,8 @@ def test_the_map_is_what_the_environment_s_jet_does_to_the_vehicle():
     for seed in range(4):
         env.reset(seed=seed)
         for _ in range(12):
-            env.step(np.zeros(1, dtype=np.float32))
-            offset, jet = env.loop.position[1] - env._path[0, 0], env.loop.jet[[5, 0, 1]]
+            info = env.step(np.zeros(1, dtype=np.float32))[-1]
+            offset, jet = env.loop.position[1] - info["fan_y"], env.loop.jet[[5, 0, 1]]
             shown = [np.interp(offset, offsets, table.mean[a]) for a in range(3)]
             felt.append((np.sign(offset) * jet[0], jet[1], np.sign(offset) * shown[0], shown[1]))
     torque, force, shown_torque, shown_force = np.mean(felt, axis=0)
