@@ -293,7 +293,7 @@ def test_a_giant_yaml_file_is_refused_before_it_is_parsed(tmp_path):
 def test_a_text_that_unpacks_to_more_than_a_flight_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(text_table, "LIMITS", replace(LIMITS, table_text=1_000_000))
     path = tmp_path / "bomb.csv.gz"
-    path.write_bytes(gzip.compress(b"0\n" * 5_000_000))
+    path.write_bytes(gzip.compress(b"a,b,c\n" + b"0.1,0.2,0.3\n" * 500_000))
     with pytest.raises(InputError, match=r"bomb\.csv\.gz: more than 1000000 characters"):
         read_log(path)
 
