@@ -33,7 +33,7 @@ addEventListener("load", async () => {
     width: root.clientWidth, scroll_width: root.scrollWidth, height: root.scrollHeight,
     wide: [...page.body.querySelectorAll("*")].filter(e => box(e).right > root.clientWidth + 1).map(name),
     missing: [...page.images].filter(i => !i.naturalWidth).map(i => i.src),
-    pictures: [...page.querySelectorAll("canvas")].map(s => ({alt: label(s), width: box(s).width, height: box(s).height})),
+    pictures: [...page.querySelectorAll("canvas, noscript img")].map(s => ({alt: s.alt || label(s), width: box(s).width, height: box(s).height})),
     background: getComputedStyle(page.body).backgroundColor, ink: getComputedStyle(page.body).color,
     text: page.body.innerText,
     done: await (async (page, view) => { ACT })(page, document.getElementById("page").contentWindow),
