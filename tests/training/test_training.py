@@ -110,6 +110,36 @@ def test_the_shipped_policy_does_what_the_learner_would(algorithm):
         np.testing.assert_allclose(policy.act(x), expected[0], atol=1e-5)
 
 
+def test_the_fast_update_is_that_of_stable_baselines3():
+    config = tiny("sac", "learning_rate_end=0.0008")
+    learned = []
+    for kind in (sb3.SAC, None):
+        env = make_env(config)
+        learner = make_learner(config, env, 0)
+        if kind is not None:
+            learner = kind(
+                "MlpPolicy",
+                make_env(config),
+                seed=0,
+                device="cpu",
+                policy_kwargs={"net_arch": config["net"]},
+                **{**config["learner"], "learning_rate": 0.0008},
+            )
+        learner.learn(60)  # the first updates too
+        torch.manual_seed(1)
+        np.random.seed(1)  # noqa: NPY002
+        learner.train(20, 64)
+        learned.append(
+            {**learner.policy.state_dict(), "log_ent_coef": learner.log_ent_coef.detach()}
+        )
+    for name, value in learned[0].items():
+        np.testing.assert_allclose(value.numpy(), learned[1][name].numpy(), atol=2e-5, err_msg=name)
+    fresh = make_learner(config, make_env(config), 0).policy.state_dict()
+    assert (
+        float((fresh["actor.mu.weight"] - learned[0]["actor.mu.weight"]).abs().max()) > 1e-3
+    )  # something was learned
+
+
 def test_a_checkpoint_of_another_configuration_is_refused(tmp_path):
     train(tiny("sac"), "base", 0, tmp_path)
     other = tiny("sac", "net=[9]")
