@@ -68,8 +68,8 @@ def test_repr_is_short_and_says_what_it_is():
     for thing, words in (
         (VEHICLE, "<Vehicle ardrone2: 0.465 kg, arm 0.126"),
         (made, "<Diagnosis explained: rotor_drag; force error "),
-        (made.traces[0], "<Trace of flight: 125 samples"),
-        (made.signatures[0], "<Signature of rotor_drag: Fx over body velocity x (m/s), 125 points"),
+        (made.traces[0], "Trace(log='flight', period=0.04)"),
+        (made.signatures[0], "Signature(effect='rotor_drag', channel='Fx', regressor="),
         (log, "<FlightLog without a name: 3 samples, 0 to 2 s>"),
     ):
         assert repr(thing).startswith(words)
