@@ -13,7 +13,7 @@ from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.effects import parse_setting
 from windwrench.envs.recording import record_flight
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.logs.flight_log import FlightLog, with_rows
 from windwrench.identification.wrench_series import estimate_log, pose_notes
 
 VEHICLE = load_vehicle("ardrone2")
@@ -61,6 +61,16 @@ def held(columns):
     columns[1200:, 1] = columns[1200, 1]
 
 
+def stopped(speeds):
+    speeds[1200:, 1] = 0.0
+
+
+def attitude_held(log):
+    turned = log.quaternion.copy()
+    turned[1200:] = turned[1200]
+    return replace(log, quaternion=turned)
+
+
 def outliers(columns):
     rng = np.random.default_rng(0)
     hit = rng.random(len(columns)) < 0.01
@@ -83,6 +93,13 @@ FAULTS = {
     "rotors swapped": (lambda log: rotors(log, swapped), ROTORS),
     "a rotor's column twice": (lambda log: rotors(log, repeated), ROTORS),
     "a rotor's speed stands still": (lambda log: rotors(log, held), ROTORS),
+    "a rotor's speed is zero": (lambda log: rotors(log, stopped), ROTORS),
+    "the attitude stands still": (attitude_held, ("the attitude stands still",)),
+    "a second of rows is lost": (
+        lambda log: with_rows(log, np.abs(log.t - 5.5) > 0.5),
+        ("gap", *POSE),
+    ),
+    "every other row is lost": (lambda log: with_rows(log, np.arange(len(log.t)) % 2 == 0), ()),
     "an axis stands still": (lambda log: position(log, held), POSE),
     "outliers of the position": (lambda log: position(log, outliers), POSE),
     "a jump for good": (lambda log: position(log, moved_for_good), POSE),

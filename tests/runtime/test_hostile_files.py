@@ -160,6 +160,9 @@ def test_files_that_unpack_to_gigabytes_cost_little(tmp_path):
     expected["policy.npz"] = "unpacks to 2147483"
     (tmp_path / "deep.yaml").write_text("[" * 100_000)
     expected["deep.yaml"] = "more than 60 deep"
+    with (tmp_path / "giant.yaml").open("wb") as file:
+        file.truncate(50 * 2**30)
+    expected["giant.yaml"] = "more than 200000 bytes"
     if PARQUET:
         dictionary_bomb(tmp_path / "texts.parquet")
         expected["texts.parquet"] = "column px cannot be read: it holds"

@@ -85,23 +85,6 @@ def test_a_motor_curve_is_written_and_read_back() -> None:
     assert parse_vehicle(dump_vehicle(curved())).motor_curve == curved().motor_curve
 
 
-@pytest.mark.parametrize(
-    ("curve", "words"),
-    [
-        ("{thrust: [0.1]}", "thrust must be 2 to 6 numbers"),
-        ("{thrust: [0.0, -0.1]}", "expected a positive one"),
-        ("{thrust: [0.0, 0.1], command: [2000, 1000]}", "a larger one at u = 1"),
-        ("{thrust: [0.0, 0.1], voltage: 2}", "voltage"),
-        ("3", "must be a mapping"),
-    ],
-)
-def test_a_motor_curve_that_is_none_is_refused(curve: str, words: str) -> None:
-    """Each message names the field and what was expected."""
-    text = dump_vehicle(load_vehicle("crazyflie")) + f"motor_curve: {curve}\n"
-    with pytest.raises(InputError, match=words):
-        parse_vehicle(text)
-
-
 def test_the_scale_of_commands_counts_the_dips_between_high_thrusts() -> None:
     """Thrust that swings from 0.2 to 1.8 of the weight has the weight as its mean; without its dips
     the mean is above it, and the scale would be too small.

@@ -1,4 +1,3 @@
-import sys
 import warnings
 
 import numpy as np
@@ -9,7 +8,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import InputError, load_vehicle
-from windwrench.identification.logs.flight_log import POSE, REQUIRED, ROTORS, FlightLog, write_log
+from windwrench.identification.logs.flight_log import POSE, ROTORS, FlightLog, write_log
 from windwrench.identification.logs.reading import read_log
 
 SUFFIXES = (".csv", ".csv.gz", ".parquet")
@@ -87,54 +86,6 @@ def change(rows, k, **fields):
     return rows
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "expected"),
-    [
-        ("pz", "", "column pz, row 4 .line 5. is empty or NaN.*all seven pose columns"),
-        ("t", "-inf", "column t, row 4 .line 5. is infinite"),
-        ("qw", "0", "columns qw, qx, qy, qz, row 4 .line 5.: a quaternion of length 0; expected 1"),
-        ("omega1", "1_0", "column omega1, row 4 .line 5.: '1_0' is not a number"),
-        ("omega1", "0x10", "column omega1, row 4 .line 5.: '0x10' is not a number"),
-    ],
-)
-def test_a_bad_number_is_named(path, rows, name, value, expected):
-    with pytest.raises(InputError, match=f"flight.csv: {expected}"):
-        read_log(write_text(path, change(rows, 3, **{name: value})))
-
-
-@pytest.mark.parametrize("name", REQUIRED)
-def test_a_missing_column_is_named(path, rows, name):
-    for row in rows:
-        del row[name]
-    with pytest.raises(
-        InputError, match=rf"flight.csv: missing column\(s\) {name}; expected t, px"
-    ):
-        read_log(write_text(path, rows))
-
-
-@pytest.mark.parametrize(
-    ("content", "expected"),
-    [
-        (
-            (",".join(REQUIRED) + ",t\n" + "1," * 12 + "1\n").encode(),
-            "column t stands there more than once",
-        ),
-        (b't,"px\n1,2\n', r"missing column.s. .*, found 1, 2\."),
-        (b"t," * 600_000, "more than 1000000 in line 1"),
-    ],
-)
-def test_a_file_that_is_no_log_is_refused(path, content, expected):
-    path.write_bytes(content)
-    with pytest.raises(InputError, match=f"flight.csv: {expected}"):
-        read_log(path)
-
-
-def test_parquet_without_pyarrow_says_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(InputError, match=r"pip install 'windwrench\[parquet\]'"):
-        read_log(tmp_path / "flight.parquet")
-
-
 def test_truth_comes_whole_or_not_at_all(path, rows):
     for row in rows:
         row["fx"] = "0"
@@ -206,16 +157,6 @@ def test_millimetres_are_doubted(path, rows):
         read_log(write_text(path, rows))
 
 
-def test_more_columns_in_any_order_and_text_dialect(path, rows):
-    plain = read_log(write_text(path, rows))
-    shuffled = [
-        {"phase": '"hover, steady"', **dict(reversed(row.items())), "empty": ""} for row in rows
-    ]
-    other = write_text(path.with_name("dialect.csv"), shuffled)
-    other.write_bytes(b"\xef\xbb\xbf" + other.read_bytes().replace(b"\n", b"\r\n") + b"\r\n\r\n")
-    assert_same(read_log(other), plain)
-
-
 finite = st.floats(-1e3, 1e3, allow_subnormal=False)
 
 
@@ -278,50 +219,3 @@ def test_a_failed_write_keeps_the_old_file(tmp_path, rows, path):
     with pytest.raises(InputError, match=r"flight.xlsx: unknown kind"):
         write_log(log, tmp_path / "flight.xlsx")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["flight.csv", "taken.csv"]
-
-
-# NanoBench
-
-NANOBENCH_COLUMNS = ("t", *POSE, *(f"motor_motor_m{i}" for i in (1, 2, 3, 4)), "pwr_pm_vbat")
-
-
-def nanobench_rows(**fields):
-    row = dict.fromkeys(NANOBENCH_COLUMNS, "0") | {"qw": "1", "pwr_pm_vbat": "4.2"} | fields
-    return [row | {"t": f"{1.7e9 + 0.01 * k:.2f}"} for k in range(3)]
-
-
-def test_nanobench_conventions(path):
-    half, vehicle = np.sqrt(0.5), load_vehicle("crazyflie")
-    commands = {"motor_motor_m1": "10000", "motor_motor_m4": "40000"}
-    turned = nanobench_rows(qz=str(half), qw=str(half), **commands)
-    log = read_log(write_text(path, turned), reader="nanobench", vehicle=vehicle)
-    np.testing.assert_allclose(log.t, [0, 0.01, 0.02], atol=1e-6)
-    np.testing.assert_allclose(log.quaternion[0], [half, 0, 0, half], atol=1e-15)
-    # m4 is front-left, our first rotor; m1 is front-right, our fourth; at the vehicle's reference
-    # voltage, whatever the battery's, which is passed on
-    full = vehicle.voltage_ref / 4.2 * np.array([4e4, 1e4])
-    thrust = vehicle.k * log.rotor_speeds[0] ** 2
-    np.testing.assert_allclose(thrust[[1, 2]], 0.0)
-    np.testing.assert_allclose(
-        thrust[[0, 3]], 2.130295e-11 * full**2 + 1.032633e-6 * full + 5.484560e-4
-    )
-    low = nanobench_rows(**commands, pwr_pm_vbat="3.3")
-    low = read_log(write_text(path, low), reader="nanobench", vehicle=vehicle)
-    np.testing.assert_array_equal(low.rotor_speeds, log.rotor_speeds)
-    np.testing.assert_allclose(low.voltage, 3.3)
-    assert log.commanded
-    np.testing.assert_allclose(log.command[0], np.array([4e4, 0.0, 0.0, 1e4]) / 65535.0)
-    assert any("thrust model" in note for note in log.notes)
-
-
-def test_nanobench_bad_numbers_are_named(path):
-    with pytest.raises(
-        InputError, match=r"column pwr_pm_vbat, row 1 .line 2.: -1 is negative; expected a voltage"
-    ):
-        read_log(write_text(path, nanobench_rows(pwr_pm_vbat="-1")), reader="nanobench")
-    with pytest.raises(InputError, match=r"column motor_motor_m2, row 1 .line 2. is empty or NaN"):
-        read_log(write_text(path, nanobench_rows(motor_motor_m2="")), reader="nanobench")
-    with pytest.raises(InputError, match="expected those of a NanoBench table"):
-        read_log(write_text(path, hover_rows()), reader="nanobench")
-    log = read_log(write_text(path, nanobench_rows(motor_motor_m2="70000")), reader="nanobench")
-    assert any("3 motor command(s) beyond that range" in note for note in log.notes)

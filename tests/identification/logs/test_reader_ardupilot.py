@@ -229,25 +229,6 @@ def test_what_is_missing_is_named(read, messages, expected):
         read(*messages)
 
 
-@pytest.mark.filterwarnings("ignore::UserWarning")
-def test_a_cut_or_spoiled_log_reads_or_is_refused(tmp_path):
-    path, data = tmp_path / "log.BIN", dataflash([parm(), *POSE, imu(T), rcou(T)])
-    rng = np.random.default_rng(0)
-    read = 0
-    for k in range(60):
-        spoiled = bytearray(data if k % 2 else data[: rng.integers(2, len(data))])
-        for place in rng.integers(0, len(spoiled), 20 if k % 2 else 0):
-            spoiled[place] = rng.integers(256)
-        path.write_bytes(bytes(spoiled))
-        try:
-            log = read_log(path, "ardupilot_bin")
-        except InputError:
-            continue
-        read += 1
-        assert np.isfinite(log.command).all()
-    assert read > 5
-
-
 @pytest.mark.measured
 def test_a_real_log_on_the_ground(vehicle):
     """Half a second of a copter that stands: gravity is seen, the motors are off."""

@@ -1,4 +1,3 @@
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -319,46 +318,3 @@ SIX = {"CA_ROTOR_COUNT": 6}
 def test_what_is_missing_is_named(read, topics, parameters, expected):
     with pytest.raises(InputError, match=f"flight.ulg: .*{expected}"):
         read(topics, parameters)
-
-
-@pytest.mark.parametrize(
-    "content", [b"", b"ULog", b"PK\x03\x04" + bytes(100), b"ULog\x01\x12\x35\x01" + bytes(8)]
-)
-def test_what_is_no_ulog_is_refused(tmp_path, content, vehicle):
-    (tmp_path / "flight.ulg").write_bytes(content)
-    with pytest.raises(InputError, match=r"flight.ulg: (cannot be read as a ULog|no motors)"):
-        read_log(tmp_path / "flight.ulg", "px4_ulog", vehicle)
-    with pytest.raises(InputError, match=r"absent.ulg: cannot be read"):
-        read_log(tmp_path / "absent.ulg", "px4_ulog", vehicle)
-
-
-@pytest.mark.filterwarnings("ignore::UserWarning")
-def test_a_cut_or_spoiled_log_reads_or_is_refused(tmp_path, vehicle, capsys):
-    path, data = tmp_path / "flight.ulg", ulog_bytes(FLIGHT)
-    rng = np.random.default_rng(0)
-    read = 0
-    for k in range(60):
-        if k % 2:
-            spoiled = bytearray(data)
-            for place in rng.integers(0, len(data), 20):
-                spoiled[place] = rng.integers(256)
-        else:
-            spoiled = data[: rng.integers(0, len(data))]
-        path.write_bytes(spoiled)
-        try:
-            log = read_log(path, "px4_ulog", vehicle)
-        except InputError:
-            continue
-        read += 1
-        assert np.isfinite(log.rotor_speeds).all()
-    assert read > 5
-    assert capsys.readouterr().out == ""
-
-
-def test_without_pyulog_a_ulog_says_what_to_install(tmp_path, monkeypatch):
-    (tmp_path / "flight.ulg").write_bytes(b"ULog\x01\x12\x35\x01")
-    monkeypatch.setitem(sys.modules, "pyulog", None)
-    with pytest.raises(
-        InputError, match=r"pip install 'windwrench\[logs\]', or pip install pyulog"
-    ):
-        read_log(tmp_path / "flight.ulg")

@@ -3,7 +3,6 @@ that are cut, packed or hostile.
 """
 
 import sqlite3
-import sys
 from contextlib import closing
 from dataclasses import replace
 
@@ -367,17 +366,6 @@ def test_an_array_is_what_the_map_says(write, line, wanted, vehicle):
     np.testing.assert_allclose(found[0], wanted)
 
 
-@pytest.mark.parametrize("name", ["flight.bag", "flight.db3", "flight.mcap"])
-@pytest.mark.parametrize(
-    "content",
-    [b"", b"#ROSBAG V1.2\n", b"PK\x03\x04" + bytes(200), b"#ROSBAG V2.0\n", b"\x89MCAP0\r\n"],
-)
-def test_what_is_no_bag_is_refused(tmp_path, name, content, vehicle):
-    (tmp_path / name).write_bytes(content)
-    with pytest.raises(InputError, match=rf"{name}: cannot be read as a ROS"):
-        read_log(tmp_path / name, "rosbag", vehicle)
-
-
 def test_what_is_not_there_is_refused(tmp_path, vehicle):
     (tmp_path / "flight.csv").write_text("t")
     for path, reader_name, expected in (
@@ -388,25 +376,6 @@ def test_what_is_not_there_is_refused(tmp_path, vehicle):
     ):
         with pytest.raises(InputError, match=expected):
             read_log(path, reader_name, vehicle)
-
-
-@pytest.mark.filterwarnings("ignore::UserWarning")
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_cut_or_spoiled_bag_reads_or_is_refused(write, kind, vehicle):
-    path = write(FLIGHT, kind)
-    file = path if kind == "bag" else next(path.glob(f"*.{kind}"))
-    data = file.read_bytes()
-    rng = np.random.default_rng(0)
-    for k in range(40):
-        spoiled = bytearray(data[: rng.integers(0, len(data))] if k % 2 else data)
-        for place in rng.integers(0, len(spoiled) + 1, 10 if k % 2 == 0 else 0):
-            spoiled[place % len(spoiled)] = rng.integers(256)
-        file.write_bytes(spoiled)
-        try:
-            log = read_log(file, "rosbag", vehicle)
-        except InputError:
-            continue
-        assert np.isfinite(log.rotor_speeds).all()
 
 
 def test_another_definition_of_a_known_type_is_refused(write, vehicle):
@@ -499,12 +468,3 @@ def test_files_and_messages_packed_one_by_one_are_refused(mode, write, vehicle):
         match=rf"metadata.yaml: compression_mode {mode.name.lower()}: expected a bag that is not",
     ):
         read_log(path, "rosbag", vehicle)
-
-
-def test_without_rosbags_a_bag_says_what_to_install(tmp_path, monkeypatch, vehicle):
-    (tmp_path / "flight.bag").write_bytes(b"#ROSBAG V2.0\n")
-    monkeypatch.setitem(sys.modules, "rosbags", None)
-    with pytest.raises(
-        InputError, match=r"pip install 'windwrench\[logs\]', or pip install rosbags"
-    ):
-        read_log(tmp_path / "flight.bag", "rosbag", vehicle)

@@ -1,6 +1,7 @@
 """Which reader a log needs is told from what is in it, whatever its name."""
 
 import gzip
+import sys
 from pathlib import Path
 
 import pytest
@@ -59,6 +60,22 @@ def test_the_first_bytes_decide_whatever_the_name(tmp_path, begins, name):
     assert found is not None
     assert found.name == BEGINNINGS[begins]
     with pytest.raises(InputError):  # that reader's own words
+        read_log(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("name", "begins", "package", "extra"),
+    [
+        ("flight.ulg", b"ULog\x01\x12\x35\x01", "pyulog", "logs"),
+        ("flight.bag", b"#ROSBAG V2.0\n", "rosbags", "logs"),
+        ("flight.parquet", b"PAR1", "pyarrow", "parquet"),
+    ],
+)
+def test_a_missing_package_is_named(tmp_path, monkeypatch, name, begins, package, extra):
+    (tmp_path / name).write_bytes(begins)
+    monkeypatch.setitem(sys.modules, package, None)
+    words = rf"needs {package}.*: pip install 'windwrench\[{extra}\]', or "
+    with pytest.raises(InputError, match=words):
         read_log(tmp_path / name)
 
 

@@ -22,6 +22,7 @@ from windwrench.runtime.errors import InputError
         ("a.csv", '"t";"x"\n"0,5";"1,5"\n"1,5";"2"\n', "t x", [0.5, 1.5]),
         ("a.csv", "t,x\r\n0,NaN\r\n1,2\r\n", "t x", [0, np.nan]),
         ("a.csv", "t,x\n0,null\n1,2\n", "t x", [0, np.nan]),
+        ("a.csv", "\ufefft,x\r\n0,1\r\n1,2\r\n\r\n", "t x", [0, 1]),
         ("a.csv", "1,2,3\n2,3,4\n", "1 2 3", [1, 2, 3]),
     ],
 )
@@ -59,6 +60,8 @@ def test_a_last_line_that_was_cut_off_is_left_out(tmp_path: Path) -> None:
     [
         ("# c\nt;x;y\n0;1;2\n1;2\n2;3;4\n3;4;5\n", "row 2 (line 4) has 2 field(s); expected 3"),
         ("t,x\n0,1\n\n1,2\n \n2,a\n3,4\n", "column x, row 3 (line 6): 'a' is not a number"),
+        ("t,x\n0,1\n1,1_0\n", "column x, row 2 (line 3): '1_0' is not a number"),
+        ("t,x\n0,1\n1,0x10\n", "column x, row 2 (line 3): '0x10' is not a number"),
         ("t;x\n0,5;1,5\n1,5;1.5\n2,5;2,5\n", "column x, row 2 (line 3): '1.5' is not a number"),
         ('t,x\n0,1\n1,"2"3\n2,3\n', "row 2 (line 3) has 0 field(s)"),
         ("t,x,x\n0,1,2\n1,2,3\n", "column x stands there more than once"),
