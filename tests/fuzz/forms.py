@@ -27,6 +27,7 @@ from tests.support.blackbox_writer import FIELDS as BLACKBOX_FIELDS
 from tests.support.blackbox_writer import blackbox
 from tests.support.converted_flights import write_bag
 from tests.support.dataflash_writer import dataflash
+from tests.support.map_tables import hover_columns, table_text, vehicle_of
 from tests.support.paths import ROOT
 from tests.support.ulog_writer import ulog_bytes
 from windwrench.controllers import make_controller
@@ -41,6 +42,7 @@ from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.identification.logs.flight_log import FlightLog, write_log
 from windwrench.identification.logs.map_guess import guess_map
 from windwrench.identification.logs.mapped_log import map_table
+from windwrench.identification.logs.readers import TABLES
 from windwrench.identification.logs.reading import finished, read_log
 from windwrench.identification.logs.tables import open_table
 from windwrench.identification.wrench_series import estimate_log
@@ -112,74 +114,23 @@ def _own_log(name: str) -> bytes:
     return _written(lambda path: write_log(log, path), name)
 
 
-def _text_table(columns: Mapping[str, Array | float]) -> bytes:
-    whole = np.broadcast_arrays(*map(np.asarray, columns.values()))
-    lines = [",".join(f"{x:.17g}" for x in row) for row in np.stack(whole, axis=1).tolist()]
-    return "\n".join([",".join(columns), *lines, ""]).encode()
+def _table(log_map: str) -> bytes:
+    """Return a table that a reader knows by the columns of its map."""
+    return table_text(hover_columns(log_map, _COUNT, _PERIOD))
 
 
-def _table(reader: str) -> bytes:
-    """Return a table that a reader knows by its columns."""
-    t = _times()
-    crazyflie = {f"motor.m{i}": 40_000.0 for i in range(1, 5)}
-    places = ("rear_right", "front_right", "rear_left", "front_left")
+def _betaflight_table() -> bytes:
+    """Return a table as blackbox_decode writes it."""
     columns: dict[str, Array | float] = {
-        "nanobench": {
-            "t": 1e9 + t,
-            **dict.fromkeys(("px", "py", "qx", "qy", "qz"), 0.0),
-            "pz": 1.0,
-            "qw": 1.0,
-            "pwr_pm_vbat": 3.9,
-            **{f"motor_motor_m{i}": 36_000.0 for i in range(1, 5)},
-        },
-        "crazyswarm2": {
-            "t_s": t,
-            **dict.fromkeys(("est_x_m", "est_y_m", "est_vx_mps"), 0.0),
-            **dict.fromkeys(("roll_rad", "pitch_rad", "yaw_rad", "mocap_x_m", "mocap_y_m"), 0.0),
-            **{f"torque_cmd_{axis}_Nm": 0.0 for axis in "xyz"},
-            "est_z_m": 1.0,
-            "mocap_z_m": 1.0 + 0.001 * t,
-            "thrust_cmd_N": 0.33,
-        },
-        "racer": {
-            "timestamp_s": t,
-            "pos_x": 0.0,
-            "pos_y": 0.0,
-            "pos_z": 1.0,
-            "quat_w": 1.0,
-            **{f"{name}_{axis}": 0.0 for name in ("quat", "gyro", "vel_body") for axis in "xyz"},
-            "spec_force_x": 0.0,
-            "spec_force_y": 0.0,
-            "spec_force_z": 9.81,
-            "battery_v": 11.1,
-            **{f"rpm_{place}": 3600.0 for place in places},
-        },
-        "cflib": {
-            "timestamp": 1e3 * t,
-            "acc.x": 0.0,
-            "acc.y": 0.0,
-            "acc.z": 1.0,
-            "pm.vbat": 3.9,
-            **{f"stateEstimate.{name}": 0.0 for name in ("x", "y", "qx", "qy", "qz")},
-            "stateEstimate.z": 1.0 + 0.01 * t,
-            "stateEstimate.qw": 1.0,
-            **crazyflie,
-            **{f"gyro.{axis}": 0.0 for axis in "xyz"},
-        },
-        "betaflight": {
-            "loopIteration": np.arange(_COUNT, dtype=np.float64),
-            "time (us)": 1e6 * t,
-            **{f"{name}[{i}]": 0.0 for name in ("gyroADC", "accSmooth") for i in range(3)},
-            "accSmooth[2]": 2048.0,
-            "vbatLatest (V)": 11.1,
-            **{f"motor[{i}]": 1500.0 for i in range(4)},
-            **{f"eRPM[{i}]": 420.0 for i in range(4)},
-        },
-    }[reader]
-    return _text_table(columns)
-
-
-_nanobench, _crazyswarm2 = partial(_table, "nanobench"), partial(_table, "crazyswarm2")
+        "loopIteration": np.arange(_COUNT, dtype=np.float64),
+        "time (us)": 1e6 * _times(),
+        **{f"{name}[{i}]": 0.0 for name in ("gyroADC", "accSmooth") for i in range(3)},
+        "accSmooth[2]": 2048.0,
+        "vbatLatest (V)": 11.1,
+        **{f"motor[{i}]": 1500.0 for i in range(4)},
+        **{f"eRPM[{i}]": 420.0 for i in range(4)},
+    }
+    return table_text(columns)
 
 
 @cache
@@ -498,11 +449,11 @@ def forms() -> dict[str, Form]:
     found = [
         log("CSV", "log.csv", own, _CELLS),
         log("gzipped CSV", "log.csv.gz", partial(_own_log, "log.csv.gz"), packed),
-        log("nanobench", "log.csv", _nanobench, _CELLS, "nanobench", "crazyflie"),
-        log("crazyswarm2", "log.csv", _crazyswarm2, _CELLS, "crazyswarm2", "crazyflie"),
-        log("racer", "log.csv", partial(_table, "racer"), _CELLS),
-        log("crazyflie_csv", "log.csv", partial(_table, "cflib"), _CELLS, None, "crazyflie"),
-        log("betaflight_csv", "log.csv", partial(_table, "betaflight"), _CELLS),
+        *(
+            log(name, "log.csv", partial(_table, log_map), _CELLS, name, vehicle_of(log_map))
+            for name, log_map in TABLES.items()
+        ),
+        log("betaflight_csv", "log.csv", _betaflight_table, _CELLS),
         log("ardupilot_bin", "log.BIN", _dataflash, _BYTES, "ardupilot_bin"),
         log("betaflight", "log.bbl", _blackbox, _BYTES, "betaflight"),
         log("crazyflie_sd", "log00", _sd_card, _BYTES, "crazyflie_sd", "crazyflie"),

@@ -276,31 +276,6 @@ def test_the_kits_own_columns_are_read_in_any_layout(tmp_path: Path, flown: Flig
         np.testing.assert_allclose(log.gyro, own.gyro, atol=1e-15)
 
 
-def test_a_betaflight_table_is_known_by_its_columns(tmp_path: Path) -> None:
-    """As blackbox_decode writes it: settings before the header, a text column, no pose."""
-    names = ["loopIteration", "time (us)", *(f"gyroADC[{i}]" for i in range(3))]
-    names += [f"accSmooth[{i}]" for i in range(3)] + [f"motor[{i}]" for i in range(4)]
-    names += [f"eRPM[{i}]" for i in range(4)] + ["vbatLatest (V)", "flightModeFlags (flags)"]
-    row = ["500", "600", "700", "800", "1000", "1100", "1200", "1300", "16.1", "ANGLE_MODE|ARM"]
-    lines = ['"Product","Blackbox flight data recorder"', '"acc_1G","2048"', ", ".join(names)]
-    for k in range(50):
-        imu = [str(10 + k), str(-20 - k), str(30 + k), str(k), str(k), str(2048 + k)]
-        lines.append(", ".join([str(k), str(1000 * k), *imu, *row]))
-    path = tmp_path / "bf.csv"
-    path.write_text("\n".join(lines) + "\n")
-    log = read_log(path)
-    assert not log.has_pose
-    assert "reader betaflight_csv" in log.source
-    assert log.accelerometer is not None
-    assert log.gyro is not None
-    np.testing.assert_allclose(log.accelerometer[0], [0.0, 0.0, 9.80665])
-    np.testing.assert_allclose(log.gyro[0], np.radians([10, -20, 30]))
-    rpm = log.rotor_speeds[0] * 7 * 30 / np.pi
-    np.testing.assert_allclose(rpm, [130_000, 120_000, 100_000, 110_000])
-    assert log.command is not None
-    np.testing.assert_allclose(log.command[0, 0], (800 - 48) / (2047 - 48))
-
-
 def test_an_unknown_table_is_refused_with_what_to_do(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"missing column\(s\) px.*windwrench check a.csv"):
         read_log(table(tmp_path / "a.csv", {}))

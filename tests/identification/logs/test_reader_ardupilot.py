@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from tests.support.autopilot_flight import (
     FLIP,
@@ -227,20 +226,6 @@ def test_frame_types_number_their_motors(read, kind, order):
 def test_what_is_missing_is_named(read, messages, expected):
     with pytest.raises(InputError, match=f"00000001.BIN: .*{expected}"):
         read(*messages)
-
-
-@pytest.mark.measured
-def test_a_real_log_on_the_ground(vehicle):
-    """Half a second of a copter that stands: gravity is seen, the motors are off."""
-    path = data_file("ardupilot/backend_log_80k.BIN")
-    log = read_log(path)
-    np.testing.assert_allclose(np.linalg.norm(log.accelerometer, axis=1), 9.81, atol=0.1)
-    up = Rotation.from_quat(log.quaternion, scalar_first=True).apply(log.accelerometer)
-    np.testing.assert_allclose(up, np.tile([0.0, 0.0, 9.81], (len(up), 1)), atol=0.3)
-    np.testing.assert_array_equal(log.command, 0.0)
-    known = read_log(path, None, vehicle)
-    assert not known.has_rotor_speeds
-    assert any("no rotor speeds: the motor commands are 0" in note for note in known.notes)
 
 
 @pytest.mark.measured

@@ -6,39 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from tests.fuzz.forms import _crazyswarm2, _nanobench, _own_log
-from tests.support.data_paths import data_file
+from tests.support.map_tables import hover_columns, table_text
 from windwrench.dynamics import InputError
 from windwrench.identification.logs.readers import (
     READERS,
+    TABLES,
     find_reader,
     reader_by_columns,
     reader_by_content,
 )
 from windwrench.identification.logs.reading import read_log
-
-REAL = {
-    "px4/sample_log_small.ulg": "px4_ulog",
-    "motor_faults/TestCase_3_1000000002.ulg": "px4_ulog",
-    "ardupilot/backend_log_80k.BIN": "ardupilot_bin",
-    "crazyflie_imu/log10": "crazyflie_sd",
-    "nanobench/B6_linear_ramp_rep1.csv.gz": "nanobench",
-    "crazyswarm2_payload/csv/log165.csv": "crazyswarm2",
-    "crazypad/normal_flight__E8_log00.csv.gz": "crazypad",
-    "racer/flight_c.csv.gz": "racer",
-    "flights/labelled_00.csv.gz": None,
-}
-
-
-@pytest.mark.measured
-@pytest.mark.parametrize("name", REAL)
-def test_real_logs_need_no_reader_named(name):
-    path = data_file(name)
-    reader = REAL[name]
-    log = read_log(path)
-    assert log.source.endswith(f"(reader {reader})") if reader else log.source == str(path)
-    assert len(log.t) > 2
-
 
 BEGINNINGS = {
     b"ULog\x01\x12\x35\x01": "px4_ulog",
@@ -123,13 +100,8 @@ def test_a_table_that_fits_two_readers_is_refused():
         reader_by_columns(Path("a.csv"), header)
 
 
-@pytest.mark.parametrize(
-    ("make", "reader"),
-    [(_nanobench, "nanobench"), (_crazyswarm2, "crazyswarm2")],
-)
-def test_tables_are_known_by_their_columns(tmp_path, make, reader):
+@pytest.mark.parametrize("reader", TABLES)
+def test_tables_are_known_by_their_columns(tmp_path, reader):
     path = tmp_path / "flight.csv"
-    path.write_bytes(make())
+    path.write_bytes(table_text(hover_columns(TABLES[reader])))
     assert f"reader {reader}" in read_log(path).source
-    (tmp_path / "own.csv").write_bytes(_own_log("own.csv"))
-    assert "reader" not in read_log(tmp_path / "own.csv").source

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.support.map_tables import hover_columns, table_text
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.logs.reading import read_log
@@ -13,22 +14,6 @@ from windwrench.identification.logs.reading import read_log
 COUNT = 40
 TIME = 0.004 * np.arange(COUNT)
 AXES = ("roll_rad", "pitch_rad", "yaw_rad")
-PLACES = ("rear_right", "front_right", "rear_left", "front_left")
-COLUMNS = {
-    "crazypad": {"t_s": TIME} | {f"motor_m{i}_0to65535": 1e4 * i for i in range(1, 5)},
-    "crazyswarm2": {"t_s": TIME, "thrust_cmd_N": 0.3}
-    | dict.fromkeys(
-        [
-            *AXES,
-            *(f"est_{axis}_m" for axis in "xyz"),
-            *(f"torque_cmd_{axis}_Nm" for axis in "xyz"),
-        ],
-        0.0,
-    ),
-    "racer": {"timestamp_s": TIME, "quat_w": 1.0, "pos_z": 1.0 + TIME, "battery_v": 16.0 - TIME}
-    | dict.fromkeys(["pos_x", "pos_y", "quat_x", "quat_y", "quat_z"], 0.0)
-    | {f"rpm_{place}": 6000.0 + i for i, place in enumerate(PLACES)},
-}
 
 
 @pytest.fixture
@@ -38,41 +23,36 @@ def vehicle():
 
 @pytest.fixture
 def read(tmp_path):
-    """Read a table of a map's columns; a keyword replaces a column, None leaves it out."""
+    """Read a hover by a map; a keyword replaces a column, None leaves the column out."""
 
     def read_table(name, vehicle=None, reader=None, **given):
-        columns = {k: v for k, v in (COLUMNS[name] | given).items() if v is not None}
-        rows = np.column_stack([value * np.ones(COUNT) for value in columns.values()])
+        columns = {
+            k: v for k, v in (hover_columns(name, COUNT, 0.004) | given).items() if v is not None
+        }
         path = tmp_path / "log.csv"
-        np.savetxt(path, rows, "%.9g", ",", header=",".join(columns), comments="")
+        path.write_bytes(table_text(columns))
         return read_log(path, reader, vehicle)
 
     return read_table
 
 
-def test_requests_of_crazypad_become_commands(read, vehicle):
-    log = read("crazypad", est_ax_g=0.5, roll_deg=90.0)
-    expected = np.array([4e4, 3e4, 2e4, 1e4]) / 65535.0
-    np.testing.assert_allclose(log.command, np.tile(expected, (COUNT, 1)))
-    assert not log.has_pose
-    assert not log.has_rotor_speeds
-    assert log.vehicle == "crazyflie"
-    np.testing.assert_allclose(log.extra["roll"], np.pi / 2)
-    assert "onboard_acceleration" not in log.extra  # two of its three columns are missing
-    log = read("crazypad", replace(vehicle, motor_curve=MotorCurve((0.0, 0.2))))
+def test_requests_of_crazypad_are_linear_in_thrust(read, vehicle):
+    curved = replace(vehicle, motor_curve=MotorCurve((0.0, 0.2)))
+    log = read("crazypad", curved, est_ax_g=0.5, est_ay_g=None)
     assert log.commanded
     np.testing.assert_allclose(np.square(log.rotor_speeds) * vehicle.k, 0.2 * log.command)
+    assert "onboard_acceleration" not in log.extra  # one of its three columns is missing
 
 
 def test_wrenches_of_crazyswarm2_become_rotor_speeds(read, vehicle):
     torque = dict(zip((f"torque_cmd_{a}_Nm" for a in "xyz"), (1e-3, -5e-4, 1e-4), strict=True))
-    log = read("crazyswarm2", vehicle, **torque)
+    log = read("crazyswarm2", vehicle, thrust_cmd_N=0.3, **torque)
     wrench = vehicle.rotor_wrench(log.rotor_speeds[7])
     np.testing.assert_allclose(wrench, [0.3, *torque.values()], rtol=1e-9)
     assert "reader crazyswarm2" in log.source
     assert any("inverse of the rotor mixing of crazyflie" in note for note in log.notes)
     pull = np.where((np.arange(COUNT) >= 5) & (np.arange(COUNT) < 8), 0.02, 0.0)
-    log = read("crazyswarm2", vehicle, torque_cmd_x_Nm=pull)
+    log = read("crazyswarm2", vehicle, thrust_cmd_N=0.3, torque_cmd_x_Nm=pull)
     assert log.rotor_speeds.min() == 0.0
     assert log.rotor_speeds.max() <= vehicle.omega_max
     assert any("commands of 3 sample(s)" in note for note in log.notes)
@@ -103,20 +83,15 @@ def test_held_positions_are_no_measurements(read):
 @pytest.mark.parametrize(("stray", "left"), [(5, COUNT - 5), (30, COUNT)])
 def test_stray_samples_are_dropped(read, stray, left):
     """A few before a gap at the start; a gap in the flight is none."""
-    log = read("crazyswarm2", t_s=TIME + 0.7 * (np.arange(COUNT) >= stray), est_x_m=np.arange(40.0))
+    log = read(
+        "crazyswarm2", t_s=TIME + 0.7 * (np.arange(COUNT) >= stray), mocap_x_m=np.arange(40.0)
+    )
     assert len(log.t) == left
     assert log.t[0] == 0.0
     assert log.position[0, 0] == COUNT - left
     assert all(len(column) == left for column in log.extra.values())
     said = "dropped 5 stray sample(s) before a gap of 0.7" if stray == 5 else "1 gap(s) in time"
     assert any(said in note for note in log.notes)
-
-
-def test_the_racers_rotors_stand_at_their_places(read):
-    log = read("racer")
-    wanted = np.array([6003.0, 6002.0, 6000.0, 6001.0]) * np.pi / 30.0
-    np.testing.assert_allclose(log.rotor_speeds[0], wanted)
-    np.testing.assert_allclose(log.voltage, 16.0 - TIME)
 
 
 @pytest.mark.parametrize(
@@ -132,6 +107,12 @@ def test_the_racers_rotors_stand_at_their_places(read):
         ("crazyswarm2", {"pitch_rad": None}, "pitch_rad; expected those of a crazyswarm2 table"),
         ("crazyswarm2", {"thrust_cmd_N": np.nan}, "thrust_cmd_N, row 1 .line 2. is empty or NaN"),
         ("crazyswarm2", {"t_s": 0.0}, "column t, row 2 .line 3.: 0 s repeats"),
+        (
+            "nanobench",
+            {"pwr_pm_vbat": -1.0},
+            "pwr_pm_vbat, row 1 .*: -1 is negative; expected a v",
+        ),
+        ("nanobench", {"motor_motor_m2": np.nan}, "motor_motor_m2, row 1 .* is empty or NaN"),
         ("racer", {"quat_w": None}, "quat_w; expected those of a table of the racer"),
         ("racer", {"rpm_rear_left": None}, "rpm_rear_left; expected those of a table of the racer"),
     ],
