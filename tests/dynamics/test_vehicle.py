@@ -38,76 +38,31 @@ def test_presets_load_and_can_hover(name):
     assert 1.5 * vehicle.hover_rate < vehicle.omega_max
 
 
-def test_the_documented_presets_are_there():
-    assert {"ardrone2", "crazyflie", "hummingbird"} <= set(preset_names())
-
-
 def test_a_minimal_file_loads(tmp_path):
     vehicle = load_vehicle(saved(tmp_path))
     assert vehicle.mass == 0.5
     np.testing.assert_array_equal(vehicle.inertia, np.diag([0.002, 0.003, 0.004]))
 
 
-def test_a_full_inertia_matrix_loads(tmp_path):
-    inertia = [[0.002, 1e-4, 0], [1e-4, 0.003, 0], [0, 0, 0.004]]
-    np.testing.assert_array_equal(load_vehicle(saved(tmp_path, inertia=inertia)).inertia, inertia)
-
-
+# with one mistake each; tests/golden/error_lines.json has the errors of some 40 files more
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"mass": -0.5}, ["mass", "positive", "-0.5"]),
-        ({"mass": "heavy"}, ["mass", "positive number", "heavy"]),
         ({"mass": float("nan")}, ["mass", "positive number", "nan"]),
         ({"mass": True}, ["mass", "positive number", "True"]),
-        ({"arm_l": 0}, ["arm_l", "positive"]),
-        ({"k": [8e-6] * 3}, ["k", "4 finite numbers"]),
-        ({"k": [8e-6] * 3 + [-8e-6]}, ["k", "four positive"]),
-        ({"p": 2e-7}, ["p", "4 finite numbers"]),
-        ({"inertia": [0.002, 0.003]}, ["inertia", "3 x 3"]),
         ({"inertia": [[0.002, 0, 0], [0, 0.003, 0]]}, ["inertia", "3 x 3"]),
-        ({"inertia": [[0.002, 1e-4, 0], [0, 0.003, 0], [0, 0, 0.004]]}, ["inertia", "symmetric"]),
-        ({"inertia": [0.002, -0.003, 0.004]}, ["inertia", "positive definite"]),
         (
             {"inertia": [[0.002, 0.01, 0], [0.01, 0.003, 0], [0, 0, 0.004]]},
             ["inertia", "positive definite"],
         ),
-        ({"rotor_positions": [[0.1, 0.1, 0]] * 3}, ["rotor_positions", "4 x 3"]),
         ({"rotor_positions": [[0.1, 0.1]] * 4}, ["rotor_positions", "4 x 3"]),
-        ({"rotor_positions": [[0.1, 0.1, 0]] * 4}, ["rotor_positions", "independently"]),
-        ({"spin": [1, 1, 1, 2]}, ["spin", "1 or -1"]),
-        ({"com": [0, 0]}, ["com", "3 finite numbers"]),
-        ({"omega_lsb": -1.0}, ["omega_lsb", "negative"]),
-        ({"omega_source": "guessed"}, ["omega_source", "measured or commanded", "guessed"]),
-        ({"floor_z": 3.0, "ceiling_z": 1.0}, ["floor_z", "ceiling_z"]),
         ({"maas": 0.5}, ["maas", "expected one of", "Did you mean 'mass'?"]),
-        ({"mocap": {"rate_hz": -1}}, ["mocap.rate_hz", "positive"]),
-        ({"mocap": {"rate": 100}}, ["mocap", "rate", "Did you mean 'rate_hz'?"]),
-        ({"mocap": 200}, ["mocap", "mapping"]),
-        ({"mass": None}, ["missing", "mass"]),
         ({"k": None, "inertia": None}, ["missing", "inertia", "k"]),
-        (
-            {"effects": [{"name": "rotor_dragg"}]},
-            ["effect", "rotor_dragg", "Did you mean 'rotor_drag'?"],
-        ),
-        (
-            {"effects": [{"name": "rotor_drag", "coefficients": {"kd": 1e-4}}]},
-            ["rotor_drag", "coefficient", "kdx"],
-        ),
-        (
-            {"effects": [{"name": "rotor_drag", "coefficients": {"kdx": -1}}]},
-            ["rotor_drag", "kdx", "between"],
-        ),
         (
             {"effects": [{"name": "rotor_drag", "coefficients": {"kdx": float("nan")}}]},
             ["rotor_drag", "kdx", "finite"],
         ),
-        (
-            {"effects": [{"name": "rotor_drag", "coefficients": [1]}]},
-            ["rotor_drag", "coefficients", "mapping"],
-        ),
         ({"effects": [{"coefficients": {}}]}, ["effects", "name"]),
-        ({"effects": "rotor_drag"}, ["effects", "list"]),
     ],
 )
 def test_an_error_names_file_field_and_what_was_expected(tmp_path, changes, words):
@@ -121,33 +76,21 @@ def test_an_error_names_file_field_and_what_was_expected(tmp_path, changes, word
 
 
 @pytest.mark.parametrize(
-    ("text", "word"),
+    ("content", "words"),
     [
-        ("mass: [1, 2", "YAML"),
-        ("- 1\n- 2\n", "mapping"),
-        ("", "mapping"),
-        ("3.5", "mapping"),
-        ("\x00", "YAML"),
+        (b"", "mapping"),
+        (b"3.5", "mapping"),
+        (b"\x00", "YAML"),
+        (b"\xff\xfe\x00\x01", "cannot be read"),
+        (None, "cannot be read"),
     ],
 )
-def test_a_file_of_another_form_is_named(tmp_path, text, word):
+def test_what_is_no_vehicle_file_is_named(tmp_path, content, words):
     path = tmp_path / "bad.yaml"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(InputError, match=word) as caught:
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError, match=rf"bad\.yaml: .*{words}"):
         load_vehicle(path)
-    assert str(path) in str(caught.value)
-
-
-def test_what_is_no_vehicle_file_is_named(tmp_path):
-    path = tmp_path / "bad.yaml"
-    path.write_bytes(b"\xff\xfe\x00\x01")
-    for wrong, words in (
-        (path, r"bad\.yaml: cannot be read"),
-        (tmp_path / "nowhere.yaml", r"nowhere\.yaml: cannot be read"),
-        ("ardrone", "Did you mean 'ardrone2'"),
-    ):
-        with pytest.raises(InputError, match=words):
-            load_vehicle(wrong)
 
 
 def test_the_measured_flights_vehicle_loads():
