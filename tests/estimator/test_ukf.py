@@ -14,7 +14,6 @@ from tests.support.reference_filters import (
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import compile_effects
 from windwrench.estimator import UKFTuning, WrenchUKF
-from windwrench.estimator.reference import ReferenceUKF
 from windwrench.estimator.smoother import RecordingUKF
 
 VEHICLE = load_vehicle("ardrone2")
@@ -53,38 +52,6 @@ def test_filter_and_smoother_equal_the_literal_ones_over_a_yawing_flight(effects
         e, size = found.at(k), np.sqrt(np.diag(P))
         np.testing.assert_allclose(as_reference(e, state), state, rtol=0, atol=1e-8)
         assert np.abs((e.covariance - P) / np.outer(size, size)).max() < 1e-7
-
-
-def test_torque_error_in_a_yawing_flight():
-    torque = np.array([0.01, -0.015, 0.02])
-    flight = yawing_flight(VEHICLE, 1600, seed=6, torque=torque)
-    ukf = WrenchUKF(VEHICLE, UKFTuning(), PERIOD)
-    begin(ukf, flight)
-    settled = fly(ukf, flight)[600:]
-    error = np.array([e.torque - torque for e in settled])
-    assert np.sqrt(np.mean(np.sum(error**2, axis=1))) < 0.005
-    force_error = np.array([e.force - [0.3, -0.2, -0.1] for e in settled])
-    assert np.sqrt(np.mean(force_error**2)) < 0.05
-
-
-def test_the_sign_of_a_quaternion_means_nothing():
-    flight = yawing_flight(VEHICLE, 200, seed=7)
-    signs = np.random.default_rng(0).choice([-1.0, 1.0], (200, 1))
-    results = []
-    for seen in (flight, flight | {"quaternion": signs * flight["quaternion"]}):
-        ukf = WrenchUKF(VEHICLE, UKFTuning(), PERIOD)
-        begin(ukf, flight)
-        e = fly(ukf, seen)[-1]
-        results.append((e.torque, e.force, e.covariance, e.nis))
-    for a, b in zip(*results, strict=True):
-        np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-12)
-
-
-def test_weights_sum_to_one():
-    slow = ReferenceUKF(VEHICLE, UKFTuning(), PERIOD)
-    slow.reset([0, 0, 1], [1, 0, 0, 0], initial_covariance())
-    for noise in (slow.Q, slow.R):
-        assert slow.sigma_points(noise)[1].sum() == pytest.approx(1.0, abs=1e-14)
 
 
 FORCE, TORQUE = np.array([0.0, 0.0, -0.52]), np.array([0.067, 0.0, 0.0])
