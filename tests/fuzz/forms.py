@@ -8,7 +8,6 @@ import io
 import json
 import math
 import shutil
-import struct
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
@@ -23,13 +22,14 @@ from numpy.typing import NDArray
 from pyarrow import parquet
 
 from tests.fuzz.spoiling import Draw, places, spoiled_bytes, spoiled_table, spoiled_text
-from tests.support.blackbox_writer import FIELDS as BLACKBOX_FIELDS
 from tests.support.blackbox_writer import blackbox
+from tests.support.blackbox_writer import flight as blackbox_rows
 from tests.support.converted_flights import write_bag
-from tests.support.dataflash_writer import dataflash
+from tests.support.dataflash_writer import dataflash, imu, micro, parm, rcou, xkf1, xkq
 from tests.support.map_tables import hover_columns, table_text, vehicle_of
 from tests.support.paths import ROOT
-from tests.support.ulog_writer import ulog_bytes
+from tests.support.sd_card_writer import sd_card
+from tests.support.ulog_writer import battery, control, esc, odometry, sensor_combined, ulog_bytes
 from windwrench.controllers import make_controller
 from windwrench.controllers.features import Features
 from windwrench.controllers.trained_policy import load_policy, save_policy
@@ -131,40 +131,6 @@ def _betaflight_table() -> bytes:
         **{f"eRPM[{i}]": 420.0 for i in range(4)},
     }
     return table_text(columns)
-
-
-@cache
-def _ulog() -> bytes:
-    t = _times()
-    stamps = np.round(1e6 * (t + 10.0)).astype(np.uint64)
-    turned = np.column_stack([np.ones(_COUNT), np.zeros((_COUNT, 3))])
-    esc = {f"int32_t esc[{i}].esc_rpm": np.full(_COUNT, 3600) for i in range(4)}
-    return ulog_bytes(
-        {
-            "vehicle_mocap_odometry": {
-                "uint64_t timestamp": stamps,
-                "uint64_t timestamp_sample": stamps,
-                "uint8_t pose_frame": np.full(_COUNT, 2),
-                "float position": np.zeros((_COUNT, 3)),
-                "float q": turned,
-            },
-            "esc_status": {"uint64_t timestamp": stamps, **esc},
-            "actuator_motors": {
-                "uint64_t timestamp": stamps,
-                "uint64_t timestamp_sample": stamps,
-                "float control": np.full((_COUNT, 4), 0.5),
-            },
-            "battery_status": {
-                "uint64_t timestamp": stamps,
-                "float voltage_v": np.full(_COUNT, 11.1),
-            },
-            "vehicle_land_detected": {
-                "uint64_t timestamp": stamps,
-                "bool landed": np.zeros(_COUNT, bool),
-            },
-        },
-        {"THR_MDL_FAC": 0.3, "CA_ROTOR_COUNT": 4},
-    )
 
 
 @cache
@@ -338,54 +304,40 @@ def _effects() -> bytes:
 
 
 @cache
+def _ulog() -> bytes:
+    t = _times()
+    topics = {
+        "vehicle_mocap_odometry": odometry(t),
+        "esc_status": esc(t),
+        "sensor_combined": sensor_combined(t),
+        "actuator_motors": control(t, np.full((_COUNT, 4), 0.5)),
+        "battery_status": battery(t, np.full(_COUNT, 11.1)),
+    }
+    return ulog_bytes(topics, {"THR_MDL_FAC": 0.3, "CA_ROTOR_COUNT": 4})
+
+
+@cache
 def _dataflash() -> bytes:
-    t = 1e6 * (10.0 + _times())
-    zero, none = np.zeros(_COUNT), np.zeros(_COUNT)
-    place = {"PN": zero, "PE": 0.1 * np.sin(_times()), "PD": zero - 1.0}
-    turn = {"Q1": zero + 1.0, "Q2": zero, "Q3": zero, "Q4": zero}
-    force = {"AccX": zero, "AccY": zero, "AccZ": zero - 9.81}
-    gyro = {"GyrX": zero, "GyrY": zero, "GyrZ": zero}
-    pulses = {f"C{i}": zero + 1500.0 for i in range(1, 5)}
-    volts = {"TimeUS": t, "Inst": none, "Volt": zero + 11.1}
-    named = {b"FRAME_CLASS": 1.0, b"FRAME_TYPE": 1.0, b"MOT_PWM_MIN": 1000.0, b"MOT_PWM_MAX": 2e3}
-    parameters = {"TimeUS": [0.0] * 4, "Name": [*named], "Value": [*named.values()]}
-    return dataflash(
-        [
-            ("PARM", "QNf", parameters),
-            ("XKF1", "QBfff", {"TimeUS": t, "C": none, **place}),
-            ("XKQ", "QBffff", {"TimeUS": t, "C": none, **turn}),
-            ("IMU", "QBffffff", {"TimeUS": t, "I": none, **gyro, **force}),
-            ("RCOU", "QHHHH", {"TimeUS": t, **pulses}),
-            ("BAT", "QBf", volts),
-        ]
-    )
+    t = 10.0 + _times()
+    volts = {"TimeUS": micro(t), "Inst": 0.0 * t, "Volt": 0.0 * t + 11.1}
+    return dataflash([parm(), xkf1(t), xkq(t), imu(t), rcou(t), ("BAT", "QBf", volts)])
 
 
 @cache
 def _blackbox() -> bytes:
-    rng = np.random.default_rng(0)
-    rows = []
-    for k in range(_COUNT):
-        row = dict.fromkeys(BLACKBOX_FIELDS, 0) | {"accSmooth[2]": 2048, "rcCommand[3]": 1500}
-        row |= {f"gyroADC[{i}]": int(rng.integers(-50, 50)) for i in range(3)}
-        row |= {f"motor[{i}]": 700 + int(rng.integers(40)) for i in range(4)}
-        row |= {f"eRPM[{i}]": 900 + int(rng.integers(40)) for i in range(4)}
-        rows.append(row | {"loopIteration": 2 * k, "time": 1_000_000 + 10_000 * k})
-    return blackbox(rows)
+    return blackbox(blackbox_rows(_COUNT))
 
 
 @cache
 def _sd_card() -> bytes:
-    names = [f"stateEstimate.{axis}(f)" for axis in ("x", "y", "z", "qw", "qx", "qy", "qz")]
-    names += [f"acc.{axis}(f)" for axis in "xyz"] + [f"gyro.{axis}(f)" for axis in "xyz"]
-    names += [f"motor.m{i}(H)" for i in range(1, 5)] + ["pm.vbat(f)"]
-    out = struct.pack("<BHHH", 0xBC, 2, 1, 7) + b"fixedFrequency\0"
-    out += struct.pack("<H", len(names)) + b"".join(name.encode() + b"\0" for name in names)
-    for k, t in enumerate(_times()):
-        values = (0.1 * math.sin(t), 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.1 * k, 0.0, 0.0)
-        record = (7, round(1e6 * (30.0 + t)), *values, *[40_000] * 4, 3.9)
-        out += struct.pack("<HQ13f4Hf", *record)
-    return out
+    columns = hover_columns("cflib", _COUNT, _PERIOD)
+    del columns["timestamp"]  # each event has its own
+    variables = {
+        f"{name}({'H' if name.startswith('motor.') else 'f'})": np.broadcast_to(values, _COUNT)
+        for name, values in columns.items()
+        if not name.startswith("rpm.")
+    }
+    return sd_card({"fixedFrequency": (30.0 + _times(), variables)})
 
 
 def _zipped(spoiled: Way) -> Way:

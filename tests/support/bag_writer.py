@@ -46,12 +46,22 @@ def write_bag(path, topics, kind="mcap", variant=0, delay=0.0, packed=()):
             how = how or {"typestore": store}
             connection = writer.add_connection(topic, name, **how)
             for t in times:
-                raw = serialize(_message(store, name, fields(t)), name)
+                raw = serialize(message(store, name, fields(t)), name)
                 writer.write(connection, START + round(1e9 * (t + delay)), raw)
     return path
 
 
-def _message(store, name, given):
+def pose_fields(position, quaternion):
+    """Return the fields of a pose: position (3,) in m, quaternion (4,) with the scalar first."""
+    place = dict(zip("xyz", map(float, position), strict=True))
+    return {
+        "position": place,
+        "orientation": dict(zip("wxyz", map(float, quaternion), strict=True)),
+    }
+
+
+def message(store, name, given):
+    """Return a message of a type from some of its fields; the others are zero."""
     _, known = store.fielddefs[name]
     values = {field: _value(store, kind, given.get(field)) for field, kind in known}
     assert set(given) <= set(values)
@@ -64,10 +74,10 @@ def _value(store, kind, given):
         number = "" if what[0] == "string" else 0
         return given if given is not None else number
     if node is Nodetype.NAME:
-        return _message(store, what, given or {})
+        return message(store, what, given or {})
     (inner, name), count = what
     if inner is Nodetype.NAME:
         items = given if given is not None else [{}] * (count if node is Nodetype.ARRAY else 0)
-        return [_message(store, name, item) for item in items]
+        return [message(store, name, item) for item in items]
     numbers = given if given is not None else np.zeros(count if node is Nodetype.ARRAY else 0)
     return np.asarray(numbers, dtype=name[0])

@@ -4,6 +4,8 @@ has, after the format's description in Betaflight's documentation.
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 # field: predictor and encoding in I frames, predictor and encoding in P frames
 FIELDS = {
     "loopIteration": (0, 1, 6, 9),
@@ -33,6 +35,34 @@ HEADERS = {
     "minthrottle": str(MINTHROTTLE),
     "motor_poles": "14",
 }
+
+
+def flight(count=400, seed=0):
+    """Rows of a flight at 1 kHz: half a second on the ground, then all fields wander, now and then
+    by a leap.
+    """
+    rng = np.random.default_rng(seed)
+    values = dict.fromkeys(FIELDS, 0) | {
+        "accSmooth[2]": 2048,
+        "rcCommand[3]": 1200,
+        "vbatLatest": 2480,
+    }
+    values |= {f"motor[{i}]": 300 + 100 * i for i in range(4)}
+    values |= {f"eRPM[{i}]": 900 + 10 * i for i in range(4)}
+    rows = []
+    for k in range(count):
+        if k:
+            leap = rng.choice([0, 1, 5, 20, 300], size=len(FIELDS), p=[0.3, 0.3, 0.2, 0.15, 0.05])
+            for name, size in zip(FIELDS, leap, strict=True):
+                still = name.startswith(("accSmooth", "gyroADC")) and k < 0.6 * count
+                if not still:
+                    values[name] += int(rng.integers(-size, size + 1))
+        for name in values:
+            low = LEAST_MOTOR if name.startswith("motor") else 0
+            if name.startswith(("motor", "eRPM", "rssi", "rcCommand[3]", "vbat")):
+                values[name] = min(max(values[name], low), 2047)
+        rows.append(values | {"loopIteration": 2 * k, "time": 5_000_000 + 1000 * k + k % 3})
+    return rows
 
 
 def blackbox(

@@ -1,15 +1,11 @@
 """A flight in the kit's own form, written as other programs write theirs."""
 
 import numpy as np
-from rosbags import rosbag1, rosbag2
-from rosbags.rosbag2 import StoragePlugin
-from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
+from tests.support import bag_writer
+from tests.support.autopilot_flight import FLIP
 from tests.support.ulog_writer import ulog_bytes
-
-FLIP = np.diag([1.0, -1.0, -1.0])  # our world and body seen from PX4's, each half a turn about x
-START = 1_700_000_000_000_000_000  # ns
 
 
 def write_ulog(log, path):
@@ -42,29 +38,17 @@ def write_bag(log, path, kind="db3", pose_topic="/vicon/drone"):
     """A bag with poses and with rotor speeds on /motors: of ROS 1 (``kind`` bag), or a folder of
     ROS 2 with SQLite (db3) or MCAP (mcap).
     """
-    ros1 = kind == "bag"
-    store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
-    serialize = store.serialize_ros1 if ros1 else store.serialize_cdr
-    plugin = StoragePlugin.MCAP if kind == "mcap" else StoragePlugin.SQLITE3
-    types = store.types
-    pose_name, array_name = "geometry_msgs/msg/PoseStamped", "std_msgs/msg/Float32MultiArray"
-    with (
-        rosbag1.Writer(path) if ros1 else rosbag2.Writer(path, version=9, storage_plugin=plugin)
-    ) as writer:
-        poses = writer.add_connection(pose_topic, pose_name, typestore=store)
-        rotors = writer.add_connection("/motors", array_name, typestore=store)
-        for t, p, q, speeds in zip(
-            log.t, log.position, log.quaternion, log.rotor_speeds, strict=True
-        ):
-            now = START + round(1e9 * t)
-            stamp = types["builtin_interfaces/msg/Time"](now // 10**9, now % 10**9)
-            header = types["std_msgs/msg/Header"](*([0] if ros1 else []), stamp, "world")
-            pose = types["geometry_msgs/msg/Pose"](
-                types["geometry_msgs/msg/Point"](*p),
-                types["geometry_msgs/msg/Quaternion"](q[1], q[2], q[3], q[0]),
-            )
-            message = types[pose_name](header, pose)
-            writer.write(poses, now, serialize(message, pose_name))
-            layout = types["std_msgs/msg/MultiArrayLayout"]([], 0)
-            message = types[array_name](layout, speeds.astype(np.float32))
-            writer.write(rotors, now, serialize(message, array_name))
+    row = {t: k for k, t in enumerate(log.t.tolist())}
+
+    def pose(t):
+        here = bag_writer.pose_fields(log.position[row[t]], log.quaternion[row[t]])
+        return {"header": bag_writer.stamp(t), "pose": here}
+
+    def motors(t):
+        return {"data": log.rotor_speeds[row[t]]}
+
+    topics = {
+        pose_topic: ("geometry_msgs/msg/PoseStamped", row, pose),
+        "/motors": ("std_msgs/msg/Float32MultiArray", row, motors),
+    }
+    bag_writer.write_bag(path, topics, kind)

@@ -3,9 +3,9 @@
 import sys
 import types
 
-from rosbags.typesys import Stores, get_typestore
+from tests.support.bag_writer import message, pose_fields, typestore
 
-STORE = get_typestore(Stores.ROS2_HUMBLE)
+STORE = typestore(False)
 
 
 class World:
@@ -70,27 +70,13 @@ def install(monkeypatch, world):
         monkeypatch.setitem(sys.modules, name, module)
 
 
-def header(ns, frame="world"):
-    t = STORE.types
-    time = t["builtin_interfaces/msg/Time"](sec=ns // 10**9, nanosec=ns % 10**9)
-    return t["std_msgs/msg/Header"](stamp=time, frame_id=frame)
-
-
 def pose(ns, position, quaternion):
-    t = STORE.types
-    w, x, y, z = map(float, quaternion)
-    return t["geometry_msgs/msg/PoseStamped"](
-        header=header(ns),
-        pose=t["geometry_msgs/msg/Pose"](
-            position=t["geometry_msgs/msg/Point"](*map(float, position)),
-            orientation=t["geometry_msgs/msg/Quaternion"](x=x, y=y, z=z, w=w),
-        ),
-    )
+    """A pose that was stamped at a time in ns."""
+    header = {"stamp": {"sec": ns // 10**9, "nanosec": ns % 10**9}, "frame_id": "world"}
+    fields = {"header": header, "pose": pose_fields(position, quaternion)}
+    return message(STORE, "geometry_msgs/msg/PoseStamped", fields)
 
 
 def array(values):
-    import numpy as np
-
-    t = STORE.types
-    layout = t["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
-    return t["std_msgs/msg/Float64MultiArray"](layout=layout, data=np.array(values, dtype=float))
+    """Numbers without a unit."""
+    return message(STORE, "std_msgs/msg/Float64MultiArray", {"data": values})

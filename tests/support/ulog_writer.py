@@ -1,8 +1,14 @@
-"""A small writer of ULog files, after the format's description in PX4's user guide."""
+"""A small writer of ULog files, after the format's description in PX4's user guide, and the flight
+of ``autopilot_flight`` as PX4 logs it.
+"""
 
 import struct
 from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
+
+from tests.support.autopilot_flight import FLIP, PX4, growth, inertial, ned
 
 _TYPES = {"uint64_t": "Q", "float": "f", "uint8_t": "B", "int32_t": "i", "bool": "?"}
 
@@ -76,3 +82,53 @@ def _flat(value: Any) -> list[Any]:
         if getattr(value, "shape", ())
         else [value.item() if hasattr(value, "item") else value]
     )
+
+
+def stamps(t):
+    return np.round(1e6 * (t + 10.0)).astype(np.uint64)
+
+
+def odometry(t, new=True):
+    position, turn = ned(t)
+    head = {"uint64_t timestamp": stamps(t + 0.02), "uint64_t timestamp_sample": stamps(t)}
+    if new:
+        return head | {
+            "uint8_t pose_frame": np.full(len(t), 2),
+            "float position": position,
+            "float q": turn.as_quat(scalar_first=True),
+        }
+    xyz = {f"float {axis}": position[:, i] for i, axis in enumerate("xyz")}
+    return (
+        head
+        | {"uint8_t local_frame": np.full(len(t), 0), "float q": turn.as_quat(scalar_first=True)}
+        | xyz
+    )
+
+
+def esc(t, speeds=PX4, **functions):
+    rpm = np.multiply.outer(growth(t), speeds) * 30.0 / np.pi
+    fields = {"uint64_t timestamp": stamps(t)}
+    for i in range(4):
+        fields[f"int32_t esc[{i}].esc_rpm"] = np.round(rpm[:, i]).astype(int)
+        if functions:
+            fields[f"uint8_t esc[{i}].actuator_function"] = np.full(len(t), functions[f"f{i}"])
+    return fields
+
+
+def sensor_combined(t):
+    gyro, force = inertial(t)
+    return {
+        "uint64_t timestamp": stamps(t),
+        "float gyro_rad": gyro @ FLIP,
+        "float accelerometer_m_s2": force @ FLIP,
+    }
+
+
+def control(t, values):
+    """Return actuator_motors: relative thrusts (N, K)."""
+    return {"uint64_t timestamp": stamps(t), "float control": values}
+
+
+def battery(t, volts):
+    """Return battery_status: voltages (N,)."""
+    return {"uint64_t timestamp": stamps(t), "float voltage_v": volts}

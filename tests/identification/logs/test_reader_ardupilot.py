@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from tests.support.autopilot_flight import (
-    FLIP,
     assert_inertial,
     assert_motion,
     inertial,
@@ -16,7 +15,17 @@ from tests.support.autopilot_flight import (
     ned,
 )
 from tests.support.data_paths import data_file
-from tests.support.dataflash_writer import dataflash
+from tests.support.dataflash_writer import (
+    COMMAND,
+    att,
+    dataflash,
+    imu,
+    micro,
+    parm,
+    rcou,
+    xkf1,
+    xkq,
+)
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.logs.readers.dataflash import read_dataflash
@@ -25,80 +34,7 @@ from windwrench.identification.logs.reading import read_log
 T = 5.0 + 0.02 * np.arange(300)
 SLOW = T[::5]
 FAST = 5.0 + 0.0025 * np.arange(2400)
-PARAMETERS = {
-    "FRAME_CLASS": 1.0,
-    "FRAME_TYPE": 1.0,
-    "MOT_PWM_MIN": 1100.0,
-    "MOT_PWM_MAX": 1900.0,
-    "MOT_THST_EXPO": 0.5,
-    "MOT_SPIN_MIN": 0.1,
-    "MOT_SPIN_MAX": 0.9,
-    "SERVO9_FUNCTION": 33.0,
-    "SERVO10_FUNCTION": 34.0,
-    "SERVO11_FUNCTION": 35.0,
-    "SERVO12_FUNCTION": 36.0,
-}
-COMMAND = np.array([0.50, 0.52, 0.54, 0.56])  # ours: front-left, rear-left, rear-right, front-right
-
-
-def micro(t):
-    return 1e6 * t
-
-
-def xkf1(t):
-    position, _ = ned(t)
-    angles = {name: np.zeros(len(t)) for name in ("Roll", "Pitch", "Yaw")}
-    places = {name: position[:, i] for i, name in enumerate(("PN", "PE", "PD"))}
-    return "XKF1", "QBcccfff", {"TimeUS": micro(t), "C": np.zeros(len(t)), **angles, **places}
-
-
-def xkq(t):
-    q = ned(t)[1].as_quat(scalar_first=True)
-    return (
-        "XKQ",
-        "QBffff",
-        {
-            "TimeUS": micro(t),
-            "C": np.zeros(len(t)),
-            **{f"Q{i + 1}": q[:, i] for i in range(4)},
-        },
-    )
-
-
-def att(t):
-    yaw, pitch, roll = ned(t)[1].as_euler("ZYX", degrees=True).T
-    angles = {"Roll": roll, "Pitch": pitch, "Yaw": yaw % 360.0}
-    return "ATT", "QccC", {"TimeUS": micro(t), **angles}
-
-
-def imu(t):
-    gyro, force = inertial(t)
-    columns = {f"Gyr{a}": (gyro @ FLIP)[:, i] for i, a in enumerate("XYZ")}
-    columns |= {f"Acc{a}": (force @ FLIP)[:, i] for i, a in enumerate("XYZ")}
-    return "IMU", "QBffffff", {"TimeUS": micro(t), "I": np.zeros(len(t)), **columns}
-
-
-def rcou(t, channels=(9, 10, 11, 12)):
-    pulses = {f"C{i}": np.zeros(len(t)) for i in range(1, 15)}
-    for channel, u in zip(channels, COMMAND[[3, 1, 0, 2]], strict=True):
-        pulses[f"C{channel}"] = np.full(len(t), 1100.0 + 800.0 * u)
-    return "RCOU", "Q" + "H" * 14, {"TimeUS": micro(t), **pulses}
-
-
 POSE = (xkf1(T), xkq(T))
-
-
-def parm(**changes):
-    values = {k: v for k, v in (PARAMETERS | changes).items() if v is not None}
-    return (
-        "PARM",
-        "QNf",
-        {
-            "TimeUS": [1.0] * len(values),
-            "Name": [name.encode() for name in values],
-            "Value": list(values.values()),
-        },
-    )
 
 
 def esc(t):

@@ -2,8 +2,6 @@
 they lie, and synthetic ones.
 """
 
-import struct
-import zlib
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +9,9 @@ import pytest
 from scipy.signal import butter, filtfilt
 from scipy.spatial.transform import Rotation
 
+from tests.support.autopilot_flight import inertial, motion
 from tests.support.data_paths import data_file
+from tests.support.sd_card_writer import sd_card
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.logs.readers import crazyflie_sd
@@ -25,18 +25,6 @@ MOTORS = np.array([40000, 41000, 42000, 43000])  # m1 front-right to m4 front-le
 OURS = MOTORS[::-1]
 
 
-def motion(t):
-    position = np.column_stack([0.5 * np.cos(t), 0.8 * np.sin(t), 1.0 + 0.1 * t])
-    angles = np.column_stack([2.0 + 0.5 * t, 0.2 * np.sin(2 * t), 0.3 * np.cos(t)])
-    return position, Rotation.from_euler("ZYX", angles), angles
-
-
-def inertial(t):
-    turn, after = motion(t)[1], motion(t + 1e-5)[1]
-    acceleration = np.column_stack([-0.5 * np.cos(t), -0.8 * np.sin(t), np.full(len(t), 9.81)])
-    return (turn.inv() * after).as_rotvec() / 1e-5, turn.inv().apply(acceleration)
-
-
 def fast(t):
     """Variables of gyro, accelerometer and motors, as the firmware logs them."""
     gyro, force = inertial(t)
@@ -47,28 +35,11 @@ def fast(t):
 
 def slow(t):
     """Variables of the onboard filter: legacy Euler angles, nose up positive."""
-    position, _, angles = motion(t)
-    yaw, pitch, roll = np.degrees(angles).T
+    position, turn = motion(t)
+    yaw, pitch, roll = turn.as_euler("ZYX", degrees=True).T
     out = {f"stateEstimate.{a}(f)": position[:, i] for i, a in enumerate("xyz")}
     out |= {"stateEstimate.roll(f)": roll, "stateEstimate.pitch(f)": -pitch}
     return out | {"stateEstimate.yaw(f)": yaw, "pm.vbat(f)": 4.1 - 0.01 * (t - t[0])}
-
-
-def sd_card(events, version=2, checksum=True):
-    """Return the bytes of a log of events ``{name: (times, variables)}``, in order of time."""
-    out = struct.pack("<BHH", 0xBC, version, len(events))
-    records = []
-    for number, (name, (t, variables)) in enumerate(events.items(), 7):
-        out += struct.pack("<H", number) + name.encode() + b"\0"
-        out += struct.pack("<H", len(variables))
-        out += b"".join(key.encode() + b"\0" for key in variables)
-        layout = "<H" + ("Q" if version == 2 else "I") + "".join(key[-2] for key in variables)
-        for k, at in enumerate(t):
-            stamp = round(1e6 * at) if version == 2 else round(1e3 * at)
-            values = [int(c[k]) if key[-2] != "f" else float(c[k]) for key, c in variables.items()]
-            records.append((at, struct.pack(layout, number, stamp, *values)))
-    out += b"".join(record for _, record in sorted(records, key=lambda r: r[0]))
-    return out + struct.pack("<I", zlib.crc32(out)) if checksum else out
 
 
 @pytest.fixture
@@ -86,7 +57,7 @@ def test_events_of_several_rates(write, version):
     log = read_log(write(sd_card({"imu": (T, fast(T)), "pose": (SLOW, slow(SLOW))}, version)))
     assert "reader crazyflie_sd" in log.source
     # the inertial sensor is four times as fast as the pose: it has no rows of its own yet
-    position, turn, _ = motion(log.t + SLOW[0])
+    position, turn = motion(log.t + SLOW[0])
     np.testing.assert_allclose(log.position, position, atol=2e-3)
     seen = Rotation.from_quat(log.quaternion, scalar_first=True)
     assert (turn.inv() * seen).magnitude().max() < 2e-3
@@ -183,7 +154,7 @@ def test_a_table_of_log_variables(tmp_path, time, unit):
     path.write_text("\n".join(lines) + "\n")
     log = read_log(path)
     assert "reader crazyflie_csv" in log.source
-    position, turn, _ = motion(log.t[log.valid] + T[0])
+    position, turn = motion(log.t[log.valid] + T[0])
     np.testing.assert_allclose(log.position[log.valid], position, atol=3e-3)
     seen = Rotation.from_quat(log.quaternion[log.valid], scalar_first=True)
     assert (turn.inv() * seen).magnitude().max() < 3e-3

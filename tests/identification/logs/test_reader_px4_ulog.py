@@ -14,7 +14,15 @@ from tests.support.autopilot_flight import (
     motion,
     ned,
 )
-from tests.support.ulog_writer import ulog_bytes
+from tests.support.ulog_writer import (
+    battery,
+    control,
+    esc,
+    odometry,
+    sensor_combined,
+    stamps,
+    ulog_bytes,
+)
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.logs.reading import read_log
@@ -29,37 +37,6 @@ WIDE = np.arange(-0.5, T[-1] + 0.5, 0.004)
 @pytest.fixture(scope="module")
 def vehicle():
     return load_vehicle("ardrone2")
-
-
-def stamps(t):
-    return np.round(1e6 * (t + 10.0)).astype(np.uint64)
-
-
-def odometry(t, new=True):
-    position, turn = ned(t)
-    head = {"uint64_t timestamp": stamps(t + 0.02), "uint64_t timestamp_sample": stamps(t)}
-    if new:
-        return head | {
-            "uint8_t pose_frame": np.full(len(t), 2),
-            "float position": position,
-            "float q": turn.as_quat(scalar_first=True),
-        }
-    xyz = {f"float {axis}": position[:, i] for i, axis in enumerate("xyz")}
-    return (
-        head
-        | {"uint8_t local_frame": np.full(len(t), 0), "float q": turn.as_quat(scalar_first=True)}
-        | xyz
-    )
-
-
-def esc(t, speeds=PX4, **functions):
-    rpm = np.multiply.outer(growth(t), speeds) * 30.0 / np.pi
-    fields = {"uint64_t timestamp": stamps(t)}
-    for i in range(4):
-        fields[f"int32_t esc[{i}].esc_rpm"] = np.round(rpm[:, i]).astype(int)
-        if functions:
-            fields[f"uint8_t esc[{i}].actuator_function"] = np.full(len(t), functions[f"f{i}"])
-    return fields
 
 
 def onboard(t):
@@ -77,15 +54,6 @@ def onboard(t):
             "uint64_t timestamp": stamps(fast),
             "float q": ned(fast)[1].as_quat(scalar_first=True),
         },
-    }
-
-
-def sensor_combined(t):
-    gyro, force = inertial(t)
-    return {
-        "uint64_t timestamp": stamps(t),
-        "float gyro_rad": gyro @ FLIP,
-        "float accelerometer_m_s2": force @ FLIP,
     }
 
 
@@ -110,11 +78,8 @@ FLIGHT = MOCAP | {"esc_status": esc(WIDE)}
 @pytest.mark.parametrize("topic", ["vehicle_mocap_odometry", "vehicle_visual_odometry"])
 @pytest.mark.parametrize("new", [True, False])
 def test_motion_capture_and_turn_rates(read, topic, new):
-    battery = {
-        "uint64_t timestamp": stamps(WIDE[::25]),
-        "float voltage_v": 12.0 - 0.1 * WIDE[::25],
-    }
-    topics = {topic: odometry(T, new), "esc_status": esc(WIDE), "battery_status": battery}
+    volts = battery(WIDE[::25], 12.0 - 0.1 * WIDE[::25])
+    topics = {topic: odometry(T, new), "esc_status": esc(WIDE), "battery_status": volts}
     log = read(topics | onboard(T[::3]))
     np.testing.assert_allclose(log.t, T, atol=2e-6)
     assert_motion(log, T)
@@ -187,10 +152,6 @@ SHARES = np.array([0.40, 0.42, 0.44, 0.46])  # relative thrusts of our rotors
 THEIRS = SHARES[[3, 1, 0, 2]]
 
 
-def control(values):
-    return {"actuator_motors": {"uint64_t timestamp": stamps(WIDE), "float control": values}}
-
-
 def assert_scaled(log, vehicle):
     """The vertical part of a thrust that stays the same carries the weight on the mean."""
     thrust = vehicle.k * log.rotor_speeds**2
@@ -206,7 +167,7 @@ def assert_scaled(log, vehicle):
 def test_relative_thrust_is_scaled_to_the_weight(read, vehicle):
     values = np.full((len(WIDE), 12), np.nan)
     values[20:, :4] = THEIRS  # disarmed before
-    topics = MOCAP | {"esc_status": esc(WIDE, 0 * PX4)} | control(values)
+    topics = MOCAP | {"esc_status": esc(WIDE, 0 * PX4)} | {"actuator_motors": control(WIDE, values)}
     assert_scaled(read(topics, {"THR_MDL_FAC": 0.3}), vehicle)
     alone = read(topics, vehicle=None)  # without a vehicle commands stay what they are
     assert not alone.has_rotor_speeds
@@ -225,8 +186,9 @@ def test_a_tilted_flight_needs_more_thrust_than_its_weight(read, vehicle):
         "float gyro_rad": np.sin(np.multiply.outer(WIDE, [1.0, 2.0, 3.0])),
         "float accelerometer_m_s2": force + 1e-3 * np.sin(WIDE)[:, None],
     }
+    half = control(WIDE, np.full((len(WIDE), 12), 0.5))
     with pytest.warns(UserWarning, match="gyro|gx"):
-        log = read(MOCAP | {"sensor_combined": sensed} | control(np.full((len(WIDE), 12), 0.5)))
+        log = read(MOCAP | {"sensor_combined": sensed, "actuator_motors": half})
     thrust = np.sum(vehicle.k * log.rotor_speeds**2, axis=1)
     np.testing.assert_allclose(thrust, 1.5 * vehicle.weight, rtol=1e-3)
 
