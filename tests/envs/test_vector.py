@@ -1,55 +1,67 @@
 """Many environments in one process are as many single ones."""
 
-import gymnasium as gym
 import mujoco
 import numpy as np
 import pytest
 
-import windwrench  # noqa: F401  registers the environment
+from tests.support.vector_flights import fly, make
 from windwrench.dynamics import InputError
-
-NAME = "windwrench/FanTracking-v0"
-
-
-def make(num_envs, **kwargs):
-    return gym.make_vec(NAME, num_envs=num_envs, vectorization_mode="vector_entry_point", **kwargs)
+from windwrench.runtime.vector_lanes import WIDTH
 
 
-def rows(envs, seed, count):
-    """Everything that the first steps return, as one array (count, n, .)."""
-    rng, out = np.random.default_rng(seed), []
-    frames, infos = envs.reset(seed=seed)
-    for _ in range(count):
-        frames, rewards, lost, over, infos = envs.step(
-            rng.uniform(-1, 1, (envs.num_envs, 1)).astype(np.float32)
-        )
-        numbers = [infos[name] for name in NUMBERS]
-        out.append(
-            np.column_stack(
-                [frames, rewards, lost, over, *numbers, infos["force"], infos["torque"]]
-            )
-        )
-    return np.array(out)
-
-
-NUMBERS = (
-    "reward_tracking",
-    "reward_change",
-    "fan_y",
-    "fan_velocity",
-    "y",
-    "offset",
-    "time",
-    "lost",
+@pytest.mark.parametrize(
+    ("given", "threads"),
+    [
+        ({"estimator": "ukf"}, 5),
+        ({"estimator": "constant-gain"}, 2),
+        ({"plant": "lanes"}, 3),
+    ],
 )
+def test_the_bits_depend_on_neither_number_nor_threads(given, threads):
+    given = {"scenario": "varied", "max_episode_steps": 7, **given}
+    many, decisions = 2 * WIDTH + 1 if "plant" in given else 5, 16
+    alone = fly(make(many, **given), decisions)
+    for other in (make(2, **given), make(many, threads=threads, **given)):
+        count = other.num_envs
+        np.testing.assert_array_equal(fly(other, decisions), alone[:, :count])
 
 
-@pytest.mark.parametrize(("estimator", "threads"), [("ukf", 5), ("constant-gain", 2)])
-def test_threads_give_the_same_bits(estimator, threads):
-    given = {"scenario": "varied", "estimator": estimator, "max_episode_steps": 7}
-    alone, spread = make(5, **given), make(5, threads=threads, **given)
-    np.testing.assert_array_equal(rows(alone, 3, 20), rows(spread, 3, 20))
-    spread.close()
+@pytest.mark.parametrize("plant", ["mujoco", "lanes"])
+def test_one_state_that_is_no_number_is_lost_and_the_others_fly_on(plant, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log where it runs
+    envs, healthy = make(3, plant, threads=2), make(3, plant)
+    actions = np.zeros((3, 1), np.float32)
+    for one in (envs, healthy):
+        one.reset(seed=0)
+    if plant == "mujoco":
+        envs.envs[1].loop.data.qvel[0] = np.nan
+    else:
+        envs._flying.loops["qvel"][0, 0, 1] = np.nan
+    frames, rewards, lost, _, infos = envs.step(actions)
+    assert lost.tolist() == infos["lost"].tolist() == [False, True, False]
+    assert frames in envs.observation_space
+    assert np.isfinite([rewards, infos["offset"]]).all()
+    np.testing.assert_array_equal(frames[[0, 2]], healthy.step(actions)[0][[0, 2]])
+    _, rewards, lost, _, infos = envs.step(actions)
+    assert not lost.any()
+    assert (rewards[1], infos["time"][1]) == (0.0, 0.0)
+    envs.close()
+
+
+def test_many_environments_want_a_reset_of_all_first():
+    envs = make(2)
+    with pytest.raises(InputError, match="reset before step"):
+        envs.step(np.zeros((2, 1), np.float32))
+    envs.reset(seed=0, options={"reset_mask": np.array([True, False])})
+    with pytest.raises(InputError, match="reset before step"):
+        envs.step(np.zeros((2, 1), np.float32))
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "lanes"])
+@pytest.mark.parametrize(("name", "value"), [("threads", 0), ("num_envs", 0), ("num_envs", -1)])
+def test_numbers_below_one_are_refused(name, value, plant):
+    with pytest.raises(InputError, match=name):
+        make(**{"num_envs": 2, "plant": plant, name: value})
 
 
 def test_seeds_may_be_listed_and_a_part_reset():
@@ -66,6 +78,8 @@ def test_seeds_may_be_listed_and_a_part_reset():
     assert infos["time"].tolist() == [0.0, pytest.approx(0.16), pytest.approx(0.16)]
     with pytest.raises(InputError, match="3 seeds"):
         envs.reset(seed=[1, 2])
+    with pytest.raises(InputError, match=r"unknown option 'mask'.*expected one of reset_mask"):
+        envs.reset(options={"mask": 1})
 
 
 @pytest.mark.parametrize("actions", [np.zeros(3), np.zeros((2, 1)), np.full((3, 1), np.nan)])
@@ -75,12 +89,6 @@ def test_bad_actions_are_named_and_nothing_flies(actions):
     with pytest.raises(InputError, match=r"shape \(3, 1\)"):
         envs.step(actions)
     assert (envs.step(np.zeros((3, 1)))[4]["time"] == 0.08).all()
-
-
-@pytest.mark.parametrize(("name", "value"), [("threads", 0), ("num_envs", 0), ("num_envs", -1)])
-def test_numbers_below_one_are_refused(name, value):
-    with pytest.raises(InputError, match=name):
-        make(**{"num_envs": 2, name: value})
 
 
 def test_mujoco_s_clock_is_a_user_s_again_after_a_flight():

@@ -1,0 +1,34 @@
+"""Vector environments of FanTracking and all that their flights return."""
+
+import gymnasium as gym
+import numpy as np
+
+import windwrench  # noqa: F401  registers the environment
+
+NUMBERS = (
+    *("reward_tracking", "reward_change", "fan_y", "fan_velocity", "y", "offset"),
+    *("force", "torque", "time", "lost"),
+)
+
+
+def make(num_envs, plant="mujoco", **kwargs):
+    return gym.make_vec(
+        "windwrench/FanTracking-v0",
+        num_envs=num_envs,
+        vectorization_mode="vector_entry_point",
+        plant=plant,
+        **kwargs,
+    )
+
+
+def fly(envs, decisions, seed=3, law=None):
+    """Everything that the first decisions return, as one array (decisions, n, .)."""
+    rng, rows = np.random.default_rng(seed), []
+    seen, infos = envs.reset(seed=seed)
+    for _ in range(decisions):
+        drawn = rng.uniform(-1, 1, (100, 1)).astype(np.float32)[: envs.num_envs]
+        seen, rewards, lost, over, infos = envs.step(drawn if law is None else law(seen))
+        numbers = [infos[name].reshape(envs.num_envs, -1) for name in NUMBERS]
+        rows.append(np.column_stack([seen, rewards, lost, over, *numbers]))
+    envs.close()
+    return np.array(rows)
