@@ -16,7 +16,8 @@ McKinnon and Schoellig, *Unscented External Force and Torque Estimation for Quad
 
 import math
 from collections.abc import Callable
-from typing import Any
+from copy import deepcopy
+from typing import Any, Self
 
 import numpy as np
 from numba import carray
@@ -419,6 +420,11 @@ class WrenchUKF:
         gate: float | None = None,
         recovery: Recovery | None = None,
     ) -> None:
+        if not isinstance(vehicle, Vehicle):
+            raise InputError(
+                f"{type(self).__name__}: vehicle must be a Vehicle, such as "
+                f"load_vehicle('ardrone2'), got {vehicle!r}"
+            )
         if not (math.isfinite(period) and period > 0):
             raise InputError(f"WrenchUKF: period must be positive, in s, got {period!r}")
         if gate is not None and not 0.5 <= gate < 1.0:
@@ -459,6 +465,10 @@ class WrenchUKF:
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
         self._bind()
+
+    def __copy__(self) -> Self:
+        """Return a filter with a memory of its own that stands where this one stands."""
+        return deepcopy(self)
 
     def reset(
         self,
@@ -663,6 +673,8 @@ class WrenchUKF:
         if call is None:
             biases = self.record[0]["imu"]["used"]
             step = self._compiled_step_with_biases if biases else self._compiled_step
+            if not self.record[0]["x"][3:7].any():
+                raise InputError(f"{type(self).__name__}: call reset before a step")
             call = self._call = specialised(step, self.record, parts, dt, 0.0)
         if call(self.record, parts, dt, self._voltage if voltage is None else voltage) < 0:
             raise self._sample.bad_quaternion()

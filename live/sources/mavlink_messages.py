@@ -120,9 +120,11 @@ class MessageReader:
     def _take_attitude(self, m: Any, sample: Sample) -> bool:
         """Keep an attitude for the positions that come without one."""
         quaternion = np.array([m.q1, m.q2, m.q3, m.q4], dtype=np.float64)
+        rates = np.array([m.rollspeed, m.pitchspeed, m.yawspeed], dtype=np.float64)
         good = abs(float(np.linalg.norm(quaternion)) - 1.0) <= _NORM_TOLERANCE
-        if good and sample.stamp is not None:
-            rates = np.array([m.rollspeed, m.pitchspeed, m.yawspeed], dtype=np.float64)
+        if not (good and np.isfinite(rates).all()):
+            raise ValueError("no attitude")
+        if sample.stamp is not None:
             self._attitude = sample.stamp, quaternion, rates
         return False
 

@@ -1,5 +1,7 @@
 """The wrench filter and its smoother against the literal ones, and what the filter must hold."""
 
+import copy
+
 import numpy as np
 import pytest
 
@@ -126,6 +128,7 @@ def test_a_missing_measurement_is_a_prediction():
 @pytest.mark.parametrize(
     ("make", "words"),
     [
+        (lambda: WrenchUKF("ardrone2"), r"must be a Vehicle, such as load_vehicle\('ardrone2'\)"),
         (lambda: UKFTuning(torque_walk=-1.0), "torque_walk"),
         (lambda: UKFTuning(position_noise=(1, 2)), "position_noise"),
         (lambda: UKFTuning(force_walk="a"), "force_walk"),
@@ -142,3 +145,17 @@ def test_a_missing_measurement_is_a_prediction():
 def test_bad_settings_are_named(make, words):
     with pytest.raises(InputError, match=words):
         make()
+
+
+def test_a_filter_that_was_not_reset_says_so():
+    with pytest.raises(InputError, match="call reset before a step"):
+        WrenchUKF(VEHICLE).step(np.full(4, 400.0), [0, 0, 1], [1, 0, 0, 0])
+
+
+def test_a_copy_has_a_memory_of_its_own():
+    ukf = WrenchUKF(VEHICLE)
+    ukf.reset([0, 0, 1], [1, 0, 0, 0])
+    other = copy.copy(ukf)
+    ukf.step(np.full(4, 400.0), [0.1, 0, 1], [1, 0, 0, 0])
+    np.testing.assert_array_equal(other.estimate.position, [0, 0, 1])
+    assert ukf.estimate.position[0] > 0.0
