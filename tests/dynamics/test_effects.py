@@ -11,7 +11,7 @@ import pytest
 
 from tests.support.parameters import mostly_slow
 from windwrench.dynamics import EffectSetting, InputError, Mocap, load_vehicle
-from windwrench.dynamics.effects import compile_effects, get, names, parse_setting
+from windwrench.dynamics.effects import get, names, parse_setting
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.plant import NOISE, TICK, PlantSettings
 from windwrench.envs.recording import draw_trajectory, record_flight
@@ -74,27 +74,6 @@ def test_an_effect_says_what_it_is(name):
         assert all(np.isfinite(size) and c.minimum <= size <= c.maximum for size in c.typical)
     for size in (0, 1):
         assert any(c.typical[size] != 0 for c in effect.coefficients)
-
-
-@pytest.mark.parametrize("name", names())
-def test_an_effect_has_the_function_of_its_kind(name):
-    effect = get(name)
-    functions = {
-        "rotor input": effect.model,
-        "wrench": effect.model,
-        "body": effect.amend,
-        "sensing": effect.model,
-    }
-    assert functions[effect.kind] is not None
-    if effect.model is not None:
-        assert effect.model.address != 0
-        bundle = compile_effects(VEHICLE.with_effects(parse_setting(name)))
-        models = {
-            "wrench": bundle.wrench_models,
-            "rotor input": bundle.rotor_models,
-            "sensing": bundle.sensing_models,
-        }
-        assert effect.model.address in models[effect.kind]
 
 
 @pytest.mark.parametrize("name", names())

@@ -66,15 +66,6 @@ def test_hierarchical_draws_have_the_variance_of_crossed_policies_and_episodes()
     assert draws.mean() == pytest.approx(2.0, abs=0.02)
 
 
-def test_what_differs_between_policies_is_not_averaged_away_over_episodes():
-    # five policies, each the same on all episodes: five numbers are known, not two hundred
-    scores = np.repeat(np.arange(5.0)[:, None], 40, axis=1)
-    low, high = hierarchical_bootstrap(mean, scores)
-    narrow = episode_bootstrap(mean, scores.mean(axis=0))
-    assert high - low > 1.0
-    assert narrow[1] - narrow[0] < 1e-9
-
-
 def test_the_hierarchical_interval_covers_other_policies_and_other_episodes():
     inside = 0
     for k in range(150):
