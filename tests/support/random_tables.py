@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import load_vehicle
@@ -63,33 +62,12 @@ def flight(vehicle: str, trajectory: str, seed: int, seconds: float = 20.0) -> F
     """Return a simulated flight with an IMU and motor commands (rotor speed by 1.25 times the
     fastest).
     """
-    model = load_vehicle(vehicle)
-    c = record_flight(model, (), trajectory, seconds, seed)
+    c = record_flight(load_vehicle(vehicle), (), trajectory, seconds, seed, imu=True)
     rng = np.random.default_rng(seed)
-    rotation = Rotation.from_quat(c["quaternion"], scalar_first=True)
-    thrust = np.zeros((len(c["t"]), 3))
-    thrust[:, 2] = np.square(c["rotor_speeds"]) @ model.k
-    force = rotation.inv().apply(c["force"]) + thrust
-    matrices = rotation.as_matrix().reshape(-1, 9)
-    period = float(np.median(np.diff(c["t"])))
-    smooth = savgol_filter(matrices, 15, 3, axis=0).reshape(-1, 3, 3)
-    change = savgol_filter(matrices, 15, 3, deriv=1, delta=period, axis=0).reshape(-1, 3, 3)
-    skew = np.einsum("nji,njk->nik", smooth, change)
-    rates = 0.5 * np.column_stack(
-        [
-            skew[:, 2, 1] - skew[:, 1, 2],
-            skew[:, 0, 2] - skew[:, 2, 0],
-            skew[:, 1, 0] - skew[:, 0, 1],
-        ]
-    )
+    c["accelerometer"] += 0.1 * rng.standard_normal(c["accelerometer"].shape)
+    c["gyro"] += 0.01 * rng.standard_normal(c["gyro"].shape)
     return FlightLog(
-        t=c["t"],
-        position=c["position"],
-        quaternion=c["quaternion"],
-        rotor_speeds=c["rotor_speeds"],
-        voltage=c.get("voltage", np.full(len(c["t"]), 11.1)),
-        accelerometer=force / model.mass + 0.1 * rng.standard_normal(force.shape),
-        gyro=rates + 0.01 * rng.standard_normal(rates.shape),
+        **{"voltage": np.full(len(c["t"]), 11.1)} | c,
         command=np.clip(c["rotor_speeds"] / (1.25 * c["rotor_speeds"].max()), 0.0, 1.0),
         name=f"{vehicle}_{trajectory}_{seed}",
         vehicle=vehicle,

@@ -203,14 +203,6 @@ def test_a_written_log_reads_back_exactly(tmp_path_factory, suffix, log):
     assert_same(read_log(path), log)
 
 
-@pytest.mark.parametrize("suffix", SUFFIXES)
-def test_writing_leaves_nothing_else(tmp_path, rows, path, suffix):
-    log = read_log(write_text(path, rows))
-    write_log(log, tmp_path / f"again{suffix}")
-    write_log(log, tmp_path / f"again{suffix}")
-    assert sorted(p.name for p in tmp_path.iterdir()) == [f"again{suffix}", "flight.csv"]
-
-
 def test_a_failed_write_keeps_the_old_file(tmp_path, rows, path):
     log = read_log(write_text(path, rows))
     (tmp_path / "taken.csv").mkdir()

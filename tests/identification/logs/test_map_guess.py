@@ -8,7 +8,7 @@ import yaml
 
 from tests.support.random_tables import fields_of, flight, random_table, save
 from windwrench.dynamics import load_vehicle
-from windwrench.identification.logs.column_names import Group, take_apart
+from windwrench.identification.logs.column_names import Group
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.log_map import parse_map
 from windwrench.identification.logs.map_guess import Guess, guess_map, map_yaml, motor_unit
@@ -51,23 +51,8 @@ def test_pose_and_motors_in_rows_of_their_own_are_read(tmp_path: Path, flown: Fl
     assert not guessed(path).doubts
 
 
-def test_names_are_taken_apart() -> None:
-    names = take_apart(["Position X [mm]", "gyroADC[1]", "roll_deg", "q[0]", "t", "accel_x (g)"])
-    assert [(n.base, n.unit) for n in names] == [
-        ("position_x", "mm"),
-        ("gyroadc_1", ""),
-        ("roll", "deg"),
-        ("q_0", ""),
-        ("t", ""),
-        ("accel_x", "g"),
-    ]
-
-
-def test_a_table_without_motors_or_pose_is_refused_with_what_is_missing(tmp_path: Path) -> None:
+def test_a_table_without_a_time_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
-    path.write_text("t,height\n0,1\n0.1,2\n0.2,2\n")
-    with pytest.raises(InputError, match=r"no columns look like a pose .* or like four motors"):
-        guessed(path)
     path.write_text("a,b\n0,1\n0,2\n0,2\n")
     with pytest.raises(InputError, match="no column looks like a time"):
         guessed(path)

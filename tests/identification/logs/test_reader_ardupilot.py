@@ -2,8 +2,6 @@
 installed, and synthetic flights.
 """
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -27,7 +25,6 @@ from tests.support.dataflash_writer import (
     xkq,
 )
 from windwrench.dynamics import InputError, load_vehicle
-from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.logs.readers.dataflash import read_dataflash
 from windwrench.identification.logs.reading import read_log
 
@@ -82,12 +79,6 @@ def test_frames_motors_and_commands(read, vehicle):
     np.testing.assert_allclose(thrust[9].sum(), needed, rtol=1e-3)
     assert log.commanded
     assert any("e = 0.5 (MOT_THST_EXPO)" in note for note in log.notes)
-
-
-def test_a_motor_curve_stands_before_arducopters(read, vehicle):
-    curve = MotorCurve(thrust=(0.0, 0.0, 3.0), voltage_exponent=0.0, command=(1100.0, 1900.0))
-    log = read(parm(), *POSE, rcou(T), vehicle=replace(vehicle, motor_curve=curve))
-    np.testing.assert_allclose(vehicle.k * log.rotor_speeds[3] ** 2, 3.0 * COMMAND**2, rtol=1e-9)
 
 
 def test_a_slow_pose_beside_a_fast_imu(read):

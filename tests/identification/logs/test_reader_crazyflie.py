@@ -13,7 +13,6 @@ from tests.support.autopilot_flight import inertial, motion
 from tests.support.data_paths import data_file
 from tests.support.sd_card_writer import sd_card
 from windwrench.dynamics import InputError, load_vehicle
-from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.logs.readers import crazyflie_sd
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.report.log_check import check_log
@@ -70,7 +69,7 @@ def test_events_of_several_rates(write, version):
     assert any("stood at 30 s at the first event" in note for note in log.notes)
 
 
-def test_set_points_become_rotor_speeds_by_a_curve(write):
+def test_set_points_become_rotor_speeds(write):
     path, vehicle = write(sd_card({"imu": (T, fast(T))})), load_vehicle("crazyflie")
     log = read_log(path)  # the log names its vehicle
     assert log.vehicle == "crazyflie"
@@ -78,10 +77,6 @@ def test_set_points_become_rotor_speeds_by_a_curve(write):
     thrust = (2.130295e-11 * counts + 1.032633e-6) * counts + 5.484560e-4
     np.testing.assert_allclose(vehicle.k * log.rotor_speeds[5] ** 2, thrust, rtol=1e-9)
     assert log.commanded
-    curve = MotorCurve(thrust=(0.0, 0.0, 0.2), voltage_exponent=0.0, command=(0.0, 65535.0))
-    log = read_log(path, None, replace(vehicle, motor_curve=curve))
-    wanted = 0.2 * (OURS / 65535) ** 2
-    np.testing.assert_allclose(vehicle.k * log.rotor_speeds[5] ** 2, wanted, rtol=1e-9)
 
 
 def test_a_check_judges_the_log_as_a_diagnosis_reads_it(write):

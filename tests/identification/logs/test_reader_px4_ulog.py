@@ -178,21 +178,6 @@ def test_relative_thrust_is_scaled_to_the_weight(read, vehicle):
     np.testing.assert_allclose(thrust, SHARES + 2.0 * SHARES**2, rtol=1e-5)
 
 
-def test_a_tilted_flight_needs_more_thrust_than_its_weight(read, vehicle):
-    """The accelerometer says how much: here half as much again."""
-    force = np.tile([0.0, 0.0, -1.5 * vehicle.gravity], (len(WIDE), 1))  # forward, right, down
-    sensed = {
-        "uint64_t timestamp": stamps(WIDE),
-        "float gyro_rad": np.sin(np.multiply.outer(WIDE, [1.0, 2.0, 3.0])),
-        "float accelerometer_m_s2": force + 1e-3 * np.sin(WIDE)[:, None],
-    }
-    half = control(WIDE, np.full((len(WIDE), 12), 0.5))
-    with pytest.warns(UserWarning, match="gyro|gx"):
-        log = read(MOCAP | {"sensor_combined": sensed, "actuator_motors": half})
-    thrust = np.sum(vehicle.k * log.rotor_speeds**2, axis=1)
-    np.testing.assert_allclose(thrust, 1.5 * vehicle.weight, rtol=1e-3)
-
-
 @pytest.mark.parametrize("topic", ["sensor_combined", "vehicle_imu"])
 def test_without_a_pose_the_inertial_sensors_are_read(read, topic):
     fields = sensor_combined(WIDE)

@@ -66,8 +66,6 @@ def test_the_folder_of_a_bag_is_known_by_what_is_in_it(tmp_path, entry):
     ("content", "expected"),
     [
         (b"", r"begins with nothing \(it is empty\)"),
-        (b"PK\x03\x04" + bytes(30), "begins with 50 4b 03 04 00 00 00 00"),
-        (b"<html><body>not found</body>", "begins with '<html><body>not '"),
         (
             gzip.compress(b"ULog\x01\x12\x35", mtime=0),
             "packed .gzip.; expected a table, .csv.gz by name",
@@ -79,19 +77,7 @@ def test_what_no_reader_knows_says_what_was_found_and_looked_for(tmp_path, conte
     path.write_bytes(content)
     with pytest.raises(InputError, match=rf"flight.xyz: .*{expected}") as refused:
         read_log(path)
-    if b"\x1f" not in content[:1]:
-        for words in ("ULog", "DataFlash", "ROS bag", "SD-card", "blackbox", ".csv, .csv.gz"):
-            assert words in str(refused.value)
     assert "\n" not in str(refused.value)
-
-
-def test_a_table_of_unknown_columns_lists_what_was_looked_for(tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_text("time,alpha,beta\n0,1,2\n")
-    with pytest.raises(InputError, match=r"missing column\(s\) t, px") as refused:
-        read_log(path)
-    for words in ("nanobench", "crazyswarm2", "racer", "found time, alpha, beta"):
-        assert words in str(refused.value)
 
 
 def test_a_table_that_fits_two_readers_is_refused():
