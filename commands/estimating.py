@@ -84,7 +84,8 @@ def estimate(
         if truth is not None:
             measures["RMSE to truth"] = truth[i]
         for measure, value in measures.items():
-            table.append((f"{name}, {measure} ({unit})", *(f"{v:+.4g}" for v in value)))
+            sign = "+" if measure == "mean" else ""
+            table.append((f"{name}, {measure} ({unit})", *(f"{v:{sign}.4g}" for v in value)))
             result[f"{name}_{measure.lower().replace(' ', '_')}_{unit}"] = value
     show_table(("", "x", "y", "z"), table)
     say(*written)
