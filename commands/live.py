@@ -1,5 +1,6 @@
 """The wrench while the vehicle flies."""
 
+import os
 import sys
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import ExitStack, nullcontext
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from ..live.session import Session
 
 _PAGES = 5.0  # a second
+_NOT_WRITTEN = 2  # exit code
 _SIMULATED = "ardrone2"  # that flies in a simulation where nothing else is said
 
 
@@ -41,8 +43,10 @@ def live(
     """
     from ..dynamics.vehicle_file import load_vehicle, name_in_log, preset_names
     from ..identification.logs.log_map import load_map
-    from ..live.filtering import LiveSettings, warm_up
-    from ..live.outputs import COLUMNS, as_line
+    from ..live.filtering import LiveSettings, Output, warm_up
+    from ..live.messages import Row
+    from ..live.outlets import Outlet
+    from ..live.outputs import Lines
     from ..live.recorder import Recorder
     from ..live.session import Session
     from ..live.sources.open import kind_of, make_source
@@ -60,17 +64,20 @@ def live(
     settings = LiveSettings(gate_of(gate), horizon, rate, wait, seconds)
     tallies = Tallies()
     stream = make_source(source, model, None if map is None else load_map(map), tallies)
-    recorder = None
+    recorder, recording, telling = None, None, None
     if record is not None:
         recorder = Recorder(record, name_in_log(model, flown), tallies, horizon)
+        recording = Outlet[Row](recorder, tallies)
     with working("preparing the filter"):
         warm_up(model)
-    lines: dict[str, Any] = {}
     if not console.is_terminal and not console.quiet:
-        out_text = sys.stdout
-        out_text.write(",".join(COLUMNS) + "\n")
-        lines = {"tell": lambda o: out_text.write(as_line(o)), "flush": out_text.flush}
-    session = Session(stream, settings, recorder, **lines)
+        telling = Outlet[Output](
+            Lines(sys.stdout),
+            tallies,
+            # who alone read the estimates has enough of them
+            failed=lambda: None if stream.answers or recorder or view else session.stop(),
+        )
+    session = Session(stream, settings, recording, telling)
     with ExitStack() as shown:
         if view:
             from ..live.web_view import WebView
@@ -78,6 +85,10 @@ def live(
             address = shown.enter_context(WebView(session, port)).address
             note(f"page: {address}")
         interrupted = _watch(session)
+    if telling is not None and telling.problem:
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - or the end stalls too
+    if any(outlet.problem for outlet in session.outlets):
+        run.code = _NOT_WRITTEN
     result = _summary(session)
     if recorder is not None and recorder.rows:
         run.written.append(recorder.path)
@@ -106,11 +117,16 @@ def _watch(session: "Session") -> bool:
         running = threads.submit(session.run)
         try:
             moving = Live(console=console, auto_refresh=False, transient=True)
-            with moving if draws else nullcontext() as shown:
-                while not running.done():
-                    if shown is not None:
-                        shown.update(page(session.snapshot(), session.source), refresh=True)
-                    wait([running], 1.0 / _PAGES)
+            try:
+                with moving if draws else nullcontext() as shown:
+                    while not running.done():
+                        _say(session)
+                        if shown is not None:
+                            shown.update(page(session.snapshot(), session.source), refresh=True)
+                        wait([running], 1.0 / _PAGES)
+            except Exception as error:
+                session.tallies.fail("not drawn", "the terminal", error)
+            wait([running])
         except KeyboardInterrupt:
             interrupted = True
         finally:
@@ -121,10 +137,17 @@ def _watch(session: "Session") -> bool:
     return interrupted
 
 
+def _say(session: "Session") -> None:
+    """Say what is new to its user, of a link or a failure."""
+    for line in session.tallies.news():
+        errors.print(line, style="yellow" if line.startswith("warning") else "dim", markup=False)
+
+
 def _summary(session: "Session") -> dict[str, Any]:
     """Say what came and what became of it; return it."""
     from ..live.terminal_page import counts_words
 
+    _say(session)
     now = session.snapshot()
     median, most = now.latency_ms
     mean, deviation = session.tallies.wrench.mean, session.tallies.wrench.deviation

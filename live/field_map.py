@@ -23,17 +23,13 @@ from ..identification.logs.log_map import (
 from ..identification.logs.magnitudes import Magnitudes
 from ..identification.logs.map_fit import ways, with_range
 from ..runtime.errors import InputError
-from .messages import Array, Sample
+from .messages import Array, Malformed, Sample
 
 _SECOND = 1_000_000_000  # ns
 _NORM_TOLERANCE = 0.02  # of a quaternion's length, as in a log
 _OUTSIDE = 0.01  # of a command's range, beyond which it is none of that range
 _LARGEST = Magnitudes().largest
 _FIELDS = {"rotors": "rotor_speeds", "commands": "command"}  # of a sample; others as the section
-
-
-class Malformed(ValueError):  # noqa: N818 - of one message, not of the request
-    """A message that says nothing: why, in words."""
 
 
 class FieldMap:

@@ -13,6 +13,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
+class Malformed(ValueError):  # noqa: N818 - of one message, not of the request
+    """A message that says nothing: why, in words."""
+
+
 @dataclass(slots=True, kw_only=True)
 class Measured:
     """Quantities of one time; None: not measured."""

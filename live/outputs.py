@@ -1,6 +1,6 @@
 """An estimate as it is told: the columns of ``wrench.csv``."""
 
-from typing import Any
+from typing import Any, TextIO
 
 from .filtering import Output
 
@@ -27,3 +27,33 @@ def as_fields(output: Output) -> dict[str, Any]:
 def as_line(output: Output) -> str:
     """Return an estimate as a line of ``wrench.csv``."""
     return ",".join(map(repr, [*_values(output), float(output.estimate.status_code)])) + "\n"
+
+
+class Lines:
+    """Estimates as lines of text; a sink.
+
+    Args:
+        file: that they are written to.
+    """
+
+    name, lost, pause = "standard output", "not told", 0.0
+
+    def __init__(self, file: TextIO) -> None:
+        self._file = file
+        self.rows = self.held = 0
+        file.write(",".join(COLUMNS) + "\n")
+
+    def add(self, output: Output) -> None:
+        """Write an estimate."""
+        self.held += 1
+        self._file.write(as_line(output))
+
+    def idle(self) -> None:
+        """Have what was written read."""
+        self._file.flush()
+        self.rows, self.held = self.rows + self.held, 0
+
+    end = idle
+
+    def close(self) -> None:
+        """Leave the file to its owner."""

@@ -9,7 +9,7 @@ the header, and the reader of logs leaves it out.
 import math
 import os
 from bisect import bisect_left
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,6 @@ from .tallies import Tallies
 
 _SETTLES = 1.0  # s of rows that are looked at to see which channels there are
 _WRITTEN_EVERY = 0.25  # s, stream's time
-_IDLE = 0.4  # s without a message after which everything is written
 # columns of each quantity of a row, in their order
 _CHANNELS = {
     "position": POSE[:3],
@@ -47,7 +46,7 @@ _KEPT = ("voltage", "force", "torque")  # rows without one have the last before
 
 
 class Recorder:
-    """Writes rows to a new flight log (``.csv``).
+    """Writes rows to a new flight log (``.csv``); a sink.
 
     Nothing is written before the stream has run for a second: one that turns out to be none leaves
     no file.
@@ -55,20 +54,16 @@ class Recorder:
     Args:
         path: the log; it must not exist.
         vehicle: name of the vehicle that flies, or empty where the log must not state one.
-        tallies: where rows are counted that could not be recorded.
+        tallies: where rows are counted that came too late to be recorded.
         horizon: s that a row may be late.
 
     Raises:
-        InputError: the name is none of a ``.csv``, or there is such a file already.
+        InputError: the name is none of a ``.csv``, or no new file can be written there.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        vehicle: str,
-        tallies: Tallies,
-        horizon: float,
-    ) -> None:
+    lost, pause = "not recorded", 0.4  # s without a row after which everything is written
+
+    def __init__(self, path: Path, vehicle: str, tallies: Tallies, horizon: float) -> None:
         if path.suffix.lower() != ".csv":
             raise InputError(
                 f"--record {path}: expected a name that ends in .csv: a log that can be read "
@@ -76,7 +71,10 @@ class Recorder:
             )
         if path.exists():
             raise InputError(f"--record {path}: exists already; expected the name of a new log")
-        self.path, self.rows = path, 0
+        folder = next(folder for folder in path.absolute().parents if folder.exists())
+        if not folder.is_dir() or not os.access(folder, os.W_OK):
+            raise InputError(f"--record {path}: {folder} is no folder that can be written to")
+        self.path, self.rows, self.name = path, 0, f"the recording {path}"
         self._tallies, self._horizon = tallies, horizon
         name = f"vehicle={vehicle}"
         self._last = name if vehicle and VEHICLE.fullmatch(name) else "whole"
@@ -87,11 +85,16 @@ class Recorder:
         self._written = -math.inf  # s, time of the last row written
         self._due = -math.inf  # s, when to write next
 
+    @property
+    def held(self) -> int:
+        """How many rows wait to be written."""
+        return len(self._held)
+
     def add(self, row: Row) -> None:
         """Record a row; one of a time that there is already is joined with it.
 
         Raises:
-            InputError: the log cannot be written.
+            OSError: the log cannot be written.
         """
         if row.t <= self._written:
             self._tallies.counts["not recorded"] += 1
@@ -111,41 +114,38 @@ class Recorder:
             self._write(newest - self._horizon)
             self._due = newest + _WRITTEN_EVERY
 
-    def idle(self, seconds: float) -> None:
-        """Write what is held, if nothing has come for a while."""
-        if seconds > _IDLE and self._file is not None:
+    def idle(self) -> None:
+        """Write what is held of a log that is begun."""
+        if self._file is not None:
+            self._write(math.inf)
+
+    def end(self) -> None:
+        """Write all that is left; fewer than two rows make no log."""
+        if self._file is not None or len(self._held) >= 2:
             self._write(math.inf)
 
     def close(self) -> None:
-        """Write all that is left, and close the log; fewer than two rows make none."""
-        if self._file is not None or len(self._held) >= 2:
-            self._write(math.inf)
+        """Close the log; one without a row is taken away."""
         if self._file is not None:
             os.close(self._file)
             self._file = None
+            if not self.rows:
+                self.path.unlink()
 
     def _write(self, until: float) -> None:
         if self._file is None:
             self._begin()
+        assert self._file is not None
         count = sum(row.t <= until for row in self._held)
-        if not count:
-            return
-        rows, self._held = self._held[:count], self._held[count:]
-        self._put("".join(map(self._line, rows)))
-        self._written = rows[-1].t
-        self.rows += count
-
-    def _put(self, text: str) -> None:
-        data = text.encode()
-        try:
-            assert self._file is not None
-            while data:
-                data = data[os.write(self._file, data) :]
-        except OSError as error:
-            raise InputError(
-                f"--record {self.path}: cannot be written: {error.strerror or error}; what was "
-                "recorded before is a whole log"
-            ) from error
+        data = "".join(map(self._line, self._held[:count])).encode()
+        while data:
+            done = os.write(self._file, data)
+            whole = data.count(b"\n", 0, done)
+            if whole:
+                self._written = self._held[whole - 1].t
+            del self._held[:whole]
+            self.rows += whole
+            data = data[done:]
 
     def _begin(self) -> None:
         """Choose the columns by what has come, and write their names."""
@@ -163,14 +163,9 @@ class Recorder:
         self._channels = {name: _CHANNELS[name] for name, taken in chosen.items() if taken}
         self._latest = {name: there[name][0] for name in _KEPT if chosen[name]}
         names = ["t", *(column for columns in self._channels.values() for column in columns)]
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
-        except OSError as error:
-            raise InputError(
-                f"--record {self.path}: cannot be written: {error.strerror or error}"
-            ) from error
-        self._put(",".join([*names, self._last]) + "\n")
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        self._file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        os.write(self._file, (",".join([*names, self._last]) + "\n").encode())
 
     def _line(self, row: Row) -> str:
         fields = [repr(round(row.t, 9))]
@@ -185,7 +180,5 @@ class Recorder:
 
 def _joined(row: Row, other: Row) -> Row:
     """Return a row with what another of the same time holds besides."""
-    for name in (field.name for field in fields(Row)):
-        if getattr(row, name) is None:
-            setattr(row, name, getattr(other, name))
-    return row
+    names = [field.name for field in fields(Row) if getattr(row, field.name) is None]
+    return replace(row, **{name: getattr(other, name) for name in names})

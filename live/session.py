@@ -1,7 +1,8 @@
 """A stream from beginning to end: messages in, estimates out, a log beside it.
 
 Everything between a message's arrival and its estimate is done in one thread, one message after the
-other; whoever shows the estimates looks at ``snapshot`` from another.
+other. Whoever records or tells does so behind an ``Outlet``, whoever shows looks at ``snapshot``
+from a thread of its own: that they fail or stall does not reach the stream.
 """
 
 import gc
@@ -9,20 +10,22 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 from ..runtime.errors import InputError
 from .clocks import Clocks
 from .filtering import LiveFilter, LiveSettings, Output
 from .messages import Row, Sample
-from .recorder import Recorder
+from .outlets import WAITING, Outlet
 from .rows import Joiner
 from .sources.base import Source
 
 _SECOND = 1_000_000_000  # ns
-_VIEW_SECONDS, _VIEWED = 30.0, 50.0  # what a view shows: so long, and so often a second
+_VIEWED = 50.0  # estimates that a view shows, a second
+VIEWED = 1500  # in all: of the last 30 s
 SILENT = 0.5  # s without a message after which a source has stopped
 _POLL = 0.1  # s between two looks at whether to end
 _TURN = 2e-4  # s after which Python's threads take turns: an arrival waits no longer for the page
@@ -52,36 +55,39 @@ class Session:
     Args:
         source: of messages; it states the vehicle and counts.
         settings: of the stream.
-        recorder: where rows are recorded; None: nowhere.
-        tell: called with each estimate, in the stream's thread.
-        flush: called when all that has come is dealt with.
+        recording: where rows go; None: nowhere.
+        telling: where estimates go.
     """
 
     def __init__(
         self,
         source: Source,
         settings: LiveSettings | None = None,
-        recorder: Recorder | None = None,
-        tell: Callable[[Output], None] = lambda output: None,
-        flush: Callable[[], None] = lambda: None,
+        recording: Outlet[Row] | None = None,
+        telling: Outlet[Output] | None = None,
     ) -> None:
         tallies = source.tallies
-        self.source, self.tallies, self.recorder = source, tallies, recorder
+        self.source, self.tallies = source, tallies
+        self.recording, self.telling = recording, telling
         self.filter = LiveFilter(source.vehicle, tallies, settings)
         self._settings = self.filter.settings
         self._clocks = Clocks(tallies, self._settings.horizon, source.paced)
         self._joiner = Joiner(source.vehicle, tallies)
-        self._tell, self._flush = tell, flush
         self._stop = threading.Event()
         self._first = self._last = time.monotonic_ns()  # of messages
         self._begun = 0.0  # s, stream's time of the first estimate
-        self._unrecorded: list[Row] = []
-        self._fresh: list[int] = []  # ns, arrivals whose estimates are being told
+        self._unrecorded: deque[Row] = deque(maxlen=WAITING)
+        self._fresh: list[int] = []  # ns, arrivals whose estimates are being sent
         self.output: Output | None = None
         # what a view shows
-        self._recent: deque[Output] = deque(maxlen=round(_VIEW_SECONDS * _VIEWED))
+        self._recent: deque[Output] = deque(maxlen=VIEWED)
         self.estimates = 0
         self.ended = ""  # why, in words
+
+    @property
+    def outlets(self) -> list[Outlet[Any]]:
+        """Where rows and estimates go."""
+        return [one for one in (self.recording, self.telling) if one is not None]
 
     def since(self, t: float) -> list[Output]:
         """Return the estimates of the last 30 s that lie after ``t``, s, from any thread."""
@@ -90,16 +96,19 @@ class Session:
     def stop(self) -> None:
         """Have the stream end; from any thread."""
         self._stop.set()
+        for outlet in self.outlets:
+            outlet.patience = 0.0
 
     def run(self) -> None:
         """Open the source and deal with all that comes, until it ends or ``stop`` is called.
 
         Raises:
-            InputError: there is no such source, what comes is none of its messages, or the log
-                cannot be written.
+            InputError: there is no such source, or what comes is none of its messages.
         """
         try:
             self.source.open()
+            for outlet in self.outlets:
+                outlet.patience = self.source.patience
             self._first = self._last = time.monotonic_ns()
             with _undisturbed():
                 while not self._stop.is_set():
@@ -109,18 +118,23 @@ class Session:
                     self.ended = self.ended or "it was stopped"
             for output in self.filter.begin():
                 self._out(output)
-            self._flush()
+            self._record()
             if not self.estimates and not self._stop.is_set():
                 raise self._nothing("before it ended")
         finally:
-            self.source.close()
-            if self.recorder is not None and self.estimates:
-                self._record()
-                self.recorder.close()
+            with self.tallies.spared("not read", self.source.name):
+                self.source.close()
+            for outlet in self.outlets:
+                outlet.close()
 
     def _once(self) -> bool:
         """Deal with what has come; return whether there may be more."""
-        samples = self.source.receive(_POLL)
+        samples: list[Sample] | None = []
+        failures = self.tallies.counts["not read"]
+        with self.tallies.spared("not read", self.source.name):
+            samples = self.source.receive(_POLL)
+        if self.tallies.counts["not read"] > failures:
+            self._stop.wait(_POLL)
         now = time.monotonic_ns()
         if samples is None:
             self.ended = "the source ended"
@@ -132,18 +146,16 @@ class Session:
             self._last = now
             spent = time.thread_time_ns()
             for sample in samples:
-                self.take(sample)
+                with self.tallies.spared("not estimated", f"a {sample.kind}"):
+                    self.take(sample)
                 if self._stop.is_set():
                     break
-            self._flush()
             out, spent = time.monotonic_ns(), time.thread_time_ns() - spent
             for arrival in self._fresh:
                 self.tallies.latency.add(out - arrival)
                 self.tallies.processor.add(spent // len(self._fresh))
             self._fresh.clear()
             self._record()
-        elif self.recorder is not None:
-            self.recorder.idle(1e-9 * (now - self._last))
         wait = self._settings.wait
         if not self.estimates and wait and now - self._first > wait * _SECOND:
             raise self._nothing(f"within {wait:g} s")
@@ -162,27 +174,24 @@ class Session:
             self._out(output)
             if output.row is row and self.source.paced:  # not one that was held back
                 self._fresh.append(row.arrival)
-        if self.recorder is not None:
+        if self.recording is not None:
             self._unrecorded.append(row)
 
     def _record(self) -> None:
-        """Record the rows that came, once their estimates are out."""
-        if self.recorder is not None:
-            for row in self._unrecorded:
-                self.recorder.add(row)
-            self._unrecorded.clear()
+        """Record the rows that came, once there is an estimate and it is out."""
+        while self.recording is not None and self.estimates and self._unrecorded:
+            self.recording.put(self._unrecorded.popleft())
 
     def _out(self, output: Output) -> None:
         if not self.estimates:
             self._begun = output.t
         self.estimates += 1
         self.output = output
-        try:
+        with self.tallies.spared("not sent", f"the answer to {self.source.name}"):
             self.source.send(output)
-        except OSError:
-            self.tallies.counts["not sent"] += 1
         self.tallies.wrench.add(output.wrench)
-        self._tell(output)
+        if self.telling is not None:
+            self.telling.put(output)
         if not self._recent or output.t - self._recent[-1].t >= 1.0 / _VIEWED - 1e-6:
             self._recent.append(output)
         seconds = self._settings.seconds
@@ -217,7 +226,7 @@ class Session:
             clocks=self._clocks.count,
             estimates=self.estimates,
             restarts=self.filter.restarts,
-            recorded=0 if self.recorder is None else self.recorder.rows,
+            recorded=0 if self.recording is None else self.recording.sink.rows,
             seconds=0.0 if self.output is None else self.output.t - self._begun,
         )
 

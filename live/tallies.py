@@ -3,11 +3,14 @@
 import math
 from bisect import bisect_left
 from collections import Counter, defaultdict, deque
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import accumulate
 
 import numpy as np
 
-from .messages import Array
+from ..runtime.errors import InputError
+from .messages import Array, Malformed
 
 _BINS_PER_OCTAVE = 16
 _WINDOW = 5_000_000_000  # ns, over which a rate is told
@@ -88,12 +91,54 @@ class Tallies:
     ``lost`` (missing in the sender's own count, or in its regular times), ``malformed``, ``clock
     jumps``, ``implausible times``, ``waiting`` (poses that came while no rotor speeds were known),
     ``stops`` (times that the source was silent and came back), ``refused`` (poses that the gate
-    took for outliers), ``not recorded``, ``not sent`` (estimates that the link did not take).
+    took for outliers), ``not decoded``, ``not read`` and ``not estimated`` (messages, reads of the
+    link and rows at which this kit or a library of it failed), ``not sent``, ``not recorded``,
+    ``not told`` (what the link, the log or standard output did not take), ``not drawn`` (a terminal
+    that failed), ``not shown`` (events that a browser was too slow for), ``turned away`` (browsers
+    beyond those that are served).
     """
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
+        self._said: dict[str, bool] = {}  # lines for people, and whether they were taken
         self.rates: defaultdict[str, Rate] = defaultdict(Rate)
         self.latency = Durations()
         self.processor = Durations()
         self.wrench = Means()
+
+    def say(self, line: str) -> None:
+        """Keep a line for people, once; from any thread."""
+        self._said.setdefault(line, False)
+
+    def news(self) -> list[str]:
+        """Return the lines that were kept since the last call."""
+        lines = [line for line, taken in self._said.copy().items() if not taken]
+        self._said.update(dict.fromkeys(lines, True))
+        return lines
+
+    @contextmanager
+    def spared(self, count: str, what: str) -> Iterator[None]:
+        """Have the stream go on after a failure of the block: it is counted, and the first is said.
+
+        Raises:
+            InputError: it is its user's mistake, and no failure of ours.
+            Malformed: it is the sender's.
+        """
+        try:
+            yield
+        except (InputError, Malformed):
+            raise
+        except Exception as error:
+            self.fail(count, what, error)
+
+    def fail(self, count: str, what: str, error: Exception) -> None:
+        """Count a failure, and say the first."""
+        self.counts[count] += 1
+        if self.counts[count] == 1:
+            self.say(f"warning: {what}: {reason_of(error)}; the stream goes on")
+
+
+def reason_of(error: Exception) -> str:
+    """Return why something failed, on a line."""
+    said = " ".join(str(getattr(error, "strerror", None) or error).split())[:200]
+    return said if isinstance(error, InputError | OSError) else f"{type(error).__name__}: {said}"

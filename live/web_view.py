@@ -1,26 +1,38 @@
 """The stream as a page in a browser on this machine: the vehicle, the force as an arrow, the last
 30 s.
 
-Served with Python's own HTTP server on 127.0.0.1 alone; the page asks for nothing from elsewhere. A
-browser is told ten times a second what has come since, as server-sent events. Requests that name
-another host are refused: no page of another site reads the stream by pointing its name at this
-machine.
+Served on 127.0.0.1 alone; the page asks for nothing from elsewhere. A browser is told ten times a
+second what has come since, as server-sent events. Requests that name another host are refused: no
+page of another site reads the stream by pointing its name at this machine. One thread serves all
+browsers, and waits for none: it holds few connections, each for a time, and leaves out what a
+browser is too slow for.
 """
 
+import asyncio
 import json
 import math
+import socket
 import threading
-import time
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from collections import deque
 from importlib import resources
 from typing import Any
 
 from ..runtime.errors import InputError
-from .filtering import Output
-from .session import SILENT, Session
+from .session import SILENT, VIEWED, Session
 
 _EVERY = 0.1  # s between two events
 _HOSTS = ("127.0.0.1", "localhost")
+_MOST = 16  # connections; a browser holds one, and asks for a page by another
+_TIMEOUT = 5.0  # s that a request may take to come, and that a browser may read nothing
+_HEAD = 8192  # bytes of a request
+_HEADERS = """HTTP/1.1 {status}
+Content-Type: {kind}
+Cache-Control: no-store
+Connection: close
+Content-Security-Policy: default-src 'none'; script-src 'unsafe-inline'; \
+style-src 'unsafe-inline'; connect-src 'self'
+
+""".replace("\n", "\r\n")
 
 
 class WebView:
@@ -37,108 +49,134 @@ class WebView:
     def __init__(self, session: Session, port: int) -> None:
         self._session = session
         self._over = threading.Event()
-        page = resources.files(__package__).joinpath("view.html").read_bytes()
-        view = self
-
-        class Handler(BaseHTTPRequestHandler):
-            """Answers one request."""
-
-            def do_GET(self) -> None:
-                """Give the page, or the events."""
-                host = self.headers.get("Host", "").rpartition(":")[0] or self.headers.get("Host")
-                if host not in _HOSTS:
-                    self.send_error(403)
-                elif self.path == "/":
-                    self._head("text/html; charset=utf-8", len(page))
-                    self.wfile.write(page)
-                elif self.path == "/events":
-                    self._head("text/event-stream", None)
-                    view._tell(self.wfile)
-                else:
-                    self.send_error(404)
-
-            def _head(self, kind: str, length: int | None) -> None:
-                self.send_response(200)
-                self.send_header("Content-Type", kind)
-                self.send_header("Cache-Control", "no-store")
-                self.send_header(
-                    "Content-Security-Policy",
-                    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
-                    "connect-src 'self'",
-                )
-                if length is not None:
-                    self.send_header("Content-Length", str(length))
-                self.end_headers()
-
-            def log_message(self, format: str, *args: Any) -> None:
-                """Say nothing on the terminal."""
-
+        self._page = resources.files(__package__).joinpath("view.html").read_bytes()
+        # time, s, and text of the estimates that are shown
+        self._points: deque[tuple[float, str]] = deque(maxlen=VIEWED)
+        self._open = 0  # connections
         try:
-            self._server = ThreadingHTTPServer(("127.0.0.1", port), Handler)
-        except OSError as error:
+            self._socket = socket.create_server(("127.0.0.1", port))
+        except (OSError, OverflowError) as error:
             raise InputError(
-                f"--port {port}: no page can be served there: {error.strerror or error}; expected "
-                "another, or 0 for any that is free"
+                f"--port {port}: no page can be served there: {getattr(error, 'strerror', error)}; "
+                "expected another, or 0 for any that is free"
             ) from error
-        self._server.daemon_threads = True
-        self.address = f"http://127.0.0.1:{self._server.server_address[1]}/"
+        self.address = f"http://127.0.0.1:{self._socket.getsockname()[1]}/"
+        self._thread = threading.Thread(target=self._run, daemon=True, name="page")
 
     def __enter__(self) -> "WebView":
-        self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._over.set()
-        self._server.shutdown()
-        self._server.server_close()
+        self._thread.join(_TIMEOUT)
 
-    def _tell(self, file: Any) -> None:
-        """Send events until the browser goes or the stream ends; the first has the last 30 s."""
-        source = self._session.source
-        first: dict[str, Any] = {
-            "vehicle": source.vehicle.name,
-            "source": source.name,
-            "weight": source.vehicle.weight,
-            "arm": source.vehicle.arm_l,
-            "rotors": source.vehicle.positions.tolist(),
-        }
-        last = -math.inf  # s, stream's time of the newest estimate that was sent
+    def _run(self) -> None:
+        with self._session.tallies.spared("not shown", "the page"), self._socket:
+            asyncio.run(self._serve())
+
+    async def _serve(self) -> None:
+        asyncio.get_running_loop().set_exception_handler(lambda *_: None)  # of browsers that go
+        self._look()
+        server = await asyncio.start_server(self._connected, sock=self._socket, limit=_HEAD)
+        while not self._over.is_set():
+            await asyncio.sleep(_EVERY)
+            self._look()
+        server.close()
+        for _ in range(10):  # until browsers know
+            await asyncio.sleep(_EVERY if self._open else 0.0)
+
+    async def _connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Answer one request."""
+        self._open += 1
         try:
-            while True:
+            writer.transport.set_write_buffer_limits(0)  # drained is sent
+            if self._open > _MOST:
+                self._session.tallies.counts["turned away"] += 1
+                writer.write(_head("503 Service Unavailable"))
+                return
+            request = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _TIMEOUT)
+            status, path = _asked(request)
+            writer.write(_head(status, "event-stream" if path == "/events" else "html"))
+            if path == "/events":
+                await self._tell(writer)
+            elif path == "/":
+                writer.write(self._page)
+            await asyncio.wait_for(writer.drain(), _TIMEOUT)
+        except (OSError, EOFError, asyncio.LimitOverrunError):
+            writer.transport.abort()  # too slow, gone, or no browser
+        finally:
+            self._open -= 1
+            writer.close()
+
+    async def _tell(self, writer: asyncio.StreamWriter) -> None:
+        """Send events until the stream ends; the first has the last 30 s.
+
+        Raises:
+            TimeoutError: the browser reads nothing.
+        """
+        source, last, missed = self._session.source, -math.inf, 0
+        vehicle = source.vehicle
+        first: dict[str, Any] = {
+            "vehicle": vehicle.name,
+            "source": source.name,
+            "weight": vehicle.weight,
+            "arm": vehicle.arm_l,
+            "rotors": vehicle.positions.tolist(),
+        }
+        while True:
+            if writer.transport.get_write_buffer_size():
+                missed += 1
+                self._session.tallies.counts["not shown"] += 1
+                if missed * _EVERY > _TIMEOUT:
+                    raise TimeoutError
+            else:
                 over = self._over.is_set()
-                points = self._session.since(last)
-                last = points[-1].t if points else last
-                event = {**first, **self._state(points), "over": over}
-                file.write(f"data: {json.dumps(event)}\n\n".encode())
-                file.flush()
+                points = ",".join(text for t, text in self._points if t > last)
+                last, missed = self._points[-1][0] if self._points else last, 0
+                head = json.dumps({**first, "over": over})[1:-1]
+                writer.write(f'data: {{{head},{self._state},"points":[{points}]}}\n\n'.encode())
                 first = {}
                 if over:
                     return
-                time.sleep(_EVERY)
-        except OSError:  # the browser has gone
-            return
+            await asyncio.sleep(_EVERY)
 
-    def _state(self, points: list[Output]) -> dict[str, Any]:
+    def _look(self) -> None:
+        """Keep what there is to show, for all browsers."""
+        for one in self._session.since(self._points[-1][0] if self._points else -math.inf):
+            values = [one.t, *one.wrench, *one.std]
+            point = [float(f"{x:.5g}") if i else round(x, 3) for i, x in enumerate(values)]
+            self._points.append((one.t, json.dumps(point)))
         now = self._session.snapshot()
-        output = now.output
-        if output is None:
-            return {"points": []}
-        estimate = output.estimate
-        return {
-            "points": [_point(one) for one in points],
-            "position": estimate.position.tolist(),
-            "quaternion": estimate.quaternion.tolist(),
-            "status": "silent" if now.silence > SILENT else estimate.status,
+        state: dict[str, Any] = {}
+        if now.output is not None:
+            estimate = now.output.estimate
+            state = {
+                "position": estimate.position.tolist(),
+                "quaternion": estimate.quaternion.tolist(),
+                "status": "silent" if now.silence > SILENT else estimate.status,
+            }
+        state |= {
             "rates": now.rates,
             "counts": now.counts,
             "restarts": now.restarts,
             "recorded": now.recorded,
             "latency": [x if x == x else None for x in now.latency_ms],
         }
+        self._state = json.dumps(state)[1:-1]
 
 
-def _point(output: Output) -> list[float]:
-    """Return time, force, torque and their standard deviations."""
-    values = [output.t, *output.wrench, *output.std]
-    return [float(f"{x:.5g}") if i else round(x, 3) for i, x in enumerate(values)]
+def _asked(request: bytes) -> tuple[str, str]:
+    """Return the status of the answer to a request, and the path that is given; empty: none."""
+    first, *lines = request.decode("latin-1").split("\r\n")
+    fields = dict(line.lower().split(":", 1) for line in lines if ":" in line)
+    words, host = first.split(" "), fields.get("host", "").strip()
+    if host.partition(":")[0] not in _HOSTS:
+        return "403 Forbidden", ""
+    if len(words) != 3 or words[0] != "GET":
+        return "405 Method Not Allowed", ""
+    return ("200 OK", words[1]) if words[1] in ("/", "/events") else ("404 Not Found", "")
+
+
+def _head(status: str, kind: str = "html") -> bytes:
+    return _HEADERS.format(status=status, kind=f"text/{kind}; charset=utf-8").encode()

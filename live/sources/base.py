@@ -2,8 +2,9 @@
 
 from abc import ABC, abstractmethod
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 from urllib.parse import parse_qsl, urlsplit
 
 import numpy as np
@@ -13,9 +14,13 @@ from ...identification.logs.log_map import LogMap
 from ...runtime.errors import InputError
 from ...runtime.extras import need
 from ..filtering import Output
-from ..messages import Array, Sample
+from ..messages import Array, Malformed, Sample
 from ..tallies import Tallies
 
+# s for which a file waits for those who take its estimates: someone leafs through them, or a disk
+# stalls, and nothing flies
+WAITS = 60.0
+Found = TypeVar("Found")
 _RESTARTED = 1_000  # messages; a count that falls by more has begun again
 LARGEST_SHARE = 1.5  # motor commands that none exceeds are shares of the full one
 _MOST_LOST = 1_000_000  # messages; a count that rises by more is another
@@ -38,6 +43,9 @@ class Source(ABC):
     options: tuple[str, ...] = ()  # of an address
     library = ""  # that the extra of the kind's name brings
     paced = True  # messages arrive at the vehicle's own pace
+    patience = 0.0  # s for which what is not paced waits for those who take the estimates
+    strict = False  # a first message that is malformed says that the stream is of another kind
+    answers = False  # estimates are sent back
     link: Any = None  # a ``Link`` that messages come by, of a source that has one
 
     def __init__(
@@ -48,7 +56,7 @@ class Source(ABC):
         self.name = text  # for people
         self.address = read_address(text, self.kind, self.options)
         self.vehicle, self.tallies, self.log_map = vehicle, tallies, log_map
-        self._understood = False  # a message was
+        self._understood = not self.strict
         self._numbers: dict[object, int] = {}  # the newest of each sender's own count
         self._prepare()
 
@@ -67,15 +75,50 @@ class Source(ABC):
             InputError: there is no such source, or it cannot be opened.
         """
         if self.link is not None:
-            self.link.open()
+            self.tallies.say(self.link.open())
 
     @abstractmethod
-    def receive(self, timeout: float) -> list[Sample] | None:
-        """Return what has come, after at most ``timeout`` s; None: the stream has ended.
+    def read(self, timeout: float) -> list[tuple[Any, int]] | None:
+        """Return the messages that have come, after at most ``timeout`` s, as they are, and when
+        they arrived, ns; None: the stream has ended.
 
         Raises:
             InputError: what comes is none of this source's messages.
         """
+
+    def decode(self, message: Any, arrival: int) -> Sample | None:
+        """Return what a message holds, or None.
+
+        Raises:
+            Malformed: it says nothing.
+        """
+        found: Sample = message
+        return found
+
+    def receive(self, timeout: float) -> list[Sample] | None:
+        """Return what the messages hold that have come; None: the stream has ended.
+
+        Raises:
+            InputError: as ``read``; or the first message of a strict source is malformed.
+        """
+        messages = self.read(timeout)
+        if messages is None:
+            return None
+        samples = [self.unless_malformed(self.decode, *message) for message in messages]
+        found = [sample for sample in samples if sample is not None]
+        self._understood |= bool(found)
+        return found
+
+    def unless_malformed(self, decode: Callable[..., Found], *message: Any) -> Found | None:
+        """Return what a function makes of a message; None where it cannot, which is counted."""
+        try:
+            with self.tallies.spared("not decoded", f"a message of {self.name}"):
+                return decode(*message)
+        except Malformed as why:
+            if not self._understood:
+                raise InputError(f"{self.name}: {why}") from why
+            self.tallies.counts["malformed"] += 1
+        return None
 
     @abstractmethod
     def expected(self) -> str:
@@ -92,22 +135,6 @@ class Source(ABC):
         """Listen no more."""
         if self.link is not None:
             self.link.close()
-
-    def take_sound(self, sample: Sample) -> Sample:
-        """Return a message that was understood: from now on others are only counted."""
-        self._understood = True
-        return sample
-
-    def malformed(self, why: str) -> None:
-        """Count a message that says nothing.
-
-        Raises:
-            InputError: none was understood before: the stream is of another kind than its user
-                thinks.
-        """
-        if not self._understood:
-            raise InputError(f"{self.name}: {why}")
-        self.tallies.counts["malformed"] += 1
 
     def count_lost(self, sender: object, number: int, wraps: int = 0) -> None:
         """Count what is missing before a message in its sender's own count.

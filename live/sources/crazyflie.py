@@ -16,13 +16,14 @@ import math
 import queue
 import threading
 import time
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
 from ...identification.logs.rotor_orders import ORDERS
 from ...runtime.errors import InputError
-from ..messages import Sample
+from ..messages import Malformed, Sample
 from .base import Source, command_of, unwrapped
 
 _FULL = 65_535.0  # PWM
@@ -57,7 +58,7 @@ class CrazyflieLog(Source):
             )
         self._period = int(address.number("period", 10.0, least=10.0)) // 10 * 10
         self._imu = address.choice("imu", ("0", "1")) == "1"
-        self._rows: queue.SimpleQueue[Sample] = queue.SimpleQueue()
+        self._blocks: queue.SimpleQueue[tuple[Any, int]] = queue.SimpleQueue()  # and arrivals
         self._problem = ""
         self._over = threading.Event()
         self._cf: Any = None
@@ -131,25 +132,25 @@ class CrazyflieLog(Source):
 
     def _take(self, stamp: int, data: dict[str, Any], block: Any) -> None:
         """Take a block of the log, in cflib's thread."""
-        arrival = time.monotonic_ns()
-        found = self._row(data) if block.name == "row" else self._imu_of(data)
-        if found is None:
-            self.tallies.counts["malformed"] += 1
-            return
-        at = self._stamp(block.name, stamp)
-        if self._rows.qsize() > _LONGEST:
+        if self._blocks.qsize() > _LONGEST:
             self.tallies.counts["lost"] += 1
         else:
-            self._rows.put(Sample(block.name, at, arrival, block.name == "row", **found))
+            self._blocks.put(((block.name, stamp, data), time.monotonic_ns()))
 
-    def _row(self, data: dict[str, Any]) -> dict[str, Any] | None:
-        """Return the quantities of a row; None: it has no pose."""
+    def decode(self, message: Any, arrival: int) -> Sample | None:
+        """Return what a block holds."""
+        kind, stamp, data = message
+        found = self._row(data) if kind == "row" else self._imu_of(data)
+        return Sample(kind, self._stamp(kind, stamp), arrival, kind == "row", **found)
+
+    def _row(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Return the quantities of a row."""
         x, y, z, w = self._decompress(data["stateEstimateZ.quat"])
         quaternion = np.array([w, x, y, z], dtype=np.float64)
         length = float(np.linalg.norm(quaternion))
         position = np.array([data[name] for name, _ in _POSE[:3]], dtype=np.float64)
         if not (0.9 < length < 1.1 and np.isfinite(position).all()):
-            return None
+            raise Malformed("no pose")
         volts = float(data["pm.vbat"])
         group = "rpm" if "rpm.m1" in data else "motor"
         motors = np.array([data[f"{group}.m{i}"] for i in ORDERS["crazyflie"]], dtype=np.float64)
@@ -164,25 +165,21 @@ class CrazyflieLog(Source):
             ),
         }
 
-    def _imu_of(self, data: dict[str, Any]) -> dict[str, Any] | None:
-        """Return gyro and accelerometer; None: a number is not finite."""
+    def _imu_of(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Return gyro and accelerometer."""
         values = np.array([data[name] for name, _ in _IMU], dtype=np.float64)
         if not np.isfinite(values).all():
-            return None
+            raise Malformed("a number that is not finite")
         return {"gyro": np.radians(values[:3]), "accelerometer": _G * values[3:]}
 
-    def receive(self, timeout: float) -> list[Sample] | None:
-        """Return the rows that have come."""
-        samples = []
-        try:
-            samples.append(self._rows.get(timeout=timeout))
+    def read(self, timeout: float) -> list[tuple[Any, int]] | None:
+        """Return the blocks that have come."""
+        came = []
+        with suppress(queue.Empty):
+            came.append(self._blocks.get(timeout=timeout))
             while True:
-                samples.append(self._rows.get_nowait())
-        except queue.Empty:
-            pass
-        if not samples and self._over.is_set():
-            return None
-        return samples
+                came.append(self._blocks.get_nowait())
+        return came if came or not self._over.is_set() else None
 
     def close(self) -> None:
         """Close the link, without the set point that cflib sends there."""

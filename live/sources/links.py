@@ -9,9 +9,12 @@ from typing import Any
 
 from ...runtime.errors import InputError
 from ...runtime.extras import need
+from ..messages import Malformed
 from .base import Address
 
-_LARGEST = 65_536  # bytes that are read at once
+_AT_ONCE = 65_536  # bytes that are read at once of a port
+# bytes of a datagram of MAVLink: 14 of its longest messages, and far more than a network takes
+_LARGEST = 4096
 _BUFFER = 4 * 2**20  # bytes that wait for us, of which the system gives what it allows
 
 
@@ -28,8 +31,8 @@ class Link(ABC):
         self.peer: Any = None  # whom to send to, once it is known
 
     @abstractmethod
-    def open(self) -> None:
-        """Open it.
+    def open(self) -> str:
+        """Open it; return where it is open, in words.
 
         Raises:
             InputError: it cannot be opened.
@@ -47,7 +50,11 @@ class Link(ABC):
     def _receive(self) -> bytes | None: ...
 
     def read(self, timeout: float) -> bytes | None:
-        """Return what there is, waiting up to ``timeout`` s for it; None: nothing."""
+        """Return what there is, waiting up to ``timeout`` s for it; None: nothing.
+
+        Raises:
+            Malformed: it is more than one message can be.
+        """
         return self._receive() if select.select([self.opened], [], [], timeout)[0] else None
 
     def close(self) -> None:
@@ -58,16 +65,23 @@ class Link(ABC):
 
 
 class Datagrams(Link):
-    """A link by UDP: listens, and answers whoever spoke last; or calls an address."""
+    """A link by UDP: listens, on this machine alone unless the address names another host, and
+    answers whoever spoke last; or calls an address.
 
-    def __init__(self, address: Address, host: str) -> None:
+    Args:
+        address: where.
+        largest: bytes of a datagram; a larger one is left unread.
+    """
+
+    def __init__(self, address: Address, largest: int) -> None:
         super().__init__(address.text)
-        self._host, self._port = address.host or host, address.port
-        self._calls = address.scheme == "udpout"
+        self._host, self._port = address.host or "127.0.0.1", address.port
+        self._calls, self._largest = address.scheme == "udpout", largest
 
-    def open(self) -> None:
+    def open(self) -> str:
         """Listen, or call."""
         flags = 0 if self._calls else socket.AI_PASSIVE
+        where = f"{self._host}:{self._port}"
         try:
             family, kind, protocol, _, address = socket.getaddrinfo(
                 self._host, self._port, type=socket.SOCK_DGRAM, flags=flags
@@ -83,14 +97,16 @@ class Datagrams(Link):
             self.close()
             reason = getattr(error, "strerror", None) or error
             does = "call" if self._calls else "listen at"
-            where = f"{self._host}:{self._port}"
             raise InputError(f"{self._text}: cannot {does} {where}: {reason}") from error
+        return f"{'calling' if self._calls else 'listening at'} {where}, UDP"
 
     def _receive(self) -> bytes | None:
         try:
-            data, peer = self.opened.recvfrom(_LARGEST)
+            data, peer = self.opened.recvfrom(self._largest + 1)
         except (BlockingIOError, ConnectionError):
             return None
+        if len(data) > self._largest:
+            raise Malformed(f"a datagram of more than {self._largest} bytes")
         self.peer = self.peer if self._calls else peer
         return bytes(data)
 
@@ -108,7 +124,7 @@ class SerialPort(Link):
         self._path = address.path
         self._baud = int(address.number("baud", baud, least=1.0))
 
-    def open(self) -> None:
+    def open(self) -> str:
         """Open the port."""
         need("serial", "mavlink")
         serial: Any = importlib.import_module("serial")
@@ -117,10 +133,11 @@ class SerialPort(Link):
             self.peer = self._path
         except (OSError, ValueError) as error:
             raise InputError(f"{self._text}: cannot be opened: {error}") from error
+        return f"reading {self._path} at {self._baud} baud"
 
     def _receive(self) -> bytes:
         try:
-            return bytes(self.opened.read(_LARGEST))
+            return bytes(self.opened.read(_AT_ONCE))
         except OSError as error:
             raise InputError(f"{self._text}: the port went away: {error}") from error
 
@@ -138,7 +155,7 @@ def make_link(address: Address, baud: int) -> Link:
     if address.scheme in ("udp", "udpin", "udpout"):
         if address.port is None:
             raise InputError(f"{address.text}: no port; expected mavlink:udp://HOST:PORT")
-        return Datagrams(address, "127.0.0.1" if address.scheme == "udpout" else "0.0.0.0")
+        return Datagrams(address, _LARGEST)
     if address.scheme or not address.path:
         raise InputError(
             f"{address.text}: expected mavlink:udp://HOST:PORT, mavlink:udpout://HOST:PORT or a "

@@ -1,8 +1,8 @@
 """MAVLink of PX4 and ArduPilot, by UDP or a serial port, read with pymavlink.
 
-``mavlink:udp://HOST:PORT`` listens there, ``mavlink:udpout://HOST:PORT`` calls there,
-``mavlink:/dev/ttyUSB0`` opens a port (``?baud=921600``). With ``?rate=100`` the autopilot is asked
-for the messages at that rate, Hz.
+``mavlink:udp://HOST:PORT`` listens there (without a host, to this machine alone),
+``mavlink:udpout://HOST:PORT`` calls there, ``mavlink:/dev/ttyUSB0`` opens a port
+(``?baud=921600``). With ``?rate=100`` the autopilot is asked for the messages at that rate, Hz.
 
 **Pose**, the first of these that comes (``?pose=NAME`` chooses): ATT_POS_MOCAP,
 VISION_POSITION_ESTIMATE, ODOMETRY (in NED or FRD), or LOCAL_POSITION_NED with the attitude of
@@ -25,7 +25,7 @@ import time
 from typing import Any
 
 from ..filtering import Output
-from ..messages import Sample
+from ..messages import Malformed, Sample
 from .base import Source
 from .esc_status import add_esc_status
 from .links import make_link
@@ -52,14 +52,12 @@ class Mavlink(Source):
 
     kind, options = "mavlink", ("baud", "rate", "pose")
 
-    library = "pymavlink"
+    library, answers = "pymavlink", True
 
     def _prepare(self) -> None:
         self.link = make_link(self.address, _BAUD)
         self._rate = self.address.number("rate", 0.0)
-        self._reader = MessageReader(
-            self.vehicle, self.tallies, self.address.choice("pose", ("", *POSES))
-        )
+        self._reader = MessageReader(self.vehicle, self.address.choice("pose", ("", *POSES)))
         self._sender = WrenchSender(self.vehicle)
         self._mav: Any = None
         self._requested = False
@@ -74,8 +72,8 @@ class Mavlink(Source):
         add_esc_status(dialect)
         self._dialect = dialect
 
-    def receive(self, timeout: float) -> list[Sample] | None:
-        """Return what the messages that are there hold."""
+    def read(self, timeout: float) -> list[tuple[Any, int]] | None:
+        """Return the messages that are there."""
         now = time.monotonic_ns()
         if now >= self._due_heartbeat and self.link.peer is not None:
             self._due_heartbeat = now + _SECOND
@@ -83,17 +81,16 @@ class Mavlink(Source):
             self._mav.heartbeat_send(
                 d.MAV_TYPE_ONBOARD_CONTROLLER, d.MAV_AUTOPILOT_INVALID, 0, 0, 0
             )
-        data = self.link.read(timeout)
+        data = self.unless_malformed(self.link.read, timeout)
         arrival = time.monotonic_ns()
-        messages = (self._mav.parse_buffer(data) if data else None) or []
-        samples = [self._take(message, arrival) for message in messages]
-        return [sample for sample in samples if sample is not None]
+        messages = self.unless_malformed(self._mav.parse_buffer, data) if data else None
+        return [(message, arrival) for message in messages or ()]
 
-    def _take(self, message: Any, arrival: int) -> Sample | None:
+    def decode(self, message: Any, arrival: int) -> Sample | None:
+        """Return what a message of the autopilot holds, or None."""
         kind = message.get_type()
         if kind == "BAD_DATA":
-            self.tallies.counts["malformed"] += 1
-            return None
+            raise Malformed("bytes that are no message")
         sender = (message.get_srcSystem(), message.get_srcComponent())
         self.count_lost(sender, int(message.get_seq()), 256)
         if message.get_srcComponent() == _OURS:

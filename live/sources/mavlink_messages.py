@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 from ...dynamics.vehicle import Vehicle
 from ...identification.logs.rotor_orders import ORDERS
 from ...identification.logs.streams import from_ned
-from ..messages import Array, Measured, Sample
-from ..tallies import Tallies
+from ..messages import Array, Malformed, Measured, Sample
 from .base import LARGEST_SHARE, command_of, unwrapped
 
 HALF_TURN = np.array([1.0, -1.0, -1.0])  # of a vector
@@ -36,12 +35,11 @@ class MessageReader:
 
     Args:
         vehicle: that flies.
-        tallies: where messages are counted that say nothing.
         forced: the message that is read for the pose; empty: the best that comes.
     """
 
-    def __init__(self, vehicle: Vehicle, tallies: Tallies, forced: str) -> None:
-        self._vehicle, self._tallies, self._forced = vehicle, tallies, forced
+    def __init__(self, vehicle: Vehicle, forced: str) -> None:
+        self._vehicle, self._forced = vehicle, forced
         self._poses: dict[str, int] = {}  # kinds that have come, and when first, ns
         self._attitude: tuple[int, Array, Array] | None = None  # stamp, quaternion, rates
         self.seen: set[str] = set()  # kinds of messages
@@ -63,7 +61,11 @@ class MessageReader:
         }
 
     def read(self, message: Any, arrival: int) -> Sample | None:
-        """Return what a message that arrived at ``arrival`` ns holds, or None."""
+        """Return what a message that arrived at ``arrival`` ns holds, or None.
+
+        Raises:
+            Malformed: it says nothing.
+        """
         kind = message.get_type()
         self.seen.add(kind)
         reader = self._readers.get(kind)
@@ -71,11 +73,7 @@ class MessageReader:
             return None
         stamps = [ns * getattr(message, name) for name, ns in _STAMPS if hasattr(message, name)]
         sample = Sample(kind, stamps[0] if stamps else None, arrival)
-        try:
-            return sample if reader(message, sample) and _check_finite(sample) else None
-        except ValueError:
-            self._tallies.counts["malformed"] += 1
-            return None
+        return sample if reader(message, sample) and _check_finite(sample) else None
 
     def _chosen(self, kind: str, arrival: int) -> bool:
         """Return whether poses of a kind are read: the best of those that come."""
@@ -93,14 +91,14 @@ class MessageReader:
         turn = np.array(quaternion, dtype=np.float64)
         length = float(np.linalg.norm(turn))
         if not abs(length - 1.0) <= _NORM_TOLERANCE:
-            raise ValueError("no quaternion")
+            raise Malformed("no quaternion")
         position = np.array((m.x, m.y, m.z), dtype=np.float64)
         sample.position, sample.quaternion = from_ned(position, turn / length)
         return True
 
     def _odometry(self, m: Any, sample: Sample) -> bool:
         if m.frame_id not in _Z_DOWN:
-            raise ValueError("an unknown frame")
+            raise Malformed("an unknown frame")
         return self._pose(m, sample, m.q)
 
     def _vision(self, m: Any, sample: Sample) -> bool:
@@ -123,7 +121,7 @@ class MessageReader:
         rates = np.array([m.rollspeed, m.pitchspeed, m.yawspeed], dtype=np.float64)
         good = abs(float(np.linalg.norm(quaternion)) - 1.0) <= _NORM_TOLERANCE
         if not (good and np.isfinite(rates).all()):
-            raise ValueError("no attitude")
+            raise Malformed("no attitude")
         if sample.stamp is not None:
             self._attitude = sample.stamp, quaternion, rates
         return False
@@ -173,9 +171,9 @@ def _check_finite(sample: Sample) -> bool:
     """Return whether there is something in a sample.
 
     Raises:
-        ValueError: a number is not finite.
+        Malformed: a number is not finite.
     """
     parts = [getattr(sample, field.name) for field in fields(Measured)]
     if not all(np.isfinite(part).all() for part in parts if part is not None):
-        raise ValueError("not finite")
+        raise Malformed("a number that is not finite")
     return True

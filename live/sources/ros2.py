@@ -36,7 +36,7 @@ _AT_ONCE = 64  # messages taken before their estimates are out
 class Ros2(Source):
     """Messages of topics."""
 
-    kind, options = "ros2", (*_PARTS, "frame")
+    kind, options, answers = "ros2", (*_PARTS, "frame"), True
 
     def _prepare(self) -> None:
         text, address = self.name, self.address
@@ -61,7 +61,7 @@ class Ros2(Source):
         self._node: Any = None
         self._executor: Any = None
         self._rclpy: Any = None
-        self._samples: list[Sample] = []
+        self._came: list[tuple[Any, int]] = []  # topics with their messages, and arrivals
         self._publishers: tuple[Any, Any] | None = None
 
     def open(self) -> None:
@@ -113,24 +113,26 @@ class Ros2(Source):
             self._executor.spin_once(timeout_sec=0.1)
 
     def _take(self, topic: TopicReader, message: Any) -> None:
-        sample = topic.sample(message, time.monotonic_ns())
-        if sample is None:
-            self.tallies.counts["malformed"] += 1
-        else:
-            self._samples.append(sample)
+        self._came.append(((topic, message), time.monotonic_ns()))
 
-    def receive(self, timeout: float) -> list[Sample] | None:
+    def read(self, timeout: float) -> list[tuple[Any, int]] | None:
         """Return what has come."""
         if not self._rclpy.ok():
             return None
-        self._samples = []
+        self._came = []
         self._executor.spin_once(timeout_sec=timeout)
         for _ in range(_AT_ONCE):
-            before = len(self._samples)
+            before = len(self._came)
             self._executor.spin_once(timeout_sec=0.0)
-            if len(self._samples) == before:
+            if len(self._came) == before:
                 break
-        return self._samples
+        return self._came
+
+    def decode(self, message: Any, arrival: int) -> Sample | None:
+        """Return what a topic's message holds."""
+        topic, content = message
+        found: Sample = topic.sample(content, arrival)
+        return found
 
     def send(self, output: Output) -> None:
         """Publish the wrench."""

@@ -15,7 +15,7 @@ from ...identification.logs.readers.topic_map import UNITS, Setting, Topic
 from ...runtime.errors import InputError, unknown_name
 from ..field_map import FieldMap
 from ..filtering import Output
-from ..messages import Array, Sample
+from ..messages import Array, Malformed, Sample
 
 WRENCH = "geometry_msgs/msg/WrenchStamped"
 ACCELERATION = "geometry_msgs/msg/AccelWithCovarianceStamped"
@@ -47,17 +47,23 @@ class TopicReader:
             )
         self._fields = FieldMap(self._topic.log_map, vehicle, name)
 
-    def sample(self, message: Any, arrival: int) -> Sample | None:
-        """Return what a message holds; None where that is nothing that a flight has."""
+    def sample(self, message: Any, arrival: int) -> Sample:
+        """Return what a message holds.
+
+        Raises:
+            Malformed: that is nothing that a flight has.
+        """
         try:
             values = self._topic.values(message).tolist()
             fields = dict(zip(self._topic.columns, values, strict=True))
             fields["stamp"] = stamp(message)
             found = self._fields.sample(self._topic.name, fields, arrival)
-        except (IndexError, ValueError, AttributeError, TypeError):
-            return None
+        except (IndexError, ValueError, AttributeError, TypeError) as error:
+            raise Malformed(str(error)) from error
         found.stamp = found.stamp or None
-        return found if found.has_any else None
+        if not found.has_any:
+            raise Malformed("nothing")
+        return found
 
 
 def wrench_message(types: Mapping[str, Any], output: Output, frame: str) -> Any:

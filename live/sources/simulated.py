@@ -16,7 +16,7 @@ from ...envs.plant import NOISE, TICK
 from ...envs.scenarios import draw_fan_path, get_scenario
 from ...runtime.errors import InputError
 from ..messages import Array, Sample
-from .base import Source
+from .base import WAITS, Source
 
 _SECOND = 1_000_000_000  # ns
 _AT_ONCE = 0.05  # s of flight that are made up for at once, at most
@@ -32,6 +32,7 @@ class Simulated(Source):
         self._scenario = get_scenario(self.address.path or "base")
         self._speed = self.address.number("speed", 1.0)
         self.paced = self._speed == 1.0
+        self.patience = 0.0 if self.paced else WAITS
         self._seed = int(self.address.number("seed", 0.0))
         self._controller = make_controller("admittance")
         self._rng = np.random.default_rng(self._seed)
@@ -52,11 +53,11 @@ class Simulated(Source):
         self._loop = task.loop
         self._begun = time.monotonic_ns()  # when tick 0 was due
 
-    def receive(self, timeout: float) -> list[Sample] | None:
+    def read(self, timeout: float) -> list[tuple[Sample, int]] | None:
         """Fly as far as time has passed; return what was measured."""
         now = time.monotonic_ns()
         if self._speed == 0.0:
-            return [self._tick(time.monotonic_ns()) for _ in range(DECISION_TICKS)]
+            return [self._tick() for _ in range(DECISION_TICKS)]
         passed = 1e-9 * (now - self._begun) * self._speed
         due = math.floor(passed / TICK) + 1 - self._ticks
         if due <= 0:
@@ -67,11 +68,11 @@ class Simulated(Source):
             self._begun += round((due - 1) * TICK / self._speed * _SECOND)
             due = 1
         due = min(due, max(1, round(_AT_ONCE * max(self._speed, 1.0) / TICK)))
-        return [self._tick(time.monotonic_ns()) for _ in range(due)]
+        return [self._tick() for _ in range(due)]
 
-    def _tick(self, arrival: int) -> Sample:
-        """Fly one tick; return the pose that it samples, and the rotor speeds then."""
-        loop = self._loop
+    def _tick(self) -> tuple[Sample, int]:
+        """Fly one tick; return the pose that it samples, the rotor speeds then, and when it was."""
+        loop, arrival = self._loop, time.monotonic_ns()
         phase = self._ticks % DECISION_TICKS
         if phase == 0:
             self._decide()
@@ -97,7 +98,7 @@ class Simulated(Source):
             torque=external[3:],
         )
         self._ticks += 1
-        return sample
+        return sample, arrival
 
     def _decide(self) -> None:
         """Move the fan, and have the controller answer what the vehicle feels."""

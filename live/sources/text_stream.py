@@ -5,23 +5,26 @@ Fields are separated by commas, semicolons, tabs or white space, whichever the h
 
 import os
 import select
+import stat
 import sys
 import time
+from typing import Any
 
 from ...identification.logs.text_table import TextLayout
 from ...runtime.errors import InputError
-from ..field_map import FieldMap, Malformed
-from ..messages import Sample
-from .base import Source
+from ..field_map import FieldMap
+from ..messages import Malformed, Sample
+from .base import WAITS, Source
 
 _PIECE = 65_536  # bytes
 _LONGEST = 65_536  # bytes of one line
+_PIPE_WAITS = 1.0  # s: what fills a pipe may fly, and less than the pipe holds at 200 Hz
 
 
 class TextStream(Source):
     """Rows of a table that comes on standard input."""
 
-    kind, paced = "csv", False
+    kind, paced, patience, strict = "csv", False, _PIPE_WAITS, True
 
     def _prepare(self) -> None:
         if self.address.path != "-":
@@ -51,9 +54,11 @@ class TextStream(Source):
                 "--vehicle V < flight.csv"
             )
         self.descriptor = sys.stdin.fileno()
+        if stat.S_ISREG(os.fstat(self.descriptor).st_mode):
+            self.patience = WAITS
 
-    def receive(self, timeout: float) -> list[Sample] | None:
-        """Return the rows of the lines that are there."""
+    def read(self, timeout: float) -> list[tuple[Any, int]] | None:
+        """Return the lines that are there."""
         assert self.descriptor is not None
         if self._ended:
             return None
@@ -66,14 +71,16 @@ class TextStream(Source):
             self._ended = True
             lines, self._rest = [self._rest] if self._rest else [], b""
         elif len(self._rest) > _LONGEST:
-            raise InputError(
-                f"{self.name}: a line of more than {_LONGEST} bytes; expected a table of text"
-            )
-        samples = [self._line(line, arrival) for line in lines]
-        return [sample for sample in samples if sample is not None]
+            if not self._header:
+                raise InputError(
+                    f"{self.name}: a line of more than {_LONGEST} bytes; expected a table of text"
+                )
+            self._rest = self._rest[:_LONGEST]  # no row, once it ends
+        return [(line, arrival) for line in lines]
 
-    def _line(self, line: bytes, arrival: int) -> Sample | None:
-        text = line.decode("utf-8-sig" if not self._header else "utf-8", "replace").strip()
+    def decode(self, message: Any, arrival: int) -> Sample | None:
+        """Return the row of a line."""
+        text = message.decode("utf-8-sig" if not self._header else "utf-8", "replace").strip()
         if not text:
             return None
         if not self._header:
@@ -83,23 +90,18 @@ class TextStream(Source):
         if len(fields) == len(self._header) + 1 and not fields[-1]:
             fields.pop()
         if len(fields) != len(self._header):
-            self.malformed(
+            raise Malformed(
                 f"a row of {len(fields)} field(s); expected {len(self._header)}, as many as the "
                 "header"
             )
-            return None
-        try:
-            values = {
-                name: self._number(name, field)
-                for name, field in zip(self._header, fields, strict=True)
-                if name
-            }
-            sample = self._map.sample("row", values, arrival)
-        except Malformed as error:
-            self.malformed(str(error))
-            return None
+        values = {
+            name: self._number(name, field)
+            for name, field in zip(self._header, fields, strict=True)
+            if name
+        }
+        sample = self._map.sample("row", values, arrival)
         sample.whole = True
-        return self.take_sound(sample)
+        return sample
 
     def _begin(self, text: str) -> None:
         """Take the header."""

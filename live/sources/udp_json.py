@@ -2,81 +2,91 @@
 
 ``udp-json://HOST:PORT`` listens there. An object is a row of this kit's columns, or of those that a
 map names, or a part of one; beside them ``seq``, a count of the sender's by which lost ones are
-known. With ``?reply=1`` each estimate is sent back to where the last datagram came from.
+known. With ``?reply=1`` each estimate is sent back to where the last datagram came from. Datagrams
+beyond 16,384 bytes, 1,024 values or 64 objects are malformed: a batch of 0.3 s at 200 Hz is within
+them, and what others cost would delay estimates.
 """
 
 import json
 import time
+from typing import Any
 
 from ...runtime.errors import InputError
-from ..field_map import FieldMap, Malformed
+from ..field_map import FieldMap
 from ..filtering import Output
-from ..messages import Sample
+from ..messages import Malformed, Sample
 from ..outputs import as_fields
 from .base import Source
 from .links import Datagrams
 
-_AT_ONCE = 64  # datagrams taken before their estimates are out
+_AT_ONCE = 64  # datagrams, and objects of one, taken before their estimates are out
+_LARGEST, _VALUES = 16_384, 1_024  # bytes and values of a datagram
 
 
 class UdpJson(Source):
     """Rows of JSON objects that come by UDP."""
 
-    kind, options = "udp-json", ("reply",)
+    kind, options, strict = "udp-json", ("reply",), True
 
     def _prepare(self) -> None:
-        self._reply = self.address.choice("reply", ("0", "1")) == "1"
+        self.answers = self.address.choice("reply", ("0", "1")) == "1"
         if self.address.port is None:
             raise InputError(f"{self.name}: no port; expected udp-json://HOST:PORT")
         self._map = FieldMap(self.log_map, self.vehicle, self.name)
-        self.link = Datagrams(self.address, "127.0.0.1")
+        self.link = Datagrams(self.address, _LARGEST)
 
-    def receive(self, timeout: float) -> list[Sample] | None:
-        """Return what the datagrams that are there hold."""
-        samples: list[Sample] = []
+    def read(self, timeout: float) -> list[tuple[Any, int]] | None:
+        """Return the objects of the datagrams that are there."""
+        items: list[tuple[Any, int]] = []
         for i in range(_AT_ONCE):
-            data = self.link.read(0.0 if i else timeout)
+            data = self.unless_malformed(self.link.read, 0.0 if i else timeout)
             if data is None:
                 break
-            samples += self._samples(data, time.monotonic_ns())
-        return samples
+            arrival = time.monotonic_ns()
+            objects = self.unless_malformed(_objects, data) or ()
+            items += [(item, arrival) for item in objects]
+        return items
 
-    def _samples(self, data: bytes, arrival: int) -> list[Sample]:
-        try:
-            value = json.loads(data)
-        except (ValueError, RecursionError):
-            self.malformed(f"{data[:60]!r}; expected a datagram of JSON")
-            return []
-        found = []
-        for item in value if isinstance(value, list) else [value]:
-            if not isinstance(item, dict):
-                self.malformed(f"{json.dumps(item)[:60]}; expected an object of named numbers")
-                continue
-            try:
-                sample = self._map.sample("json", item, arrival)
-            except Malformed as error:
-                self.malformed(str(error))
-                continue
-            sample.kind = _kind(sample)
-            if sample.kind == "json":
-                self.malformed(
-                    f"none of the fields that are looked for; found {', '.join(item)[:200]}; "
-                    "expected such as px, omega1, gx, vbat, or those of --map"
-                )
-                continue
-            if type(number := item.get("seq")) is int:
-                self.count_lost("", number)
-            found.append(self.take_sound(sample))
-        return found
+    def decode(self, message: Any, arrival: int) -> Sample | None:
+        """Return what an object holds."""
+        sample = self._map.sample("json", message, arrival)
+        sample.kind = _kind(sample)
+        if sample.kind == "json":
+            raise Malformed(
+                f"none of the fields that are looked for; found {', '.join(message)[:200]}; "
+                "expected such as px, omega1, gx, vbat, or those of --map"
+            )
+        if type(number := message.get("seq")) is int:
+            self.count_lost("", number)
+        return sample
 
     def send(self, output: Output) -> None:
         """Send the estimate to where the last datagram came from, if it wants to know."""
-        if self._reply:
+        if self.answers:
             self.link.write(json.dumps(as_fields(output)).encode())
 
     def expected(self) -> str:
         """Return what must come."""
         return "datagrams of JSON with t, px, py, pz, qw, qx, qy, qz and omega1 ... omega4"
+
+
+def _objects(data: bytes) -> list[dict[str, Any]]:
+    """Return the objects of a datagram.
+
+    Raises:
+        Malformed: it holds none, or so many values that decoding them would delay the stream.
+    """
+    if data.count(b",") >= _VALUES or data.count(b"{") > _AT_ONCE:
+        raise Malformed(f"a datagram of more than {_VALUES} values or {_AT_ONCE} objects")
+    try:
+        value = json.loads(data)
+    except (ValueError, RecursionError) as error:
+        raise Malformed(f"{data[:60]!r}; expected a datagram of JSON") from error
+    items = value if isinstance(value, list) else [value]
+    other = next((item for item in items if not isinstance(item, dict)), None)
+    if other is not None:
+        raise Malformed(f"{json.dumps(other)[:60]}; expected an object of named numbers")
+    return items
 
 
 def _kind(sample: Sample) -> str:

@@ -11,6 +11,7 @@ from windwrench.dynamics import load_vehicle
 from windwrench.envs.recording import record_flight
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.live.filtering import LiveSettings
+from windwrench.live.outlets import Outlet
 from windwrench.live.session import Session
 from windwrench.live.sources.open import make_source
 from windwrench.live.tallies import Tallies
@@ -55,21 +56,43 @@ def wrench_of(outputs):
     return np.array([[o.t, *o.estimate.force, *o.estimate.torque] for o in outputs])
 
 
+class Kept:
+    """A sink that keeps what comes, with ``does`` before each item."""
+
+    name, lost, pause, held = "what is kept", "not told", 0.0, 0
+
+    def __init__(self, does=lambda: None):
+        self.items, self.does = [], does
+
+    @property
+    def rows(self):
+        return len(self.items)
+
+    def add(self, item):
+        self.does()
+        self.items.append(item)
+
+    def idle(self):
+        pass
+
+    end = close = idle
+
+
 class Pipeline:
     """Samples in, estimates out, by a session without a source and without time passing."""
 
     def __init__(self, **settings):
         self.tallies, self.outputs = Tallies(), []
         source = SimpleNamespace(
-            vehicle=VEHICLE, tallies=self.tallies, paced=True, send=lambda output: None
+            name="here", vehicle=VEHICLE, tallies=self.tallies, paced=True, send=lambda output: None
         )
         self.session = Session(
             source,
             LiveSettings(**settings),
-            recorder=SimpleNamespace(rows=0),
-            tell=self.outputs.append,
+            SimpleNamespace(sink=SimpleNamespace(rows=0)),
+            SimpleNamespace(put=self.outputs.append),
         )
-        self.rows = self.session._unrecorded
+        self.session._unrecorded = self.rows = []
 
     def take(self, samples):
         for sample in samples:
@@ -83,14 +106,19 @@ class Pipeline:
 class Running:
     """A session of a source, in a thread of its own."""
 
-    def __init__(self, text, vehicle=VEHICLE, log_map=None, descriptor=None, **settings):
-        self.tallies, self.outputs, self.failed = Tallies(), [], []
+    def __init__(
+        self, text, vehicle=VEHICLE, log_map=None, descriptor=None, kept=None, record=None,
+        **settings,
+    ):  # fmt: skip
+        self.tallies, self.kept, self.failed = Tallies(), kept or Kept(), []
+        self.outputs = self.kept.items
         self.source = make_source(text, vehicle, log_map, self.tallies)
         self.source.descriptor = descriptor  # of a table
         self.session = Session(
             self.source,
-            settings=LiveSettings(**{"wait": 0.0} | settings),
-            tell=self.outputs.append,
+            LiveSettings(**{"wait": 0.0} | settings),
+            record and record(self.tallies),
+            Outlet(self.kept, self.tallies),
         )
         self.thread = threading.Thread(target=self._run, daemon=True)
         self.thread.start()

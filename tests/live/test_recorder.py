@@ -15,6 +15,7 @@ def record(path, rows, close=True):
     for row in rows:
         recorder.add(row)
     if close:
+        recorder.end()
         recorder.close()
     return recorder
 

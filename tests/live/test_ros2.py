@@ -14,6 +14,7 @@ from tests.live.test_pipeline import whole
 from windwrench.dynamics import InputError
 from windwrench.dynamics.rotation import matrix_of
 from windwrench.identification.logs.readers.topic_map import Setting
+from windwrench.live.messages import Malformed
 from windwrench.live.sources.open import make_source
 from windwrench.live.tallies import Tallies
 
@@ -54,7 +55,8 @@ def test_rotors_of_a_multi_array_need_a_unit():
     sample = topic.sample(array([10, 20, 30, 40]), 0)
     np.testing.assert_allclose(sample.rotor_speeds, np.array([40, 30, 20, 10]) * np.pi / 30)
     assert sample.stamp is None
-    assert topic.sample(array([1.0, 2.0]), 0) is None
+    with pytest.raises(Malformed):
+        topic.sample(array([1.0, 2.0]), 0)
     with pytest.raises(InputError, match="unknown type"):
         TopicReader("pose", "/m", kind, Setting(), VEHICLE)
 

@@ -11,7 +11,8 @@ from tests.live.stream import VEHICLE, Running, as_csv, as_objects, flight, free
 from tests.live.test_pipeline import offline
 from windwrench.identification.logs.log_map import load_map
 from windwrench.identification.logs.reading import read_log
-from windwrench.live.field_map import FieldMap, Malformed
+from windwrench.live.field_map import FieldMap
+from windwrench.live.messages import Malformed
 from windwrench.live.sources.open import make_source
 from windwrench.live.tallies import Tallies
 

@@ -1,0 +1,257 @@
+"""Extreme messages of every source: none is an exception, and the estimates after them are finite.
+
+1,000 of each in the suite; 20,000 of each with ``pytest tests/live/test_extremes.py -m slow``.
+"""
+
+import json
+import math
+import os
+import re
+import struct
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.live.stream import VEHICLE, as_csv, as_objects, flight
+from windwrench.identification.logs.readers.topic_map import Setting
+from windwrench.live.filtering import LiveSettings
+from windwrench.live.session import Session
+from windwrench.live.sources.crazyflie import _IMU, _POSE
+from windwrench.live.sources.open import make_source
+from windwrench.live.tallies import Tallies
+
+NUMBERS = (
+    *(0, 1, -1, 0.0, -0.0, 0.5, 1.0, -1.0, 376.0, 1e-300, 5e-324, 1e9, 1e18, 1e308, -1e308),
+    *(2**31, 2**32 - 1, 2**63, -(2**63), 2**64 - 1, 10**400, math.nan, math.inf, -math.inf),
+)
+OTHERS = (None, True, "", "1", "NaN", [], [1.0], {}, {"t": 1}, "\x00", "é" * 50)
+FAILURES = ("not decoded", "not read", "not estimated", "not sent")
+COUNTS = (1_000, pytest.param(20_000, marks=pytest.mark.slow))
+counts = pytest.mark.parametrize("count", COUNTS)
+
+
+class Attacked:
+    """A stream of which each good message is followed by nine that are extreme."""
+
+    def __init__(self, text):
+        self.source = make_source(text, VEHICLE, None, Tallies())
+        self.session = Session(self.source, LiveSettings(wait=0.0, rate_hz=200.0))
+        self.rng = np.random.default_rng(5)
+
+    def any(self, values=NUMBERS):
+        return values[self.rng.integers(len(values))]
+
+    def run(self, count, good, extreme):
+        """``good(k)`` and ``extreme()`` put a message where the source finds it."""
+        rows = len(flight()["t"])
+        for k in range(rows // 2):
+            good(k)
+            self.session._once()
+        for k in range(count):
+            extreme()
+            self.session._once()
+            if k % 9 == 0:
+                good(rows // 2 + k // 9 % (rows // 2))
+                self.session._once()
+        counts, output = self.source.tallies.counts, self.session.output
+        assert not {name: counts[name] for name in FAILURES if counts[name]}, self.said()
+        assert self.session.estimates > 100
+        assert np.isfinite([*output.wrench, *output.std]).all()
+        assert counts["malformed"] > 0
+        self.session.snapshot()
+
+    def said(self):
+        return self.source.tallies.news()
+
+
+class Link:
+    """A link by which one piece of bytes comes at a time."""
+
+    peer = opened = "here"
+
+    def __init__(self):
+        self.pieces = []
+
+    def open(self):
+        return "here"
+
+    def read(self, timeout):
+        return self.pieces.pop(0) if self.pieces else None
+
+    def write(self, data):
+        pass
+
+
+@counts
+def test_json(count):
+    stream = Attacked("udp-json://:9?reply=1")
+    stream.source.link = link = Link()
+    good = as_objects(flight())
+
+    def extreme():
+        one = dict(good[stream.rng.integers(len(good))])
+        for name in stream.rng.choice(list(one), stream.rng.integers(1, 5)):
+            one[name] = stream.any(NUMBERS + OTHERS)
+        text = json.dumps([one] * stream.rng.integers(1, 4) if stream.rng.random() < 0.2 else one)
+        data = bytearray(text.encode())
+        if stream.rng.random() < 0.2:
+            data[stream.rng.integers(len(data))] = stream.rng.integers(256)
+        link.pieces.append(bytes(data))
+
+    stream.run(count, lambda k: link.pieces.append(json.dumps(good[k]).encode()), extreme)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [b"[" + b"1," * 7000 + b"1]", b"[" + b'{"t":1},' * 64 + b"{}]", b"[" * 16_000, b"9" * 16_000],
+)
+def test_a_datagram_that_costs_much_is_malformed(data):
+    stream = Attacked("udp-json://:9")
+    stream.source.link, stream.source._understood = SimpleNamespace(read=lambda _: data), True
+    stream.session._once()
+    assert stream.source.tallies.counts == {"malformed": 64}
+
+
+@counts
+def test_a_table(count):
+    header, *lines = as_csv(flight()).splitlines()
+    read, write = os.pipe()
+    stream = Attacked("-")
+    stream.source.descriptor = read
+    os.write(write, f"{header}\n".encode())
+
+    def extreme():
+        fields = lines[stream.rng.integers(len(lines))].split(",")
+        for at in stream.rng.integers(len(fields), size=stream.rng.integers(1, 4)):
+            fields[at] = str(stream.any((*NUMBERS, *OTHERS)))
+        data = bytearray(",".join(fields).encode())
+        if stream.rng.random() < 0.2:
+            data[stream.rng.integers(len(data))] = stream.rng.integers(256)
+        os.write(write, bytes(data) + b"\n")
+
+    stream.run(count, lambda k: os.write(write, f"{lines[k]}\n".encode()), extreme)
+    os.write(write, b"1," * 30_000)
+    stream.session._once()
+    os.close(read)
+    os.close(write)
+
+
+FLOATS = (0.0, -0.0, 0.5, 1.0, -1.0, 1e-45, 1e9, 3e38, -3e38, math.nan, math.inf, -math.inf)
+
+
+@counts
+@pytest.mark.parametrize("only", ["", "ESC_STATUS"])
+def test_mavlink(count, only):
+    """Every number of a message of every kind that is read, and bytes that were changed."""
+    common = pytest.importorskip("pymavlink.dialects.v20.common")
+    from windwrench.live.sources.esc_status import add_esc_status
+    from windwrench.live.sources.mavlink_messages import MessageReader
+
+    stream = Attacked("mavlink:udp://:9?pose=ODOMETRY&rate=50")
+    stream.source.link = link = Link()
+    stream.source.open()
+    rng, flown, esc_status = stream.rng, flight(), add_esc_status(common)
+    sender = common.MAVLink(SimpleNamespace(write=link.pieces.append), srcSystem=7)
+    names = [only] if only else [*MessageReader(VEHICLE, "")._readers, "HEARTBEAT"]
+    kinds = [one for one in common.mavlink_map.values() if one.msgname in names]
+
+    def number(letter):
+        if letter == "f":
+            return stream.any(FLOATS)
+        bits = 8 * struct.calcsize(letter)
+        low = 0 if letter.isupper() else -(2 ** (bits - 1))
+        return low + stream.any(
+            (0, 1, 2 ** (bits - 1), 2**bits - 1, int(rng.integers(2**16)) % 2**bits)
+        )
+
+    def extreme():
+        kind = stream.any(kinds)
+        wire = kind.unpacker.format
+        letters = [
+            letter
+            for times, letter in re.findall(r"(\d*)([a-zA-Z])", wire)
+            for _ in range(int(times or 1))
+        ]
+        payload = struct.pack(wire, *map(number, letters))
+        message = common.MAVLink_message(kind.id, kind.msgname)
+        data = bytearray(message._pack(sender, kind.crc_extra, payload))
+        if rng.random() < 0.1:
+            data[rng.integers(len(data))] = rng.integers(256)
+        link.pieces.append(bytes(data))
+
+    def good(k):
+        us, motors = round(flown["t"][k] * 1e6), [3, 1, 0, 2]
+        rpm = [round(w * 30 / np.pi) for w in flown["rotor_speeds"][k][motors]]
+        sender.send(esc_status(0, us, rpm, [11.0] * 4, [1.0] * 4))
+        x, y, z = flown["position"][k] * [1, -1, -1]
+        q = flown["quaternion"][k] * [1, 1, -1, -1]
+        sender.odometry_send(us, 1, 12, x, y, z, q, *[0] * 6, *[[0.0] * 21] * 2, 0, 0, 0)
+        link.pieces[:] = [b"".join(link.pieces)]
+
+    stream.run(count, good, extreme)
+
+
+@counts
+def test_crazyflie(count):
+    encoding = pytest.importorskip("cflib.utils.encoding")
+    stream = Attacked("crazyflie:radio://0/80/2M?imu=1")
+    source, rng, flown = stream.source, stream.rng, flight()
+    source._decompress = encoding.decompress_quaternion
+    row, imu = SimpleNamespace(name="row"), SimpleNamespace(name="imu")
+
+    def good(k):
+        w, x, y, z = flown["quaternion"][k]
+        data = {f"stateEstimate.{axis}": flown["position"][k][i] for i, axis in enumerate("xyz")}
+        data["stateEstimateZ.quat"] = int(encoding.compress_quaternion([x, y, z, w]))
+        data |= {f"rpm.m{i + 1}": 3600 for i in range(4)} | {"pm.vbat": 11.0}
+        source._take(round(1e3 * flown["t"][k]), data, row)
+
+    def extreme():
+        stamp = int(rng.integers(2**24))
+        words = {f"rpm.m{i + 1}": int(stream.any((0, 1, 65_535))) for i in range(4)}
+        data = {name: stream.any(FLOATS) for name, _ in (*_POSE[:3], *_IMU)} | words
+        data |= {"stateEstimateZ.quat": int(rng.integers(2**32)), "pm.vbat": stream.any(FLOATS)}
+        source._take(stamp, data, row if rng.random() < 0.7 else imu)
+
+    stream.run(count, good, extreme)
+
+
+@counts
+def test_ros2(count, monkeypatch):
+    fake = pytest.importorskip("tests.support.fake_ros")
+    kinds = {"/p": "geometry_msgs/msg/PoseStamped", "/m": "std_msgs/msg/Float64MultiArray"}
+    world, flown = fake.World(kinds), flight()
+    fake.install(monkeypatch, world)
+    monkeypatch.setattr(
+        "windwrench.live.sources.ros2.topic_map",
+        lambda *_: ({"pose": Setting("/p"), "rotors": Setting("/m", unit="rad/s")}, {}),
+    )
+    stream = Attacked("ros2:topics.yaml")
+    stream.source.open()
+    rng = stream.rng
+    floats = (*FLOATS, 1e308, 10.0**15)
+
+    def good(k):
+        ns = 1_700_000_000 * 10**9 + round(flown["t"][k] * 1e9)
+        world.waiting.append(("/m", fake.array(flown["rotor_speeds"][k])))
+        position, quaternion = flown["position"][k], flown["quaternion"][k]
+        world.waiting.append(("/p", fake.pose(ns, position, quaternion)))
+
+    def extreme():
+        if rng.random() < 0.5:
+            size = int(stream.any((0, 1, 3, 4, 4, 4, 5, 100)))
+            world.waiting.append(("/m", fake.array([stream.any(floats) for _ in range(size)])))
+        else:
+            values = [stream.any(floats) for _ in range(7)]
+            ns = int(stream.any((0, -1, 1, 2**31 * 10**9, 1_700_000_000 * 10**9)))
+            world.waiting.append(("/p", fake.pose(ns, values[:3], values[3:])))
+
+    class Executor:
+        def spin_once(self, timeout_sec):
+            if world.waiting:
+                topic, message = world.waiting.pop(0)
+                world.callbacks[topic](message)
+
+    stream.source._executor = Executor()
+    stream.run(count, good, extreme)
