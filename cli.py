@@ -122,6 +122,8 @@ def main() -> None:
 def _refused(error: Any) -> int:
     """Say what the user's mistake was; return the exit code."""
     text = str(error) if isinstance(error, InputError) else error.format_message()
+    for one in getattr(error.__cause__, "errors", list)()[:1]:  # pydantic's, behind typer's
+        text += f", got {one['input']!r}"
     # what a parser says may take several lines
     errors.print(
         f"error: {' '.join(printable(text).split())}",
