@@ -39,14 +39,6 @@ def fly(env, seed, count=15, between=None):
     return np.array(rows, dtype=np.float64)
 
 
-@pytest.mark.parametrize("scenario", ["base", "varied"])
-def test_an_episode_does_not_feel_another_environment(scenario):
-    env, other = FanTrackingEnv(scenario), FanTrackingEnv("gusty")
-    other.reset(seed=9)
-    beside = fly(env, 3, between=lambda: other.step(np.array([0.7], np.float32)))
-    np.testing.assert_array_equal(beside, fly(FanTrackingEnv(scenario), 3))
-
-
 def test_stable_baselines_checker_finds_nothing():
     checker = pytest.importorskip(
         "stable_baselines3.common.env_checker",
@@ -106,21 +98,6 @@ def test_after_a_bad_fan_path_which_is_named_there_is_no_step(path):
         env.step(np.zeros(1, np.float32))
 
 
-def test_a_vehicle_that_leaves_is_lost():
-    env = FanTrackingEnv("static")
-    env.reset(seed=0)
-    side = np.sign(env.loop.position[1])
-    terminated = False
-    while not terminated:
-        assert env.loop.time < 6.0
-        observation, reward, terminated, truncated, info = env.step(np.array([side], np.float32))
-        assert observation in env.observation_space
-    assert not truncated
-    assert info["lost"]
-    assert abs(info["offset"]) > 2.5
-    assert reward < 0.05
-
-
 def test_the_constant_gain_flies_much_the_same():
     full, constant = (
         fly(FanTrackingEnv(), 7, 25),
@@ -132,19 +109,14 @@ def test_the_constant_gain_flies_much_the_same():
     np.testing.assert_allclose(constant[:, 9], full[:, 9], atol=0.005)  # m
 
 
-@pytest.mark.parametrize("what", ["plant", "filter"])
-def test_a_state_that_is_no_number_is_lost(what, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log where it runs
+def test_a_filter_whose_state_is_no_number_starts_over():
     env = FanTrackingEnv()
     env.reset(seed=0)
     env.step(np.zeros(1, np.float32))
-    if what == "plant":
-        env.loop.data.qvel[0] = np.nan
-    else:
-        env.loop.state[16] = np.nan
+    env.loop.state[16] = np.nan
     observation, _, lost, _, info = env.step(np.zeros(1, np.float32))
-    # the filter starts over at the last pose; the plant cannot
-    assert lost == info["lost"] == (what == "plant")
+    assert not lost
+    assert not info["lost"]
     assert np.isfinite(env.loop.state[:19]).all()
     assert observation in env.observation_space
 

@@ -3,10 +3,9 @@ change it.
 """
 
 import json
-import multiprocessing
 import re
 import threading
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 
 import gymnasium
 import numpy as np
@@ -90,10 +89,3 @@ def test_sixteen_threads_at_once_fly_the_same_trajectories():
 
     with ThreadPoolExecutor(16) as pool:
         assert list(pool.map(fly, range(16))) == [alone[i % 4] for i in range(16)]
-
-
-@pytest.mark.slow
-def test_four_processes_at_once_fly_the_same_trajectories():
-    alone = [flown(seed) for seed in range(4)]
-    with ProcessPoolExecutor(4, mp_context=multiprocessing.get_context("spawn")) as pool:
-        assert list(pool.map(flown, range(4))) == alone

@@ -60,25 +60,6 @@ def test_whole_episodes_in_closed_loop_have_the_same_error():
     np.testing.assert_allclose(rmse, expected, atol=1e-6)
 
 
-def test_a_lost_vehicle_starts_anew_and_the_others_fly_on():
-    envs = make(2, "lanes", scenario="static", max_episode_steps=1000)
-    twin = make(2, "mujoco", scenario="static", max_episode_steps=1000)
-    _, infos = envs.reset(seed=0)
-    twin.reset(seed=0)
-    away = np.array([[np.sign(infos["offset"][0])], [0.0]], np.float32)
-    for _ in range(80):
-        seen, _, lost, _, infos = envs.step(away)
-        same, _, expected, _, _ = twin.step(away)
-        np.testing.assert_array_equal(lost, expected)
-        np.testing.assert_allclose(seen, same, atol=1e-6)
-        if lost.any():
-            break
-    assert lost.tolist() == [True, False]
-    then = infos["time"][1]
-    infos = envs.step(away)[4]
-    assert infos["time"].tolist() == [0.0, pytest.approx(then + 0.08)]
-
-
 @njit
 def fly_on(address, steps, dt):
     loop = LOOPS_AT(address)

@@ -64,23 +64,14 @@ def test_an_unknown_view_is_named():
 
 
 @pytest.mark.parametrize(
-    "given", [{}, {"observe": "history"}, {"observe": "pose", "normalize": True}]
+    ("mode", "seen"),
+    [
+        (AutoresetMode.SAME_STEP, {"observe": "history"}),
+        (AutoresetMode.NEXT_STEP, {"observe": "pose", "normalize": True}),
+    ],
 )
-def test_many_see_what_each_alone_would(given):
-    envs = gym.make_vec(
-        NAME, num_envs=2, vectorization_mode="vector_entry_point", scenario="fast", **given
-    )
-    frames = [envs.reset(seed=2)[0][1]]
-    frames += [envs.step(np.stack([a, a]))[0][1] for a in ACTIONS]
-    np.testing.assert_array_equal(frames, seen(**given))
-    # a part that starts anew leaves the others' history alone
-    again, _ = envs.reset(seed=[2, None], options={"reset_mask": np.array([True, False])})
-    np.testing.assert_array_equal(again[1], frames[-1])
-
-
-@pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP])
-def test_episodes_follow_each_other_as_gymnasium_s_own_vector_environment_has_it(mode):
-    given = {"scenario": "fast", "observe": "history"}
+def test_episodes_follow_each_other_as_gymnasium_s_own_vector_environment_has_it(mode, seen):
+    given = {"scenario": "fast", **seen}
     native = gym.make_vec(
         NAME,
         num_envs=2,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from windwrench.dynamics import EffectSetting, Mocap, load_vehicle
+from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.fan import Fan, fan_record, jet_table
 from windwrench.envs.plant import (
@@ -23,8 +23,6 @@ from windwrench.envs.plant import (
     sense,
 )
 from windwrench.envs.recording import TRAJECTORIES, record_flight
-from windwrench.identification.logs.flight_log import FlightLog
-from windwrench.identification.wrench_series import estimate_log
 from windwrench.runtime.errors import InputError
 
 QUIET = PlantSettings(
@@ -72,16 +70,6 @@ class Bench:
             mujoco.mj_step(self.model, self.data, SUBSTEPS)
             rows[k] = np.concatenate([self.data.qpos, self.data.qvel])
         return rows
-
-
-def test_without_thrust_it_falls_freely():
-    rows = Bench().run(np.zeros(4), 100)
-    t = TICK * np.arange(1, 101)
-    np.testing.assert_allclose(rows[:, 9], -VEHICLE.gravity * t, rtol=1e-9)
-    np.testing.assert_allclose(
-        rows[:, 2], 5.0 - 0.5 * VEHICLE.gravity * t**2, atol=0.5 * VEHICLE.gravity * TICK * t[-1]
-    )
-    np.testing.assert_array_equal(rows[:, 3], 1.0)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -167,15 +155,6 @@ def test_the_pose_s_scalar_part_is_never_negative_so_its_sign_flips_facing_backw
     np.testing.assert_allclose(np.linalg.norm(rows[:, 3:], axis=1), 1.0, atol=1e-14)
 
 
-def test_the_pose_s_noise_has_the_stated_size_and_stands_in_the_world():
-    q = Rotation.from_euler("zx", [1.0, 0.8])
-    vehicle = VEHICLE.mocap
-    rows, _ = sensed(q.as_quat(scalar_first=True), 4000, replace(QUIET, sensor_noise=True))
-    np.testing.assert_allclose(rows[:, :3].std(axis=0), vehicle.sigma_pos_m, rtol=0.1)
-    error = (Rotation.from_quat(rows[:, 3:], scalar_first=True) * q.inv()).as_rotvec()
-    np.testing.assert_allclose(error.std(axis=0), vehicle.sigma_att_rad, rtol=0.1)
-
-
 @pytest.mark.parametrize("rate", [0.0, 0.05, 0.4])
 def test_dropouts_come_at_the_stated_rate(rate):
     _, seen = sensed((1.0, 0.0, 0.0, 0.0), 4000, replace(QUIET, dropout=rate))
@@ -194,15 +173,6 @@ def test_the_filter_flies_on_through_dropouts():
     assert np.linalg.eigvalsh(loop.covariance)[0] > 0
 
 
-def test_the_disturbance_has_the_stated_size():
-    bench = Bench(settings=PlantSettings(motor_lag=0.0, sensor_noise=False, disturbance_time=0.05))
-    rng, samples = np.random.default_rng(5), []
-    for _ in range(8000):
-        bench.run(np.full(4, HOVER), 1, rng.standard_normal((1, NOISE)))
-        samples.append(bench.plant["disturbance"].copy())
-    np.testing.assert_allclose(np.std(samples, axis=0), [0.03] * 3 + [0.01] * 3, rtol=0.15)
-
-
 def test_the_truth_in_a_log_is_the_wrench_that_was_applied():
     effects = (
         EffectSetting("constant_force", {"fx": 0.1}),
@@ -211,24 +181,6 @@ def test_the_truth_in_a_log_is_the_wrench_that_was_applied():
     log = record_flight(VEHICLE, effects, "hover", 3.0, 0, QUIET)
     np.testing.assert_allclose(log["force"][1:], np.tile([0.1, 0, 0], (600, 1)), atol=1e-12)
     np.testing.assert_allclose(log["torque"][1:, 2], 0.01, rtol=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("com", "inertia"),
-    [
-        ((0.01, -0.02, 0.0), None),
-        ((0.0, 0.0, 0.05), [[0.0022, 3e-4, 0], [3e-4, 0.003, -2e-4], [0, -2e-4, 0.0048]]),
-    ],
-)
-def test_a_centre_of_mass_off_the_rotors_moves_as_in_the_filter_s_model(com, inertia):
-    vehicle = VEHICLE if inertia is None else replace(VEHICLE, inertia=np.array(inertia))
-    vehicle = replace(vehicle, mocap=Mocap(200.0, 1e-4, 5e-4))
-    offset = EffectSetting("com_offset", dict(zip(("cx", "cy", "cz"), com, strict=True)))
-    log = FlightLog(**record_flight(vehicle, (offset,), "yaw", 12.0, 2, QUIET))
-    series = estimate_log(log, vehicle.with_effects(offset))
-    settled = series.t > 4.0
-    assert np.abs(series.force[settled]).max() < 0.02
-    assert np.abs(series.torque[settled]).max() < 0.002
 
 
 @pytest.mark.parametrize("trajectory", sorted(TRAJECTORIES))

@@ -1,13 +1,10 @@
-from dataclasses import replace
-
-import mujoco
 import numpy as np
 import pytest
 
 from windwrench.dynamics import load_vehicle
 from windwrench.envs.closed_loop import ClosedLoop
-from windwrench.envs.plant import NOISE, PlantSettings, load_world
-from windwrench.envs.suspended_load import SuspendedLoad, hang, pull
+from windwrench.envs.plant import NOISE, PlantSettings
+from windwrench.envs.suspended_load import SuspendedLoad
 from windwrench.runtime.errors import InputError
 
 VEHICLE = load_vehicle("ardrone2")
@@ -48,25 +45,6 @@ def test_reset_takes_the_load_off():
     loop.reset(np.random.default_rng(0), np.array([0.0, 0.0, 1.5]))
     loop.run(np.zeros((200, NOISE)))
     np.testing.assert_array_equal(loop.load_pull(), 0.0)
-
-
-def test_it_swings_as_a_pendulum_and_the_thread_does_not_push():
-    # a vehicle that nothing moves
-    model, data = load_world(replace(VEHICLE, mass=1e4, inertia=1e4 * np.eye(3)), LOAD)
-    data.qpos[2] = 1.5
-    hang(model, data, LOAD)
-    anchor = data.site("anchor").xpos.copy()
-    data.xfrc_applied[model.body("vehicle").id, 2] = 9.81e4
-    data.joint("load").qpos[:3] = anchor + LOAD.length * np.array([np.sin(0.1), 0.0, -np.cos(0.1)])
-    x = []
-    for _ in range(2000):
-        mujoco.mj_step(model, data)
-        x.append(data.joint("load").qpos[0] - anchor[0])
-    period = 2 * np.mean(np.diff(np.flatnonzero(np.diff(np.sign(x))))) * model.opt.timestep
-    np.testing.assert_allclose(period, 2 * np.pi * np.sqrt(LOAD.length / 9.81), rtol=0.01)
-    data.joint("load").qpos[:3] = anchor - np.array([0.0, 0.0, 0.5 * LOAD.length])
-    mujoco.mj_forward(model, data)
-    np.testing.assert_array_equal(pull(data, VEHICLE.com), 0.0)
 
 
 @pytest.mark.parametrize(

@@ -14,21 +14,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 from pyarrow import chunked_array, parquet
 from pyarrow import table as arrow_table
 
 from tests.fuzz.forms import Form, forms, lay_out
 from tests.fuzz.spoiling import LAUGHS
 from tests.support.compiling import compile_estimates
-from tests.support.paths import ROOT
 from windwrench.cli import main
 from windwrench.controllers.trained_policy import load_policy
 from windwrench.dynamics import InputError, load_vehicle
-from windwrench.dynamics.vehicle_file import parse_vehicle
-from windwrench.estimator import UKFTuning
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.tables import open_table
 from windwrench.runtime.yaml_file import parse_yaml
@@ -47,23 +42,6 @@ MANY = settings(
     suppress_health_check=list(HealthCheck),
 )
 
-plain = st.recursive(
-    st.none()
-    | st.booleans()
-    | st.integers()
-    | st.floats()
-    | st.text(max_size=20)
-    | st.dates()
-    | st.binary(max_size=8),
-    lambda parts: (
-        st.lists(parts, max_size=4)
-        | st.dictionaries(st.text(max_size=8) | st.integers(), parts, max_size=4)
-    ),
-    max_leaves=12,
-)
-GOOD = yaml.safe_load((ROOT / "dynamics" / "vehicles" / "ardrone2.yaml").read_text())
-FIELDS = (*GOOD, "spin", "rotor_positions", "com", "floor_z", "ceiling_z", "effects", "thing")
-
 
 def attempt(call, *arguments):
     """Return what a call makes of its input, and the words by which it refuses it."""
@@ -74,13 +52,6 @@ def attempt(call, *arguments):
         said = str(error)
     assert said.strip()
     return None, said
-
-
-def taken_or_refused(words, call, *arguments):
-    """Return what a call makes of its input, or None where it refuses it with these words."""
-    taken, said = attempt(call, *arguments)
-    assert not said or words in said
-    return taken
 
 
 class TooLong(BaseException):
@@ -185,19 +156,6 @@ def test_a_command_that_takes_its_input_is_seen(tmp_path, monkeypatch, capsys):
     path = lay_out(good, good.good(), tmp_path / "input")
     with pytest.raises((AssertionError, pytest.fail.Exception)):
         assert_command_refuses(good, path, monkeypatch, capsys)
-
-
-@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
-@given(st.dictionaries(st.sampled_from(FIELDS), plain, max_size=4), st.booleans())
-def test_any_vehicle_file_is_taken_or_refused(changes, whole):
-    text = yaml.safe_dump((GOOD if whole else {}) | changes, allow_unicode=True)
-    vehicle = taken_or_refused("mine.yaml: ", parse_vehicle, text, "mine.yaml")
-    assert vehicle is None or vehicle.mass > 0
-
-
-@given(st.sampled_from(["torque_walk", "position_noise", "kappa", "gyro_noise"]), plain)
-def test_any_tuning_is_taken_or_refused(name, value):
-    taken_or_refused(name, lambda: UKFTuning(**{name: value}))
 
 
 # what a stranger's file could do

@@ -73,20 +73,3 @@ def test_an_effect_of_ones_own_is_found_with_its_coefficient(example, own_librar
     assert found.effects[0].coefficients["k"] == pytest.approx(0.12, rel=0.08)
     assert found.after.force_rms < 0.8 * found.before.force_rms
     assert "tether: k = 0.1" in capsys.readouterr().out
-
-
-def test_the_tether_pulls_to_its_hook_and_only_through_a_lever_turns(own_library):
-    library.add_folder(FOLDER / "effects")
-    model, base = library.get("tether").model.ctypes, library.base
-    double = np.ctypeslib.as_ctypes
-    vehicle, state, wrench = np.zeros(base.VEHICLE_SIZE), np.zeros(base.STATE_SIZE), np.zeros(6)
-    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # yawed by 90 degrees
-    state[base.ROTATION : base.ROTATION + 9] = quarter.ravel()
-    state[base.POSITION : base.POSITION + 3] = position = np.array([1.0, -2.0, 1.5])
-    vehicle[base.COM : base.COM + 3] = com = np.array([0.01, 0.02, -0.03])
-    model(double(np.array([0.1])), double(vehicle), double(state), double(wrench))
-    force = 0.1 * (np.array([0.0, 0.0, 2.5]) - position)
-    np.testing.assert_allclose(wrench[:3], force, rtol=1e-12)
-    np.testing.assert_allclose(
-        wrench[3:], np.cross(-com, quarter.T @ force), rtol=1e-12, atol=1e-15
-    )

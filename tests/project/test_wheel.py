@@ -120,19 +120,6 @@ def test_the_wheel_is_small(wheel):
 
 
 @pytest.mark.slow
-def test_it_runs_from_any_folder(installed, tmp_path):
-    said = run(
-        installed,
-        "import gymnasium, windwrench, pathlib\n"
-        f"assert pathlib.Path(windwrench.__file__).is_relative_to({str(installed)!r})\n"
-        "env = gymnasium.make('windwrench:windwrench/FanTracking-v0')\n"
-        "env.reset(seed=0); print(env.step([0.1])[1])",
-        tmp_path,
-    )
-    assert float(said) > 0
-
-
-@pytest.mark.slow
 def test_every_command_starts_where_there_is_no_checkout(empty, tmp_path):
     for name in sorted(command.name for command in app.registered_commands):
         assert f"Usage: windwrench {name}" in call(empty, tmp_path, name, "--help")

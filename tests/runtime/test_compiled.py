@@ -8,12 +8,6 @@ import pytest
 
 from windwrench.runtime.compile_notice import LINE, CompileNotice
 
-CODE = (
-    "import gymnasium, windwrench\nenv = "
-    "gymnasium.make('windwrench/FanTracking-v0')\nenv.reset(seed=0)\n"
-    "print(env.step([0.1])[0].tobytes().hex())"
-)
-
 
 @pytest.fixture
 def told():
@@ -63,22 +57,3 @@ def test_numba_tells_what_it_compiles_and_not_what_it_loads(tmp_path):
     )
     assert cold.stdout == "6 ['double']\n", cold.stderr
     assert warm.stdout == "6 []\n", warm.stderr
-
-
-@pytest.mark.slow
-def test_a_cold_and_a_warm_start_give_the_same_bits(tmp_path):
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-    cold, *warm = (
-        subprocess.run(
-            [sys.executable, "-c", CODE],
-            cwd=tmp_path,
-            env=environment,
-            capture_output=True,
-            text=True,
-        )
-        for _ in range(4)
-    )
-    assert cold.returncode == 0, cold.stderr
-    assert cold.stderr.count(LINE) == 1
-    assert not any(LINE in run.stderr for run in warm)
-    assert all(cold.stdout == run.stdout for run in warm)

@@ -15,9 +15,6 @@ from windwrench.runtime.vector_lanes import (
     any_of,
     choose,
     corners,
-    first_below,
-    first_column,
-    lanes_by,
 )
 
 SINGLE = np.dtype(
@@ -114,69 +111,6 @@ def test_memory_lies_where_lanes_may_be_loaded(count):
         again = RECORD.like(records[:1].copy())
         assert again.ctypes.data % (8 * WIDTH) == 0
         assert again["gain"][0] == 2.0
-
-
-def test_single_records_are_written_into_lanes_and_read_as_columns():
-    records, single = RECORD.zeros(2), np.zeros(1, SINGLE)[0]
-    single["a"], single["b"], single["inner"]["more"] = 1.0, [2.0, 3.0], 4.0
-    single["gain"], single["inner"]["shift"] = 5.0, 6.0
-    RECORD.share(records, single)
-    RECORD.write(records, 1, slice(2, 3), single)
-    assert records["gain"].tolist() == [5.0, 5.0]
-    assert records["inner"]["shift"].tolist() == [6.0, 6.0]
-    assert records["b"][1, :, 2].tolist() == [2.0, 3.0]
-    assert records["inner"]["more"][1, :, 2].tolist() == [4.0] * 7
-    assert records["a"].sum() == 1.0
-    RECORD.columns(records)[0, :, 2] = RECORD.columns(records)[1, :, 2]
-    assert records["a"][:, 2].tolist() == [1.0, 1.0]
-    assert records["inner"]["shift"].tolist() == [6.0, 6.0]
-    where = RECORD.offset("inner", "more") // 8
-    assert records[1:].view(np.float64)[where + 2] == 4.0
-
-
-@njit
-def once(f, factor):
-    f.gain = factor
-
-
-@njit
-def twice(f, factor):
-    f.gain = 2.0 * factor
-
-
-by_kind = lanes_by(once, twice)
-
-
-@njit
-def fill(f, rows):
-    """A symmetric matrix of products, each of them worked out once in lanes."""
-    by_kind(f, 1.5)
-    for i in range(3):
-        for j in range(first_column(rows, i), 3):
-            f.inner.more[3 + i] += 1.0  # products that were worked out in this row
-            if j >= first_below(rows, i):
-                f.inner.more[j] += 1.0  # and put below the diagonal
-
-
-@njit
-def fill_lanes(address):
-    fill(_at(address), _at(address).out)
-
-
-@njit
-def fill_singly(records):
-    fill(records[0], records[0].out)
-
-
-def test_lanes_work_out_the_upper_half_and_single_numbers_all():
-    lanes, single = RECORD.zeros(1), np.zeros(1, SINGLE)
-    fill_lanes(lanes.ctypes.data)
-    fill_singly(single)
-    assert (lanes["gain"][0], single["gain"][0]) == (3.0, 1.5)
-    assert single["inner"]["more"][0].tolist() == [0, 0, 0, 3, 3, 3, 0]
-    assert lanes["inner"]["more"][0, :, 0].tolist() == [0, 1, 2, 3, 2, 1, 0]
-    assert first_column(single["out"], 2) == 0
-    assert first_below(single["out"], 2) > len(single["out"][0])
 
 
 def test_in_python_a_condition_is_one_truth():
