@@ -3,20 +3,10 @@
 import numpy as np
 import pytest
 
-from windwrench.controllers.features import Features, History
+from windwrench.controllers.features import Features
 from windwrench.dynamics import InputError
 from windwrench.evaluation.episodes import FIRST_TEST_SEED, benchmark_seeds
 from windwrench.training.seeds import FIRST_VALIDATION_SEED, training_seed, validation_seeds
-
-
-def test_frames_are_scaled_columns_of_the_observation():
-    features = Features(("torque_z", "force_x", "command"), 1, (0.03, 0.5, 1.0))
-    observations = np.arange(16.0).reshape(2, 8)
-    np.testing.assert_allclose(
-        features.frames(observations * 0.01, {}),
-        np.array([[0.05 / 0.03, 0.0, 0.07], [0.13 / 0.03, 0.16, 0.15]]),
-        rtol=1e-6,
-    )
 
 
 def test_truth_comes_from_info():
@@ -29,35 +19,6 @@ def test_truth_comes_from_info():
 def test_what_is_mirrored_is_known():
     features = Features(("torque_z", "force_x", "path_y"), 2)
     np.testing.assert_array_equal(features.mirrored, [-1, 1, -1, -1, 1, -1])
-
-
-def test_a_history_is_oldest_first_and_starts_with_its_first_frame():
-    history = History(Features(("torque_z",), 3), 2)
-    history.restart(np.array([[1.0], [2.0]], dtype=np.float32), [0, 1])
-    history.push(np.array([[3.0], [4.0]], dtype=np.float32))
-    np.testing.assert_array_equal(history.flat(), [[1, 1, 3], [2, 2, 4]])
-    history.restart(np.array([[9.0], [8.0]], dtype=np.float32), np.array([False, True]))
-    np.testing.assert_array_equal(history.flat(), [[1, 1, 3], [8, 8, 8]])
-
-
-def test_a_path_is_the_sum_of_the_velocities_since_the_start():
-    features = Features(("path_y", "velocity_y"), 2)
-    history = History(features, 2)
-
-    def frames(*speeds):
-        observations = np.zeros((2, 8))
-        observations[:, 6] = speeds
-        return features.frames(observations, {})
-
-    history.restart(frames(0.5, 0.2), [0, 1])
-    history.push(frames(0.3, -0.1))
-    history.push(frames(0.1, 0.1))
-    # 80 ms at 0.3 and 0.1 m/s; velocities are seen in halves of a m/s
-    np.testing.assert_allclose(
-        history.flat(), [[0.024, 0.6, 0.032, 0.2], [-0.008, -0.2, 0.0, 0.2]], atol=1e-7
-    )
-    history.restart(frames(0.4, 0.4), np.array([False, True]))
-    np.testing.assert_allclose(history.flat()[:, 2], [0.032, 0.0], atol=1e-7)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from functools import cache
 
 import pytest
 
+from tests.support.alike import assert_alike
 from tests.support.imu_flights import imu_flight, pose_removed
 from tests.support.own_effects import copied, joined, renamed
 from windwrench.dynamics import EffectSetting, load_vehicle
@@ -55,22 +56,6 @@ def called_back(text, new):
     return json.loads(text)
 
 
-def assert_alike(one, other):
-    """Assert that two reports are the same, their numbers to rounding."""
-    if isinstance(one, dict):
-        assert one.keys() == other.keys()
-        for key in one:
-            assert_alike(one[key], other[key])
-    elif isinstance(one, list):
-        assert len(one) == len(other)
-        for a, b in zip(one, other, strict=True):
-            assert_alike(a, b)
-    elif isinstance(one, float):
-        assert other == pytest.approx(one, rel=1e-4, abs=1e-9, nan_ok=True)
-    else:
-        assert one == other
-
-
 @pytest.mark.parametrize(
     "name",
     [
@@ -84,7 +69,7 @@ def test_a_library_under_other_names_explains_the_same(name):
     assert own["effects"]
     order = {effect: i for i, effect in enumerate(names())}
     with renamed(lambda effect: f"law{order[effect]:02d}") as new:
-        assert_alike(own, called_back(report(log), new))
+        assert_alike(called_back(report(log), new), own)
 
 
 @pytest.mark.parametrize(
