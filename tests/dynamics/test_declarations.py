@@ -4,7 +4,7 @@ points.
 
 import pytest
 
-from tests.support.own_effects import joined
+from tests.support.own_effects import HOSE, joined
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.effects import (
     Coefficient,
@@ -20,33 +20,6 @@ from windwrench.dynamics.effects import (
 )
 from windwrench.dynamics.effects.declaration import Found
 from windwrench.dynamics.effects.vanishing import does_nothing_alone
-
-HOSE = '''"""A pull that comes and goes."""
-
-import math
-
-from numba import cfunc
-from windwrench.dynamics.effects.base import EFFECT_MODEL, TIME, Coefficient, Effect
-
-
-@cfunc(EFFECT_MODEL)
-def model(c, vehicle, state, wrench):
-    wrench[0] += c[0] * math.sin(c[1] * state[TIME])
-
-
-EFFECT = Effect(
-    name="hose",
-    kind="wrench",
-    coefficients=(
-        Coefficient("a", "N", (0.2, 0.02), "pull"),
-        Coefficient("w", "rad/s", (3.0, 3.0), "frequency"),
-    ),
-    source="test",
-    excitation="any flight",
-    model=model,
-    # more
-)
-'''
 
 
 def declared(**words):

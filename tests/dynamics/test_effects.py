@@ -132,19 +132,6 @@ def test_coefficients_on_a_command_line():
     assert setting == EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 2e-4})
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("rotor_drag:kdx=nan", "finite"),
-        ("motor_lag:tau=9", "between 0 and 0.5 s"),
-        ("", "unknown effect"),
-    ],
-)
-def test_a_bad_setting_is_named(text, words):
-    with pytest.raises(InputError, match=words):
-        parse_setting(text)
-
-
 def test_too_many_effects_are_refused():
     with pytest.raises(InputError, match="at most"):
         record_flight(VEHICLE, (parse_setting("constant_force"),) * 17, "hover", 1.0)

@@ -11,6 +11,34 @@ import pytest
 
 from windwrench.dynamics import effects
 
+# an effect that does nothing while one coefficient is zero; "# more" is where it may say more
+HOSE = '''"""A pull that comes and goes."""
+
+import math
+
+from numba import cfunc
+from windwrench.dynamics.effects.base import EFFECT_MODEL, TIME, Coefficient, Effect
+
+
+@cfunc(EFFECT_MODEL)
+def model(c, vehicle, state, wrench):
+    wrench[0] += c[0] * math.sin(c[1] * state[TIME])
+
+
+EFFECT = Effect(
+    name="hose",
+    kind="wrench",
+    coefficients=(
+        Coefficient("a", "N", (0.2, 0.02), "pull"),
+        Coefficient("w", "rad/s", (3.0, 3.0), "frequency"),
+    ),
+    source="test",
+    excitation="any flight",
+    model=model,
+    # more
+)
+'''
+
 
 def copied(name: str, new: str, folder: Path) -> Path:
     """Write the kit's own file of an effect as a user would have written it, under a new name."""

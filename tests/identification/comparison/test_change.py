@@ -17,7 +17,7 @@ from windwrench.identification.comparison.change import (
     ChangeSettings,
     compare,
 )
-from windwrench.identification.comparison.trim import Trim, carrying, trim_of, trim_of_log
+from windwrench.identification.comparison.trim import Trim, trim_of, trim_of_log
 from windwrench.identification.comparison.words import change_headline, write_change
 from windwrench.identification.logs.flight_log import FlightLog
 
@@ -122,19 +122,6 @@ def test_flights_that_say_nothing_are_refused():
     still = FlightLog(log.t, log.position, log.quaternion, 0.0 * log.rotor_speeds, name="still")
     with pytest.raises(InputError, match="still: 0 s of calm flight"):
         trim_of_log(still, vehicle)
-
-
-def test_flight_is_told_from_ground_by_the_thrust_alone():
-    """Two hops with a rest between: only what lies well inside a hop counts."""
-    t = 0.01 * np.arange(3000)
-    flying = ((t > 5.0) & (t < 12.0)) | ((t > 16.0) & (t < 25.0))
-    total = np.where(flying, 2.0 + 0.05 * np.sin(7.0 * t), 0.3)
-    steady = carrying(t, total)
-    inside = ((t > 7.0) & (t < 10.0)) | ((t > 18.0) & (t < 23.0))
-    assert steady[inside].all()
-    assert not steady[(t < 6.3) | (t > 23.7) | ((t > 10.7) & (t < 17.3))].any()
-    assert carrying(t, np.full(3000, 2.0)).all()  # a log of a piece of a flight
-    assert not carrying(t, np.zeros(3000)).any()
 
 
 def test_another_battery_voltage_makes_the_total_less_certain():

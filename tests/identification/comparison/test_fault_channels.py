@@ -5,7 +5,6 @@ import pytest
 
 from windwrench.dynamics import InputError
 from windwrench.identification.comparison.fault_channels import (
-    STEP,
     Channels,
     channels_of_log,
     sample,
@@ -24,20 +23,6 @@ def hover(seconds=8.0, rate=200.0, command_rate=200.0, **changed):
     return Channels(
         "hover.csv", t, streams["gyro"], t, streams["accelerometer"], u, streams["command"]
     )
-
-
-def test_means_over_an_interval_are_those_of_what_is_linear_between_samples():
-    t = np.arange(0.0, 8.0, 0.005)
-    rate = np.column_stack([np.sin(t), np.cos(2.0 * t), 0.3 * t])
-    force = np.column_stack([0.0 * t, 0.0 * t, 9.81 + np.sin(3.0 * t)])
-    samples = sample(hover(gyro=rate, accelerometer=force))
-    low, high = samples.t - 0.5 * STEP, samples.t + 0.5 * STEP
-    expected = (np.sin(high) - np.sin(low)) / STEP
-    np.testing.assert_allclose(samples.angular_acceleration[:, 0], expected, atol=1e-3)
-    mean = 9.81 + (np.cos(3.0 * low) - np.cos(3.0 * high)) / (3.0 * STEP)
-    np.testing.assert_allclose(samples.specific_force, mean, atol=1e-3)
-    assert samples.ended == ""
-    assert samples.t[0] > 1.5  # what may still be taking off is left out
 
 
 def test_nothing_is_read_behind_a_clipped_gyro_or_an_impact():

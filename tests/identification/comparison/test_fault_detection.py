@@ -2,7 +2,6 @@
 
 import json
 
-import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -11,24 +10,7 @@ from tests.support.golden_identification import failing_flight
 from windwrench.cli import app
 from windwrench.identification.comparison.fault_channels import channels_of_log
 from windwrench.identification.comparison.fault_detection import find_fault
-from windwrench.identification.comparison.fault_noise import ORDER, fit_noise
 from windwrench.identification.comparison.words import fault_data, fault_headline
-
-
-def test_the_noise_of_an_autoregression_is_whitened():
-    rng = np.random.default_rng(0)
-    drive = rng.standard_normal(4000)
-    value = np.zeros(4000)
-    for i in range(2, 4000):
-        value[i] = 0.6 * value[i - 1] + 0.3 * value[i - 2] + drive[i]
-    follows = np.ones(4000, dtype=bool)
-    follows[0] = False
-    noise = fit_noise(value, np.zeros(4000), follows)
-    np.testing.assert_allclose(noise.filter[1:3], [-0.6, -0.3], atol=0.06)
-    white = noise.whiten(value)
-    np.testing.assert_allclose(white, drive[noise.whole], atol=0.5)
-    assert noise.variance == pytest.approx(1.0, abs=0.06)
-    assert not noise.whole[:ORDER].any()
 
 
 def test_a_failing_rotor_is_named_with_its_time():

@@ -10,7 +10,6 @@ from windwrench.identification.posterior.evidence import (
     Marginal,
     evidence_of_one_more,
     log_sum,
-    marginal,
     set_evidence,
     tempering,
 )
@@ -37,19 +36,6 @@ def test_the_evidence_of_one_coefficient_is_the_integral(right, low):
     )
     assert found.log_evidence == pytest.approx(by_numbers(2.0, right, low, np.inf), abs=1e-6)
     assert found.mode[0] == pytest.approx(max(right / 3.0, low))
-
-
-def test_what_is_integrated_out_costs_what_it_explains():
-    rng = np.random.default_rng(1)
-    x, y = rng.standard_normal((300, 3)), rng.standard_normal(300)
-    normal, right = x.T @ x, x.T @ y
-    part = marginal(normal, right, float(y @ y), np.array([0, 1]), np.array([2]), np.ones(1))
-    whole = Marginal(normal, right, -0.5 * float(y @ y))
-    none = np.full(3, -np.inf), np.full(3, np.inf)
-    both = set_evidence(whole, [0, 1, 2], *none)
-    found = set_evidence(part, [0, 1], none[0][:2], none[1][:2])
-    assert found.log_evidence == pytest.approx(both.log_evidence)
-    assert found.mode == pytest.approx(both.mode[:2])
 
 
 def test_a_likelihood_is_tempered_where_its_scores_scatter_too_much():

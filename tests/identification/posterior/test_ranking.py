@@ -1,12 +1,24 @@
-"""A short flight's missing effect is the likeliest, and its coefficient within its deviation."""
+"""A short flight's missing effect is the likeliest, and its coefficient within its deviation.
+
+``python -m tests.identification.posterior.test_ranking`` writes the golden rankings anew.
+"""
+
+import json
+from dataclasses import asdict
 
 import pytest
 
+from tests.support.alike import assert_alike
+from tests.support.paths import ROOT
 from tests.support.searches import DRAG, VEHICLE, settings
 from windwrench.identification.inference.regression import Flights
 from windwrench.identification.posterior.ranking import rank
 from windwrench.studies.trials.practice_flights import fly_practice
 
+GOLDEN = ROOT / "tests" / "golden" / "rankings.json"
+MASS = {"mass": {"dm": 0.03}}
+WIND = {"wind": {"wx": 2.0, "wy": 1.0}, "rotor_drag": DRAG}
+NEAR = {k: {x: 0.9 * y for x, y in v.items()} for k, v in WIND.items()}
 LIBRARY = ("rotor_drag", "mass", "inertia", "constant_force", "motor_lag")
 
 
@@ -15,9 +27,20 @@ def flown(**effects):
     return Flights([log], VEHICLE)
 
 
+def numbers(found):
+    """Return of a ranking what is kept: its three likeliest sets, structure and tempering."""
+    return {**asdict(found), "sets": [asdict(one) for one in found.sets[:3]]}
+
+
+def assert_kept(name, found):
+    """Assert that a ranking is the one that was kept, to what optimisers leave."""
+    kept = json.loads(GOLDEN.read_text(encoding="utf-8"))[name]
+    assert_alike(json.loads(json.dumps(numbers(found))), kept, name, rel=1e-3, least=1e-6)
+
+
 def test_a_missing_mass_is_found():
-    flights = flown(mass={"dm": 0.03})
-    found = rank(flights, LIBRARY)
+    found = rank(flown(**MASS), LIBRARY)
+    assert_kept("mass", found)
     best = found.sets[0]
     assert best.effects == ("mass",)
     assert found.probability["mass"] > 0.9
@@ -37,11 +60,20 @@ def test_a_law_that_the_library_lacks_shows_as_structure():
 
 
 def test_what_another_search_proposes_is_asked_too():
-    truth = {"wind": {"wx": 2.0, "wy": 1.0}, "rotor_drag": DRAG}
-    flights = flown(**truth)
-    near = {k: {x: 0.9 * y for x, y in v.items()} for k, v in truth.items()}
-    best = rank(flights, ("wind", *LIBRARY), near).sets[0]
+    flights = flown(**WIND)
+    found = rank(flights, ("wind", *LIBRARY), NEAR)
+    assert_kept("wind", found)
+    best = found.sets[0]
     assert best.effects == ("rotor_drag", "wind")
     assert best.coefficients["wind"]["wx"] == pytest.approx(2.0, rel=0.1)
     # what lies outside the library is no proposal
-    assert rank(flights, ("mass",), truth).sets == rank(flights, ("mass",)).sets
+    assert rank(flights, ("mass",), WIND).sets == rank(flights, ("mass",)).sets
+
+
+if __name__ == "__main__":
+    made = {
+        "mass": rank(flown(**MASS), LIBRARY),
+        "wind": rank(flown(**WIND), ("wind", *LIBRARY), NEAR),
+    }
+    text = json.dumps({name: numbers(found) for name, found in made.items()}, indent=1)
+    GOLDEN.write_text(text + "\n", encoding="utf-8")

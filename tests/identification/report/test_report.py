@@ -13,7 +13,7 @@ import pytest
 from tests.support.browser import look, needs_browser
 from tests.support.diagnoses import made_diagnosis, made_trace
 from tests.support.golden_report import GOLDEN, said
-from windwrench.dynamics import InputError, dump_vehicle, load_vehicle
+from windwrench.dynamics import dump_vehicle, load_vehicle
 from windwrench.identification.findings import (
     Candidate,
     Disturbance,
@@ -22,10 +22,8 @@ from windwrench.identification.findings import (
     Structure,
 )
 from windwrench.identification.report.files import write_report
-from windwrench.identification.report.plot_numbers import candidate_bars
 from windwrench.identification.report.words import (
     headline,
-    percent,
     rounded,
     with_std,
 )
@@ -167,12 +165,6 @@ def test_the_numbers(reports):
     assert blocks["second"] == [[1.0, 2.5]]
 
 
-def test_a_folder_that_cannot_be_written(diagnosis, tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="cannot be written"):
-        write_report(diagnosis, tmp_path / "file")
-
-
 def test_names_that_are_no_text(diagnosis, tmp_path):
     numbers, html, _ = write_report(
         replace(diagnosis, logs=("log\udcff",)), tmp_path, command="windwrench diagnose log\udcff"
@@ -200,40 +192,8 @@ def test_a_coefficient_is_as_precise_as_it_is_known(value, std, text):
     assert with_std(value, std) == text
 
 
-@pytest.mark.parametrize(
-    ("value", "digits", "text"),
-    [
-        (0.03049, 2, "0.030"),
-        (0.0999, 2, "0.10"),
-        (12345.6, 3, "12300"),
-        (0.0, 3, "0"),
-        (-1.5, 3, "−1.50"),
-        (math.inf, 3, "–"),
-    ],
-)
-def test_significant_digits(value, digits, text):
-    assert rounded(value, digits) == text
-
-
 def test_the_sentences_are_those_kept():
     assert said() == json.loads(GOLDEN.read_text(encoding="utf-8"))
-
-
-def test_chart_and_names_agree(diagnosis):
-    (drag,) = diagnosis.effects
-    ranked = (
-        Candidate("rotor_efficiency", 0.9, False),
-        Candidate("mass", 0.8, False),
-        Candidate("rotor_drag", 0.5, True),
-        Candidate("wind", 0.4, False),
-    )
-    undecided = replace(drag, indistinguishable_from=("rotor_efficiency",))
-    made = replace(diagnosis, effects=(undecided,), candidates=ranked)
-    bars = {bar.name: bar for bar in candidate_bars(made)}
-    kinds = {name: bar.kind for name, bar in bars.items() if bar.kind}
-    assert kinds == {"rotor_efficiency": "rival", "rotor_drag": "named"}
-    assert bars["mass"].share == percent(0.8)
-    assert bars["mass"].width == pytest.approx(2 * bars["wind"].width, abs=0.2)
 
 
 class Page(HTMLParser):

@@ -1,7 +1,6 @@
 """Exports against the definitions of those who read them."""
 
 import re
-import tomllib
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,10 +9,9 @@ import pytest
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting, MotorCurve
 from windwrench.identification.vehicle_fit.exports import EXPORTS
-from windwrench.identification.vehicle_fit.result import IDENTIFIED, NOTHING, Estimate
+from windwrench.identification.vehicle_fit.result import IDENTIFIED, Estimate
 
 LAG = Estimate("motor_lag", 0.05, 0.04, 0.06, "s", IDENTIFIED, "")
-NO_LAG = Estimate("motor_lag", float("nan"), float("nan"), float("nan"), "s", NOTHING, "")
 
 
 class Found(SimpleNamespace):
@@ -77,17 +75,3 @@ def test_rotorpy_makes_the_same_forces_and_torques():
     assert [p["k_eta"] / v.k[0] * thrust.sum(), *torque] == pytest.approx(want, rel=1e-4)
     assert p["tau_m"] == 0.05
     assert p["k_d"] == pytest.approx(2.5e-6)
-
-
-def test_drone_models_mixes_and_counts_in_rpm():
-    it = found(lag=NO_LAG)
-    table = tomllib.loads(EXPORTS["drone-models"](it))["crazyflie"]
-    v = it.vehicle
-    rpm = np.array([15000.0, 16000.0, 17000.0, 18000.0])  # front-right, rear-right, ...
-    mixing = np.array(table["mixing_matrix"])
-    thrust = table["rpm2thrust"][2] * rpm**2
-    torque = mixing @ thrust * np.array([table["L"], table["L"], 0.0])
-    torque[2] = mixing[2] @ (table["rpm2torque"][2] * rpm**2)
-    ours = (rpm * 2 * np.pi / 60)[[3, 2, 1, 0]]  # front-left, rear-left, ...
-    assert [thrust.sum(), *torque] == pytest.approx(v.rotor_wrench(ours), rel=1e-4)
-    assert "rotor_dyn_coef" not in table
