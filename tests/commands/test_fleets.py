@@ -6,15 +6,11 @@ import json
 import pytest
 from pebble import ProcessExpired
 
-from windwrench.dynamics import EffectSetting, load_vehicle
-from windwrench.envs.recording import record_flight
-from windwrench.identification.fleet.flight import diagnose_one, key_of
+from windwrench.identification.fleet.flight import key_of
 from windwrench.identification.fleet.manifest import find_logs
 from windwrench.identification.fleet.outcomes import Outcomes
-from windwrench.identification.fleet.running import OUTCOMES, run_fleet
-from windwrench.identification.logs.flight_log import FlightLog, write_log
+from windwrench.identification.fleet.running import OUTCOMES
 from windwrench.runtime import workers
-from windwrench.runtime.plain_values import plain
 
 FOUND = {
     "status": "diagnosed",
@@ -123,25 +119,3 @@ def test_a_fleet_of_which_nothing_is_left_says_so(call, here, logs):
     assert code == 2
     assert "none of 1 logs could be diagnosed" in error
     assert "fleet.html" in error
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("cluster", [None, "local"])
-def test_processes_find_what_one_diagnosis_finds(tmp_path, cluster):
-    if cluster:
-        pytest.importorskip("ray", reason="Ray is not installed: pip install 'windwrench[cluster]'")
-    effect = EffectSetting("rotor_drag", {"kdx": 2.4e-4, "kdy": 1.8e-4})
-    flown = record_flight(load_vehicle("ardrone2"), (effect,), "excite", 15.0, 0)
-    write_log(FlightLog(**flown, name="0", vehicle="ardrone2"), tmp_path / "0.csv")
-    (tmp_path / "bad.csv").write_text("t\n")
-    logs, _ = find_logs([tmp_path])
-    outcomes = Outcomes(tmp_path / OUTCOMES)
-    done = run_fleet(logs, outcomes, jobs=1, cluster=cluster)
-    for one in done:
-        alone = {"key": one.key, **diagnose_one(one)}
-        there = outcomes[one.key]
-        there["reason"] = there.get("reason", "").rpartition("/")[2]
-        alone["reason"] = alone.get("reason", "").rpartition("/")[2]
-        assert there == plain(alone)
-    assert [outcomes[one.key]["status"] for one in done] == ["diagnosed", "refused"]
-    outcomes.close()
