@@ -5,10 +5,8 @@ import pytest
 
 from windwrench.controllers import (
     CONTROLLERS,
-    Admittance,
     AdmittancePID,
     Oracle,
-    Ratio,
     make_controller,
 )
 from windwrench.controllers.flight import flight_record, fly, move_setpoint
@@ -38,13 +36,6 @@ def test_a_command_is_one_number_within_bounds(name):
         command = controller(observation(torque), info(fan_y=3.0, y=-3.0, fan_velocity=0.5))
         assert command.shape == (1,)
         assert abs(command[0]) <= MAX_COMMAND
-
-
-@pytest.mark.parametrize(("make", "force"), [(Admittance, 1.0), (Ratio, 0.5)])
-def test_a_second_axis_is_commanded_by_the_pitch_torque(make, force):
-    seen = np.array([0.5, 0.0, 0.0, 0.0, 0.01, -0.02, 0.0, 0.0, 0.0, 0.0])
-    command = make(gain=5.0, gain_z=10.0)(seen)
-    np.testing.assert_allclose(command, [0.1 / force, 0.1 / force], rtol=1e-6)
 
 
 def test_the_oracle_moves_with_the_fan_and_towards_it():

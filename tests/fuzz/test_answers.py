@@ -12,7 +12,6 @@ import pytest
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.effects import parse_setting
 from windwrench.envs.recording import record_flight
-from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.logs.flight_log import FlightLog, with_rows
 from windwrench.identification.wrench_series import estimate_log, pose_notes
 
@@ -155,15 +154,3 @@ def test_a_diagnosis_is_told_of_poses_that_jump_as_an_estimate_is(circle):
     (said,) = [note for note in estimate_log(lossy, VEHICLE).notes if "poses jump" in note]
     assert said in pose_notes(lossy, VEHICLE)
     assert not pose_notes(circle, VEHICLE)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["a rotor's speed stands still", "rows lost, times counted"])
-def test_a_spoiled_flight_is_not_diagnosed_as_another_vehicle(name, circle):
-    spoil, words = FAULTS[name]
-    try:
-        found = diagnose([spoil(circle)], VEHICLE)
-    except InputError:
-        return
-    named = {effect.name for effect in found.effects}
-    assert named <= {"rotor_drag"} or any(word in note for note in found.notes for word in words)

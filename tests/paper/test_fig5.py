@@ -27,14 +27,6 @@ def ratios(result, pair, noise, error):
     ]
 
 
-@pytest.mark.slow
-def test_an_observer_tuned_for_low_noise_is_far_worse_than_the_filter_at_high_noise(result):
-    for error in ("force_steady", "torque_steady"):
-        found = ratios(result, "observer / UKF, both tuned at low noise", "high", error)
-        assert len(found) == len(PLANTS) * len(FLIGHTS)
-        assert min(found) > 1.5
-
-
 def test_an_ekf_on_the_same_model_is_as_good(result):
     for noise in NOISES:
         for error in fig5.ERRORS:

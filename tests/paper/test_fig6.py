@@ -55,22 +55,6 @@ def test_the_result_is_whole(result):
     assert all(row.paper and row.here for row in result.comparison)
 
 
-def test_the_map_s_points_are_put_where_they_belong():
-    points = fig6.grid_points()
-    assert len(np.unique(points, axis=0)) == 49
-    assert np.max(np.linalg.norm(np.diff(points, axis=0), axis=1)) == pytest.approx(0.5)
-    np.testing.assert_allclose(fig6.as_map(points, points[:, 1]), np.tile(fig6.GRID_Y, (7, 1)))
-    assert fig6.odd_share(fig6.as_map(points, points[:, 1] ** 3)) == pytest.approx(1.0)
-    assert fig6.odd_share(fig6.as_map(points, points[:, 1] ** 2)) == pytest.approx(0.0)
-
-
-def test_the_peak_of_a_profile_is_found_between_its_points():
-    y = np.linspace(-1.5, 1.5, 31)
-    at, size = fig6.peak(y, 0.03 * np.sin(np.pi * y / 0.92) + 0.001)
-    assert at == pytest.approx(0.46, abs=0.01)
-    assert size == pytest.approx(0.03, rel=0.03)
-
-
 def test_a_flight_repeats_bit_for_bit_and_bad_input_is_refused():
     points = np.array([[2.3, 0.0], [2.3, 0.5]])
     first, again = fig6.fly_points(points, 3, 0.1), fig6.fly_points(points, 3, 0.1)

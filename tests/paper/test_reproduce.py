@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from windwrench.dynamics import InputError
 from windwrench.paper import NAMES
-from windwrench.paper.reproduce import _module, chosen, reproduce, write_page, write_result
+from windwrench.paper.reproduce import chosen, reproduce, write_page, write_result
 from windwrench.paper.result import Comparison, Result
 from windwrench.runtime.provenance import commit, made_by
 
@@ -30,14 +30,6 @@ def small_result(value=1.0):
         [Comparison("a value (m)", "about 1", f"{value:.2f}")],
         ["A remark."],
     )
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_every_experiment_has_what_the_runner_calls(name):
-    module = _module(name)
-    assert isinstance(module.TITLE, str)
-    assert module.SEEDS >= 1
-    assert callable(module.run)
 
 
 def test_the_same_result_gives_the_same_bytes(tmp_path):
@@ -66,23 +58,6 @@ def test_the_page_shows_the_table_and_the_picture(tmp_path):
     assert made_by("windwrench reproduce fig3 --seeds 3", [commit()]) in page.splitlines()
     assert "A remark." in page
     assert "fig4" not in page
-
-
-@pytest.mark.slow
-def test_a_second_run_keeps_what_is_there_and_repeats_what_is_not(tmp_path):
-    assert reproduce(["fig6"], tmp_path, seeds=1, jobs=1) == {"fig6": True}
-    first = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
-    assert reproduce(["fig6"], tmp_path, seeds=1, jobs=1) == {"fig6": False}
-    (tmp_path / "fig6.svg").unlink()  # what no page shows need not be there
-    assert reproduce(["fig6"], tmp_path, seeds=1, jobs=1) == {"fig6": False}
-    (tmp_path / "fig6.png").unlink()
-    shares = []
-    assert reproduce(
-        ["fig6"], tmp_path, seeds=1, jobs=1, report=lambda s: shares.append(s["fig6"])
-    ) == {"fig6": True}
-    assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == first
-    assert shares[-1] == 1.0
-    assert shares == sorted(shares)
 
 
 def test_wrong_requests_are_named(tmp_path):

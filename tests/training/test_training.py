@@ -3,11 +3,6 @@ would.
 """
 
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 
 import numpy as np
 import pytest
@@ -71,26 +66,6 @@ def test_a_run_that_stopped_goes_on_as_if_it_had_not(algorithm, tmp_path):
         assert (tmp_path / "whole" / name).read_bytes() == (tmp_path / "parts" / name).read_bytes()
     a, b = read_progress(tmp_path / "whole"), read_progress(tmp_path / "parts")
     assert (a.steps, a.rmse_m) == (b.steps, b.rmse_m) == ([120, 240], b.rmse_m)
-
-
-def test_a_killed_run_leaves_nothing_half_written_and_goes_on(tmp_path):
-    killed = tmp_path / "killed"
-    settings = [w for s in [*SHORT, *TINY["sac"], "checkpoint=60"] for w in ("--set", s)]
-    program = "from windwrench.cli import main; main()"
-    process = subprocess.Popen(
-        [sys.executable, "-c", program, "train", "sac", "--seed=3", f"--out={killed}", *settings],
-        cwd=tmp_path,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    while not (killed / "checkpoint.pt").exists() and process.poll() is None:
-        time.sleep(0.02)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
-    train(tiny("sac"), "base", 3, killed)
-    train(tiny("sac"), "base", 3, tmp_path / "whole")
-    assert (tmp_path / "whole" / "last.npz").read_bytes() == (killed / "last.npz").read_bytes()
-    assert not list(killed.glob(".*.tmp"))
 
 
 @pytest.mark.parametrize("algorithm", LEARNERS)

@@ -4,7 +4,7 @@ import pytest
 
 from tests.support.searches import DRAG, VEHICLE, recorded, searched
 from windwrench.envs.recording import background
-from windwrench.identification.inference.search import FittedEffects, is_possible
+from windwrench.identification.inference.search import FittedEffects
 from windwrench.identification.inference.stepwise_search import are_told_apart
 
 LIBRARY = ["rotor_drag", "body_drag", "mass", "com_offset", "constant_force", "latency"]
@@ -35,12 +35,6 @@ def test_what_acts_explains_most_and_nothing_is_left_beside_it(search):
     beside = gains_at(search, fit)
     assert "rotor_drag" not in {x.effect for x in beside}
     assert max(x.deviance_reduction for x in beside) < 40.0
-
-
-@pytest.mark.parametrize(("damping", "there"), [(0.5, True), (50.0, False)])
-def test_no_air_damps_a_load_so_much(damping, there):
-    load = {"m": 0.03, "l": 0.5, "damping": damping}
-    assert is_possible(FittedEffects({"slung_payload": load}), VEHICLE) is there
 
 
 def test_in_a_hover_a_force_and_a_thrust_are_not_told_apart():
