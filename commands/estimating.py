@@ -1,10 +1,26 @@
 """The external wrench on a logged flight."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from ..runtime.errors import InputError
 from .flight_logs import log_notes, read_flights
 from .terminal import console, film_kinds, gate_of, note, results_folder, say, show_table, working
+
+if TYPE_CHECKING:
+    from ..dynamics.vehicle import Vehicle
+    from ..estimator import NoiseFit, UKFTuning
+    from ..estimator.consistency import Consistency
+    from ..identification.logs.flight_log import FlightLog
+
+# what innovations that agree within a second say, of a given and of a fitted tuning
+_TOO_SLOW = (
+    "warning: innovations agree with each other within a second: the wrench changes faster than "
+    "the tuning says. It is late, and its deviations are too small. Leave out --no-tune and "
+    "--tuning.",
+    "Innovations agree with each other within a second even so: the wrench changes otherwise than "
+    "a random walk. windwrench diagnose names an effect that the vehicle lacks.",
+)
 
 
 def estimate(
@@ -14,7 +30,8 @@ def estimate(
     vehicle: str | None = None,
     smooth: bool | None = None,
     gate: float | None = None,
-    tune: bool = False,
+    tune: bool | None = None,
+    tuning: Path | None = None,
     film: bool = False,
     video: bool = False,
     rrd: bool = False,
@@ -30,15 +47,9 @@ def estimate(
     """
     from ..identification.motion.inertial_signals import reads_imu
     from ..identification.report.wrench_picture import plot_wrench
-    from ..identification.wrench_series import (
-        counts,
-        estimate_log,
-        truth_rmse,
-        tune_to_log,
-        tuning_note_of,
-        write_wrench,
-    )
+    from ..identification.wrench_series import counts, estimate_log, truth_rmse, write_wrench
     from .log_film import draw_film, shown_rows
+    from .tuning_file import load_tuning, save_tuning
 
     level = gate_of(gate)
     kinds = film_kinds(view, video, film, "--film")
@@ -49,13 +60,13 @@ def estimate(
     if smooth is None:
         smooth = (flight.gyro is None) == (flight.accelerometer is None)
     smooth = smooth or reads_imu(flight)
-    fit = None
-    if tune:
-        with working("fitting the tuning"):
-            fit = tune_to_log(flight, model)
+    given = None if tuning is None else load_tuning(tuning, flight.period)
+    fit, consistency, said = _tuned(flight, model, given, tuning is None if tune is None else tune)
     with working("estimating") as progress:
-        series = estimate_log(flight, model, fit.tuning if fit else None, progress, smooth, level)
+        series = estimate_log(flight, model, fit.tuning if fit else given, progress, smooth, level)
     written = [write_wrench(series, folder), plot_wrench(series, flight, folder / "wrench.png")]
+    written.append(folder / "tuning.yaml")
+    save_tuning(series.tuning, flight.period, written[-1])
     if rows is not None:
         written += draw_film(flight, model, series, rows, folder, kinds, view, rrd)
     log_notes(series.notes)
@@ -72,9 +83,11 @@ def estimate(
     }
     if fit is not None:
         result["tuning"] = fit.as_dict()
-        console.print(str(fit))
-    elif unsuited := tuning_note_of(flight, model):
-        note(f"{unsuited} Use --tune to fit the tuning to this log.")
+    note(said)
+    if consistency is not None:
+        result["consistency"] = consistency.as_dict()
+        if consistency.too_slow:
+            note(_TOO_SLOW[fit is not None])
     truth = truth_rmse(series, flight)
     table = []
     for i, (name, values, unit) in enumerate(
@@ -90,3 +103,22 @@ def estimate(
     show_table(("", "x", "y", "z"), table)
     say(*written)
     return result
+
+
+def _tuned(
+    flight: "FlightLog", model: "Vehicle", given: "UKFTuning | None", wanted: bool
+) -> "tuple[NoiseFit | None, Consistency | None, str]":
+    """Return the fitted tuning, if that is wanted and can be had; what the innovations say of the
+    tuning that is used, if there are enough; and a sentence on both.
+    """
+    from ..identification.wrench_series import consistency_with_log, tune_to_log
+
+    try:
+        if not wanted:
+            consistency = consistency_with_log(flight, model, given)
+            return None, consistency, f"The tuning was not fitted: {consistency}."
+        with working("fitting the tuning"):
+            fit = tune_to_log(flight, model, given)
+    except InputError as error:
+        return None, None, f"The {'given' if given else 'default'} tuning was used: {error}"
+    return fit, fit.after, str(fit)

@@ -32,6 +32,7 @@ def live(
     out: Path = Path("results/diagnose"),
     seconds: float | None = None,
     gate: float | None = None,
+    tuning: Path | None = None,
     horizon: float = 0.3,
     rate: float | None = None,
     wait: float = 10.0,
@@ -51,6 +52,7 @@ def live(
     from ..live.session import Session
     from ..live.sources.open import kind_of, make_source
     from ..live.tallies import Tallies
+    from .tuning_file import load_tuning
 
     if vehicle is None and kind_of(source) != "sim":
         raise InputError(
@@ -61,7 +63,8 @@ def live(
     model = load_vehicle(flown)
     if diagnose_after and record is None:
         raise InputError("--diagnose-after: expected --record LOG with it, the log to diagnose")
-    settings = LiveSettings(gate_of(gate), horizon, rate, wait, seconds)
+    given = None if tuning is None else load_tuning(tuning)
+    settings = LiveSettings(gate_of(gate), horizon, rate, wait, seconds, given)
     tallies = Tallies()
     stream = make_source(source, model, None if map is None else load_map(map), tallies)
     recorder, recording, telling = None, None, None
@@ -145,7 +148,7 @@ def _say(session: "Session") -> None:
 
 def _summary(session: "Session") -> dict[str, Any]:
     """Say what came and what became of it; return it."""
-    from ..live.terminal_page import counts_words
+    from ..live.terminal_page import counts_words, tuning_words
 
     _say(session)
     now = session.snapshot()
@@ -159,6 +162,7 @@ def _summary(session: "Session") -> dict[str, Any]:
         "messages": {kind: rate.count for kind, rate in session.tallies.rates.items()},
         "counts": now.counts,
         "restarts": now.restarts,
+        "consistency": now.consistency.as_dict() if now.consistency.seconds else None,
         "period_s": session.filter.period,
         "clock_drift_ppm": now.drift_ppm,
         "latency_ms": {"median": median, "p99": most},
@@ -176,6 +180,8 @@ def _summary(session: "Session") -> dict[str, Any]:
         lines.append(f"counted: {counts_words(now.counts)}")
     if now.restarts:
         lines.append(f"the filter restarted {now.restarts} time(s): after gaps or jumps")
+    if now.consistency.seconds:
+        lines.append(f"tuning: {tuning_words(now.consistency)}")
     if median == median:
         lines.append(f"latency: median {median:.2f} ms, 99 % within {most:.2f} ms")
     force, torque = (" ".join(f"{x:+.4g}" for x in part) for part in (mean[:3], mean[3:]))

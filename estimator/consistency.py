@@ -1,10 +1,17 @@
-"""Is a filter as good as it says? Its errors against its own covariance, where the truth is known.
+"""Is a filter as good as it says?
 
 Bar-Shalom, Li and Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001,
 section 5.4: the normalised estimation error squared (NEES) of a consistent filter is chi-squared
 with as many degrees of freedom as the state has (18), the normalised innovation squared (NIS) with
-as many as the measurement has (6).
+as many as the measurement has (6). Its innovations are also white (Mehra, *On the identification of
+variances and adaptive Kalman filtering*, IEEE Trans. Automatic Control 15, 1970): whitened ones
+summed over a second and divided by the root of their number are six normal numbers again, whose
+squares add up to a NIS *over a second*. Its mean exceeds that of NIS by the innovations'
+autocorrelations at all lags within a second, nearer ones weighted more. So it shows a wrench that
+walks too slowly, which pushes every pose of a second the same way by less than one pose's noise.
 """
+
+import math
 
 import numpy as np
 from scipy.stats import chi2
@@ -49,3 +56,61 @@ def chi2_band(dof: int, runs: int, probability: float = 0.95) -> tuple[float, fl
         )
     tail = 0.5 * (1.0 - probability)
     return float(chi2.ppf(tail, dof * runs)) / runs, float(chi2.ppf(1.0 - tail, dof * runs)) / runs
+
+
+class Consistency:
+    """What the innovations of a flight say of its filter's tuning, in memory that does not grow.
+
+    Attributes:
+        poses: that were added.
+        seconds: that have one.
+    """
+
+    def __init__(self) -> None:
+        self.poses = self.seconds = 0
+        self._nis, self._over_seconds = 0.0, 0.0  # sums
+        self._sum, self._summed, self._end = np.zeros(MEASURED), 0, -math.inf  # of this second
+
+    def add(self, t: float, white: Array, nis: float) -> None:
+        """Take in the whitened innovation (6,) of a pose at ``t``, s, and its NIS."""
+        if not self._end - 1.0 <= t < self._end:
+            self._over_seconds += self._this_second
+            self._sum[:], self._summed, self._end = 0.0, 0, t + 1.0
+            self.seconds += 1
+        self._sum += white
+        self._summed += 1
+        self._nis += nis
+        self.poses += 1
+
+    @property
+    def _this_second(self) -> float:
+        return float(self._sum @ self._sum) / max(self._summed, 1)
+
+    @property
+    def nis(self) -> float:
+        """Mean NIS of a pose; 6 is expected, NaN where there is none."""
+        return self._nis / (self.poses or math.nan)
+
+    @property
+    def nis_over_second(self) -> float:
+        """Mean NIS over a second, likewise."""
+        return (self._over_seconds + self._this_second) / (self.seconds or math.nan)
+
+    @property
+    def too_slow(self) -> bool:
+        """Whether NIS over a second lies beyond that of 99 % of consistent filters: the wrench
+        walks faster than the tuning says.
+        """
+        return self.nis_over_second > chi2_band(MEASURED, max(self.seconds, 1), 0.98)[1]
+
+    def as_dict(self) -> dict[str, float]:
+        """Return the numbers as plain data."""
+        names = ("nis", "poses", "nis_over_second", "seconds")
+        return {name: getattr(self, name) for name in names}
+
+    def __str__(self) -> str:
+        low, high = chi2_band(MEASURED, max(self.seconds, 1))
+        return (
+            f"NIS {self.nis:.2f}, over a second {self.nis_over_second:.3g} (expected {MEASURED}; "
+            f"95 % of means over {self.seconds} s from {low:.2f} to {high:.2f})"
+        )

@@ -33,6 +33,7 @@ _CONSTANT = -3.0 * math.log(2.0 * math.pi)  # of a normal density of six numbers
 # A row of a flight
 ROW = np.dtype(
     [
+        ("t", "f8"),  # s
         ("dt", "f8"),  # s since the row before
         ("sample", "f8", (11,)),  # mean rotor speeds of the way there, position, quaternion
         ("voltage", "f8"),  # V
@@ -43,10 +44,12 @@ ROW = np.dtype(
 # What a pass finds at a pose
 INNOVATION = np.dtype(
     [
+        ("t", "f8"),  # s
         ("nis", "f8"),
         ("log_likelihood", "f8"),  # of the pose, given all before it
         ("outlier", "?"),  # likelier an outlier than a pose of this filter
         ("innovation", "f8", (6,)),  # of (rho, x), rho an MRP
+        ("white", "f8", (6,)),  # the same as the filter expects it: six normal numbers of size 1
         ("root", "f8", (6, 6)),  # of its covariance, lower triangular
     ]
 )
@@ -112,7 +115,8 @@ def pieces_of(
         attitude_error(pose[second, 3:], pose[first, 3:], turn)  # a quarter of it, world
         quaternion_to_matrix(pose[first, 3:], rotation)
         row = np.zeros(last - first, dtype=ROW)
-        row["dt"], row["sample"][:, 4:] = np.diff(t[first : last + 1]), pose[steps]
+        row["t"], row["dt"] = t[steps], np.diff(t[first : last + 1])
+        row["sample"][:, 4:] = pose[steps]
         row["sample"][:, :4] = 0.5 * (rotor_speeds[here] + rotor_speeds[steps])
         row["voltage"] = vehicle.voltage_ref
         if voltage is not None:
@@ -180,7 +184,7 @@ def _pass(
             continue
         # the filter's own gate and restarts stay out: the likelihood of outliers is stated here
         nis = innovate(f, z[4:7], z[7:11], True, True)
-        found.nis = nis
+        found.t, found.nis, found.white[:] = row.t, nis, f.innovation
         log_normal = log_inlier + _CONSTANT - 0.5 * nis
         for i in range(6):
             log_normal -= math.log(f.L[i, i])

@@ -12,11 +12,10 @@ White noise often is not: below some size it changes nothing, and then it stays 
 comes to rest on its bound.
 """
 
-import math
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from ..dynamics.vehicle import Vehicle
 from ..runtime.errors import InputError
-from .consistency import MEASURED, chi2_band
+from .consistency import MEASURED, Consistency, chi2_band
 from .estimate import Array
 from .innovations import Innovations, Piece, innovations, pieces_of
 from .likelihood_search import climb
@@ -65,11 +64,7 @@ class NoiseFitSettings:
             thrust.
         position: m: the best motion capture, a poor radio.
         attitude: rad.
-        rise_times: s, of tunings among which the search starts.
-        quieter: factors on their white noise.
-        consistent: mean NIS by 6 within which a tuning counts as consistent for a user: far wider
-            than the 95 % band of a long log, which the smallest imperfection leaves.
-        notable_gain: log-likelihood of a pose by which another tuning is clearly better.
+        rise_times: s, of tunings among which the search starts, with a tenth of the white noise.
     """
 
     startup: float = 1.0
@@ -84,9 +79,6 @@ class NoiseFitSettings:
     position: tuple[float, float] = (2e-5, 0.3)
     attitude: tuple[float, float] = (1e-4, 0.5)
     rise_times: tuple[float, ...] = (1.0, 0.3, 0.1)
-    quieter: tuple[float, ...] = (0.1,)
-    consistent: tuple[float, float] = (0.9, 1.1)
-    notable_gain: float = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,54 +91,39 @@ class NoiseFit:
     Attributes:
         tuning: the fitted one.
         given: the tuning that was given.
-        poses: that count.
-        outliers: of them, to the fitted tuning.
-        nis_before: mean; 6 is expected.
-        nis_after: mean; 6 is expected.
-        nis_band: of a mean over so many poses, 95 %.
+        before: what the innovations say of the given tuning.
+        after: likewise, of the fitted one.
         log_likelihood_before: sum over the poses, outliers included.
         log_likelihood_after: sum over the poses, outliers included.
+        outliers: poses, to the fitted tuning.
         rise_before: (3,) s of the force, (3,) s of the torque, 10-90 %.
         rise_after: likewise (s), of the fitted tuning.
         deviation: standard deviation of the logarithm of each fitted number (8,), in the order of
             force walk (horizontal, vertical), torque walk (the same), thrust, motor torque,
             position and attitude noise; NaN where it came to rest on a bound.
-        consistent: from the settings.
     """
 
     tuning: UKFTuning
     given: UKFTuning
-    poses: int
-    outliers: int
-    nis_before: float
-    nis_after: float
-    nis_band: tuple[float, float]
+    before: Consistency
+    after: Consistency
     log_likelihood_before: float
     log_likelihood_after: float
+    outliers: int
     rise_before: tuple[Array, Array]
     rise_after: tuple[Array, Array]
     deviation: Array
-    consistent: tuple[float, float]
-
-    @property
-    def given_is_consistent(self) -> bool:
-        """Whether the mean NIS of the given tuning is near 6, and the fitted one is no likelier
-        than its eight numbers alone would make it (Schwarz, *Estimating the dimension of a model*,
-        Annals of Statistics 6, 1978).
-        """
-        low, high = self.consistent
-        gain = self.log_likelihood_after - self.log_likelihood_before
-        return low <= self.nis_before / MEASURED <= high and gain <= 0.5 * len(
-            _PARAMETERS
-        ) * math.log(MEASURED * self.poses)
 
     def as_dict(self) -> dict[str, object]:
         """Return the fitted numbers, NIS and rise times as plain data."""
         names = dict.fromkeys(name for name, _ in _PARAMETERS)
         return {name: np.asarray(getattr(self.tuning, name)).tolist() for name in names} | {
-            "nis_before": self.nis_before,
-            "nis_after": self.nis_after,
-            "nis_band": list(self.nis_band),
+            "nis_before": self.before.nis,
+            "nis_after": self.after.nis,
+            "nis_band": list(chi2_band(MEASURED, self.after.poses)),
+            "nis_over_second_before": self.before.nis_over_second,
+            "nis_over_second_after": self.after.nis_over_second,
+            "nis_over_second_band": list(chi2_band(MEASURED, self.after.seconds)),
             "log_likelihood_before": self.log_likelihood_before,
             "log_likelihood_after": self.log_likelihood_after,
             "force_rise_time_s": self.rise_after[0].tolist(),
@@ -154,44 +131,13 @@ class NoiseFit:
         }
 
     def __str__(self) -> str:
-        if self.given_is_consistent:
-            return f"The tuning suits this flight: {_nis(self.nis_before, self.nis_band)}."
-        gain = (self.log_likelihood_after - self.log_likelihood_before) / self.poses
         (force, torque), (force_before, torque_before) = self.rise_after, self.rise_before
         return (
-            f"{nis_sentence(self.nis_before, self.nis_band, self.consistent)} Fitted to the log, "
-            f"NIS is {self.nis_after:.2f} and each pose {_likelier(gain)} times as "
-            f"likely: the estimated force rises in {_times(force)} s instead of "
-            f"{_times(force_before)} s, the torque in {_times(torque)} s instead of "
-            f"{_times(torque_before)} s."
+            f"The tuning was fitted to this flight: {self.after}, instead of NIS "
+            f"{self.before.nis:.2f}, over a second {self.before.nis_over_second:.3g}; the force "
+            f"rises in {_times(force)} s instead of {_times(force_before)} s, the torque in "
+            f"{_times(torque)} s instead of {_times(torque_before)} s."
         )
-
-
-def nis_sentence(
-    nis: float, band: tuple[float, float], consistent: tuple[float, float] | None = None
-) -> str:
-    """Return what a mean NIS over a flight says of the tuning, for a user.
-
-    Args:
-        nis: mean over the poses.
-        band: in which 95 % of such means lie.
-        consistent: see ``NoiseFitSettings``.
-    """
-    low, high = NoiseFitSettings().consistent if consistent is None else consistent
-    ratio = (nis / MEASURED) ** 0.5
-    found = _nis(nis, band)
-    if low <= nis / MEASURED <= high:
-        return f"The tuning expects innovations about as large as this flight shows ({found})."
-    size = f"{ratio:.3g} times smaller" if ratio > 1.0 else f"{1.0 / ratio:.3g} times larger"
-    return f"The tuning expects innovations {size} than this flight shows ({found})."
-
-
-def _nis(nis: float, band: tuple[float, float]) -> str:
-    return f"NIS {nis:.2f}, expected {MEASURED}, 95 % band {band[0]:.2f} to {band[1]:.2f}"
-
-
-def _likelier(gain: float) -> str:
-    return f"{math.exp(gain):.2g}" if gain < 5.0 else "over 100"
 
 
 def _times(seconds: Array) -> str:
@@ -199,7 +145,7 @@ def _times(seconds: Array) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def tuning_note(
+def consistency_of(
     vehicle: Vehicle,
     t: ArrayLike,
     rotor_speeds: ArrayLike,
@@ -207,29 +153,13 @@ def tuning_note(
     quaternion: ArrayLike,
     voltage: ArrayLike | None = None,
     tuning: UKFTuning | None = None,
-    settings: NoiseFitSettings | None = None,
-) -> str | None:
-    """Return a sentence for the user if a flight contradicts the given tuning, without a fit: by
-    its NIS, or because one of a few other tunings is clearly likelier. None if it does not, or if
-    too few poses count.
-
-    Arguments and errors are those of ``fit_noise``.
+) -> Consistency:
+    """Return what the innovations of a flight say of a tuning, without a fit: arguments and errors
+    are those of ``fit_noise``.
     """
     columns = t, rotor_speeds, position, quaternion, voltage
-    flight = _prepare(vehicle, columns, tuning, settings)
-    if flight.poses < flight.use.fewest_poses:
-        return None
-    passes = [flight.evaluate(made, flight.whole) for made in _starts(flight)]
-    per_pose = [float(each.log_likelihood.mean()) for each in passes]
-    gain = max(per_pose) - per_pose[0]
-    nis = _mean_nis(passes[0])
-    low, high = flight.use.consistent
-    if low <= nis / MEASURED <= high and gain <= flight.use.notable_gain:
-        return None
-    sentence = nis_sentence(nis, chi2_band(MEASURED, flight.poses), flight.use.consistent)
-    if gain > flight.use.notable_gain:
-        sentence += f" Another tuning makes each pose {_likelier(gain)} times as likely."
-    return sentence
+    flight = _Flight(vehicle, columns, tuning, NoiseFitSettings())
+    return flight.judge(flight.given)[0]
 
 
 def fit_noise(
@@ -260,16 +190,11 @@ def fit_noise(
             held poses and start-ups are taken out.
     """
     columns = t, rotor_speeds, position, quaternion, voltage
-    flight = _prepare(vehicle, columns, tuning, settings)
-    if flight.poses < flight.use.fewest_poses:
-        raise InputError(
-            f"fit_noise: {flight.poses} of {len(flight.columns[0])} rows have a pose that does not "
-            f"repeat the last one and comes {flight.use.startup:g} s or more after a start; "
-            f"expected at least {flight.use.fewest_poses} to fit the tuning to"
-        )
-    use, period, given = flight.use, flight.period, flight.given
+    use = NoiseFitSettings() if settings is None else settings
+    flight = _Flight(vehicle, columns, tuning, use)
+    period, given = flight.period, flight.given
     pieces = flight.whole if len(flight.columns[0]) <= use.rows else _excerpts(flight)
-    if sum(int(piece.rows["counted"].sum()) for piece in pieces) < use.fewest_poses:
+    if _poses(pieces) < use.fewest_poses:
         pieces = flight.whole
 
     def evaluate(x: Array) -> Innovations:
@@ -277,32 +202,20 @@ def fit_noise(
 
     bounds = np.log(_bounds(vehicle, period, use))
     starts = [np.clip(_numbers(made), *bounds.T) for made in _starts(flight)]
-    with ThreadPoolExecutor(min(len(bounds), os.cpu_count() or 1)) as threads:
-        likelihoods = [each.log_likelihood.sum() for each in threads.map(evaluate, starts)]
-        found, deviation = climb(evaluate, starts[int(np.argmax(likelihoods))], bounds, threads)
-    fitted = _tuning(found, given)
-    before = flight.evaluate(given, flight.whole)
-    after = flight.evaluate(fitted, flight.whole)
+    try:
+        with ThreadPoolExecutor(min(len(bounds), os.cpu_count() or 1)) as threads:
+            likelihoods = [each.log_likelihood.sum() for each in threads.map(evaluate, starts)]
+            found, deviation = climb(evaluate, starts[int(np.argmax(likelihoods))], bounds, threads)
+        fitted = _tuning(found, given)
+        rise, rise_after = (rise_times(vehicle, made, period) for made in (given, fitted))
+    except np.linalg.LinAlgError as error:
+        raise InputError(f"fit_noise: no tuning suits these poses: {error}") from error
+    before, likelihood, _ = flight.judge(given)
+    after, likelihood_after, outliers = flight.judge(fitted)
     return NoiseFit(
-        fitted,
-        given,
-        flight.poses,
-        int(after.outlier.sum()),
-        _mean_nis(before),
-        _mean_nis(after),
-        chi2_band(MEASURED, flight.poses),
-        float(before.log_likelihood.sum()),
-        float(after.log_likelihood.sum()),
-        rise_times(vehicle, given, period),
-        rise_times(vehicle, fitted, period),
-        deviation,
-        use.consistent,
+        *(fitted, given, before, after, likelihood, likelihood_after),
+        *(outliers, rise, rise_after, deviation),
     )
-
-
-def _mean_nis(found: Innovations) -> float:
-    kept = found.nis[~found.outlier]
-    return float(kept.mean()) if kept.size else float("inf")
 
 
 def _tuning(x: Array, given: UKFTuning) -> UKFTuning:
@@ -328,16 +241,15 @@ def _starts(flight: "_Flight") -> list[UKFTuning]:
     tunings = []
     for rise in flight.use.rise_times:
         made = UKFTuning.for_vehicle(flight.vehicle, flight.period, rise)
-        tunings += [
+        tunings.append(
             replace(
                 flight.given,
                 force_walk=made.force_walk,
                 torque_walk=made.torque_walk,
-                thrust_noise=factor * np.asarray(made.thrust_noise),
-                motor_torque_noise=factor * np.asarray(made.motor_torque_noise),
+                thrust_noise=0.1 * np.asarray(made.thrust_noise),
+                motor_torque_noise=0.1 * np.asarray(made.motor_torque_noise),
             )
-            for factor in flight.use.quieter
-        ]
+        )
     return [flight.given, *tunings]
 
 
@@ -368,26 +280,52 @@ def _excerpts(flight: "_Flight") -> list[Piece]:
     return pieces
 
 
-@dataclass(frozen=True, eq=False)
+def _poses(pieces: Sequence[Piece]) -> int:
+    """Return how many count."""
+    return sum(int(piece.rows["counted"].sum()) for piece in pieces)
+
+
 class _Flight:
-    """One flight, checked, as the fit and the note look at it."""
+    """One flight, checked: t, rotor speeds, position, quaternion, and voltage or None."""
 
-    vehicle: Vehicle
-    columns: list[Any]  # t, rotor speeds, position, quaternion, voltage or None
-    period: float
-    given: UKFTuning
-    use: NoiseFitSettings
-    whole: list[Piece] = field(default_factory=list)
-
-    @property
-    def poses(self) -> int:
-        """How many count."""
-        return sum(int(piece.rows["counted"].sum()) for piece in self.whole)
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        given: Sequence[ArrayLike | None],
+        tuning: UKFTuning | None,
+        use: NoiseFitSettings,
+    ) -> None:
+        columns: list[Any] = [None if c is None else np.asarray(c, dtype=np.float64) for c in given]
+        times = columns[0]
+        names = ("t", "rotor_speeds", "position", "quaternion", "voltage")
+        for name, array, width in zip(names, columns, ((), (4,), (3,), (4,), ()), strict=True):
+            if array is None:
+                continue
+            shape = (len(times), *width)
+            if array.shape != shape:
+                raise InputError(f"fit_noise: {name} must have shape {shape}, got {array.shape}")
+            if name not in ("position", "quaternion") and not np.isfinite(array).all():
+                raise InputError(f"fit_noise: {name} must be finite in every row")
+        if len(times) < 2 or not np.all(np.diff(times) > 0):
+            raise InputError(
+                "fit_noise: expected two rows or more whose times t increase strictly, in s"
+            )
+        self.vehicle, self.columns, self.use = vehicle, columns, use
+        self.period = float(np.median(np.diff(times)))
+        self.given = UKFTuning.for_vehicle(vehicle, self.period) if tuning is None else tuning
+        self.whole = self.pieces(slice(None))
+        poses = _poses(self.whole)
+        if poses < use.fewest_poses:
+            raise InputError(
+                f"fit_noise: {poses} of {len(times)} rows have a pose that does not "
+                f"repeat the last one and comes {use.startup:g} s or more after a start; "
+                f"expected at least {use.fewest_poses} to fit the tuning to"
+            )
 
     def pieces(self, rows: slice) -> list[Piece]:
         """Return the pieces of some rows."""
-        t, speeds, x, q = (column[rows] for column in self.columns[:4])
-        volts = None if self.columns[4] is None else self.columns[4][rows]
+        columns: list[Any] = [None if c is None else c[rows] for c in self.columns]
+        t, speeds, x, q, volts = columns
         gap, startup = self.use.longest_gap, self.use.startup
         return pieces_of(self.vehicle, t, speeds, x, q, volts, gap, startup)
 
@@ -396,33 +334,11 @@ class _Flight:
         chance, reach = self.use.outlier_chance, self.use.outlier_range
         return innovations(self.vehicle, tuning, self.period, pieces, chance, reach)
 
-
-def _prepare(
-    vehicle: Vehicle,
-    given: Sequence[ArrayLike | None],
-    tuning: UKFTuning | None,
-    settings: NoiseFitSettings | None,
-) -> _Flight:
-    """Check the columns of a flight: t, rotor speeds, position, quaternion and voltage."""
-    columns = [None if c is None else np.asarray(c, dtype=np.float64) for c in given]
-    times = columns[0]
-    assert times is not None
-    names = ("t", "rotor_speeds", "position", "quaternion", "voltage")
-    for name, array, width in zip(names, columns, ((), (4,), (3,), (4,), ()), strict=True):
-        if array is None:
-            continue
-        shape = (len(times), *width)
-        if array.shape != shape:
-            raise InputError(f"fit_noise: {name} must have shape {shape}, got {array.shape}")
-        if name not in ("position", "quaternion") and not np.isfinite(array).all():
-            raise InputError(f"fit_noise: {name} must be finite in every row")
-    if len(times) < 2 or not np.all(np.diff(times) > 0):
-        raise InputError(
-            "fit_noise: expected two rows or more whose times t increase strictly, in s"
-        )
-    period = float(np.median(np.diff(times)))
-    made = UKFTuning.for_vehicle(vehicle, period) if tuning is None else tuning
-    use = NoiseFitSettings() if settings is None else settings
-    flight = _Flight(vehicle, columns, period, made, use)
-    flight.whole.extend(flight.pieces(slice(None)))
-    return flight
+    def judge(self, tuning: UKFTuning) -> tuple[Consistency, float, int]:
+        """Return what all poses say of a tuning, their log-likelihood, and how many are outliers to
+        it.
+        """
+        found, consistency = self.evaluate(tuning, self.whole), Consistency()
+        for pose in found[~found.outlier]:
+            consistency.add(pose.t, pose.white, pose.nis)
+        return consistency, float(found.log_likelihood.sum()), int(found.outlier.sum())

@@ -1,6 +1,6 @@
 """How much the filter trusts its model and its measurements."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,7 @@ from ..runtime.errors import InputError
 Array = NDArray[np.float64]
 
 # The vehicle and period for which the default tuning is stated: AR.Drone 2.0 at 200 Hz
-_PERIOD = 0.005
+PERIOD = 0.005
 _WEIGHT = 0.465 * 9.81
 _ARM = 0.1262
 
@@ -82,7 +82,7 @@ class UKFTuning:
 
     @classmethod
     def for_vehicle(
-        cls, vehicle: Vehicle, period: float = _PERIOD, rise_time: float = 1.0
+        cls, vehicle: Vehicle, period: float = PERIOD, rise_time: float = 1.0
     ) -> "UKFTuning":
         """Return the default tuning scaled to a vehicle's weight and size, its motion capture and
         the period in s.
@@ -91,15 +91,21 @@ class UKFTuning:
         """
         force = vehicle.weight / _WEIGHT
         torque = force * vehicle.arm_l / _ARM
-        slower = np.sqrt(period / _PERIOD)
-        white, walk = 1.0 / slower, slower / rise_time
         return cls(
-            motor_torque_noise=0.03 * torque * white,
-            torque_walk=3.26e-4 * torque * walk,
-            thrust_noise=0.3 * force * white,
-            force_walk=3.26e-3 * force * walk,
+            motor_torque_noise=0.03 * torque,
+            torque_walk=3.26e-4 * torque / rise_time,
+            thrust_noise=0.3 * force,
+            force_walk=3.26e-3 * force / rise_time,
             position_noise=vehicle.mocap.sigma_pos_m,
             attitude_noise=vehicle.mocap.sigma_att_rad,
-            gyro_bias_walk=1e-5 * slower,
-            accelerometer_bias_walk=1e-4 * slower,
-        )
+        ).scaled(PERIOD, period)
+
+    def scaled(self, period: float, to: float) -> "UKFTuning":
+        """Return the same tuning of steps of ``to`` s, stated for steps of ``period`` s: white
+        noise averages, a walk grows.
+        """
+        slower = np.sqrt(to / period)
+        factors = {f.name: slower for f in fields(self) if f.name.endswith("_walk")}
+        factors |= dict.fromkeys(("motor_torque_noise", "thrust_noise"), 1.0 / slower)
+        changed = {n: np.asarray(getattr(self, n)) * factor for n, factor in factors.items()}
+        return replace(self, **changed)

@@ -2,14 +2,16 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..dynamics.vehicle import Vehicle
 from ..estimator import NoiseFit, RecordingUKF, UKFTuning, WrenchEstimate, WrenchUKF, fit_noise
+from ..estimator.consistency import Consistency
 from ..estimator.estimate import COASTING, NIS, REJECTED, STATUS, STATUSES, WITHOUT_COVARIANCE
-from ..estimator.noise_fit import tuning_note
+from ..estimator.noise_fit import consistency_of
 from ..estimator.row_steps import steps_between
 from ..runtime.errors import InputError
 from .inertial_wrench import inertial_wrench
@@ -19,6 +21,7 @@ from .logs.tables import write_csv
 from .motion.inertial_signals import reads_imu
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 # probability beyond which a pose is asked whether it jumped: one good pose in 10,000 is, at 200 Hz
 # every 50 s, and it is refused only if it also lies away from the pose before
@@ -166,45 +169,50 @@ def _notes(log: FlightLog, series: WrenchSeries, smooth: bool) -> Iterator[str]:
         yield ("the log has one of gyro and accelerometer only: the poses were smoothed without it")
 
 
-def tune_to_log(log: FlightLog, vehicle: Vehicle) -> NoiseFit:
-    """Find the tuning that suits a log, beside ``UKFTuning.for_vehicle(vehicle, log.period)``; see
-    ``estimator.noise_fit``.
+def tune_to_log(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = None) -> NoiseFit:
+    """Find the tuning that suits a log, beside the given one, by default
+    ``UKFTuning.for_vehicle(vehicle, log.period)``; see ``estimator.noise_fit``.
 
     Raises:
-        InputError: the log is none to estimate a wrench from (``screen_for_estimate``), or too few
-            poses are left to fit a tuning to.
+        InputError: the log is none to estimate a wrench from (``screen_for_estimate``), too few
+            poses are left to fit a tuning to, or its pose was filtered so that neither its noise
+            nor a walk is found.
     """
-    columns = _columns(log, vehicle)
-    if columns is None:
+    fit = _of_poses(fit_noise, log, vehicle, tuning)
+    on_bound = np.isnan(fit.deviation)
+    if on_bound[:4].any() and on_bound[6:].any():
         raise InputError(
-            f"{log.source or log.name}: has no pose, or one that is too slow, to fit a tuning to; "
-            "expected 50 poses a second, or leave --tune out"
+            f"{log.source or log.name}: neither the noise of its pose nor the walk of its wrench "
+            "can be fitted: the pose was filtered before it was written"
         )
-    try:
-        return fit_noise(vehicle, *columns)
-    except InputError as error:
-        raise InputError(f"{log.source or log.name}: {error}") from error
+    return fit
 
 
-def tuning_note_of(log: FlightLog, vehicle: Vehicle) -> str | None:
-    """Return a sentence for the user if a log contradicts its vehicle's tuning, else None; no fit.
-
-    Raises:
-        InputError: the log is none to estimate a wrench from.
+def consistency_with_log(
+    log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = None
+) -> Consistency:
+    """Return what a log's innovations say of a tuning, without a fit; otherwise as
+    ``tune_to_log``.
     """
-    columns = _columns(log, vehicle)
-    return None if columns is None else tuning_note(vehicle, *columns)
+    return _of_poses(consistency_of, log, vehicle, tuning)
 
 
-def _columns(
-    log: FlightLog, vehicle: Vehicle
-) -> tuple[Array, Array, Array, Array, Array | None] | None:
-    """Return what a tuning is judged by; None of a log whose motion is that of its IMU."""
+def _of_poses(
+    judge: Callable[..., T], log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None
+) -> T:
+    """Return what is found of a tuning in the columns of a log."""
     log, _ = screen_for_estimate(log, vehicle)
     if reads_imu(log):
-        return None
+        raise InputError(
+            f"{log.source or log.name}: has no pose, or one that is too slow, to fit a tuning to; "
+            "expected 50 poses a second"
+        )
     position = np.where(log.valid[:, None], log.position, np.nan)
-    return log.t, log.rotor_speeds, position, log.quaternion, log.voltage
+    columns = log.t, log.rotor_speeds, position, log.quaternion, log.voltage
+    try:
+        return judge(vehicle, *columns, tuning=tuning)
+    except InputError as error:
+        raise InputError(f"{log.source or log.name}: {error}") from error
 
 
 def predict_to_row(ukf: WrenchUKF, log: FlightLog, k: int) -> None:

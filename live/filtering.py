@@ -13,14 +13,17 @@ from typing import Any
 import numpy as np
 
 from ..dynamics.vehicle import Vehicle
-from ..estimator import TimedFilter, WrenchEstimate, WrenchUKF
+from ..estimator import TimedFilter, UKFTuning, WrenchEstimate, WrenchUKF
+from ..estimator.estimate import NIS, RESTARTED, STATUS, TRACKING
 from ..estimator.row_steps import steps_between
+from ..estimator.tuning import PERIOD
 from ..identification.wrench_series import GATE
 from .messages import Array, Row
 from .tallies import Tallies
 
 _FIRST_ROWS = 21  # whose median step is the period
 _FIRST_SECONDS = 1.0  # after which fewer do, of a source that is slow
+_STARTUP = 1.0  # s after a start or restart whose innovations do not count
 
 
 @dataclass(frozen=True)
@@ -32,6 +35,7 @@ class LiveSettings:
     rate_hz: float | None = None  # of rows, where it is known; then none are held back
     wait: float = 10.0  # s for the first estimate; 0: for ever
     seconds: float | None = None  # s of the stream's time, after which it is over
+    tuning: UKFTuning | None = None  # of steps of 5 ms; default: that of the vehicle
 
 
 @dataclass(slots=True)
@@ -67,6 +71,7 @@ class LiveFilter:
         self._timed: TimedFilter | None = None
         self._before: Row | None = None
         self.period = math.nan  # s
+        self._settled = math.inf  # s, when the filter's start is over
         if self.settings.rate_hz is not None:
             self._start(1.0 / self.settings.rate_hz)
 
@@ -99,7 +104,10 @@ class LiveFilter:
 
     def _start(self, period: float) -> None:
         self.period = period
-        ukf = WrenchUKF(self.vehicle, period=period, gate=self.settings.gate)
+        given = self.settings.tuning
+        tuning = None if given is None else given.scaled(PERIOD, period)
+        ukf = WrenchUKF(self.vehicle, tuning, period, self.settings.gate)
+        self._white = ukf.record["innovation"][0]  # of the last pose, whitened
         self._timed = TimedFilter(ukf, self.settings.horizon)
 
     def _process(self, row: Row) -> Output | None:
@@ -111,7 +119,7 @@ class LiveFilter:
             assert row.position is not None
             assert row.quaternion is not None
             timed.reset(row.t, row.position, row.quaternion)
-            self._before = row
+            self._before, self._settled = row, row.t + _STARTUP
             return self._output(row, timed.estimate)
         now = timed.time
         if round(row.t, 9) > now:
@@ -141,7 +149,18 @@ class LiveFilter:
             timed.predict(at, speeds, voltage)
         estimate = timed.predict(row.t, speeds, voltage)
         self._before = row
-        return self._correct(timed, row) or estimate
+        estimate = self._correct(timed, row) or estimate
+        if row.has_pose:
+            self._judge(row.t, estimate)
+        return estimate
+
+    def _judge(self, t: float, estimate: WrenchEstimate) -> None:
+        """Take in what the pose of now says of the tuning."""
+        status = estimate.numbers[STATUS]
+        if status == RESTARTED:
+            self._settled = t + _STARTUP
+        elif status == TRACKING and t > self._settled:
+            self._tallies.consistency.add(t, self._white, estimate.numbers[NIS])
 
     @staticmethod
     def _correct(timed: TimedFilter, row: Row) -> WrenchEstimate | None:

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from ..estimator.consistency import Consistency
 from ..runtime.errors import InputError
 from .clocks import Clocks
 from .filtering import LiveFilter, LiveSettings, Output
@@ -40,6 +41,7 @@ class Snapshot:
     counts: dict[str, int]
     silence: float  # s since the last message
     latency_ms: tuple[float, float]  # median and 99 % quantile
+    consistency: Consistency  # of the filter with its tuning
     processor_ms: tuple[float, float]  # likewise, of a row's own processor time, but its recording
     drift_ppm: float | None
     clocks: int
@@ -222,6 +224,7 @@ class Session:
             silence=1e-9 * (now - self._last),
             latency_ms=(latency.quantile(0.5), latency.quantile(0.99)),
             processor_ms=(processor.quantile(0.5), processor.quantile(0.99)),
+            consistency=self.tallies.consistency,
             drift_ppm=self._clocks.drift,
             clocks=self._clocks.count,
             estimates=self.estimates,

@@ -9,6 +9,7 @@ from itertools import accumulate
 
 import numpy as np
 
+from ..estimator.consistency import Consistency
 from ..runtime.errors import InputError
 from .messages import Array, Malformed
 
@@ -105,6 +106,7 @@ class Tallies:
         self.latency = Durations()
         self.processor = Durations()
         self.wrench = Means()
+        self.consistency = Consistency()
 
     def say(self, line: str) -> None:
         """Keep a line for people, once; from any thread."""

@@ -7,6 +7,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from ..estimator.consistency import Consistency
 from .session import SILENT, Snapshot
 from .sources.base import Source
 
@@ -59,6 +60,9 @@ def _lines(snapshot: Snapshot) -> list[Text]:
         ),
         Text("rates    " + ", ".join(f"{kind} {rate:.0f} Hz" for kind, rate in rates)),
     ]
+    if snapshot.consistency.seconds:
+        style = "yellow" if snapshot.consistency.too_slow else ""
+        lines.append(Text(f"tuning   {tuning_words(snapshot.consistency)}", style))
     median, most = snapshot.latency_ms
     timing = f"latency  {median:.2f} ms, 99 % within {most:.2f} ms" if median == median else ""
     if snapshot.drift_ppm is not None:
@@ -76,6 +80,15 @@ def _lines(snapshot: Snapshot) -> list[Text]:
     if snapshot.recorded:
         lines.append(Text(f"recorded {snapshot.recorded} rows"))
     return lines
+
+
+def tuning_words(consistency: Consistency) -> str:
+    """Return what the innovations say of the tuning, and what to do where it is too slow."""
+    advice = (
+        "; the tuning is too slow for this flight: --record it, have windwrench estimate fit one, "
+        "and give that with --tuning"
+    )
+    return f"{consistency}{advice if consistency.too_slow else ''}"
 
 
 def counts_words(counts: dict[str, int]) -> str:

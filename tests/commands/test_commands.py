@@ -103,7 +103,7 @@ def test_an_episode_is_drawn_and_its_time_series_written(call, tmp_path):
 
 
 def test_a_recorded_flight_can_be_estimated(call, log, tmp_path):
-    code, text, _ = call("estimate", log, "--tune", "--no-smooth", "--out", "out", "--json")
+    code, text, _ = call("estimate", log, "--no-smooth", "--out", "out", "--json")
     assert code == 0
     said = json.loads(text)
     found = said["result"]
@@ -112,7 +112,9 @@ def test_a_recorded_flight_can_be_estimated(call, log, tmp_path):
     assert found["status"]["tracking"] == found["samples"]
     assert found["restarts"] == 0
     assert len(found["force_rmse_to_truth_N"]) == 3
-    assert set(said["written"]) == {"out/wrench.csv", "out/wrench.png", "out/run.json"}
+    assert set(said["written"]) == {
+        f"out/{name}" for name in ("wrench.csv", "wrench.png", "tuning.yaml", "run.json")
+    }
     wrench = np.genfromtxt(tmp_path / "out" / "wrench.csv", delimiter=",", names=True)
     names = "t fx fy fz tx ty tz std_fx std_fy std_fz std_tx std_ty std_tz nis status"
     assert list(wrench.dtype.names) == names.split()

@@ -21,6 +21,7 @@ from windwrench.identification.wrench_series import (
     counts,
     estimate_log,
     truth_rmse,
+    tune_to_log,
     write_wrench,
 )
 
@@ -223,3 +224,14 @@ def test_gyro_and_accelerometer_of_a_log_sharpen_its_estimate(vehicle):
     assert np.all(with_both < 0.8 * without)
     gyro = error(gyro=sensors["gyro"])
     assert gyro[1] < 0.8 * without[1]
+
+
+def test_a_log_that_was_filtered_before_it_was_written_has_no_tuning_to_fit(vehicle):
+    """A hover whose pose has no noise: neither pose noise nor walk is found."""
+    t = 0.005 * np.arange(800)
+    log = held_flight(vehicle, t, lift=0.0)
+    position = log.position[0] + 1e-7 * np.sin(t)[:, None]  # or each pose repeats the last one
+    quaternion = np.tile(log.quaternion[0], (len(t), 1))
+    with pytest.raises(InputError, match="filtered before it was written") as caught:
+        tune_to_log(replace(log, position=position, quaternion=quaternion), vehicle)
+    assert "\n" not in str(caught.value)

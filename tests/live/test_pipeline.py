@@ -6,8 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.live.stream import VEHICLE, Pipeline, flight, log_of
-from windwrench.identification.wrench_series import estimate_log
+from windwrench.dynamics import EffectSetting
+from windwrench.envs.recording import record_flight
+from windwrench.identification.wrench_series import estimate_log, tune_to_log
 from windwrench.live.messages import Sample
+from windwrench.live.terminal_page import tuning_words
 
 SECOND = 1_000_000_000
 
@@ -59,6 +62,24 @@ def test_a_stream_in_order_is_the_offline_filter():
     live = Pipeline().take(whole(flown))
     np.testing.assert_allclose(live.wrench(), offline(flown), atol=1e-9, rtol=0)
     assert not live.tallies.counts
+
+
+def test_a_tuning_that_is_too_slow_is_told_with_what_to_do():
+    """A drag on fast waves: the default tuning is late, and one fitted to the flight less so; the
+    figures are those of the log.
+    """
+    drag = EffectSetting("rotor_drag", {"kdx": 1.2e-4, "kdy": 1.2e-4})
+    flown = record_flight(VEHICLE, (drag,), "fast", 12.0)
+    fit = tune_to_log(log_of(flown), VEHICLE)
+    found = {}
+    for tuning in (None, fit.tuning):
+        live = Pipeline(tuning=tuning).take(whole(flown))
+        found[tuning is None] = live.session.snapshot().consistency
+    assert found[True].too_slow
+    assert "--tuning" in tuning_words(found[True])
+    assert found[True].nis == pytest.approx(fit.before.nis, rel=0.05)
+    assert found[False].nis == pytest.approx(fit.after.nis, rel=0.05)
+    assert found[False].nis_over_second < 0.3 * found[True].nis_over_second
 
 
 @pytest.mark.parametrize("drift", [-5e-4, 5e-4])

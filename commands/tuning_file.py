@@ -1,0 +1,44 @@
+"""The tuning of a filter as a YAML file: what ``estimate`` writes, it and ``live`` take."""
+
+from pathlib import Path
+
+import yaml
+
+from ..estimator.tuning import PERIOD, UKFTuning
+from ..runtime.errors import InputError, unknown_name
+from ..runtime.plain_values import plain
+from ..runtime.whole_files import replaced
+from ..runtime.yaml_file import read_yaml
+
+
+def save_tuning(tuning: UKFTuning, period: float, path: Path) -> None:
+    """Write a tuning of steps of ``period`` s to a YAML file, as that of 5 ms.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    with replaced(path) as partial:
+        data = plain(tuning.scaled(period, PERIOD))
+        text = yaml.safe_dump(data, sort_keys=False, default_flow_style=None)
+        partial.write_text(text, encoding="utf-8")
+
+
+def load_tuning(path: Path, period: float = PERIOD) -> UKFTuning:
+    """Return the tuning of a YAML file, whose fields are those of ``UKFTuning`` for steps of 5 ms,
+    for steps of ``period`` s.
+
+    Raises:
+        InputError: the file cannot be read, or a field is unknown or out of range.
+    """
+    data = read_yaml(path, "a tuning file")
+    if not isinstance(data, dict) or not data:
+        found = type(data).__name__
+        raise InputError(f"{path}: expected a mapping of fields such as force_walk, got {found}")
+    fields = UKFTuning.__dataclass_fields__
+    for name in data:
+        if name not in fields:
+            raise unknown_name("field", str(name), fields, str(path))
+    try:
+        return UKFTuning(**data).scaled(PERIOD, period)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error

@@ -1,0 +1,34 @@
+"""A tuning as a file: the same again, for any period, and what a wrong one is told."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from windwrench.commands.tuning_file import load_tuning, save_tuning
+from windwrench.dynamics import InputError
+from windwrench.estimator import UKFTuning
+
+TRUE = UKFTuning(force_walk=(0.02, 0.02, 0.008), thrust_noise=0.3)
+
+
+def test_a_tuning_is_kept_in_a_file_for_any_period(tmp_path):
+    path = tmp_path / "tuning.yaml"
+    save_tuning(TRUE, 0.01, path)
+    again = load_tuning(path, 0.01)
+    for field in fields(TRUE):
+        given = getattr(TRUE, field.name)
+        assert getattr(again, field.name) == pytest.approx(given, rel=1e-12)
+    halved = load_tuning(path, 0.005)
+    assert np.allclose(halved.force_walk, np.asarray(TRUE.force_walk) / 2**0.5)
+    assert halved.thrust_noise == pytest.approx(0.3 * 2**0.5)
+    assert halved.position_noise == TRUE.position_noise
+    for text, words in (
+        ("force_wlk: 1", "unknown field 'force_wlk'.*Did you mean 'force_walk'"),
+        ("force_walk: -1", "force_walk must be positive"),
+        ("- 1", "expected a mapping of fields"),
+    ):
+        path.write_text(text)
+        with pytest.raises(InputError, match=words) as caught:
+            load_tuning(path)
+        assert str(path) in str(caught.value)
