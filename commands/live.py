@@ -143,7 +143,8 @@ def _watch(session: "Session") -> bool:
 def _say(session: "Session") -> None:
     """Say what is new to its user, of a link or a failure."""
     for line in session.tallies.news():
-        errors.print(line, style="yellow" if line.startswith("warning") else "dim", markup=False)
+        style = "yellow" if line.startswith("warning") else "dim"
+        errors.print(line, style=style, markup=False, soft_wrap=True)
 
 
 def _summary(session: "Session") -> dict[str, Any]:

@@ -7,38 +7,36 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 from .tallies import Tallies, reason_of
 
 Item = TypeVar("Item")
-Taken = TypeVar("Taken", contravariant=True)
 # that wait for a sink: 41 s at 200 Hz, longer than a disk takes to wake or a card to erase; about
 # 10 MB of rows
 WAITING = 8192
 _LAST = 5.0  # s that the end of a stream waits for a sink that still takes; a healthy one needs ms
 
 
-class Sink(Protocol[Taken]):
+class Sink(Generic[Item]):
     """What takes items, and may stall or fail."""
 
-    name: str  # for people
-    lost: str  # as what the items are counted that it does not take
-    pause: float  # s without an item after which it is told so
-    rows: int  # taken for good
+    name = ""  # for people
+    lost = ""  # as what the items are counted that it does not take
+    pause = 0.0  # s without an item after which it is idle
+    rows = 0  # taken for good
+    held = 0  # taken, and lost if it fails
 
-    @property
-    def held(self) -> int:
-        """How many were taken, and are lost if it fails."""
-
-    def add(self, item: Taken, /) -> None:
+    def add(self, item: Item, /) -> None:
         """Take an item."""
+        raise NotImplementedError
 
     def idle(self) -> None:
-        """Nothing has come for a while."""
+        """Finish what was taken: nothing has come for a while."""
 
     def end(self) -> None:
-        """Nothing comes any more."""
+        """Finish what was taken: nothing comes any more."""
+        self.idle()
 
     def close(self) -> None:
         """Let go of what is open, after the end or a failure."""
@@ -119,11 +117,9 @@ class Outlet(Generic[Item]):
     def _next(self) -> bool:
         """Wait for an item; return whether there is one."""
         with self._changed:
-            if not self._held and not self._over:
-                self._changed.wait(self.sink.pause)
-            idle = not self._held
-        if idle:
-            self.sink.idle()
+            if self._changed.wait_for(lambda: self._held or self._over, self.sink.pause):
+                return bool(self._held)
+        self.sink.idle()
         with self._changed:
             self._changed.wait_for(lambda: self._held or self._over)
             return bool(self._held)

@@ -3,6 +3,7 @@
 from typing import Any, TextIO
 
 from .filtering import Output
+from .outlets import Sink
 
 COLUMNS = (
     "t",
@@ -29,18 +30,13 @@ def as_line(output: Output) -> str:
     return ",".join(map(repr, [*_values(output), float(output.estimate.status_code)])) + "\n"
 
 
-class Lines:
-    """Estimates as lines of text; a sink.
+class Lines(Sink[Output]):
+    """Estimates as lines of text in a file."""
 
-    Args:
-        file: that they are written to.
-    """
-
-    name, lost, pause = "standard output", "not told", 0.0
+    name, lost = "standard output", "not told"
 
     def __init__(self, file: TextIO) -> None:
         self._file = file
-        self.rows = self.held = 0
         file.write(",".join(COLUMNS) + "\n")
 
     def add(self, output: Output) -> None:
@@ -52,8 +48,3 @@ class Lines:
         """Have what was written read."""
         self._file.flush()
         self.rows, self.held = self.rows + self.held, 0
-
-    end = idle
-
-    def close(self) -> None:
-        """Leave the file to its owner."""

@@ -26,6 +26,7 @@ from ..identification.logs.flight_log import (
 )
 from ..runtime.errors import InputError
 from .messages import Row
+from .outlets import Sink
 from .tallies import Tallies
 
 _SETTLES = 1.0  # s of rows that are looked at to see which channels there are
@@ -45,8 +46,8 @@ _CHANNELS = {
 _KEPT = ("voltage", "force", "torque")  # rows without one have the last before
 
 
-class Recorder:
-    """Writes rows to a new flight log (``.csv``); a sink.
+class Recorder(Sink[Row]):
+    """Writes rows to a new flight log (``.csv``).
 
     Nothing is written before the stream has run for a second: one that turns out to be none leaves
     no file.
@@ -74,7 +75,7 @@ class Recorder:
         folder = next(folder for folder in path.absolute().parents if folder.exists())
         if not folder.is_dir() or not os.access(folder, os.W_OK):
             raise InputError(f"--record {path}: {folder} is no folder that can be written to")
-        self.path, self.rows, self.name = path, 0, f"the recording {path}"
+        self.path, self.name = path, f"the recording {path}"
         self._tallies, self._horizon = tallies, horizon
         name = f"vehicle={vehicle}"
         self._last = name if vehicle and VEHICLE.fullmatch(name) else "whole"
@@ -86,7 +87,7 @@ class Recorder:
         self._due = -math.inf  # s, when to write next
 
     @property
-    def held(self) -> int:
+    def held(self) -> int:  # type: ignore[override]
         """How many rows wait to be written."""
         return len(self._held)
 

@@ -142,5 +142,6 @@ class Tallies:
 
 def reason_of(error: Exception) -> str:
     """Return why something failed, on a line."""
+    error = error.__cause__ if isinstance(error.__cause__, OSError) else error
     said = " ".join(str(getattr(error, "strerror", None) or error).split())[:200]
     return said if isinstance(error, InputError | OSError) else f"{type(error).__name__}: {said}"

@@ -10,10 +10,12 @@ browser is too slow for.
 
 import asyncio
 import json
+import logging
 import math
 import socket
 import threading
 from collections import deque
+from contextlib import suppress
 from importlib import resources
 from typing import Any
 
@@ -52,9 +54,10 @@ class WebView:
         self._page = resources.files(__package__).joinpath("view.html").read_bytes()
         # time, s, and text of the estimates that are shown
         self._points: deque[tuple[float, str]] = deque(maxlen=VIEWED)
-        self._open = 0  # connections
+        self._open: set[asyncio.Task[None]] = set()  # connections
         try:
             self._socket = socket.create_server(("127.0.0.1", port))
+            self._socket.setblocking(False)
         except (OSError, OverflowError) as error:
             raise InputError(
                 f"--port {port}: no page can be served there: {getattr(error, 'strerror', error)}; "
@@ -72,29 +75,40 @@ class WebView:
         self._thread.join(_TIMEOUT)
 
     def _run(self) -> None:
+        logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # of browsers that go
         with self._session.tallies.spared("not shown", "the page"), self._socket:
             asyncio.run(self._serve())
 
     async def _serve(self) -> None:
-        asyncio.get_running_loop().set_exception_handler(lambda *_: None)  # of browsers that go
+        loop = asyncio.get_running_loop()
         self._look()
-        server = await asyncio.start_server(self._connected, sock=self._socket, limit=_HEAD)
+        loop.add_reader(self._socket, self._accept)
         while not self._over.is_set():
             await asyncio.sleep(_EVERY)
             self._look()
-        server.close()
-        for _ in range(10):  # until browsers know
-            await asyncio.sleep(_EVERY if self._open else 0.0)
+        loop.remove_reader(self._socket)
+        if self._open:
+            await asyncio.wait(self._open, timeout=10 * _EVERY)  # until browsers know
 
-    async def _connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    def _accept(self) -> None:
+        """Take a connection, or turn it away."""
+        with suppress(OSError):
+            connection = self._socket.accept()[0]
+            connection.setblocking(False)
+            if len(self._open) < _MOST:
+                task = asyncio.get_running_loop().create_task(self._connected(connection))
+                self._open.add(task)
+                task.add_done_callback(self._open.discard)
+                return
+            self._session.tallies.counts["turned away"] += 1
+            with connection:
+                connection.send(_head("503 Service Unavailable"))
+
+    async def _connected(self, connection: socket.socket) -> None:
         """Answer one request."""
-        self._open += 1
+        reader, writer = await asyncio.open_connection(sock=connection, limit=_HEAD)
         try:
             writer.transport.set_write_buffer_limits(0)  # drained is sent
-            if self._open > _MOST:
-                self._session.tallies.counts["turned away"] += 1
-                writer.write(_head("503 Service Unavailable"))
-                return
             request = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _TIMEOUT)
             status, path = _asked(request)
             writer.write(_head(status, "event-stream" if path == "/events" else "html"))
@@ -106,7 +120,6 @@ class WebView:
         except (OSError, EOFError, asyncio.LimitOverrunError):
             writer.transport.abort()  # too slow, gone, or no browser
         finally:
-            self._open -= 1
             writer.close()
 
     async def _tell(self, writer: asyncio.StreamWriter) -> None:
@@ -117,14 +130,10 @@ class WebView:
         """
         source, last, missed = self._session.source, -math.inf, 0
         vehicle = source.vehicle
-        first: dict[str, Any] = {
-            "vehicle": vehicle.name,
-            "source": source.name,
-            "weight": vehicle.weight,
-            "arm": vehicle.arm_l,
-            "rotors": vehicle.positions.tolist(),
-        }
-        while True:
+        first: dict[str, Any] = {"vehicle": vehicle.name, "source": source.name}
+        first |= {"weight": vehicle.weight, "arm": vehicle.arm_l}
+        first["rotors"] = vehicle.positions.tolist()
+        while not writer.is_closing():
             if writer.transport.get_write_buffer_size():
                 missed += 1
                 self._session.tallies.counts["not shown"] += 1

@@ -128,11 +128,9 @@ class Ros2(Source):
                 break
         return self._came
 
-    def decode(self, message: Any, arrival: int) -> Sample | None:
+    def decode(self, message: tuple[TopicReader, Any], arrival: int) -> Sample:
         """Return what a topic's message holds."""
-        topic, content = message
-        found: Sample = topic.sample(content, arrival)
-        return found
+        return message[0].sample(message[1], arrival)
 
     def send(self, output: Output) -> None:
         """Publish the wrench."""

@@ -81,7 +81,7 @@ def test_the_wrench_and_its_twin_as_ros_writes_them():
 
 def run(monkeypatch, world, text):
     install(monkeypatch, world)
-    found = Running(text)
+    found = Running(text, horizon=60.0)  # however busy the machine is
     found.thread.join()
     return found
 
