@@ -47,7 +47,13 @@ def estimate(
     """
     from ..identification.motion.inertial_signals import reads_imu
     from ..identification.report.wrench_picture import plot_wrench
-    from ..identification.wrench_series import counts, estimate_log, truth_rmse, write_wrench
+    from ..identification.wrench_series import (
+        counts,
+        estimate_log,
+        truth_rmse,
+        uncertainty_note,
+        write_wrench,
+    )
     from .log_film import draw_film, shown_rows
     from .tuning_file import load_tuning, save_tuning
 
@@ -88,6 +94,7 @@ def estimate(
         result["consistency"] = consistency.as_dict()
         if consistency.too_slow:
             note(_TOO_SLOW[fit is not None])
+    console.print(f"{uncertainty_note(series)}.")
     truth = truth_rmse(series, flight)
     table = []
     for i, (name, values, unit) in enumerate(

@@ -1,5 +1,5 @@
-"""What is declared of a quadrotor: rigid body, rotors, sensing and the effects that its model
-includes.
+"""What is declared of a quadrotor: rigid body, rotors, sensing, the effects that its model includes
+and how well its numbers are known.
 
 Vehicles are data: ``vehicle_file`` reads them.
 Rotor geometry, mixing and its inverse are equations (1) and (8)-(10) of McKinnon and Schoellig,
@@ -88,6 +88,7 @@ def _definite(value: Array) -> Array:
 PerRotor = Annotated[Array, numbers(4), AfterValidator(_positive)]
 InertiaMatrix = Annotated[Array, numbers(3, 3), BeforeValidator(_matrix), AfterValidator(_definite)]
 NotNegative = Annotated[Number, Field(ge=0.0), expected("a number that is not negative")]
+Share = Annotated[Number, Field(ge=0.0, lt=1.0), expected("a share, from 0 to below 1")]
 
 
 @dataclass(frozen=True)
@@ -138,6 +139,34 @@ class MotorCurve:
 
 
 @dataclass(frozen=True)
+class Uncertainty:
+    """How well a vehicle's numbers are known: standard deviations, as shares of the numbers, of
+    errors that last for a flight and have nothing to do with each other. 0: not stated.
+
+    Attributes:
+        mass: of the mass.
+        thrust: of all rotors' ``k`` in common.
+        rotor: of each rotor's ``k`` beside the others'. A centre of mass that is off by
+            ``arm_l / 2`` times this makes the same torque.
+        torque: of all rotors' ``p`` in common.
+        inertia: of the whole tensor.
+        arm_l: of the rotors' distances in common.
+        command: of thrust and torques at one command, from day to day and over a battery; counts
+            where rotor speeds are worked out from commands.
+    """
+
+    __pydantic_config__ = STRICT
+
+    mass: Share = 0.0
+    thrust: Share = 0.0
+    rotor: Share = 0.0
+    torque: Share = 0.0
+    inertia: Share = 0.0
+    arm_l: Share = 0.0
+    command: Share = 0.0
+
+
+@dataclass(frozen=True)
 class EffectSetting:
     """One effect of a vehicle's model: its name and the coefficients given; those not given are
     zero.
@@ -180,6 +209,7 @@ class Vehicle:
         motor_curve: thrust against command; None: not known.
         floor_z: m, world, height of the floor.
         ceiling_z: m, world, height of the ceiling.
+        uncertainty: how well these numbers are known.
     """
 
     __pydantic_config__ = STRICT
@@ -207,6 +237,7 @@ class Vehicle:
     motor_curve: MotorCurve | None = None
     floor_z: Number = -math.inf
     ceiling_z: Number = math.inf
+    uncertainty: Uncertainty = Uncertainty()
 
     def __repr__(self) -> str:
         effects = ", ".join(effect.name for effect in self.effects) or "none"

@@ -22,6 +22,7 @@ from .error_state import fold
 from .estimate import COASTING, NIS, TRACKING, Array
 from .filter_record import FILTER, N, drive, propagate
 from .hover_covariance import carry_at_hover, catch_up, heading, jacobian_at_hover, turn_world
+from .model_uncertainty import follow_loads
 from .recovery import Recovery, after_prediction, remember
 from .sample import check_sample, undo_sensing
 from .tuning import UKFTuning
@@ -61,6 +62,7 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
     if dt > 0.0:
         drive(f, sample[0:4], dt, voltage)
         propagate(f, x, dt, centre)
+        follow_loads(f, f.rotation, dt)
         f.time += dt
     if f.steady == 0:
         _step_with_covariance(f, sample, usable, dt)

@@ -15,6 +15,7 @@ from .covariance import add_noise, carry_by_jacobian
 from .error_state import symmetrise
 from .estimate import NIS, Array
 from .filter_record import N, drive, propagate
+from .model_uncertainty import follow_loads
 from .recovery import after_prediction
 from .ukf import WrenchUKF, step_by, step_with_biases_by
 
@@ -190,6 +191,7 @@ def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
     x, P, A, G = f.x, f.P, f.S, f.H
     drive(f, rotor_speeds, dt, voltage)
     propagate(f, x, dt, f.centre)
+    follow_loads(f, f.rotation, dt)
     model_jacobian(f, dt, A)
     carry_by_jacobian(P, A, G)
     add_noise(f, f.centre_rotation, dt)

@@ -18,8 +18,10 @@ STATE_SIZE = 20
 # What became of the last step's measurement, in the filter's memory
 TRACKING, COASTING, REJECTED, RESTARTED = 0.0, 1.0, 2.0, 3.0
 STATUSES = ("tracking", "coasting", "rejected", "restarted")
-# Layout of an estimate's numbers: the state, the status, the restarts, then perhaps the covariance
-STATUS, RESTARTS, WITHOUT_COVARIANCE = STATE_SIZE, STATE_SIZE + 1, STATE_SIZE + 2
+# Layout of an estimate's numbers: the state, the status, the restarts, the variances of torque and
+# force that the vehicle's uncertainty makes, then perhaps the covariance
+STATUS, RESTARTS, WITHOUT_COVARIANCE = STATE_SIZE, STATE_SIZE + 1, STATE_SIZE + 8
+MODEL = slice(RESTARTS + 1, WITHOUT_COVARIANCE)
 ESTIMATE_SIZE = WITHOUT_COVARIANCE + 18 * 18
 
 
@@ -30,7 +32,8 @@ class WrenchEstimate:
     front. Later steps do not change an estimate.
 
     Args:
-        numbers: (22,) state, status and restarts, or (346,), the covariance behind them.
+        numbers: (28,) state, status, restarts and the model's variances, or (352,), the covariance
+            behind them.
         std: (18,) standard deviations of the error state, where there is no covariance.
     """
 
@@ -63,7 +66,8 @@ class WrenchEstimate:
     @property
     def covariance(self) -> Array:
         """Covariance (18, 18) of the error state (rho, omega, x, v, torque, force), rho being a
-        world-frame MRP.
+        world-frame MRP: of what noise and the wrench's changes leave uncertain, with a vehicle that
+        is exactly as declared.
 
         Raises:
             InputError: the estimate has none: a batch's stands in the batch, a smoothed one must
@@ -78,20 +82,27 @@ class WrenchEstimate:
 
     @property
     def std(self) -> Array:
-        """Standard deviations (18,) of the same."""
+        """Standard deviations (18,) of the same: without the vehicle's own uncertainty."""
         if self._std is None:
             return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
         return self._std
 
     @property
+    def model_std(self) -> Array:
+        """Standard deviations (6,) of torque, Nm, and force, N, that the stated uncertainty of the
+        vehicle makes (``estimator.model_uncertainty``).
+        """
+        return np.sqrt(self.numbers[..., MODEL])
+
+    @property
     def std_torque(self) -> Array:
-        """Standard deviation (3,) of the torque, Nm."""
-        return self.std[..., 12:15]
+        """Standard deviation (3,) of the torque, Nm: of noise and of the vehicle's uncertainty."""
+        return np.hypot(self.std[..., 12:15], self.model_std[..., :3])
 
     @property
     def std_force(self) -> Array:
-        """Standard deviation (3,) of the force, N."""
-        return self.std[..., 15:18]
+        """Standard deviation (3,) of the force, N, likewise."""
+        return np.hypot(self.std[..., 15:18], self.model_std[..., 3:])
 
     @property
     def position(self) -> Array:

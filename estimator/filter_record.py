@@ -9,6 +9,7 @@ from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled
 from ..runtime.vector_lanes import any_of, choose
 from .estimate import STATE_SIZE
+from .model_uncertainty import FACTORS, LOAD, factors_of
 from .recovery import Recovery, load_recovery
 from .tuning import UKFTuning
 
@@ -45,6 +46,7 @@ FILTER = np.dtype(
         ("x", "f8", (STATE_SIZE,)),
         ("status", "f8"),  # what became of the last step's measurement
         ("restarts", "f8"),  # since the reset
+        ("model", "f8", (6,)),  # variances of torque and force by the vehicle's uncertainty
         ("P", "f8", (N, N)),
         # gaps, refusals and restarts: estimator.recovery
         # s since a position, an attitude was believed, and since each was refused
@@ -58,6 +60,8 @@ FILTER = np.dtype(
         ("in_row", "f8"),  # of those refused: how many went on from each other, up to the last
         # of (rho, x): what those from one to the next add up to, and what these may miss by
         ("jumps", "f8", (2, 6)),
+        ("load", "f8", LOAD),  # what that uncertainty scales: estimator.model_uncertainty
+        ("predicted", "f8", (6,)),  # variances of torque and force before the last measurement
         ("last_speeds", "f8", (4,)),  # rotor speeds that were measured last
         ("gated", "i8"),
         ("alarm", "f8", (2,)),  # largest NIS taken in unseen: of three numbers, of six
@@ -76,6 +80,7 @@ FILTER = np.dtype(
         ("force_walk", "f8", (3,)),
         ("noise", "f8", (6,)),  # of the measurement (rho, x)
         ("imu_noise", "f8", (6,)),  # of gyro and accelerometer
+        ("uncertain", "f8", (FACTORS,)),  # of the vehicle
         ("kappa", "f8"),
         ("period", "f8"),
         # the step in progress
@@ -121,6 +126,7 @@ FILTER = np.dtype(
         ("imu", IMU),
     ]
 )
+NUMBERS = ("x", "status", "restarts", "model")  # of an estimate without its covariance
 ESTIMATE = int(FILTER.fields["x"][1])  # type: ignore[index]  # bytes from the record's start to the estimate
 
 
@@ -146,7 +152,7 @@ def filter_record(
     record = np.zeros(1, dtype=FILTER)
     f = record[0]
     built = load_model(f, vehicle)
-    f["last_speeds"] = built.hover_rate
+    f["last_speeds"], f["uncertain"] = built.hover_rate, factors_of(built)
     f["kappa"], f["period"] = tuning.kappa, period
     load_recovery(f, built, gate, Recovery() if recovery is None else recovery)
     for name, deviation in (

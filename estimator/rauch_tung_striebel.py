@@ -30,6 +30,7 @@ from .covariance import divide, divide_transposed, root_of
 from .error_state import displace, error_from
 from .estimate import NIS, STATE_SIZE, Array
 from .filter_record import N
+from .model_uncertainty import LOAD
 from .recovery import lost_attitude, lost_position
 from .sample import check_sample, undo_sensing
 from .ukf import correct_parts, predict
@@ -46,6 +47,8 @@ LINK = np.dtype(
         ("predicted", "f8", (STATE_SIZE,)),  # the same before its measurement
         ("G", "f8", (N, N)),  # gain, transposed
         ("K", "f8", (N, N)),  # covariance of the estimate before, given this one
+        ("load", "f8", LOAD),  # as of the filter
+        ("passed", "f8", (6,)),  # of torque and force, share of a change that the one before makes
     ]
 )
 
@@ -126,8 +129,10 @@ def step_with_link(f: Record, z: Array, parts: int, dt: float, voltage: float, l
     sample = undo_sensing(f, z, usable, dt)
     before, G, K, restarts = f.P.copy(), link.G, link.K, f.restarts
     G[:], K[:] = np.eye(N), 0.0  # without a prediction both estimates are of one state
+    link.passed[:] = 1.0
     if dt > 0.0:
         predict(f, sample[0:4], dt, voltage)
+        link.passed[:] = np.diag(before)[12:] / np.diag(f.P)[12:]
         link_back(before, cross_covariance(f), f.P, G, K)
         if lost_position(f) or lost_attitude(f):  # held, and no longer predicted
             cut(before, G, K)
@@ -135,7 +140,8 @@ def step_with_link(f: Record, z: Array, parts: int, dt: float, voltage: float, l
     correct_parts(f, sample, usable)
     if f.restarts > restarts:
         cut(before, G, K)
-    link.x[:] = f.x
+        link.passed[:] = 0.0
+    link.x[:], link.load[:] = f.x, f.load
     return usable
 
 

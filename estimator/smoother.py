@@ -16,6 +16,7 @@ from ..runtime.compiled import compiled
 from ..runtime.errors import InputError
 from .estimate import (
     ESTIMATE_SIZE,
+    MODEL,
     NIS,
     RESTARTS,
     STATE_SIZE,
@@ -25,6 +26,7 @@ from .estimate import (
     WrenchEstimate,
 )
 from .filter_record import N
+from .model_uncertainty import follow_back, variances
 from .rauch_tung_striebel import LINK, step_back, step_with_link
 from .recovery import Recovery
 from .tuning import UKFTuning
@@ -58,9 +60,10 @@ def _forward_with_links(
 
 
 @compiled
-def _write(x: Array, P: Array, numbers: Array, std: Array, k: int) -> None:
+def _write(x: Array, P: Array, model: Array, numbers: Array, std: Array, k: int) -> None:
     for i in range(STATE_SIZE):
         numbers[k, i] = x[i]
+    numbers[k, MODEL] = model
     for i in range(N):
         std[k, i] = math.sqrt(P[i, i])
     if numbers.shape[1] == ESTIMATE_SIZE:
@@ -70,13 +73,16 @@ def _write(x: Array, P: Array, numbers: Array, std: Array, k: int) -> None:
 
 
 @compiled
-def _backward(links: np.ndarray, x: Array, P: Array, numbers: Array, std: Array) -> None:
-    """Write the smoothed estimates of a block, from the last, which is ``x`` and ``P``; leave in
-    these the one before the block, whose link is the first.
+def _backward(links: np.ndarray, record: np.ndarray, numbers: Array, std: Array) -> None:
+    """Write the smoothed estimates of a block, from the last, which ``record`` holds; leave in it
+    the one before the block, whose link is the first.
     """
+    f = record[0]
     for k in range(len(numbers) - 1, -1, -1):
-        _write(x, P, numbers, std, k)
-        step_back(x, P, links[k + 1], links[k].x)
+        variances(f.uncertain, f.load, f.model)
+        _write(f.x, f.P, f.model, numbers, std, k)
+        follow_back(f.load, links[k + 1].passed, links[k].load)
+        step_back(f.x, f.P, links[k + 1], links[k].x)
 
 
 class RecordingUKF(WrenchUKF):
@@ -165,10 +171,9 @@ class RecordingUKF(WrenchUKF):
             here = slice(first, min(first + _BLOCK, end))
             blocks.append((here, record.copy()))
             _forward(record, events[here])
-        x, P = record["x"][0].copy(), record["P"][0].copy()
         links = np.zeros(1 + min(_BLOCK, end - begin), dtype=LINK)
         for here, memory in reversed(blocks):
-            links["x"][0] = memory["x"][0]
+            links["x"][0], links["load"][0] = memory["x"][0], memory["load"][0]
             _forward_with_links(memory, events[here], links, numbers[here])
-            _backward(links, x, P, numbers[here], std[here])
-        _write(x, P, numbers, std, begin)
+            _backward(links, record, numbers[here], std[here])
+        _write(record["x"][0], record["P"][0], record["model"][0], numbers, std, begin)

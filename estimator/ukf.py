@@ -77,6 +77,7 @@ from .filter_record import (
     propagate,
 )
 from .imu import take_in_imu
+from .model_uncertainty import follow_loads
 from .recovery import NOISE, Recovery, after_prediction, doubted_variance, judge, remember
 from .sample import Sample, check_sample, undo_first_pose, undo_sensing
 from .sigma_points import PAIRS, errors_of_points, halve_pairs, propagate_points, spread_points
@@ -190,6 +191,7 @@ def _carry_linear(f: Record, dt: float) -> None:
     for i in range(3):
         for j in range(3):
             f.centre_rotation[i, j] = f.rotation[i, j]
+    follow_loads(f, f.centre_rotation, dt)
     carry_linear_part(f, dt)
     add_noise(f, f.centre_rotation, dt)
 
@@ -525,8 +527,9 @@ class WrenchUKF:
         reset_imu(self.record)
         reset_model(f)
         undo_first_pose(self.record)
-        for name in (*fields_between("status", "restarts"), *fields_between("gap", "jumps")):
+        for name in (*fields_between("status", "model"), *fields_between("gap", "load")):
             f[name] = 0.0
+        f["predicted"] = np.diag(f["P"])[12:]
         f["seen"] = f["x"][:7]
         self._begin()
 

@@ -15,8 +15,8 @@ from ..dynamics.vehicle import Vehicle
 from ..runtime.arguments import described, real_numbers
 from ..runtime.compiled import compiled_without_gil
 from ..runtime.errors import InputError
-from .estimate import STATE_SIZE, WITHOUT_COVARIANCE, Array, WrenchEstimate
-from .filter_record import N
+from .estimate import RESTARTS, STATE_SIZE, STATUS, WITHOUT_COVARIANCE, Array, WrenchEstimate
+from .filter_record import NUMBERS, N
 from .recovery import Recovery
 from .sample import negative_speeds
 from .tuning import UKFTuning
@@ -43,7 +43,9 @@ def _step_records(
         step(f, z[n], parts, dt, voltage[n])
         for i in range(STATE_SIZE):
             out[n, i] = f.x[i]
-        out[n, STATE_SIZE], out[n, STATE_SIZE + 1] = f.status, f.restarts
+        out[n, STATUS], out[n, RESTARTS] = f.status, f.restarts
+        for i in range(6):
+            out[n, STATE_SIZE + 2 + i] = f.model[i]
 
 
 class _Records:
@@ -60,7 +62,7 @@ class _Records:
 
     @property
     def state(self) -> Array:
-        return np.column_stack([self._records[name] for name in ("x", "status", "restarts")])
+        return np.column_stack([self._records[name] for name in NUMBERS])
 
     @property
     def covariance(self) -> Array:

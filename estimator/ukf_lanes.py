@@ -18,7 +18,7 @@ from ..runtime.addresses import address_of, call_at, numbers_at
 from ..runtime.compiled import Record, compiled, compiled_without_gil
 from ..runtime.vector_lanes import WIDTH, LaneRecord, choose
 from .estimate import STATE_SIZE, Array
-from .filter_record import FILTER, fields_between
+from .filter_record import FILTER, NUMBERS, fields_between
 from .ukf import carry, correct
 
 # what a filter must not forget from one step to the next; first in both layouts
@@ -92,11 +92,11 @@ def _step_blocks(
     work: int,
     work_z: Array,
     blocks: int,
-    kept: tuple[Array, Array, Array],
+    kept: tuple[Array, Array, Array, Array],
     z: Array,
     out: Array,
 ) -> None:
-    estimates, status, restarts = kept
+    estimates, status, restarts, model = kept
     count = len(z)
     for b in range(len(estimates)):
         take_up(blocks + b * BLOCK_SIZE, work)
@@ -111,6 +111,8 @@ def _step_blocks(
                 out[WIDTH * b + lane, i] = estimates[b, i, lane]
             out[WIDTH * b + lane, STATE_SIZE] = status[b, lane]
             out[WIDTH * b + lane, STATE_SIZE + 1] = restarts[b, lane]
+            for i in range(6):
+                out[WIDTH * b + lane, STATE_SIZE + 2 + i] = model[b, i, lane]
 
 
 def new_work(record: np.ndarray) -> np.ndarray:
@@ -152,22 +154,22 @@ class Blocks:
         write_lanes(self._blocks, n // WIDTH, lanes, record)
 
     def step(self, z: Array, _parts: int, _dt: float, _voltage: Array, out: Array) -> None:
-        """Step all: samples (n, 11), NaN where nothing was measured; estimates (n, 22), written."""
-        kept = self._blocks["x"], self._blocks["status"], self._blocks["restarts"]
+        """Step all: samples (n, 11), NaN where nothing was measured; estimates (n, 28), written."""
+        x, status, restarts, model = (self._blocks[name] for name in NUMBERS)
         _step_blocks(
             step_address(),
             self._work.ctypes.data,
             self._work["z"][0],
             self._blocks.ctypes.data,
-            kept,
+            (x, status, restarts, model),
             z,
             out,
         )
 
     @property
     def state(self) -> Array:
-        """Estimates, status and count of restarts (n, 22)."""
-        return np.column_stack([self._each(name) for name in ("x", "status", "restarts")])
+        """Estimates, status, count of restarts and the model's variances (n, 28)."""
+        return np.column_stack([self._each(name) for name in NUMBERS])
 
     @property
     def covariance(self) -> Array:

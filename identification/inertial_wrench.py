@@ -18,6 +18,7 @@ from ..estimator import UKFTuning, WrenchEstimate
 from ..estimator.estimate import (
     COASTING,
     FORCE,
+    MODEL,
     NIS,
     POSITION,
     QUATERNION,
@@ -29,6 +30,7 @@ from ..estimator.estimate import (
     VELOCITY,
     WITHOUT_COVARIANCE,
 )
+from ..estimator.model_uncertainty import LOAD, factors_of, variances_along
 from .logs.flight_log import FlightLog
 from .motion.inertial_signals import (
     InertialSignals,
@@ -44,9 +46,9 @@ Array = NDArray[np.float64]
 
 def inertial_wrench(
     log: FlightLog, vehicle: Vehicle, tuning: UKFTuning
-) -> tuple[WrenchEstimate, tuple[str, ...]]:
-    """Return the smoothed estimate at every row (N,) of a log by its gyro and accelerometer, and
-    notes.
+) -> tuple[WrenchEstimate, Array, tuple[str, ...]]:
+    """Return the smoothed estimate at every row (N,) of a log by its gyro and accelerometer, the
+    loads (N, 7, 3) of ``estimator.model_uncertainty``, and notes.
 
     The status is "tracking" within an unbroken piece of IMU readings, else "coasting". Position and
     velocity are NaN where nothing measured them; there is no NIS.
@@ -62,15 +64,17 @@ def inertial_wrench(
     noise, count = imu_noise(log), len(log.t)
     numbers, std = np.zeros((count, WITHOUT_COVARIANCE)), np.full((count, 18), np.nan)
     numbers[:, STATUS] = COASTING
+    loads = np.zeros((count, *LOAD))
     before = 0
     pieces = inertial_signals(log, vehicle.gravity)
     for number, s in enumerate(pieces):
-        state, spread = _piece(s, vehicle, tuning, log.period, noise)
+        state, spread, load = _piece(s, vehicle, tuning, log.period, noise)
         # rows between two pieces hold the values of the nearer end of the one before
         end = count if number + 1 == len(pieces) else int(np.searchsorted(log.t, s.t[-1]) + 1)
         t = log.t[before:end]
         numbers[before:end, :STATE_SIZE] = resampled(t, s.t, state)
         std[before:end, 12:] = resampled(t, s.t, spread)
+        loads[before:end] = resampled(t, s.t, load.reshape(len(s.t), -1)).reshape(-1, *LOAD)
         inside = (t >= s.t[0]) & (t <= s.t[-1] + log.period)
         numbers[before:end, STATUS] = np.where(inside, TRACKING, COASTING)
         before = end
@@ -79,7 +83,8 @@ def inertial_wrench(
         numbers[:, POSITION], numbers[:, VELOCITY] = np.nan, np.nan
     quaternion = numbers[:, QUATERNION]
     quaternion /= np.maximum(np.linalg.norm(quaternion, axis=1), 1e-9)[:, None]
-    return WrenchEstimate(numbers, std), _notes(log, pieces, vehicle)
+    numbers[:, MODEL] = variances_along(factors_of(vehicle), loads)
+    return WrenchEstimate(numbers, std), loads, _notes(log, pieces, vehicle)
 
 
 def _piece(
@@ -88,9 +93,9 @@ def _piece(
     tuning: UKFTuning,
     period: float,
     noise: tuple[float, float],
-) -> tuple[Array, Array]:
-    """Return the state (n, STATE_SIZE) of a piece, laid out as an estimate's, and the standard
-    deviations of torque and force (n, 6).
+) -> tuple[Array, Array, Array]:
+    """Return the state (n, STATE_SIZE) of a piece, laid out as an estimate's, the standard
+    deviations of torque and force (n, 6), and the loads (n, 7, 3), smoothed as these are.
     """
     acting, body = acting_wrench(s, vehicle)
     needed = needed_wrench(s, body)
@@ -102,17 +107,18 @@ def _piece(
             *(tuning.thrust_noise, tuning.motor_torque_noise),
         )
     )
-    residual = needed[:, :3] - acting[:, :3]
+    pushes, turns = _loads(s, body, needed)
+    pushes = np.stack([needed[:, :3] - acting[:, :3], *pushes], axis=2)
     inverse = np.linalg.inv(body.inertia)
-    driven = acting[:, 3:] @ inverse.T
-    force, torque = np.empty_like(residual), np.empty_like(residual)
+    driven = np.einsum("ij,cnj->nic", inverse, np.stack([acting[:, 3:], *turns]))
+    force, torque = np.empty_like(pushes), np.empty_like(driven)
     spread = np.empty(6)
     for i in range(3):
         variance = (body.mass * noise[1]) ** 2 + miss_force[i] ** 2 / steps
         walk = walk_force[i] ** 2 * steps
         # a walk that white noise of this variance hides
-        y = residual[:, i, None]
-        walked, std = _two_sided(y, np.zeros_like(y), np.eye(1), np.diag([walk]), variance)
+        y = pushes[:, i]
+        walked, std = _two_sided(y, np.zeros_like(y)[:, None], np.eye(1), np.diag([walk]), variance)
         force[:, i], spread[i] = walked[:, 0], std[0]
         own = inverse[i, i]
         torque[:, i], spread[3 + i] = _smoothed_turning(
@@ -131,29 +137,51 @@ def _piece(
     state[:, POSITION], state[:, VELOCITY] = s.position, s.velocity
     state[:, RATE] = s.angular_velocity
     state[:, QUATERNION] = continuous(Rotation.from_matrix(s.rotation).as_quat(scalar_first=True))
-    state[:, TORQUE] = np.einsum("nij,nj->ni", s.rotation, torque @ body.inertia.T)
-    state[:, FORCE] = force
-    return state, np.column_stack([std_torque, std_force])
+    torque = np.einsum("nij,jk,nkc->cni", s.rotation, body.inertia, torque)
+    state[:, TORQUE], state[:, FORCE] = torque[0], force[:, :, 0]
+    load = np.stack([*torque[1:3], *np.moveaxis(force[:, :, 1:], 2, 0), *torque[3:]], axis=1)
+    return state, np.column_stack([std_torque, std_force]), load
+
+
+def _loads(s: InertialSignals, body: Vehicle, needed: Array) -> tuple[list[Array], list[Array]]:
+    """Return the loads (n, 3) of the force, world, and of the torque, body frame, as they act.
+
+    Those of the rotors are by the logged speeds: what a declared lag or efficiency changes of them
+    is a small part of a deviation.
+    """
+    thrust, x, y, z = body.rotor_wrench(s.rotor_speeds).T
+    none, omega = np.zeros_like(thrust), s.angular_velocity
+    x, y = x - body.com[1] * thrust, y + body.com[0] * thrust
+    turning = needed[:, 3:] + np.cross(omega, omega @ body.inertia.T)
+    turns = [(thrust, none, none), (none, thrust, none), (x, y, none), (none, none, z)]
+    return (
+        [thrust[:, None] * s.rotation[:, :, 2], needed[:, :3]],
+        [*(np.column_stack(turn) for turn in turns), turning],
+    )
 
 
 def _smoothed_turning(
     rate: Array, driven: Array, period: float, walk: float, miss: float, variance: float
 ) -> tuple[Array, float]:
-    """Return the angular acceleration (n,) rad/s2 beside the one that drives an angular velocity,
-    and its standard deviation.
+    """Return the angular acceleration (n, c) rad/s2 beside the first that drives an angular
+    velocity (n,), its standard deviation, and what each of the others would show as if it acted
+    beside.
     """
     model = np.array([[1.0, period], [0.0, 1.0]])
     acting = 0.5 * period * (driven[:-1] + driven[1:])
-    drive = np.column_stack([np.append(0.0, acting), np.zeros(len(rate))])
-    out, std = _two_sided(rate[:, None], drive, model, np.diag([miss, walk]), variance)
+    drive = np.zeros((len(rate), 2, driven.shape[1]))
+    drive[1:, 0] = acting
+    shown = np.column_stack([rate, np.cumsum(drive[:, 0, 1:], axis=0)])
+    drive[:, :, 1:] = 0.0
+    out, std = _two_sided(shown, drive, model, np.diag([miss, walk]), variance)
     return out[:, 1], float(std[1])
 
 
 def _two_sided(
     y: Array, drive: Array, model: Array, noise: Array, variance: float
 ) -> tuple[Array, Array]:
-    """Return the states (n, m) of a steady fixed-interval smoother, of which the first is measured,
-    and their standard deviations (m,).
+    """Return the states (n, m, c) of a steady fixed-interval smoother, of which the first is
+    measured (n, c), and their standard deviations (m,).
     """
     m = len(model)
     H = np.eye(1, m)
@@ -168,14 +196,14 @@ def _two_sided(
         smoothed = then
         if done:
             break
-    predicted, filtered = np.empty((len(y), m)), np.empty((len(y), m))
-    x = np.zeros(m)
-    x[0] = float(np.mean(y[: max(1, len(y) // 200)]))
+    predicted, filtered = np.empty_like(drive), np.empty_like(drive)
+    x = np.zeros(drive.shape[1:])
+    x[0] = np.mean(y[: max(1, len(y) // 200)], axis=0)
     for k in range(len(y)):
         if k:
             x = model @ x + drive[k]
         predicted[k] = x
-        x = x + gain * (y[k, 0] - x[0])
+        x = x + np.outer(gain, y[k] - x[0])
         filtered[k] = x
     out = filtered.copy()
     for k in range(len(y) - 2, -1, -1):

@@ -1,6 +1,7 @@
 """The external wrench over a flight log: the wrench filter run from its first row to its last."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -11,6 +12,7 @@ from ..dynamics.vehicle import Vehicle
 from ..estimator import NoiseFit, RecordingUKF, UKFTuning, WrenchEstimate, WrenchUKF, fit_noise
 from ..estimator.consistency import Consistency
 from ..estimator.estimate import COASTING, NIS, REJECTED, STATUS, STATUSES, WITHOUT_COVARIANCE
+from ..estimator.model_uncertainty import LOAD, NAMES, factors_alone, variances_along
 from ..estimator.noise_fit import consistency_of
 from ..estimator.row_steps import steps_between
 from ..runtime.errors import InputError
@@ -32,14 +34,16 @@ _REPORTED = 10_000  # rows between two reports of progress
 class WrenchSeries(WrenchEstimate):
     """The estimate at every row (N,) of a log.
 
-    Standard deviations are the filter's own. NIS, status and restarts are those of the filter,
-    smoothed or not; NIS is NaN where there was no pose to compare with.
+    Standard deviations are those of noise and of the vehicle's stated uncertainty. NIS, status and
+    restarts are those of the filter, smoothed or not; NIS is NaN where there was no pose to compare
+    with.
 
     Attributes:
         t: (N,) s.
         vehicle: as it was declared to the filter.
         tuning: of the filter.
         notes: sentences for the user.
+        loads: (N, 7, 3) what the vehicle's uncertainty scales, as the filter followed it.
     """
 
     def __init__(
@@ -49,9 +53,11 @@ class WrenchSeries(WrenchEstimate):
         vehicle: Vehicle,
         tuning: UKFTuning,
         notes: tuple[str, ...],
+        loads: Array,
     ) -> None:
         super().__init__(estimate.numbers, estimate.std)
         self.t, self.vehicle, self.tuning, self.notes = t, vehicle, tuning, notes
+        self.loads = loads
 
 
 def estimate_log(
@@ -91,14 +97,17 @@ def estimate_log(
             (``screen_for_estimate``), or its rotor speeds make the filter's numbers overflow.
     """
     log, doubts = screen_for_estimate(log, vehicle)
+    if log.commanded:
+        vehicle = replace(vehicle, omega_source="commanded")
     both = log.gyro is not None and log.accelerometer is not None
     if reads_imu(log) or (smooth and both):
         tuning = tuning or UKFTuning.for_vehicle(vehicle, log.period)
-        found, notes = inertial_wrench(log, vehicle, tuning)
-        return WrenchSeries(found, log.t, vehicle, tuning, (*log.notes, *doubts, *notes))
+        found, loads, notes = inertial_wrench(log, vehicle, tuning)
+        return WrenchSeries(found, log.t, vehicle, tuning, (*log.notes, *doubts, *notes), loads)
     first, count = int(np.flatnonzero(log.valid)[0]), len(log.t)
     ukf = (RecordingUKF if smooth else WrenchUKF)(vehicle, tuning, log.period, gate)
     numbers, std = np.empty((count, WITHOUT_COVARIANCE)), np.empty((count, 18))
+    loads = np.zeros((count, *LOAD))
     events = np.zeros(count, dtype=np.int64)  # of a recording filter: the one that ends a row
     ukf.reset(log.position[first], log.quaternion[first])
     with np.errstate(
@@ -115,6 +124,7 @@ def estimate_log(
                     ukf.correct(log.position[k], log.quaternion[k])
             estimate = ukf.estimate
             numbers[k], std[k] = estimate.numbers[:WITHOUT_COVARIANCE], estimate.std
+            loads[k] = ukf.record["load"][0]
             if isinstance(ukf, RecordingUKF):
                 events[k] = ukf.events - 1
     numbers[:first], std[:first] = numbers[first], std[first]
@@ -127,7 +137,7 @@ def estimate_log(
     found = ukf.smooth(events) if isinstance(ukf, RecordingUKF) else WrenchEstimate(numbers, std)
     found.numbers[~log.valid, NIS] = np.nan
     found.numbers[:first, STATUS] = COASTING
-    series = WrenchSeries(found, log.t, vehicle, ukf.tuning, (*log.notes, *doubts))
+    series = WrenchSeries(found, log.t, vehicle, ukf.tuning, (*log.notes, *doubts), loads)
     series.notes += tuple(_notes(log, series, smooth))
     return series
 
@@ -148,6 +158,31 @@ def pose_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
 def counts(series: WrenchSeries) -> dict[str, int]:
     """Return how many rows have each status: tracking, coasting, rejected, restarted."""
     return {name: int(np.sum(series.status_code == i)) for i, name in enumerate(STATUSES)}
+
+
+def uncertainty_note(series: WrenchSeries) -> str:
+    """Say how far force and torque are known, and what makes up most of that."""
+    force = _largest_part(series, series.std_force, 3, "N")
+    return f"One standard deviation of the force is {force}; of the torque, " + _largest_part(
+        series, series.std_torque, 0, "Nm"
+    )
+
+
+def _largest_part(series: WrenchSeries, std: Array, first: int, unit: str) -> str:
+    """Say the deviation (N, 3) of three numbers, the ``first`` of torque and force."""
+    parts = {
+        f"{NAMES[name]}, +-{100.0 * getattr(series.vehicle.uncertainty, name):.3g} %"
+        f"{' between days' if name == 'command' else ''},": np.mean(
+            variances_along(factors, series.loads)[:, first : first + 3]
+        )
+        for name, factors in factors_alone(series.vehicle).items()
+    }
+    parts["noise"] = np.mean(np.square(series.std[:, 12 + first : 15 + first]))
+    name, total = max(parts, key=lambda part: parts[part]), np.mean(np.square(std))
+    return (
+        f"{np.sqrt(total):.2g} {unit} an axis, and {name} makes up "
+        f"{100.0 * parts[name] / total:.0f} % of its square"
+    )
 
 
 def _notes(log: FlightLog, series: WrenchSeries, smooth: bool) -> Iterator[str]:

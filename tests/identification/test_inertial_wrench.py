@@ -26,7 +26,7 @@ def test_an_imu_alone_shows_a_vertical_force(flown: FlightLog) -> None:
     series = estimate_log(pose_removed(flown), VEHICLE)
     inner = slice(400, -400)
     assert abs(float(series.force[inner, 2].mean()) + 0.4) < 0.1
-    z = np.abs(series.force - flown.force)[inner] / series.std_force[inner]
+    z = np.abs(series.force - flown.force)[inner] / series.std[inner, 15:]
     assert (z.mean(axis=0) < 2.0).all()
     assert np.isnan(series.nis).all()
     assert any("no pose" in note for note in series.notes)
@@ -53,10 +53,10 @@ def test_the_force_is_the_posterior_of_a_walk() -> None:
     rng = np.random.default_rng(0)
     n, walk, variance = 400, 0.01, 1.0
     y = np.cumsum(np.sqrt(walk) * rng.standard_normal(n)) + rng.standard_normal(n)
-    found, std = _two_sided(y[:, None], np.zeros((n, 1)), np.eye(1), np.diag([walk]), variance)
+    found, std = _two_sided(y[:, None], np.zeros((n, 1, 1)), np.eye(1), np.diag([walk]), variance)
     between = np.diff(np.eye(n), axis=0)
     precision = np.eye(n) / variance + between.T @ between / walk
     covariance = np.linalg.inv(precision)
     inner = slice(150, 250)
-    np.testing.assert_allclose(found[inner, 0], (covariance @ y / variance)[inner], atol=1e-5)
+    np.testing.assert_allclose(found[inner, 0, 0], (covariance @ y / variance)[inner], atol=1e-5)
     assert std[0] == pytest.approx(np.sqrt(covariance[200, 200]), rel=1e-4)

@@ -1,0 +1,151 @@
+"""What the vehicle's own uncertainty adds to the variances of torque and force.
+
+A mass or a thrust coefficient that is wrong stays wrong for all of a flight. No measurement of the
+motion tells it from a wrench, so it adds to the output and leaves the filter as it is: as process
+noise it would average out over time, and the stated deviation would shrink as if it did.
+
+A wrong vehicle acts on the filter as the wrench ``sum_j e_j L_j`` would, with its relative errors e
+and these loads L, in the world frame:
+
+    mass              force   m (a + g) = thrust z + force + effects
+    thrust, command   force   thrust z;  torque  that of the rotors
+    one rotor of four force   thrust z / 4;  torque  thrust / 4 at the rotor's place
+    torque, arm_l     torque  the rotors' about z, and about x and y
+    inertia           torque  all that turns the body
+
+The filter shows a wrench by and by, in each correction the share of its variance that the
+correction takes away, 1 - P / P-; so the loads are followed in the same shares. With errors that
+have nothing to do with each other, the variance of the output is ``sum_j var(e_j) L_j^2``.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..dynamics.vehicle import Uncertainty, Vehicle
+from ..runtime.compiled import Record, compiled_for_vectors
+from ..runtime.vector_lanes import choose
+
+Array = NDArray[np.float64]
+
+# Loads, one a row: thrust along body x and y, which times its arm turns the body, and along z (N);
+# what moves the mass (N); torques of the rotors about body x and y, about z, and all torques (Nm).
+# The third and fourth are followed as the force is, the others as the torque
+LOAD = (7, 3)
+# Variances by which squares of the loads count: of mass, thrust, command, arm, reaction torque,
+# inertia, then (m2) of the rotors' places y y, x x, x y
+FACTORS = 9
+
+# what each stated number is called in a sentence
+NAMES = {
+    "mass": "the mass",
+    "thrust": "the thrust coefficient",
+    "rotor": "the difference between rotors",
+    "torque": "the torque coefficient",
+    "inertia": "the inertia",
+    "arm_l": "the arm length",
+    "command": "the thrust of a command",
+}
+
+
+def factors_of(vehicle: Vehicle) -> Array:
+    """Return the factors (FACTORS,) of a vehicle's stated uncertainty."""
+    known = vehicle.uncertainty
+    x, y = (vehicle.positions - vehicle.com)[:, :2].T / 4.0
+    rotor = known.rotor**2
+    return np.array(
+        [
+            known.mass**2,
+            known.thrust**2 + rotor / 4.0,
+            known.command**2 if vehicle.omega_source == "commanded" else 0.0,
+            known.thrust**2 + known.arm_l**2,
+            known.torque**2,
+            known.inertia**2,
+            *(rotor * y @ y, rotor * x @ x, rotor * x @ y),
+        ]
+    )
+
+
+def factors_alone(vehicle: Vehicle) -> dict[str, Array]:
+    """Return the same of each stated number alone; they add up to those of all."""
+    return {
+        name: factors_of(replace(vehicle, uncertainty=Uncertainty(**{name: size})))
+        for name in NAMES
+        if (size := getattr(vehicle.uncertainty, name)) > 0.0
+    }
+
+
+@compiled_for_vectors
+def variances(factors: Array, load: Array, out: Array) -> None:
+    """Write the variances (6,) of torque and force at followed loads (7, 3) into ``out``."""
+    mass, thrust, command, arm = factors[0], factors[1], factors[2], factors[3]
+    reaction, inertia, yy, xx, xy = factors[4], factors[5], factors[6], factors[7], factors[8]
+    for i in range(3):
+        ax, ay, t, w = load[0, i], load[1, i], load[2, i], load[3, i]
+        a, z, turning = load[4, i], load[5, i], load[6, i]
+        out[i] = (
+            arm * a * a
+            + reaction * z * z
+            + command * (a + z) * (a + z)
+            + inertia * turning * turning
+            + (yy * ax * ax + xx * ay * ay - 2.0 * xy * ax * ay)
+        )
+        out[3 + i] = mass * w * w + (thrust + command) * t * t
+
+
+@compiled_for_vectors
+def variances_along(factors: Array, loads: Array) -> Array:
+    """Return the same (n, 6) of a series of loads (n, 7, 3)."""
+    out = np.empty((len(loads), 6))
+    for k in range(len(loads)):
+        variances(factors, loads[k], out[k])
+    return out
+
+
+@compiled_for_vectors
+def follow_loads(f: Record, R: Array, dt: float) -> None:
+    """Follow the loads of a prediction over ``dt`` s at the attitude ``R`` (3, 3), and write the
+    model's variances into ``f.model``. Expects the rotors' and the effects' wrench, and ``f.P``
+    before the prediction.
+    """
+    load, w, e, x = f.load, f.rotor_wrench, f.effect_wrench, f.x
+    periods = dt / f.period
+    for i in range(3):
+        turn = _taken_in(f, i, periods * f.torque_walk[i])
+        push = _taken_in(f, 3 + i, periods * f.force_walk[i])
+        thrust = R[i, 2] * w[0]
+        across = R[i, 0] * w[1] + R[i, 1] * w[2]
+        around = R[i, 2] * w[3]
+        of_effects = R[i, 0] * e[3] + R[i, 1] * e[4] + R[i, 2] * e[5]
+        load[0, i] += turn * (R[i, 0] * w[0] - load[0, i])
+        load[1, i] += turn * (R[i, 1] * w[0] - load[1, i])
+        load[2, i] += push * (thrust - load[2, i])
+        load[3, i] += push * (thrust + x[16 + i] + e[i] - load[3, i])
+        load[4, i] += turn * (across - load[4, i])
+        load[5, i] += turn * (around - load[5, i])
+        load[6, i] += turn * (across + around + of_effects + x[13 + i] - load[6, i])
+    variances(f.uncertain, load, f.model)
+
+
+@compiled_for_vectors
+def follow_back(load: Array, passed: Array, earlier: Array) -> None:
+    """Replace smoothed loads (7, 3) by those one step earlier, where they had been followed to
+    ``earlier``; ``passed`` (6,): variance of torque and force there, as a
+    share of that predicted from there.
+    """
+    for row in range(7):
+        first = 3 if row in (2, 3) else 0
+        for i in range(3):
+            before = earlier[row, i]
+            load[row, i] = before + passed[first + i] * (load[row, i] - before)
+
+
+@compiled_for_vectors
+def _taken_in(f: Record, i: int, walk: float) -> float:
+    """Return which share of the variance of torque or force number ``i`` the corrections since the
+    last prediction took away.
+    """
+    before, now = f.predicted[i], f.P[12 + i, 12 + i]
+    f.predicted[i] = now + walk
+    return choose(now < before, 1.0 - now / before, 0.0)
