@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.effects import Role, get
-from ...dynamics.vehicle import EffectSetting, Mocap, MotorCurve, Vehicle
+from ...dynamics.vehicle import EffectSetting, Mocap, MotorCurve, Uncertainty, Vehicle
 from ..logs.flight_log import FlightLog
 from ..motion.sensor_noise import sensor_noise
 from .effect_settings import effect_of, estimate_name
@@ -80,6 +80,7 @@ def vehicle_of(
         com=com,
         effects=tuple(effects),
         motor_curve=curve,
+        uncertainty=_uncertainty(estimates, arm, curve is not None),
     )
     posed = [log for log in logs if log.has_pose]
     if not posed:
@@ -93,6 +94,29 @@ def vehicle_of(
             max(noise.position, 1e-5),
             max(noise.attitude, 1e-4),
         ),
+    )
+
+
+def _uncertainty(estimates: Mapping[str, Estimate], arm: float, commands: bool) -> Uncertainty:
+    """Return the standard deviations that 95 % intervals mean, thrust's with the spread from day to
+    day; that of the mass, which was given, is not known.
+    """
+
+    def share(*names: str) -> list[float]:
+        known = [estimates[n] for n in names if n in estimates and estimates[n].low > 0.0]
+        return [min(math.log(e.high / e.low) / (2.0 * 1.96), 0.99) for e in known]
+
+    centre = [e for n in ("com x", "com y") if (e := estimates.get(n)) and e.status != NOTHING]
+    return Uncertainty(
+        thrust=math.hypot(
+            min(share("k", "thrust(0.25)", "thrust(0.5)", "thrust(0.75)"), default=0.0),
+            USUAL.thrust_spread,
+        ),
+        rotor=max((min((e.high - e.low) / 1.96 / arm, 0.99) for e in centre), default=0.0),
+        torque=max(share("p/k"), default=0.0),
+        inertia=max(share("Jxx", "Jyy", "Jzz"), default=0.0),
+        arm_l=max(share("arm_l"), default=0.0),
+        command=USUAL.command_spread if commands else 0.0,
     )
 
 

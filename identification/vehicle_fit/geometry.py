@@ -29,6 +29,10 @@ class Usual:
     reach: float = 0.2
     reach_range: tuple[float, float] = (0.1, 0.4)
     radius: float = 0.78  # of a rotor, as a share of the arm: 0.71 to 0.83
+    # standard deviations, as shares, of thrust from day to day, which the logs of one day do not
+    # show: at one rotor speed sessions differ by 0.6 to 2.4 %, at one command by 10 %
+    thrust_spread: float = 0.015
+    command_spread: float = 0.1
     hover_speed: float = 1000.0  # rad/s, where no log says what a rotor's speed is
 
 
