@@ -148,4 +148,5 @@ def _taken_in(f: Record, i: int, walk: float) -> float:
     """
     before, now = f.predicted[i], f.P[12 + i, 12 + i]
     f.predicted[i] = now + walk
-    return choose(now < before, 1.0 - now / before, 0.0)
+    share: float = choose(now < before, 1.0 - now / before, 0.0)
+    return share
