@@ -22,6 +22,7 @@ from .estimate import Array, WrenchEstimate
 from .filter_record import N
 
 MEASURED = 6  # numbers in a pose
+_MOST = 1024  # poses of a second; more make a shorter one, of the same distribution
 
 
 def state_error(estimate: WrenchEstimate, truth: Array) -> Array:
@@ -62,39 +63,43 @@ class Consistency:
     """What the innovations of a flight say of its filter's tuning, in memory that does not grow.
 
     Attributes:
-        poses: that were added.
-        seconds: that have one.
+        seconds: that have a pose.
     """
 
     def __init__(self) -> None:
-        self.poses = self.seconds = 0
-        self._nis, self._over_seconds = 0.0, 0.0  # sums
-        self._sum, self._summed, self._end = np.zeros(MEASURED), 0, -math.inf  # of this second
+        self._sums = np.zeros(2)  # of NIS and of NIS over a second, of the seconds before
+        self._before = self.seconds = self._count = 0  # poses before this second, and in it
+        self._kept, self._end = np.zeros((_MOST, MEASURED)), -math.inf
 
-    def add(self, t: float, white: Array, nis: float) -> None:
-        """Take in the whitened innovation (6,) of a pose at ``t``, s, and its NIS."""
-        if not self._end - 1.0 <= t < self._end:
-            self._over_seconds += self._this_second
-            self._sum[:], self._summed, self._end = 0.0, 0, t + 1.0
+    def add(self, t: float, white: Array) -> None:
+        """Take in the whitened innovation (6,) of a pose at ``t``, s."""
+        if not self._end - 1.0 <= t < self._end or self._count == _MOST:
+            self._sums += self._this_second
+            self._before, self._count, self._end = self.poses, 0, t + 1.0
             self.seconds += 1
-        self._sum += white
-        self._summed += 1
-        self._nis += nis
-        self.poses += 1
+        self._kept[self._count] = white
+        self._count += 1
 
     @property
-    def _this_second(self) -> float:
-        return float(self._sum @ self._sum) / max(self._summed, 1)
+    def _this_second(self) -> tuple[float, float]:
+        kept = self._kept[: self._count]
+        total = kept.sum(axis=0)
+        return float(np.vdot(kept, kept)), float(total @ total) / max(self._count, 1)
+
+    @property
+    def poses(self) -> int:
+        """How many were added."""
+        return self._before + self._count
 
     @property
     def nis(self) -> float:
         """Mean NIS of a pose; 6 is expected, NaN where there is none."""
-        return self._nis / (self.poses or math.nan)
+        return float(self._sums[0] + self._this_second[0]) / (self.poses or math.nan)
 
     @property
     def nis_over_second(self) -> float:
         """Mean NIS over a second, likewise."""
-        return (self._over_seconds + self._this_second) / (self.seconds or math.nan)
+        return float(self._sums[1] + self._this_second[1]) / (self.seconds or math.nan)
 
     @property
     def too_slow(self) -> bool:

@@ -340,5 +340,5 @@ class _Flight:
         """
         found, consistency = self.evaluate(tuning, self.whole), Consistency()
         for pose in found[~found.outlier]:
-            consistency.add(pose.t, pose.white, pose.nis)
+            consistency.add(pose.t, pose.white)
         return consistency, float(found.log_likelihood.sum()), int(found.outlier.sum())

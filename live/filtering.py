@@ -14,7 +14,7 @@ import numpy as np
 
 from ..dynamics.vehicle import Vehicle
 from ..estimator import TimedFilter, UKFTuning, WrenchEstimate, WrenchUKF
-from ..estimator.estimate import NIS, RESTARTED, STATUS, TRACKING
+from ..estimator.estimate import RESTARTED, STATUS, TRACKING
 from ..estimator.row_steps import steps_between
 from ..estimator.tuning import PERIOD
 from ..identification.wrench_series import GATE
@@ -160,7 +160,7 @@ class LiveFilter:
         if status == RESTARTED:
             self._settled = t + _STARTUP
         elif status == TRACKING and t > self._settled:
-            self._tallies.consistency.add(t, self._white, estimate.numbers[NIS])
+            self._tallies.consistency.add(t, self._white)
 
     @staticmethod
     def _correct(timed: TimedFilter, row: Row) -> WrenchEstimate | None:
