@@ -153,12 +153,12 @@ def after_prediction(f: Record, dt: float) -> None:
         wide = P[i, i] > 16.0 * f.prior[i]
         if any_of(wide):
             scale = choose(wide, math.sqrt(16.0 * f.prior[i] / P[i, i]), 1.0)
-            for j in range(N):
+            for j in range(len(P)):
                 P[i, j] *= scale
                 P[j, i] *= scale
     if any_of((gap[0] > f.patience) | (gap[1] > f.patience) | (gap[0] < gap[1])):
         position, attitude = lost_position(f), lost_attitude(f)
-        _forget(f, position, attitude)
+        _forget(f, position, attitude, False)
         for i in range(3):
             # where it was before this step: the velocity of what is held is zero
             x[i] -= choose(position, 0.5 * dt * x[7 + i], 0.0)
@@ -176,8 +176,11 @@ def start_over_if_broken(f: Record) -> None:
     total = x[0]
     for i in range(1, 19):
         total += x[i]
-    for i in range(N):
-        total += P[i, i]
+    for i in range(N):  # a float of the C overflows sooner than a double: all of P is looked at
+        row = P[i, i]
+        for j in range(i):
+            row += P[i, j]
+        total += row
     broken = choose(math.isfinite(total), 0.0, 1.0) > 0.5
     if any_of(broken):
         _start_over(f, broken)
@@ -185,14 +188,12 @@ def start_over_if_broken(f: Record) -> None:
 
 @compiled
 def _start_over(f: Record, broken: bool) -> None:
-    x, P = f.x, f.P
+    x = f.x
     for i in range(7):
         x[i] = choose(broken, f.seen[i], x[i])
     for i in range(7, 19):
         x[i] = choose(broken, 0.0, x[i])
-    for i in range(N):
-        for j in range(N):
-            P[i, j] = choose(broken, f.prior[i] if i == j else 0.0, P[i, j])
+    _forget(f, broken, broken, broken)
     f.restarts = choose(broken, f.restarts + 1.0, f.restarts)
     f.status = choose(broken, RESTARTED, f.status)
 
@@ -224,12 +225,12 @@ def lost_attitude(f: Record) -> bool:
 
 
 @compiled
-def _forget(f: Record, position: bool, attitude: bool) -> None:
+def _forget(f: Record, position: bool, attitude: bool, wrench: bool) -> None:
     """Give what is forgotten the prior's covariance, and none with the rest."""
     P = f.P
-    for i in range(12):
-        gone = attitude if i < 6 else position
-        for j in range(N):
+    for i in range(N):
+        gone = attitude if i < 6 else position if i < 12 else wrench
+        for j in range(len(P)):
             P[i, j] = choose(gone, 0.0, P[i, j])
             P[j, i] = choose(gone, 0.0, P[j, i])
         P[i, i] = choose(gone, f.prior[i], P[i, i])
@@ -264,7 +265,8 @@ def judge(
     asked = alarming | (taken & (f.refused > 0.5))
     refused = choose(asked & (choose(lost | going_on, 1.0, 0.0) < 0.5), 1.0, 0.0)
     aliased = with_attitude & turns_between(f)
-    contradicted = alarming & (going_on & ((nis > f.restart_at) | aliased))
+    hopeless = choose(nis <= f.restart_at, 0.0, 1.0) > 0.5
+    contradicted = alarming & (going_on & (hopeless | aliased))
     if f.gated > 0:
         lasting = choose(f.in_row > 1.5, f.lasting + min(gap[2], gap[3]), 0.0)
         f.lasting = choose(refused > 0.5, lasting, f.lasting)
@@ -394,7 +396,7 @@ def _agrees(
         reach = lever * age * choose(has_pace, pushed, fastest)
         slack = 6.0 * math.sqrt(variances * noise[i]) + reach
         miss = moved[i] - choose(has_pace, age * pace[i], 0.0)
-        apart += choose(measured & (miss * miss > slack * slack), 1.0, 0.0)
+        apart += choose(measured & (abs(miss) > slack), 1.0, 0.0)
         pace[i] = choose(measured, moved[i] / max(age, 1e-9), pace[i])
         moved[i] = miss
     near: bool = apart < 0.5
@@ -450,7 +452,7 @@ def continues(
                 6.0 * math.sqrt(P[6 + i, 6 + i]) + f.push[1] * (f.response + 0.5 * age)
             )
         error[6 + i] = slack
-        far += choose(measured & (error[i] * error[i] > slack * slack), 1.0, 0.0)
+        far += choose(measured & (abs(error[i]) > slack), 1.0, 0.0)
     near: bool = far < 0.5
     return near
 
@@ -469,7 +471,7 @@ def _restart(
     x, P, prior, miss = f.x, f.P, f.prior, f.mean[12:18]
     restarted = at_position | at_attitude
     aliased = at_attitude & turns_between(f)
-    _forget(f, at_position, at_attitude)
+    _forget(f, at_position, at_attitude, False)
     for i in range(4):
         x[3 + i] = choose(at_attitude, quaternion[i], x[3 + i])
     for i in range(3):
@@ -479,12 +481,10 @@ def _restart(
         P[6 + i, 6 + i] = choose(at_position, variance, P[6 + i, 6 + i])
         x[i] = choose(at_position, position[i], x[i])
         # the twist is still the best guess, unless none of such a vehicle
-        for k in (7 + i, 10 + i):
-            row = k + 2 if k < 10 else k - 7
-            mad = (at_position if k < 10 else at_attitude) & (x[k] * x[k] > 4.0 * prior[row])
-            if k >= 10:
-                mad = mad | aliased
-            x[k] = choose(mad, 0.0, x[k])
+        mad = at_position & (x[7 + i] * x[7 + i] > 4.0 * prior[9 + i])
+        x[7 + i] = choose(mad, 0.0, x[7 + i])
+        mad = aliased | (at_attitude & (x[10 + i] * x[10 + i] > 4.0 * prior[3 + i]))
+        x[10 + i] = choose(mad, 0.0, x[10 + i])
     for i in range(12, N):
         for j in range(12):
             P[i, j] = choose(restarted, 0.0, P[i, j])
@@ -512,9 +512,10 @@ def remember(
     gap[0] = choose(with_position, 0.0, gap[0])
     gap[1] = choose(with_attitude, 0.0, gap[1])
     away = choose(with_position, 0.0, 0.0)
-    for i in range(6):
-        unmeasured = choose(with_attitude if i < 3 else with_position, 0.0, 1.0) > 0.5
-        away += choose(unmeasured & (abs(jumps[0, i]) > jumps[1, i]), 1.0, 0.0)
+    if f.gated > 0:
+        for i in range(6):
+            unmeasured = choose(with_attitude if i < 3 else with_position, 0.0, 1.0) > 0.5
+            away += choose(unmeasured & (abs(jumps[0, i]) > jumps[1, i]), 1.0, 0.0)
     f.refused = choose((with_position | with_attitude) & (away < 0.5), 0.0, f.refused)
 
 

@@ -1,9 +1,9 @@
 """The wrench filter of one vehicle as a C header and a C99 source, in single or double precision.
 
-Templates hold the equations, written after the Python filter; every number comes from the Python
-filter's own record (``estimator.filter_record``), so there is one place for each. Effects are
-translated from their Python. ``tests/live/test_export_c.py`` holds C and Python together, flight by
-flight.
+Gaps, outliers and restarts are translated from the Python filter (``filter_code``), effects from
+their Python (``effect_code``); templates hold the other equations, written after it. Every number
+comes from the Python filter's own record (``estimator.filter_record``), so there is one place for
+each. ``tests/live/test_export_c.py`` holds C and Python together, flight by flight.
 """
 
 import math
@@ -26,18 +26,19 @@ from ...estimator.error_state import LARGEST_MRP_VARIANCE
 from ...estimator.filter_record import AGREEING, N
 from ...estimator.hover_covariance import CATCH_UP
 from ...estimator.imu import _PATIENCE as IMU_PATIENCE
-from ...estimator.recovery import AGREEING as AGREEING_POSES
 from ...estimator.recovery import NOISE
 from ...estimator.ukf import default_covariance
 from ...runtime.errors import InputError
 from . import hover
 from .c_numbers import literal, shape, table
+from .c_values import UntranslatableError
 from .effect_code import (
-    UntranslatableError,
     definitions,
     exportable_effects,
+    library,
     translate,
 )
+from .filter_code import constants, fields, filter_code
 from .precision import FUNCTIONS, PRECISIONS, in_precision
 from .tracker import tracker_policy
 
@@ -161,7 +162,6 @@ def export_c(
         "first_variance": np.diag(default_covariance(vehicle, tuning)),
         "hover_speed": literal(float(f["last_speeds"][0])),
         "agreeing": AGREEING,
-        "agreeing_poses": AGREEING_POSES,
         "offset": offset,
         "pairs": 12 if wrench else 6,
         "bent": 12 if wrench else 6 if offset else 3,
@@ -178,7 +178,6 @@ def export_c(
         "uses_log": "ww_log(" in effect_code,
         "voltage": "WW_ROTOR_VOLTAGE]" in effect_code,
     }
-    context["uses_smaller"] = "smaller(" in effect_code or policy is not None
     environment = Environment(
         loader=PackageLoader("windwrench.live.export_c", "templates"),
         undefined=StrictUndefined,
@@ -192,9 +191,13 @@ def export_c(
     places = "WW_STEP WW_ROTOR_TIME" + (" WW_ROTOR_ACCELERATION" if wrench else "")
     effects_c = environment.get_template("effects.c.j2").render(context | {"places": places})
     context["places"] = definitions(effects_c)
+    context["filter_code"] = filter_code(f, gate is not None)
+    context |= {"constants": "", "fields": ""}
+    source = environment.get_template(FILES["windwrench_filter.c"]).render(context)
+    context |= {"constants": constants(f, source), "fields": fields(source)}
     files = {
-        name: in_precision(environment.get_template(source).render(context), precision)
-        for name, source in FILES.items()
+        name: in_precision(environment.get_template(template).render(context), precision)
+        for name, template in FILES.items()
     }
     return Exported(files, made, tuple(e.name for e in vehicle.effects), precision)
 
@@ -212,7 +215,7 @@ def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], list[Effect]
     Raises:
         InputError: one cannot be exported.
     """
-    needed: dict[str, str] = {}
+    parts = library()
     models: dict[str, str] = {}
     found: dict[str, list[Effect]] = {"wrench": [], "rotor input": [], "sensing": []}
     for setting in vehicle.effects:
@@ -220,7 +223,7 @@ def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], list[Effect]
         if effect.kind == "body":  # its numbers are the vehicle's
             continue
         try:
-            code = translate(effect, needed)
+            code = translate(effect, parts)
         except (UntranslatableError, OSError) as error:
             raise InputError(
                 f"{vehicle.name}: effects: {effect.name} cannot be exported: it {error}; declare "
@@ -231,7 +234,7 @@ def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], list[Effect]
         models[effect.name] = code
         found[effect.kind].append(effect)
     found["wrench"].sort(key=lambda effect: not effect.sets_wind)
-    code = "\n".join([*needed.values(), *models.values()])
+    code = "\n".join([*([parts.code()] if parts.done else []), *models.values()])
     if not code:
         return [], [], [], ""
     functions: list[str] = []

@@ -1,0 +1,69 @@
+"""The wrench filter's own functions as C, and the constants and fields that they use."""
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ...estimator import recovery
+from ...estimator.filter_record import FILTER, fields_between
+from .c_numbers import literal, shape, table
+from .translate import Library
+
+# functions that templates call; each brings along what it calls
+_CALLED = (
+    recovery.after_prediction,
+    recovery.judge,
+    recovery.remember,
+    recovery.doubted_variance,
+)
+# those of templates that translated ones call, and which of their arguments they write
+_BY_HAND = {"attitude_error": "2"}
+_MEMORY = (*fields_between("x", "last_speeds"), *fields_between("z", "rows"))
+
+
+def filter_code(record: np.void, gated: bool) -> str:
+    """Return the functions of a filter, with what its record says decided."""
+    memory = {}
+    for name in _MEMORY:
+        kind = FILTER.fields[name][0]  # type: ignore[index]
+        whole = kind.base.kind == "i"
+        memory[name] = "int" if whole else "float", tuple(map(str, kind.shape))
+    library = Library(constants=record, memory=memory, by_hand=_BY_HAND)
+    for function in _CALLED:
+        if gated or function is not recovery.doubted_variance:
+            library.get(function)
+    return library.code()
+
+
+def fields(code: str) -> str:
+    """Return the declarations of the fields of ``ww_filter`` that C code uses."""
+    used = (name for name in _MEMORY if name != "P" and re.search(rf"\bf->{name}\b", code))
+    return "\n".join(
+        f"    float {name}{''.join(f'[{n}]' for n in FILTER[name].shape)};" for name in used
+    )
+
+
+def constants(record: Any, code: str) -> str:
+    """Return the definitions of those fields of a filter's record that C code uses."""
+    lines = []
+    for name, value in _numbers(record, ""):
+        word = f"ww_{name}" if value.shape else f"WW_{name.upper()}"
+        if f"#define {word} " in code or f"const float {word}[" in code:
+            continue  # a template has it, in a shape of its own
+        if re.search(rf"\b{word}\b", code):
+            lines.append(
+                f"static const float {word}{shape(value)} = {table(value, name)};"
+                if value.shape
+                else f"#define {word} {literal(float(value), name)}"
+            )
+    return "\n".join(lines)
+
+
+def _numbers(record: Any, before: str) -> Iterator[tuple[str, Any]]:
+    for name in record.dtype.names:
+        if record[name].dtype.names:
+            yield from _numbers(record[name], f"{before}{name}_")
+        else:
+            yield f"{before}{name}", record[name]

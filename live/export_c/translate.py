@@ -1,0 +1,584 @@
+"""Compiled Python functions as C, translated from their source, which stays the only place where
+they are written.
+
+What is translated is plain arithmetic on numbers and arrays: assignments, ``for`` over a ``range``,
+``if``, functions of ``math`` that C has too, ``min``, ``max``, the questions of ``vector_lanes``
+for one lane, and calls of other compiled functions. A record's fields are those of ``ww_filter``,
+or constants where an export knows them: what depends on constants alone is decided here, and the C
+has the chosen branch only. Everything else is refused.
+"""
+
+import ast
+import inspect
+import math
+import re
+import textwrap
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, cast
+
+from ...dynamics.effects import base
+from .c_values import (
+    Array,
+    Fields,
+    Number,
+    UntranslatableError,
+    Value,
+    c_name,
+    combined,
+    constant,
+    operator_of,
+)
+from .source_tree import decided, is_read, results_of, tree_of
+
+_MATHS = {
+    "sqrt": "sqrtf",
+    "sin": "sinf",
+    "cos": "cosf",
+    "exp": "ww_exp",
+    "fabs": "fabsf",
+    "atan2": "ww_atan2",
+    "isfinite": "finite_number",
+}
+_FUNCTIONS = {"abs": "fabsf", "min": "smaller", "max": "larger"}
+_PASSED_ON = ("any_of", "all_of")  # of one lane
+_TYPES = {"float": "float", "int": "int", "truth": "int"}
+_OF_ANNOTATION = {"float": "float", "int": "int", "bool": "truth"}
+
+
+@dataclass
+class Library:
+    """What translated functions may use, and those that are translated so far.
+
+    Attributes:
+        constants: the filter's record; its fields are constants unless they are in ``memory``.
+        memory: names and shapes of the fields that ``ww_filter`` has, int ones and float ones.
+        covariance: rows and columns of P, which is a parameter of its own.
+        by_hand: functions that templates have, by their names: which of their arguments they write.
+        refused: functions that are not translated, and why.
+        prefix: of the names of functions.
+    """
+
+    constants: Any = None
+    memory: Mapping[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
+    covariance: str = "WW_STATES"
+    by_hand: Mapping[str, str] = field(default_factory=dict)
+    refused: Mapping[Any, str] = field(default_factory=dict)
+    prefix: str = ""
+    done: dict[tuple[Any, ...], "Function"] = field(default_factory=dict)
+    counter: int = 0  # of names
+
+    def get(self, function: Callable[..., Any], bound: tuple[Value | None, ...] = ()) -> "Function":
+        """Return a compiled function, translated for arguments that are known (``bound``)."""
+        key = function, bound or (None,) * len(inspect.signature(function).parameters)
+        if key not in self.done:
+            made = Function(function, self, bound=key[1])
+            made.translate()
+            self.done[key] = made  # after what it calls
+        return self.done[key]
+
+    def code(self) -> str:
+        """Return all that is translated, each function before those that call it."""
+        return "\n".join(made.code() for made in self.done.values())
+
+    def field_of(self, path: tuple[str, ...]) -> Value:
+        """Return a field of the filter's record."""
+        name = "_".join(path)
+        if name == "P":
+            return Array("P", (self.covariance, self.covariance), root="P")
+        if name in self.memory:
+            kind, shape = self.memory[name]
+            if shape:
+                return Array(f"f->{name}", shape, root="f", kind=kind)
+            return Number(f"f->{name}", kind)
+        value = self.constants
+        for part in path:
+            value = value[part]
+        if getattr(value, "dtype", None) is not None and value.dtype.names:
+            return Fields(path)
+        if value.shape:
+            return Array(f"ww_{name}", tuple(map(str, value.shape)), values=value)
+        return replace(constant(value.item()), text=f"WW_{name.upper()}")
+
+
+class Function:
+    """One compiled function on its way to C."""
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        library: Library,
+        name: str = "",
+        bound: tuple[Value | None, ...] = (),
+        suffix: str = "",
+    ) -> None:
+        wrapped: Any = getattr(function, "py_func", None)
+        python: Any = wrapped or getattr(function, "__wrapped__", function)
+        self.library, self.globals = library, python.__globals__
+        self.tree = tree_of(python)
+        self.name = name or library.prefix + self.tree.name.lstrip("_")
+        self.file = python.__module__
+        self.arguments = self.tree.args.args
+        self.bound = bound or (None,) * len(self.arguments)
+        self.names: dict[str, Value] = {}
+        self.locals: dict[str, str] = {}  # of C, and their types
+        self.written: set[str] = set()  # arrays; "f": a field
+        self.used: set[str] = set()
+        self.lines: list[str] = []
+        self.suffix = (
+            suffix  # of the names of variables, of a function that is put where it is called
+        )
+        self.returned: Value | None = None
+        self.results = results_of(self.tree)
+        self.result = _OF_ANNOTATION.get(getattr(self.tree.returns, "id", ""), "")
+
+    def translate(self) -> None:
+        """Work out the lines of the body."""
+        for argument, bound in zip(self.arguments, self.bound, strict=True):
+            name = argument.arg
+            if isinstance(bound, Array) and bound.root:  # a matrix of this size
+                bound = replace(bound, text=c_name(name), root=name)
+            self.names[name] = bound or self.parameter(argument)
+        self.tree = decided(self.tree, self.known)
+        self.lines = self.block(self.tree.body)
+
+    def known(self, test: ast.expr) -> float | None:
+        """Return the value of a condition on an export's constants alone, or None."""
+        for node in ast.walk(test):
+            match node:
+                case ast.Call() | ast.Subscript():
+                    return None
+                case ast.Name(id=name) if not isinstance(self.names.get(name), Fields):
+                    if not isinstance(self.globals.get(name), int | float):
+                        return None
+        used = set(self.used)
+        value = self.number(test).known
+        self.used = used
+        return value
+
+    def parameter(self, argument: ast.arg) -> Value:
+        """Return what a parameter is, by its annotation."""
+        kind = getattr(argument.annotation, "id", "")
+        if kind in _OF_ANNOTATION:
+            return Number(c_name(argument.arg), _OF_ANNOTATION[kind])
+        if kind == "Record":
+            return Fields()
+        return Array(c_name(argument.arg), root=argument.arg)
+
+    def code(self) -> str:
+        """Return the C function."""
+        parameters, unused = [], []
+        for argument, bound in zip(self.arguments, self.bound, strict=True):
+            value, name = self.names[argument.arg], argument.arg
+            if bound is not None and not (isinstance(bound, Array) and bound.root):
+                continue  # a constant
+            if isinstance(value, Fields):
+                const = "" if "f" in self.written else "const "
+                parameters.append(f"{const}ww_filter *f")
+                name = "f"
+                if "P" in self.used:
+                    size = f"[{self.library.covariance}]"
+                    parameters.append(f"float P{size}{size}")
+            elif isinstance(value, Array) and len(value.shape) == 2:
+                parameters.append(f"float {value.text}[{value.shape[0]}][{value.shape[1]}]")
+            elif isinstance(value, Array):
+                const = "" if name in self.written else "const "
+                parameters.append(f"{const}float *{value.text}")
+            elif isinstance(value, Number):
+                parameters.append(f"{_TYPES[value.kind]} {value.text}")
+            if name not in self.used:
+                unused.append(f"    (void){'f' if name == 'f' else c_name(name)};")
+        if self.results:
+            parameters.append("float *out")
+        result = "int" if self.result in ("truth", "int") else self.result or "void"
+        head = [
+            f"    {kind} {', '.join(f'{name} = {zero}' for name in names)};"
+            for kind, zero in (("float", "0.0f"), ("int", "0"))
+            if (names := [name for name, its in self.locals.items() if its == kind])
+        ]
+        about = (ast.get_docstring(self.tree) or self.name).split("\n\n")[0].replace("``", "`")
+        comment = textwrap.fill(f"/* {self.file.split('.', 1)[-1]}: {about} */", 100)
+        signature = f"static {result} {self.name}({', '.join(parameters)})"
+        body = [f"    {line}" for line in self.lines]
+        return "\n".join([comment, signature, "{", *head, *unused, *body, "}"]) + "\n"
+
+    # ---- statements ------------------------------------------------------------------------------
+
+    def block(self, body: list[ast.stmt]) -> list[str]:
+        """Return the lines of several statements."""
+        outer, self.lines = self.lines, []
+        for statement in body:
+            self.statement(statement)
+        lines, self.lines = self.lines, outer
+        return lines
+
+    def indented(self, head: str, body: list[ast.stmt]) -> None:
+        """Add the lines of a block behind its head."""
+        self.lines += [head, *(f"    {line}" for line in self.block(body))]
+
+    def statement(self, node: ast.stmt) -> None:
+        """Add the lines of a statement."""
+        match node:
+            case ast.Expr(value=ast.Constant()):  # a docstring
+                pass
+            case (
+                ast.Assign(targets=[target], value=value)
+                | ast.AnnAssign(target=target, value=ast.expr() as value)
+            ):
+                self.assignment(target, value)
+            case ast.AugAssign(target=target, op=op, value=value):
+                amount = self.converted(self.number(value), self.number(target).kind)
+                self.lines.append(f"{self.target(target)} {operator_of(op)}= {amount};")
+            case ast.For(target=ast.Name(id=i), iter=over, body=body):
+                first, end = self.bounds(over)
+                self.names[i] = Number(c_name(i), "int")
+                i = c_name(i)
+                self.indented(f"for (int {i} = {first}; {i} < {end}; {i}++) {{", body)
+                self.lines.append("}")
+            case ast.If(test=test, body=body, orelse=orelse):
+                self.indented(f"if ({self.number(test).text}) {{", body)
+                if orelse:
+                    self.indented("} else {", orelse)
+                self.lines.append("}")
+            case ast.Return(value=ast.expr() as value) if self.suffix:
+                self.returned = self.evaluated(value)
+            case ast.Return(value=None):
+                self.lines.append("return;")
+            case ast.Return(value=ast.Tuple(elts=values)):
+                texts = [self.number(value).as_float() for value in values]
+                self.lines += [f"out[{i}] = {text};" for i, text in enumerate(texts)]
+            case ast.Return(value=ast.expr() as value):
+                self.lines.append(f"return {self.converted(self.number(value), self.result)};")
+            case ast.Expr(value=ast.Call() as call):
+                self.lines.append(f"{self.call(call, '')};")
+            case _:
+                raise UntranslatableError(f"has a statement {type(node).__name__}")
+
+    def assignment(self, target: ast.expr, value: ast.expr) -> None:
+        """Add the lines of an assignment to one target, or to several at once."""
+        match target, value:
+            case ast.Tuple(elts=targets), ast.Tuple(elts=values):
+                if not is_read(targets, values):
+                    for one, its in zip(targets, values, strict=True):
+                        self.assignment(one, its)
+                    return
+                found = tuple(self.evaluated(one) for one in values)
+            case ast.Tuple(elts=targets), _:
+                found = tuple(_elements(self.evaluated(value), len(targets)))
+                if self.suffix and all(isinstance(one, ast.Name) for one in targets):
+                    for one, its in zip(targets, found, strict=True):
+                        name = cast(ast.Name, one).id
+                        if self.is_put_once(name):
+                            self.names[name] = self.kept(its)
+                        else:
+                            self.put(one, self.kept(its))
+                    return
+            case _:
+                self.put(target, self.evaluated(value))
+                return
+        texts = [cast(Number, one).as_float() for one in found]
+        t = self.temporary()
+        self.lines.append(f"const float {t}[] = {{{', '.join(texts)}}};")
+        for i, one in enumerate(targets):
+            if not (isinstance(one, ast.Name) and one.id == "_"):
+                self.put(one, Number(f"{t}[{i}]"))
+
+    def put(self, target: ast.expr, value: Value) -> None:
+        """Add the line that gives a target its value; an array or a record gets a further name."""
+        if isinstance(target, ast.Name) and target.id not in self.names:
+            if isinstance(value, tuple):
+                value = tuple(map(self.kept, value))
+            constant_here = isinstance(value, Number) and value.known is not None and self.suffix
+            if not isinstance(value, Number) or (constant_here and self.is_put_once(target.id)):
+                self.names[target.id] = value
+                return
+        if not isinstance(value, Number):
+            raise UntranslatableError("copies an array as a whole")
+        if isinstance(target, ast.Name) and target.id not in self.names:
+            name = f"{c_name(target.id)}{self.suffix}"
+            self.locals[name] = _TYPES[value.kind]
+            self.names[target.id] = Number(name, value.kind)
+        text = self.converted(value, self.number(target).kind)
+        self.lines.append(f"{self.target(target)} = {text};")
+
+    def is_put_once(self, name: str) -> bool:
+        """Return whether a variable has one value for good."""
+        stored = [n for n in ast.walk(self.tree) if isinstance(n, ast.Name) and n.id == name]
+        return sum(isinstance(n.ctx, ast.Store) for n in stored) == 1
+
+    def kept(self, value: Value) -> Value:
+        """Return a number as one that is worked out only once."""
+        if not isinstance(value, Number) or re.fullmatch(r"[\w.>\[\]-]+", value.text):
+            return value
+        t = self.temporary()
+        self.lines.append(f"const {_TYPES[value.kind]} {t} = {value.text};")
+        return replace(value, text=t)
+
+    def converted(self, value: Number, kind: str) -> str:
+        """Return a number as one of a kind."""
+        if kind == "float":
+            return value.as_float()
+        if value.kind == "float":
+            raise UntranslatableError(f"makes a whole number of {value.text}")
+        return value.text
+
+    def target(self, node: ast.expr) -> str:
+        """Return a place that is written."""
+        match node:
+            case ast.Subscript(value=array):
+                self.written.add(cast(Array, self.evaluated(array)).root)
+            case ast.Attribute():
+                self.written.add("f")
+        return self.number(node).text
+
+    def temporary(self) -> str:
+        """Return the name of a new array."""
+        self.library.counter += 1
+        return f"t{self.library.counter}"
+
+    def bounds(self, node: ast.expr) -> tuple[str, str]:
+        """Return first and last of a range."""
+        match node:
+            case ast.Call(func=ast.Name(id="range"), args=[end]):
+                return "0", self.number(end).text
+            case ast.Call(func=ast.Name(id="range"), args=[first, end]):
+                return self.number(first).text, self.number(end).text
+        raise UntranslatableError("loops over something else than a range")
+
+    # ---- expressions -----------------------------------------------------------------------------
+
+    def number(self, node: ast.expr) -> Number:
+        """Return an expression that is a number."""
+        value = self.evaluated(node)
+        if not isinstance(value, Number):
+            raise UntranslatableError(f"has an expression {type(node).__name__}")
+        return value
+
+    def evaluated(self, node: ast.expr) -> Value:
+        """Return an expression: a number, or the name of an array or record."""
+        match node:
+            case ast.Constant(value=bool() | int() | float() as plain):
+                return constant(plain)
+            case ast.Name(id=name):
+                return self.name_of(name)
+            case ast.Attribute(value=ast.Name(id="math"), attr=name):
+                return Number("NAN") if name == "nan" else constant(getattr(math, name))
+            case ast.Attribute(value=of, attr=name):
+                record = self.evaluated(of)
+                if not isinstance(record, Fields):
+                    raise UntranslatableError(f"has an attribute {name}")
+                found = self.library.field_of((*record.path, name))
+                self.used |= {"f"} if "f->" in getattr(found, "text", "") else set()
+                self.used |= {"P"} if getattr(found, "root", "") == "P" else set()
+                return found
+            case ast.Subscript(value=of, slice=place):
+                return self.element(of, place)
+            case ast.Tuple(elts=elements):
+                found_all: list[Value] = []
+                for one in elements:
+                    starred = isinstance(one, ast.Starred)
+                    value = self.evaluated(one.value if isinstance(one, ast.Starred) else one)
+                    found_all += cast(tuple[Value, ...], value) if starred else (value,)
+                return tuple(found_all)
+            case ast.BinOp(left=left, op=ast.Pow(), right=exponent):
+                return self.power(self.number(left).as_float(), exponent)
+            case ast.BinOp(left=left, op=op, right=right):
+                return combined(op, self.number(left), self.number(right))
+            case ast.UnaryOp(op=ast.USub() | ast.Not() as op, operand=operand):
+                value = self.number(operand)
+                negative = isinstance(op, ast.USub)
+                known = value.known
+                if known is not None:
+                    known = -known if negative else not known
+                kind = value.kind if negative else "truth"
+                return Number(f"({'-' if negative else '!'}{value.text})", kind, known)
+            case ast.Compare(left=left, ops=[op], comparators=[right]):
+                return combined(op, self.number(left), self.number(right))
+            case ast.BoolOp(op=op, values=values):
+                result = self.number(values[0])
+                for one in values[1:]:
+                    result = combined(op, result, self.number(one))
+                return result
+            case ast.IfExp(test=test, body=body, orelse=orelse):
+                return self.choice(test, body, orelse)
+            case ast.Call():
+                return self.called(node)
+        raise UntranslatableError(f"has an expression {type(node).__name__}")
+
+    def choice(self, test: ast.expr, body: ast.expr, orelse: ast.expr) -> Value:
+        """Return one of two expressions."""
+        condition = self.number(test)
+        if condition.known is not None:
+            return self.evaluated(body if condition.known else orelse)
+        yes, no = self.number(body), self.number(orelse)
+        if yes.kind == no.kind:
+            return Number(f"({condition.text} ? {yes.text} : {no.text})", yes.kind)
+        return Number(f"({condition.text} ? {yes.as_float()} : {no.as_float()})")
+
+    def element(self, of: ast.expr, place: ast.expr) -> Value:
+        """Return a part of an array or of several numbers."""
+        if isinstance(of, ast.Name) and of.id not in self.names:
+            raise _no_table(of.id)
+        array = self.evaluated(of)
+        if isinstance(array, tuple):
+            return array[int(cast(float, self.number(place).known))]
+        if not isinstance(array, Array):
+            raise UntranslatableError("takes a part of a number")
+        self.used.add(array.root)
+        match place:
+            case ast.Slice(lower=lower, step=None):
+                first = self.number(lower).text if lower is not None else "0"
+                return replace(array, first=f"{array.first} + {first}" if array.first else first)
+            case ast.Tuple(elts=places):
+                return array.at(*(self.number(one) for one in places))
+        return array.at(self.number(place))
+
+    def power(self, base: str, exponent: ast.expr) -> Number:
+        """Return a positive number raised to any power, or any number to a small whole one."""
+        match exponent:
+            case ast.Constant(value=int() as times) if 2 <= times <= 4:
+                return Number(f"({' * '.join([base] * times)})")
+        return Number(f"ww_power({base}, {self.number(exponent).as_float()})")
+
+    def name_of(self, name: str) -> Value:
+        """Return what a name is: a parameter, a variable, or a constant of the file."""
+        if name in self.names:
+            if not (self.suffix or isinstance(self.names[name], Fields)):
+                self.used.add(name)
+            return self.names[name]
+        value = self.globals.get(name)
+        if isinstance(value, int) and getattr(base, name, None) == value:
+            return Number(f"WW_{name}", "int", value)
+        if isinstance(value, bool | int | float):
+            return constant(value)
+        raise _no_table(name)
+
+    # ---- calls -----------------------------------------------------------------------------------
+
+    def called(self, node: ast.Call) -> Value:
+        """Return the result of a call."""
+        match node:
+            case ast.Call(func=ast.Attribute(value=ast.Name(id="math"), attr=name), args=given):
+                if name not in _MATHS:
+                    raise UntranslatableError(f"calls math.{name}, which the C has not")
+                kind = "truth" if name == "isfinite" else "float"
+                return Number(f"{_MATHS[name]}({self.floats(given)})", kind)
+            case ast.Call(func=ast.Name(id="choose"), args=[test, body, orelse]):
+                return self.choice(test, body, orelse)
+            case ast.Call(func=ast.Name(id=name), args=[one]) if name in _PASSED_ON:
+                return self.number(one)
+            case ast.Call(func=ast.Name(id="len"), args=[of]):
+                size = cast(Array, self.evaluated(of)).shape[0]
+                return Number(size, "int", int(size) if size.isdigit() else None)
+            case ast.Call(func=ast.Name(id=name), args=given) if name in _FUNCTIONS:
+                if len(given) == 2 or name == "abs":
+                    return Number(f"{_FUNCTIONS[name]}({self.floats(given)})")
+            case ast.Call(func=ast.Name(id=name)):
+                function = self.globals.get(name)
+                if getattr(function, "targetoptions", {}).get("inline") == "always":
+                    return self.inlined(function, [self.evaluated(one) for one in node.args])
+                count = results_of(tree_of(function.py_func)) if hasattr(function, "py_func") else 0
+                if not count:
+                    text = self.call(node, "")
+                    made = self.callee(node)
+                    return Number(text, made.result if made else "float")
+                t = self.temporary()
+                self.lines.append(f"float {t}[{count}];")
+                self.lines.append(f"{self.call(node, t)};")
+                return Array(t, (str(count),), root=t)
+        name = node.func.id if isinstance(node.func, ast.Name) else "a method"
+        raise UntranslatableError(f"calls {name}, which the C has not")
+
+    def inlined(self, function: Any, given: list[Value]) -> Value:
+        """Return what a function returns, whose lines are put before the one in hand."""
+        self.library.counter += 1
+        part = Function(function, self.library, suffix=f"_{self.library.counter}")
+        part.lines, part.locals = self.lines, self.locals
+        part.written, part.used = self.written, self.used
+        stored = {
+            n.id
+            for n in ast.walk(part.tree)
+            if isinstance(getattr(n, "ctx", 0), ast.Store) and isinstance(n, ast.Name)
+        }
+        for argument, value in zip(part.arguments, given, strict=True):
+            value = self.kept(value)
+            if argument.arg in stored:
+                part.put(ast.Name(argument.arg, ast.Store()), value)
+            else:
+                part.names[argument.arg] = value
+        part.tree = decided(part.tree, part.known)
+        for statement in part.tree.body:
+            part.statement(statement)
+        if part.returned is None:
+            raise UntranslatableError(f"calls the function {part.name}, which the C has not")
+        return part.returned
+
+    def floats(self, given: list[ast.expr]) -> str:
+        """Return arguments that are numbers."""
+        return ", ".join(self.number(one).as_float() for one in given)
+
+    def callee(self, node: ast.Call) -> "Function | None":
+        """Return the function that is called, translated; None: it is written by hand."""
+        name = cast(ast.Name, node.func).id
+        function = self.globals.get(name)
+        if function in self.library.refused:
+            raise UntranslatableError(self.library.refused[function])
+        if name in self.library.by_hand:
+            return None
+        if not hasattr(function, "py_func"):
+            raise UntranslatableError(f"calls the function {name}, which the C has not")
+        values = [self.evaluated(one) for one in node.args]
+        return self.library.get(function, tuple(map(_bound, values)))
+
+    def call(self, node: ast.expr, out: str) -> str:
+        """Return the call of a compiled function, which is translated too."""
+        if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name)):
+            raise UntranslatableError(f"has an expression {type(node).__name__}")
+        made = self.callee(node)
+        texts = []
+        for i, argument in enumerate(node.args):
+            value = self.evaluated(argument)
+            if isinstance(value, Array):
+                self.used.add(value.root)
+                name = made.arguments[i].arg if made else str(i)
+                if name in (made.written if made else self.library.by_hand[node.func.id]):
+                    self.written.add(value.root)
+                if value.root:
+                    texts.append(value.pointer())
+            elif isinstance(value, Number):
+                wanted = made.names[made.arguments[i].arg] if made else value
+                texts.append(self.converted(value, cast(Number, wanted).kind))
+            elif isinstance(value, Fields) and not value.path:
+                self.used |= {"f"} | ({"P"} & made.used if made else set())
+                self.written |= {"f"} & (made.written if made else {"f"})
+                texts += ["f", "P"] if made and "P" in made.used else ["f"]
+        name = made.name if made else node.func.id
+        return f"{name}({', '.join([*texts, *([out] if out else [])])})"
+
+
+def _bound(value: Value) -> Value | None:
+    """Return what a call tells of an argument beforehand: a constant's table, a matrix' size."""
+    match value:
+        case Array(root="") | Fields(path=(_, *_)):
+            return value
+        case Array(shape=(rows, columns)):
+            return Array("", (rows, columns), root="matrix")
+    return None
+
+
+def _elements(value: Value, count: int) -> Iterator[Value]:
+    """Return the numbers of what stands on the right of several targets."""
+    for i in range(count):
+        match value:
+            case tuple():
+                yield value[i]
+            case Array():
+                yield value.at(constant(i))
+            case _:
+                raise UntranslatableError("takes one number for several")
+
+
+def _no_table(name: str) -> UntranslatableError:
+    return UntranslatableError(
+        f"looks up a table ({name}); the C has an effect's coefficients alone"
+    )
