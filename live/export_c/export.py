@@ -18,7 +18,6 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from ... import __version__
 from ...dynamics.effects import get
 from ...dynamics.effects.base import PARAMETERS, ROTORS_SIZE, STATE_SIZE, Effect
-from ...dynamics.motion import LONG_TURN
 from ...dynamics.vehicle import Vehicle
 from ...estimator import ConstantGainFilter, Recovery, UKFTuning, WrenchEKF, WrenchUKF
 from ...estimator.constant_gain import _LONGEST_GAP, _NEAR
@@ -65,7 +64,6 @@ _KNOWN = {
     "N": N,
     "NOISE": NOISE,
     "PI": math.pi,
-    "LONG_TURN": LONG_TURN,
     "LARGEST_MRP_VARIANCE": LARGEST_MRP_VARIANCE,
     "LONGEST_GAP": _LONGEST_GAP,
     "NEAR": _NEAR,
@@ -191,9 +189,10 @@ def export_c(
     places = "WW_STEP WW_ROTOR_TIME" + (" WW_ROTOR_ACCELERATION" if wrench else "")
     effects_c = environment.get_template("effects.c.j2").render(context | {"places": places})
     context["places"] = definitions(effects_c)
-    context["filter_code"] = filter_code(f, gate is not None)
-    context |= {"constants": "", "fields": ""}
+    context |= {"filter_code": "", "constants": "", "fields": ""}
     source = environment.get_template(FILES["windwrench_filter.c"]).render(context)
+    context["filter_code"] = filter_code(f, source)
+    source += context["filter_code"]
     context |= {"constants": constants(f, source), "fields": fields(source)}
     files = {
         name: in_precision(environment.get_template(template).render(context), precision)

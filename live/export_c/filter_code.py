@@ -6,34 +6,46 @@ from typing import Any
 
 import numpy as np
 
+from ...dynamics.motion import rotor_wrench
+from ...dynamics.rotation import attitude_error, normalise
 from ...estimator import recovery
-from ...estimator.filter_record import FILTER, fields_between
+from ...estimator.error_state import displace, error_from, fold
+from ...estimator.filter_record import FILTER, fields_between, propagate
+from ...estimator.imu import expected_imu
 from .c_numbers import literal, shape, table
+from .c_values import Fields, Value
 from .translate import Library
 
-# functions that templates call; each brings along what it calls
-_CALLED = (
-    recovery.after_prediction,
-    recovery.judge,
-    recovery.remember,
-    recovery.doubted_variance,
+# functions that templates may call, and what their arguments are known to be; each brings along
+# what it calls
+_CALLED: dict[Any, tuple[Value | None, ...]] = {
+    rotor_wrench: (Fields(("body",)), None, None),
+    **dict.fromkeys((attitude_error, normalise, propagate, expected_imu), ()),
+    **dict.fromkeys((displace, error_from, fold), ()),
+    **dict.fromkeys((recovery.after_prediction, recovery.judge, recovery.remember), ()),
+    recovery.doubted_variance: (),
+}
+_MEMORY = (
+    *("rotors", "rotor_wrench", "effect_wrench"),
+    *fields_between("x", "last_speeds"),
+    *fields_between("z", "rows"),
 )
-# those of templates that translated ones call, and which of their arguments they write
-_BY_HAND = {"attitude_error": "2"}
-_MEMORY = (*fields_between("x", "last_speeds"), *fields_between("z", "rows"))
 
 
-def filter_code(record: np.void, gated: bool) -> str:
-    """Return the functions of a filter, with what its record says decided."""
+def filter_code(record: np.void, source: str) -> str:
+    """Return the functions of a filter that C code calls, with what its record says decided."""
     memory = {}
     for name in _MEMORY:
+        if name == "effect_wrench" and record["wrench_count"] == 0:
+            continue  # zeros
         kind = FILTER.fields[name][0]  # type: ignore[index]
         whole = kind.base.kind == "i"
         memory[name] = "int" if whole else "float", tuple(map(str, kind.shape))
-    library = Library(constants=record, memory=memory, by_hand=_BY_HAND)
-    for function in _CALLED:
-        if gated or function is not recovery.doubted_variance:
-            library.get(function)
+    by_hand = {"apply_effects": ""} if record["wrench_count"] else {}
+    library = Library(constants=record, memory=memory, by_hand=by_hand)
+    for function, known in _CALLED.items():
+        if re.search(rf"\b{function.__name__}\(", source):
+            library.get(function, known)
     return library.code()
 
 

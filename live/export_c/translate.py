@@ -266,12 +266,12 @@ class Function:
             case ast.Tuple(elts=targets), _:
                 found = tuple(_elements(self.evaluated(value), len(targets)))
                 if self.suffix and all(isinstance(one, ast.Name) for one in targets):
-                    for one, its in zip(targets, found, strict=True):
+                    for one, of in zip(targets, map(self.kept, found), strict=True):
                         name = cast(ast.Name, one).id
                         if self.is_put_once(name):
-                            self.names[name] = self.kept(its)
+                            self.names[name] = of
                         else:
-                            self.put(one, self.kept(its))
+                            self.put(one, of)
                     return
             case _:
                 self.put(target, self.evaluated(value))
@@ -377,8 +377,8 @@ class Function:
                 found_all: list[Value] = []
                 for one in elements:
                     starred = isinstance(one, ast.Starred)
-                    value = self.evaluated(one.value if isinstance(one, ast.Starred) else one)
-                    found_all += cast(tuple[Value, ...], value) if starred else (value,)
+                    part = self.evaluated(one.value if isinstance(one, ast.Starred) else one)
+                    found_all += cast(tuple[Value, ...], part) if starred else (part,)
                 return tuple(found_all)
             case ast.BinOp(left=left, op=ast.Pow(), right=exponent):
                 return self.power(self.number(left).as_float(), exponent)
