@@ -134,7 +134,7 @@ def _believed(
     if end - begin < last - first:
         imu.refused += 1
     for s in range(first // 3, last // 3):
-        if begin <= 3 * s < end:
+        if begin <= 3 * s and 3 * s < end:
             imu.doubt[s] = -1.0
         elif imu.doubt[s] < 0.0:
             imu.doubt[s] = 0.0

@@ -264,7 +264,8 @@ def believable(
     taken = with_position | with_attitude
     f.x[NIS] = choose(taken, nis, math.nan)
     alarm, gap = f.alarm, f.gap
-    alarming = taken & (nis > choose(with_position & with_attitude, alarm[1], alarm[0]))
+    at = choose(with_position & with_attitude, alarm[1], alarm[0])
+    alarming = taken & (choose(nis <= at, 0.0, 1.0) > 0.5)  # so does what is no number
     late = (with_position & (gap[0] > f.patience)) | (with_attitude & (gap[1] > f.patience))
     if any_of(alarming | late | (f.refused > 0.5)):
         taken = judge(f, position, quaternion, with_position, with_attitude, nis, alarming)

@@ -13,6 +13,7 @@ _OPERATORS: dict[type[ast.AST], str] = {
     ast.Sub: "-",
     ast.Mult: "*",
     ast.Div: "/",
+    ast.FloorDiv: "/",
     ast.Lt: "<",
     ast.LtE: "<=",
     ast.Gt: ">",
@@ -121,12 +122,13 @@ def combined(op: ast.AST, a: Number, b: Number) -> Number:
         if "float" in (a.kind, b.kind):
             raise UntranslatableError(f"takes {a.text} {sign} {b.text} of numbers")
         return Number(f"({a.text} {sign} {b.text})", "truth")
-    whole = a.kind == b.kind == "int" and sign != "/"
+    whole = a.kind == b.kind == "int" and not isinstance(op, ast.Div)
     texts = (a.text, b.text) if whole else (a.as_float(), b.as_float())
     kind = "truth" if isinstance(op, ast.cmpop) else "int" if whole else "float"
     known = None
     if a.known is not None and b.known is not None and not (sign == "/" and b.known == 0):
         known = _PYTHON[sign](a.known, b.known)
+        known = int(known) if whole and kind == "int" else known
     elif sign == "*" and 0 in (a.known, b.known):
         return constant(0) if whole else constant(0.0)
     elif sign == "+" and a.known == 0:

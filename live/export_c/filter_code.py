@@ -9,11 +9,13 @@ import numpy as np
 from ...dynamics.motion import rotor_wrench
 from ...dynamics.rotation import attitude_error, normalise
 from ...estimator import recovery
+from ...estimator.bias_states import bound_biases
 from ...estimator.error_state import displace, error_from, fold
-from ...estimator.filter_record import FILTER, fields_between, propagate
-from ...estimator.imu import expected_imu
+from ...estimator.filter_record import FILTER, IMU, fields_between, propagate
+from ...estimator.imu import _believed, expected_imu
+from ...estimator.ukf import believable, innovate
 from .c_numbers import literal, shape, table
-from .c_values import Fields, Value
+from .c_values import Array, Fields, Value
 from .translate import Library
 
 # functions that templates may call, and what their arguments are known to be; each brings along
@@ -23,8 +25,11 @@ _CALLED: dict[Any, tuple[Value | None, ...]] = {
     **dict.fromkeys((attitude_error, normalise, propagate, expected_imu), ()),
     **dict.fromkeys((displace, error_from, fold), ()),
     **dict.fromkeys((recovery.after_prediction, recovery.judge, recovery.remember), ()),
-    recovery.doubted_variance: (),
+    **dict.fromkeys((recovery.doubted_variance, innovate, believable, bound_biases), ()),
+    _believed: (None, Array("", ("6", "6"), root="matrix"), None, None, None),
 }
+# functions of templates that these call, and which of their arguments they write
+_BY_HAND = dict.fromkeys(("_nis", "_is_push", "restore_bias_prior"), "")
 _MEMORY = (
     *("rotors", "rotor_wrench", "effect_wrench"),
     *fields_between("x", "last_speeds"),
@@ -41,10 +46,15 @@ def filter_code(record: np.void, source: str) -> str:
         kind = FILTER.fields[name][0]  # type: ignore[index]
         whole = kind.base.kind == "i"
         memory[name] = "int" if whole else "float", tuple(map(str, kind.shape))
-    by_hand = {"apply_effects": ""} if record["wrench_count"] else {}
+    for name in IMU.names or ():
+        if name in ("used", "known", "refused", "in_row", "doubt", "mean"):
+            kind = IMU.fields[name][0]  # type: ignore[index]
+            whole = kind.base.kind == "i"
+            memory[f"imu_{name}"] = "int" if whole else "float", tuple(map(str, kind.shape))
+    by_hand = _BY_HAND | ({"apply_effects": ""} if record["wrench_count"] else {})
     library = Library(constants=record, memory=memory, by_hand=by_hand)
     for function, known in _CALLED.items():
-        if re.search(rf"\b{function.__name__}\(", source):
+        if re.search(rf"\b{function.__name__.lstrip('_')}\(", source):
             library.get(function, known)
     return library.code()
 

@@ -9,6 +9,11 @@ from collections.abc import Callable
 from typing import Any, cast
 
 
+def python_of(function: Any) -> Any:
+    """Return the Python function of a compiled one."""
+    return getattr(function, "py_func", None) or getattr(function, "__wrapped__", function)
+
+
 def tree_of(function: Callable[..., Any]) -> ast.FunctionDef:
     """Return the syntax tree of a function."""
     return cast(ast.FunctionDef, ast.parse(textwrap.dedent(inspect.getsource(function))).body[0])

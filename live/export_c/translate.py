@@ -29,7 +29,7 @@ from .c_values import (
     constant,
     operator_of,
 )
-from .source_tree import decided, is_read, results_of, tree_of
+from .source_tree import decided, is_read, python_of, results_of, tree_of
 
 _MATHS = {
     "sqrt": "sqrtf",
@@ -112,8 +112,7 @@ class Function:
         bound: tuple[Value | None, ...] = (),
         suffix: str = "",
     ) -> None:
-        wrapped: Any = getattr(function, "py_func", None)
-        python: Any = wrapped or getattr(function, "__wrapped__", function)
+        python = python_of(function)
         self.library, self.globals = library, python.__globals__
         self.tree = tree_of(python)
         self.name = name or library.prefix + self.tree.name.lstrip("_")
@@ -129,7 +128,7 @@ class Function:
             suffix  # of the names of variables, of a function that is put where it is called
         )
         self.returned: Value | None = None
-        self.results = results_of(self.tree)
+        self.results, self.out = results_of(self.tree), "float"
         self.result = _OF_ANNOTATION.get(getattr(self.tree.returns, "id", ""), "")
 
     def translate(self) -> None:
@@ -189,7 +188,7 @@ class Function:
             if name not in self.used:
                 unused.append(f"    (void){'f' if name == 'f' else c_name(name)};")
         if self.results:
-            parameters.append("float *out")
+            parameters.append(f"{self.out} *out")
         result = "int" if self.result in ("truth", "int") else self.result or "void"
         head = [
             f"    {kind} {', '.join(f'{name} = {zero}' for name in names)};"
@@ -236,7 +235,9 @@ class Function:
                 self.indented(f"for (int {i} = {first}; {i} < {end}; {i}++) {{", body)
                 self.lines.append("}")
             case ast.If(test=test, body=body, orelse=orelse):
-                self.indented(f"if ({self.number(test).text}) {{", body)
+                condition = self.number(test).text  # its own parentheses do
+                condition = condition if condition[0] == "(" else f"({condition})"
+                self.indented(f"if {condition} {{", body)
                 if orelse:
                     self.indented("} else {", orelse)
                 self.lines.append("}")
@@ -245,8 +246,12 @@ class Function:
             case ast.Return(value=None):
                 self.lines.append("return;")
             case ast.Return(value=ast.Tuple(elts=values)):
-                texts = [self.number(value).as_float() for value in values]
+                found = [self.number(value) for value in values]
+                whole = all(one.kind == "int" for one in found)
+                self.out = "int" if whole else "float"
+                texts = [one.text if whole else one.as_float() for one in found]
                 self.lines += [f"out[{i}] = {text};" for i, text in enumerate(texts)]
+                self.lines += [] if node is self.tree.body[-1] else ["return;"]
             case ast.Return(value=ast.expr() as value):
                 self.lines.append(f"return {self.converted(self.number(value), self.result)};")
             case ast.Expr(value=ast.Call() as call):
@@ -477,11 +482,13 @@ class Function:
                 function = self.globals.get(name)
                 if getattr(function, "targetoptions", {}).get("inline") == "always":
                     return self.inlined(function, [self.evaluated(one) for one in node.args])
-                count = results_of(tree_of(function.py_func)) if hasattr(function, "py_func") else 0
+                count = (
+                    results_of(tree_of(python_of(function))) if hasattr(function, "py_func") else 0
+                )
                 if not count:
                     text = self.call(node, "")
-                    made = self.callee(node)
-                    return Number(text, made.result if made else "float")
+                    returned = getattr(tree_of(python_of(function)).returns, "id", "")
+                    return Number(text, _OF_ANNOTATION.get(returned, "float"))
                 t = self.temporary()
                 self.lines.append(f"float {t}[{count}];")
                 self.lines.append(f"{self.call(node, t)};")
@@ -552,7 +559,7 @@ class Function:
                 self.used |= {"f"} | ({"P"} & made.used if made else set())
                 self.written |= {"f"} & (made.written if made else {"f"})
                 texts += ["f", "P"] if made and "P" in made.used else ["f"]
-        name = made.name if made else node.func.id
+        name = made.name if made else node.func.id.lstrip("_")
         return f"{name}({', '.join([*texts, *([out] if out else [])])})"
 
 
