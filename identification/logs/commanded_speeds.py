@@ -9,12 +9,15 @@ thrust is the weight, so the thrust along each time's own rotor axis is counted 
 part; a tilted flight needs more than its weight.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
+from ...dynamics.vehicle_file import load_vehicle, preset_names
 from .flight_log import FlightLog
 from .flight_phases import flying
 from .log_map import Commands
@@ -26,6 +29,16 @@ Array = NDArray[np.float64]
 _DIP = 1.0
 _SATURATED = 0.9995  # of the full command
 _SPECIFIC_FORCE = 6.0, 16.0  # m/s2: the median of most flights; outside a unit may be another
+
+
+def flown_vehicle(vehicle: Vehicle | None, name: str) -> Vehicle | None:
+    """Return the vehicle, or else the one of a name that a log gives, where it comes with the
+    kit.
+    """
+    return _preset(name) if vehicle is None and name in preset_names() else vehicle
+
+
+_preset = cache(load_vehicle)  # a log asks for it three times
 
 
 def with_commanded_speeds(
@@ -45,11 +58,7 @@ def with_commanded_speeds(
         text = "no rotor speeds: the log has motor commands, and no vehicle says what they give"
         return replace(log, notes=(*log.notes, text))
     if vehicle.motor_curve is not None:
-        terms = " + ".join(
-            f"{c:.4g} u^{i}" if i else f"{c:.4g}"
-            for i, c in enumerate(vehicle.motor_curve.thrust)
-            if c
-        )
+        terms = _polynomial(vehicle.motor_curve.thrust)
         note = (
             f"rotor speeds: worked out from the motor commands by the motor curve of "
             f"{vehicle.name}, thrust {terms} N a rotor, without the motors' lag"
@@ -107,9 +116,10 @@ def _with_stated_thrust(
         counts * (reference / model.full_voltage), model.thrust
     )
     speeds = np.sqrt(np.where(command > 0.0, np.maximum(thrust, 0.0), 0.0) / vehicle.k)
-    terms = " + ".join(f"{c:.4g} u^{i}" if i else f"{c:.4g}" for i, c in enumerate(model.thrust))
+    source = f" ({model.thrust_source})" if model.thrust_source else ""
     notes = [
-        f"thrust model: no rotor speeds in the log; a motor is assumed to give {terms} N at "
+        f"thrust model: no rotor speeds in the log; a motor is assumed to give "
+        f"{_polynomial(model.thrust)} N{source} at "
         f"u = command * {reference:g} V / {model.full_voltage:g} V, and rotor speeds are "
         f"sqrt(thrust / k) with the k of {vehicle.name}, at {reference:g} V whatever the "
         "battery's voltage. A constant factor on thrust and the mass cannot be found from this log"
@@ -138,6 +148,12 @@ def speeds_of_wrench(wrench: Array, vehicle: Vehicle) -> tuple[Array, list[str]]
             f"the commands of {clipped} sample(s) were out of the rotors' reach and were clipped"
         )
     return np.sqrt(np.clip(square, 0.0, limit)), notes
+
+
+def _polynomial(coefficients: Sequence[float]) -> str:
+    """Return a polynomial of u in words, by the coefficients of its powers 0, 1, 2 ..."""
+    powers = ("", " u", *(f" u^{i}" for i in range(2, len(coefficients))))
+    return " + ".join(f"{c:.4g}{u}" for c, u in zip(coefficients, powers, strict=False) if c)
 
 
 def _words(model: Commands) -> str:

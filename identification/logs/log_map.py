@@ -34,7 +34,7 @@ columns the log has, with numbers in them.
   stands for 0 and for full command), clip (true: a command beyond the range is set to its end);
   what a vehicle without a motor curve is assumed to make of them: thrust_factor (f of the relative
   thrust f u^2 + (1 - f) u) or thrust (N a motor, the coefficients of the count's powers 0, 1, 2, at
-  full_voltage)
+  full_voltage, and thrust_source, who found them)
 * ``wrench``: commanded collective thrust (N) and torque about x, y, z (Nm): columns
 * ``battery``: column, unit (V, mV, cV), cells (where the voltage is that of one cell), late (s, by
   which the voltage is logged late)
@@ -239,6 +239,7 @@ class Commands(Columns):
     clip: _Truth = False
     thrust: tuple[Number, ...] = ()  # N a motor, of the count's powers 0, 1, 2
     full_voltage: Positive = 1.0  # V, at which ``thrust`` holds
+    thrust_source: str = ""  # who found ``thrust``
 
 
 @dataclass(frozen=True)

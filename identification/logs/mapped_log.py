@@ -8,55 +8,47 @@ interpolated to the position's.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
-from ...dynamics.vehicle_file import load_vehicle, preset_names
 from ...runtime.errors import InputError
 from .channels import Samples, in_kit_axes, in_kit_units, quaternions
+from .commanded_speeds import flown_vehicle
 from .flight_log import FlightLog, Mask, vehicle_of_columns
 from .log_map import Attitude, Battery, Columns, Commands, LogMap, Position, Rotors, constant
 from .map_fit import NO_QUATERNION, chosen, fitted, wanted_columns, ways
 from .rotor_orders import order_names, order_words
-from .streams import Stream, check_norms, flight_log, readable, slerp
+from .streams import Recording, Stream, check_norms, readable, slerp
 from .table import Table
 from .table_rows import LONGEST_STEPS, check_rows, has_several_rates, rows_of
-from .tables import open_table
 
 _IMU = ("accelerometer", "gyro")
 _ATTITUDE_GAP = 0.1  # s, across which an attitude is not interpolated
 _OUTSIDE = 0.5  # share of commands beyond their range from which on the range is wrong
 
 
-def read_mapped(
-    path: Path, log_map: LogMap, vehicle: Vehicle | None = None, reader: str = ""
+def map_table(
+    table: Table, log_map: LogMap, vehicle: Vehicle | None = None, reader: str = ""
 ) -> FlightLog:
-    """Read a table of any layout by a map.
+    """Return the flight log that a map makes of a table.
 
     Args:
-        path: CSV or any other text table, packed or not, or Parquet.
+        table: of any columns and any layout.
         log_map: what its columns mean.
         vehicle: that flew, to turn commands into rotor speeds; None: the map's, where that comes
             with the kit.
         reader: name of the reader that the map serves.
 
     Raises:
-        InputError: the table cannot be read, the map does not fit it, or a number is none that a
-            flight has; the message says which column and row.
+        InputError: the map does not fit the table, or a number is none that a flight has; the
+            message says which column and row.
     """
-    return map_table(open_table(path), log_map, vehicle, reader)
-
-
-def map_table(
-    table: Table, log_map: LogMap, vehicle: Vehicle | None = None, reader: str = ""
-) -> FlightLog:
-    """Return the flight log that a map makes of a table; as ``read_mapped``."""
     if log_map.is_own:
         log_map = replace(log_map, vehicle=vehicle_of_columns(table))
-    vehicle = _flown(vehicle, log_map)
+    vehicle = flown_vehicle(vehicle, log_map.vehicle)
     log_map = fitted(table, log_map, vehicle, reader)
     columns = table.read(wanted_columns(log_map))
     if log_map.is_own and has_several_rates(columns, log_map):
@@ -67,51 +59,10 @@ def map_table(
     samples, rows, words = rows_of(table, columns, log_map)
     log_map, _ = chosen([samples], log_map)
     notes += [*words, *check_rows(table, samples, rows, log_map)]
-    return channels_of_recording(table.path, [samples], log_map, reader, notes).log(vehicle)
+    return recording_of(table.path, [samples], log_map, reader, notes).log(vehicle)
 
 
-@dataclass(frozen=True)
-class Recording:
-    """The channels of a log in the kit's units, axes and order of rotors."""
-
-    path: Path
-    reader: str  # its name; nothing: none
-    log_map: LogMap  # with the sections that are there
-    streams: dict[str, Stream]  # by section; that of the position has the attitude beside it
-    notes: list[str]
-    extra: dict[str, Stream]  # what else is kept, by name
-
-    def log(self, vehicle: Vehicle | None) -> FlightLog:
-        """Return the flight log.
-
-        Args:
-            vehicle: that flew, to turn commands into rotor speeds; None: the map's, where that
-                comes with the kit.
-
-        Raises:
-            InputError: neither a pose nor gyro and accelerometer, or channels that do not overlap.
-        """
-        return flight_log(
-            self.path,
-            self.reader,
-            self.streams,
-            tuple(self.notes),
-            _flown(vehicle, self.log_map),
-            self.log_map.vehicle,
-            self.log_map.commands,
-            extra=self.extra,
-            from_zero=self.log_map.time.offset is None,
-        )
-
-
-def _flown(vehicle: Vehicle | None, log_map: LogMap) -> Vehicle | None:
-    """Return the vehicle, or the one that a map names, where it comes with the kit."""
-    if vehicle is None and log_map.vehicle in preset_names():
-        return load_vehicle(log_map.vehicle)
-    return vehicle
-
-
-def channels_of_recording(
+def recording_of(
     path: Path, recorded: Sequence[Samples], log_map: LogMap, reader: str, notes: Sequence[str]
 ) -> Recording:
     """Return the channels that a map makes of columns whose groups have a clock each.
@@ -295,10 +246,9 @@ def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream
         )
     notes = []
     if not log_map.is_own:
-        notes.append(
-            f"commands: {commands.name}, {part.unit}, {low:g} to {high:g} taken as 0 to 1, "
-            f"{_order_note(part.order)}"
-        )
+        is_said = bool(part.note) or (low, high) == (0.0, 1.0)
+        taken = "" if is_said else f"{low:g} to {high:g} taken as 0 to 1, "
+        notes.append(f"commands: {commands.name}, {part.unit}, {taken}{_order_note(part.order)}")
     if outside := int(np.sum((u < -1e-9) | (u > 1.0 + 1e-9))):
         notes.append(f"{outside} motor command(s) beyond that range were set to its end")
     return notes

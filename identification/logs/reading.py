@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
-from ...dynamics.vehicle_file import load_vehicle, preset_names
 from ...runtime.errors import InputError
+from .commanded_speeds import flown_vehicle
 from .flight_log import ACCELEROMETER, COMMANDS, GYRO, POSE, REQUIRED, ROTORS, FlightLog
 from .inertial import check_inertial
 from .log_map import OWN_MAP, load_map
 from .magnitudes import check_magnitudes, unit_doubts
-from .mapped_log import map_table, read_mapped
+from .mapped_log import map_table
 from .readers import (
     find_reader,
     looked_for_columns,
@@ -67,8 +67,7 @@ def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
         InputError: a number is none that a flight has.
     """
     check_magnitudes(log)
-    if vehicle is None and log.vehicle in preset_names():
-        vehicle = load_vehicle(log.vehicle)
+    vehicle = flown_vehicle(vehicle, log.vehicle)
     doubts = unit_doubts(log, vehicle)
     log, wrong = check_inertial(log, 9.81 if vehicle is None else vehicle.gravity)
     doubts += wrong
@@ -106,7 +105,7 @@ def _read(
     if map is not None:
         if reader is not None:
             raise InputError(f"{path}: both a reader and a map; expected one of them")
-        return read_mapped(path, load_map(map), vehicle)
+        return map_table(open_table(path), load_map(map), vehicle)
     chosen = reader_by_content(path) if reader is None else find_reader(reader)
     if chosen is not None:
         return chosen.read(path, vehicle)

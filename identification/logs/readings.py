@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from .log_map import ANGLE_UNITS, LENGTH_UNITS, SENSES
-from .rotor_orders import ORDERS, Order
+from .rotor_orders import ORDERS, Order, order_names
 
 Array = NDArray[np.float64]
 
@@ -107,15 +107,6 @@ def _positions() -> Iterator[Frames]:
             yield Frames(fact or other, turn, unusual=not fact)
 
 
-# rotors (1 front-left, 2 rear-left, 3 rear-right, 4 front-right) in the order in which others count
-# them
-_KNOWN_ORDERS = {
-    (3, 4, 2, 1): "Betaflight's order",
-    (4, 2, 1, 3): "the order of PX4 and ArduPilot, quad x",
-    (4, 3, 2, 1): "the Crazyflie's order, clockwise from front-right",
-    (1, 4, 3, 2): "clockwise from front-left, as on the AR.Drone",
-    (4, 1, 2, 3): "anticlockwise from front-right, as DJI counts",
-}
 ROTORS: Order = ORDERS["windwrench"]
 
 
@@ -265,10 +256,11 @@ class Reading:
     def _rotor_words(self) -> list[str]:
         words = []
         if self.rotors != ROTORS:
-            known = _KNOWN_ORDERS.get(self.rotors, "")
+            known = " or ".join(order_names(self.motors))
             words.append(
                 f"the rotors look permuted: omega1..omega4 are rotors "
-                f"{','.join(map(str, self.rotors))} of this vehicle{f' ({known})' if known else ''}"
+                f"{','.join(map(str, self.rotors))} of this vehicle"
+                f"{f' (the order {known})' if known else ''}"
                 "; expected 1 front-left, 2 rear-left, 3 rear-right, 4 front-right: reorder the "
                 "columns"
             )

@@ -18,6 +18,8 @@ ORDERS: dict[str, Order] = {
     "ardupilot-x": (3, 2, 4, 1),  # the same
     "betaflight": (4, 3, 1, 2),  # 1 rear-right, 2 front-right, 3 rear-left, 4 front-left
     "crazyflie": (4, 3, 2, 1),  # 1 front-right, 2 rear-right, 3 rear-left, 4 front-left
+    "ardrone": (1, 4, 3, 2),  # 1 front-left, 2 front-right, 3 rear-right, 4 rear-left
+    "dji": (2, 3, 4, 1),  # 1 front-right, 2 front-left, 3 rear-left, 4 rear-right
 }
 
 

@@ -14,9 +14,9 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from .commanded_speeds import speeds_of_wrench, with_commanded_speeds
+from .commanded_speeds import flown_vehicle, speeds_of_wrench, with_commanded_speeds
 from .flight_log import FlightLog, Mask, time_notes
-from .log_map import Commands
+from .log_map import LogMap
 
 Array = NDArray[np.float64]
 
@@ -124,102 +124,105 @@ def slerp(t: Array, attitude: Stream, longest: float = np.inf) -> Array:
     return out
 
 
-def flight_log(
-    path: Path,
-    reader: str,
-    streams: Mapping[str, Stream | None],
-    notes: tuple[str, ...],
-    vehicle: Vehicle | None = None,
-    vehicle_name: str = "",
-    model: Commands | None = None,
-    *,
-    extra: Mapping[str, Stream] | None = None,
-    from_zero: bool = True,
-) -> FlightLog:
-    """Return the log of some streams, by the names of a map's sections.
+@dataclass(frozen=True)
+class Recording:
+    """The channels of a log in the kit's units, axes and order of rotors.
 
-    Rows are the pose's samples within the span of the motors' stream. Of a sensor 5 times faster
-    than the pose, or of a log without a pose, they are the sensor's; a pose then stands in the
-    nearest row, moved there along the line to its neighbour. Everything else is interpolated to the
-    rows. A pose with a number that is not finite is not valid.
-
-    Args:
+    Attributes:
         path: the file, for errors and the log's name.
         reader: its reader's name; nothing: the file is a table of the kit's own or of a map.
-        streams: ``position`` (N, 7) m, with its scalar-first quaternion; ``rotors`` (N, 4) rad/s,
-            ``commands`` (N, 4) 0 to 1, both in the kit's order, or ``wrench`` (N, 4) N and Nm,
-            commanded; ``battery`` (N, 1) V; ``accelerometer`` (N, 3) m/s2 and ``gyro`` (N, 3)
-            rad/s, body axes forward, left, up; ``force`` and ``torque`` (N, 3), truth.
+        log_map: with the sections that are there.
+        streams: by section: ``position`` (N, 7) m, with its scalar-first quaternion; ``rotors``
+            (N, 4) rad/s, ``commands`` (N, 4) 0 to 1, or ``wrench`` (N, 4) N and Nm, commanded;
+            ``battery`` (N, 1) V; ``accelerometer`` (N, 3) m/s2 and ``gyro`` (N, 3) rad/s;
+            ``force`` and ``torque`` (N, 3), truth.
         notes: what the reader assumed.
-        vehicle: turns commands into rotor speeds where none are known, by its motor curve or by an
-            assumption that the notes state; None: they stay unknown.
-        vehicle_name: the vehicle that flew, where the reader knows it.
-        model: what commands are assumed to give where the vehicle states no motor curve.
         extra: what else is kept, by name.
-        from_zero: the log's time begins at 0; else it stays the file's.
-
-    Raises:
-        InputError: too few samples, an infinite rotor speed, a quaternion that is none, nothing to
-            find motion from, no motors, or streams that do not overlap.
     """
-    made, words = _cleaned(path, streams)
-    notes += words
-    sensors = {name: made[name] for name in ("gyro", "accelerometer") if name in made}
-    of_motors = [name for name in _MOTORS if name in made]
-    if not of_motors:
-        raise InputError(f"{path}: no motors; expected rotor speeds or motor commands")
-    motors = made[of_motors[0]].whole()
-    if "position" not in made and len(sensors) < 2:
-        absent = " and no ".join(x for x in ("accelerometer", "gyro") if x not in sensors)
-        raise InputError(
-            f"{path}: no pose, and no {absent}; expected a pose, or accelerometer and gyro"
+
+    path: Path
+    reader: str
+    log_map: LogMap
+    streams: dict[str, Stream]
+    notes: list[str]
+    extra: dict[str, Stream]
+
+    def log(self, vehicle: Vehicle | None) -> FlightLog:
+        """Return the flight log.
+
+        Rows are the pose's samples within the span of the motors' stream. Of a sensor 5 times
+        faster than the pose, or of a log without a pose, they are the sensor's; a pose then stands
+        in the nearest row, moved there along the line to its neighbour. Everything else is
+        interpolated to the rows. A pose with a number that is not finite is not valid.
+
+        Args:
+            vehicle: that flew, to turn commands into rotor speeds by its motor curve or by an
+                assumption that the notes state; None: the map's, where that comes with the kit.
+
+        Raises:
+            InputError: too few samples, an infinite rotor speed, a quaternion that is none, neither
+                a pose nor gyro and accelerometer, no motors, or streams that do not overlap.
+        """
+        path, reader, log_map = self.path, self.reader, self.log_map
+        vehicle = flown_vehicle(vehicle, log_map.vehicle)
+        made, words = _cleaned(path, self.streams)
+        notes = (*self.notes, *words)
+        sensors = {name: made[name] for name in ("gyro", "accelerometer") if name in made}
+        of_motors = [name for name in _MOTORS if name in made]
+        if not of_motors:
+            raise InputError(f"{path}: no motors; expected rotor speeds or motor commands")
+        motors = made[of_motors[0]].whole()
+        if "position" not in made and len(sensors) < 2:
+            absent = " and no ".join(x for x in ("accelerometer", "gyro") if x not in sensors)
+            raise InputError(
+                f"{path}: no pose, and no {absent}; expected a pose, or accelerometer and gyro"
+            )
+        t, pose, words = _rows(path, made.get("position"), motors, [*sensors.values()])
+        notes += words
+        after = np.searchsorted(motors.t, t)  # rows lie within the motors' span
+        steps = np.diff(motors.t)[after[motors.t[after] != t] - 1]
+        if (longest := float(steps.max(initial=0.0))) > _ROTOR_GAP:
+            notes += (
+                f"{motors.name}: up to {longest:.2g} s between messages; the "
+                f"{_MOTORS[of_motors[0]]} there are interpolated",
+            )
+        valid: Mask = np.asarray(np.isfinite(pose).all(axis=1))
+        if np.isfinite(pose[:, 3:]).any():  # else positions without an attitude, which are kept
+            pose[~valid] = np.nan
+        pose[valid, 3:] /= np.linalg.norm(pose[valid, 3:], axis=1)[:, None]
+        speeds = np.full((len(t), 4), np.nan)
+        if "rotors" in made:
+            speeds = made["rotors"].at(t)
+        elif "wrench" in made and vehicle is not None:
+            speeds, wrench_notes = speeds_of_wrench(made["wrench"].at(t), vehicle)
+            notes += tuple(wrench_notes)
+        measured = {name: x for name, s in sensors.items() if np.isfinite(x := s.between(t)).any()}
+        truth = {name: made[name].at(t) for name in ("force", "torque") if name in made}
+        kept = {name: stream.between(t) for name, stream in self.extra.items()}
+        times = t - t[0] if log_map.time.offset is None else t
+        log = FlightLog(
+            t=times,
+            position=pose[:, :3],
+            quaternion=pose[:, 3:],
+            rotor_speeds=speeds,
+            voltage=made["battery"].at(t)[:, 0] if "battery" in made else None,
+            accelerometer=measured.get("accelerometer"),
+            gyro=measured.get("gyro"),
+            name=Path(path.name.removesuffix(".gz")).stem if path.is_file() else path.name,
+            source=f"{path} (reader {reader})" if reader else str(path),
+            notes=(*notes, *_gap_notes(times, valid, bool(measured))),
+            valid=valid,
+            extra={name: x[:, 0] if x.shape[1] == 1 else x for name, x in kept.items()},
+            commanded="wrench" in made and "rotors" not in made,
+            command=made["commands"].at(t) if "commands" in made else None,
+            vehicle=log_map.vehicle,
+            **truth,
         )
-    t, pose, words = _rows(path, made.get("position"), motors, [*sensors.values()])
-    notes += words
-    after = np.searchsorted(motors.t, t)  # rows lie within the motors' span
-    steps = np.diff(motors.t)[after[motors.t[after] != t] - 1]
-    if (longest := float(steps.max(initial=0.0))) > _ROTOR_GAP:
-        notes += (
-            f"{motors.name}: up to {longest:.2g} s between messages; the {_MOTORS[of_motors[0]]} "
-            "there are interpolated",
-        )
-    valid: Mask = np.asarray(np.isfinite(pose).all(axis=1))
-    if np.isfinite(pose[:, 3:]).any():  # else positions without an attitude, which are kept
-        pose[~valid] = np.nan
-    pose[valid, 3:] /= np.linalg.norm(pose[valid, 3:], axis=1)[:, None]
-    speeds = np.full((len(t), 4), np.nan)
-    if "rotors" in made:
-        speeds = made["rotors"].at(t)
-    elif "wrench" in made and vehicle is not None:
-        speeds, wrench_notes = speeds_of_wrench(made["wrench"].at(t), vehicle)
-        notes += tuple(wrench_notes)
-    measured = {name: x for name, s in sensors.items() if np.isfinite(x := s.between(t)).any()}
-    truth = {name: made[name].at(t) for name in ("force", "torque") if name in made}
-    kept = {name: stream.between(t) for name, stream in (extra or {}).items()}
-    times = t - t[0] if from_zero else t
-    log = FlightLog(
-        t=times,
-        position=pose[:, :3],
-        quaternion=pose[:, 3:],
-        rotor_speeds=speeds,
-        voltage=made["battery"].at(t)[:, 0] if "battery" in made else None,
-        accelerometer=measured.get("accelerometer"),
-        gyro=measured.get("gyro"),
-        name=Path(path.name.removesuffix(".gz")).stem if path.is_file() else path.name,
-        source=f"{path} (reader {reader})" if reader else str(path),
-        notes=(*notes, *_gap_notes(times, valid, bool(measured))),
-        valid=valid,
-        extra={name: x[:, 0] if x.shape[1] == 1 else x for name, x in kept.items()},
-        commanded="wrench" in made and "rotors" not in made,
-        command=made["commands"].at(t) if "commands" in made else None,
-        vehicle=vehicle_name,
-        **truth,
-    )
-    return with_commanded_speeds(log, vehicle, model)
+        return with_commanded_speeds(log, vehicle, log_map.commands)
 
 
 def _cleaned(
-    path: Path, streams: Mapping[str, Stream | None]
+    path: Path, streams: Mapping[str, Stream]
 ) -> tuple[dict[str, Stream], tuple[str, ...]]:
     """Return the streams that hold something, in order of time and within what a flight has, and
     notes.
@@ -230,8 +233,6 @@ def _cleaned(
     made: dict[str, Stream] = {}
     notes: tuple[str, ...] = ()
     for name, stream in streams.items():
-        if stream is None:
-            continue
         needed = name in ("position", "rotors", "commands", "wrench")
         if needed and len(stream.t) < 2:
             raise InputError(

@@ -221,8 +221,11 @@ def _layout(path: Path, head: list[str]) -> tuple[TextLayout, int]:
         InputError: none makes a table of them.
     """
     best, found, first = 0.0, TextLayout(), 0
+    there = {mark for line in head for mark in set(line)}
     for separator in _SEPARATORS:
-        for decimal in (".", ",") if separator != "," else (".",):
+        if separator not in there and separator != " ":
+            continue
+        for decimal in (".", ",") if separator != "," and "," in there else (".",):
             layout = TextLayout(separator, decimal)
             score, start = _score(head, layout)
             if score > best + 1e-9:

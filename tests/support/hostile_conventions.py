@@ -154,9 +154,9 @@ HOSTILE = {
     "rotors early": (of_log(shifted, -0.5), r"rotor speeds come 0\.[45]\d s too early .* later"),
     "Betaflight": (
         of_log(permuted, [2, 3, 1, 0]),
-        "rotors look permuted: omega1..omega4 are rotors 3,4,2,1 of this vehicle .Betaflight's "
-        "order",
+        "rotors look permuted: omega1..omega4 are rotors 3,4,2,1 of this vehicle .the order "
+        "betaflight",
     ),
-    "PX4": (of_log(permuted, [3, 1, 0, 2]), "rotors 4,2,1,3 .* PX4"),
-    "Crazyflie": (of_log(permuted, [3, 2, 1, 0]), "rotors 4,3,2,1 .* Crazyflie's"),
+    "PX4": (of_log(permuted, [3, 1, 0, 2]), "rotors 4,2,1,3 .* px4-x"),
+    "Crazyflie": (of_log(permuted, [3, 2, 1, 0]), "rotors 4,3,2,1 .* crazyflie"),
 }

@@ -21,8 +21,9 @@ from ....runtime.errors import InputError, unknown_name
 from ....runtime.regular_files import open_regular
 from ..flight_log import FlightLog
 from ..log_map import load_map
-from ..mapped_log import read_mapped
+from ..mapped_log import map_table
 from ..table import SUFFIXES
+from ..tables import open_table
 from . import ardupilot_bin, betaflight, crazyflie_sd, px4_ulog, rosbag
 
 _HEAD = 4096  # bytes of a file that are looked at
@@ -96,7 +97,7 @@ READERS = {
 
 
 def _read_table(path: Path, vehicle: Vehicle | None, name: str) -> FlightLog:
-    return read_mapped(path, load_map(TABLES[name]), vehicle, name)
+    return map_table(open_table(path), load_map(TABLES[name]), vehicle, name)
 
 
 def find_reader(name: str) -> Reader:

@@ -24,7 +24,7 @@ from ..channels import Array, Samples
 from ..flight_log import FlightLog
 from ..log_map import Commands, LogMap, recording_map
 from ..map_fit import wanted_columns, ways
-from ..mapped_log import channels_of_recording
+from ..mapped_log import recording_of
 from ..rotor_orders import ORDERS, Order, order_words
 from ..streams import Stream
 from .dataflash import BEGINS as BEGINS
@@ -39,7 +39,7 @@ _FRAMES: dict[int, Order] = {  # of FRAME_TYPE
     1: ORDERS["ardupilot-x"],
     3: ORDERS["ardupilot-x"],  # H: the same places
     12: ORDERS["betaflight"],
-    13: (2, 3, 4, 1),  # DJI: 1 front-right, 2 front-left, 3 rear-left, 4 rear-right
+    13: ORDERS["dji"],
     14: ORDERS["crazyflie"],
     18: ORDERS["betaflight"],
 }
@@ -72,9 +72,7 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         notes.append(
             f"{log.skipped} bytes of the file belong to no message; it was cut or is damaged"
         )
-    recording = channels_of_recording(
-        path, [*recorded, *telemetry], log_map, "ardupilot_bin", notes
-    )
+    recording = recording_of(path, [*recorded, *telemetry], log_map, "ardupilot_bin", notes)
     return recording.log(vehicle)
 
 

@@ -26,7 +26,7 @@ from ..channels import Array, Samples
 from ..flight_log import FlightLog
 from ..log_map import recording_map
 from ..map_fit import wanted_columns
-from ..mapped_log import channels_of_recording
+from ..mapped_log import recording_of
 from ..tables import open_table
 from .blackbox import BEGINS as BEGINS
 from .blackbox import read_blackbox
@@ -134,7 +134,7 @@ def _log(
     for kind, scale in scales.items():
         for name in groups[kind]:
             fields[name] = (fields[name] - (low if kind == "motor" else 0.0)) * scale
-    return channels_of_recording(path, [Samples(t, fields)], log_map, reader, said).log(vehicle)
+    return recording_of(path, [Samples(t, fields)], log_map, reader, said).log(vehicle)
 
 
 def _range(path: Path, motors: list[Array], headers: Mapping[str, str]) -> tuple[float, float, str]:

@@ -26,7 +26,7 @@ from ....runtime.regular_files import read_bytes
 from ..channels import Samples
 from ..flight_log import FlightLog
 from ..log_map import load_map
-from ..mapped_log import channels_of_recording
+from ..mapped_log import recording_of
 
 BEGINS = (b"\xbc\x01\x00", b"\xbc\x02\x00")
 
@@ -67,7 +67,7 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         raise InputError(f"{path}: no event twice; expected at least two samples")
     first = min(float(samples.t[0]) for samples in events)
     notes.append(f"times: the vehicle's clock, which stood at {first:.6g} s at the first event")
-    recording = channels_of_recording(path, events, load_map("cflib"), "crazyflie_sd", notes)
+    recording = recording_of(path, events, load_map("cflib"), "crazyflie_sd", notes)
     return recording.log(vehicle)
 
 

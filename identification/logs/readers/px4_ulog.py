@@ -29,7 +29,8 @@ from ..channels import Array, Samples
 from ..flight_log import FlightLog
 from ..log_map import recording_map
 from ..map_fit import ways
-from ..mapped_log import Recording, channels_of_recording
+from ..mapped_log import recording_of
+from ..streams import Recording
 from .px4_motors import motor_order, outputs_of_motors, slots_of_escs, with_motors, without_ranges
 from .ulog_counting import counting
 
@@ -89,7 +90,7 @@ def channels(path: Path, has_ranges: bool = True) -> Recording:
         for fields in instances
         for samples in _samples(path, topic, fields, parameters)
     ]
-    recording = channels_of_recording(path, recorded, log_map, "px4_ulog", notes)
+    recording = recording_of(path, recorded, log_map, "px4_ulog", notes)
     position = recording.log_map.position
     if position is not None and position.topic == _FILTER:
         fields = log.topics[_FILTER][0]

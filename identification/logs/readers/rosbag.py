@@ -47,7 +47,7 @@ from ....runtime.file_limits import LIMITS
 from ....runtime.regular_files import check_regular, open_regular
 from ..channels import Array, Samples
 from ..flight_log import FlightLog
-from ..mapped_log import channels_of_recording
+from ..mapped_log import recording_of
 from .ros_messages import definitions, stamp
 from .topic_choice import chosen_topics
 from .topic_map import Topic, joined, topic_map
@@ -104,7 +104,7 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
         )
         for part, topic in topics.items()
     ]
-    found = channels_of_recording(path, recorded, joined(topics), "rosbag", (*notes, *doubts))
+    found = recording_of(path, recorded, joined(topics), "rosbag", (*notes, *doubts))
     return found.log(vehicle)
 
 

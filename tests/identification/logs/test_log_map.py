@@ -15,9 +15,10 @@ from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.inference.commanded_rotors import thrust_is_assumed
 from windwrench.identification.logs.flight_log import FlightLog, with_rows, write_log
 from windwrench.identification.logs.log_map import load_map, map_names, parse_map
-from windwrench.identification.logs.mapped_log import read_mapped
+from windwrench.identification.logs.mapped_log import map_table
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.rotor_orders import ORDERS, order_words, rotor_order
+from windwrench.identification.logs.tables import open_table
 from windwrench.runtime.errors import InputError
 
 GOOD = {
@@ -64,7 +65,7 @@ def test_any_convention_and_its_map_give_the_same_flight(
     true = with_rows(flown, rows)
     true = replace(true, t=true.t - true.t[0])
     written = random_table(true, rng)
-    found = read_mapped(save(written, tmp_path / "table.csv"), written.log_map)
+    found = map_table(open_table(save(written, tmp_path / "table.csv")), written.log_map)
     assert_same(found, true)
     assert found.has_pose == (written.log_map.position is not None)
     assert (found.gyro is None) == (written.log_map.gyro is None)
@@ -161,7 +162,7 @@ def test_a_table_of_several_rates_has_the_rows_of_its_pose(tmp_path: Path) -> No
     }
     volts = {"v": [f"{11 + 0.01 * k:.2f}" if k % 20 == 0 else "" for k in range(count)]}
     path = table(tmp_path / "a.csv", {**pose, **rotors, **volts}, count)
-    found = read_mapped(path, parse_map({**GOOD, "battery": {"column": "v"}}, "m"))
+    found = map_table(open_table(path), parse_map({**GOOD, "battery": {"column": "v"}}, "m"))
     assert found.valid.all()
     assert len(found.t) == 39  # from the rotors' first sample to their last
     np.testing.assert_allclose(found.rotor_speeds[:, 0] * 30 / np.pi, 3600 + np.arange(2, 80, 2))
@@ -179,9 +180,8 @@ def test_rows_of_one_time_are_one_row(tmp_path: Path) -> None:
         for n, v in zip(("x", "y", "z", "qx", "qy", "qz", "qw"), "0010001", strict=True)
     }
     rotors = {f"m{i}": ["" if k % 2 else "3600" for k in range(80)] for i in (1, 2, 3, 4)}
-    found = read_mapped(
-        table(tmp_path / "a.csv", {"t": t, **pose, **rotors}, 80), parse_map(GOOD, "m")
-    )
+    path = table(tmp_path / "a.csv", {"t": t, **pose, **rotors}, 80)
+    found = map_table(open_table(path), parse_map(GOOD, "m"))
     assert len(found.t) == 40
     assert found.valid.all()
     assert any("joined" in note for note in found.notes)
@@ -192,7 +192,7 @@ def test_times_that_go_back_are_refused_with_their_row(tmp_path: Path) -> None:
     t[7] = "0.01"
     words = r"column t, row 8 \(line 9\): 0.01 goes back from 0.06"
     with pytest.raises(InputError, match=words):
-        read_mapped(table(tmp_path / "a.csv", {"t": t}), parse_map(GOOD, "m"))
+        map_table(open_table(table(tmp_path / "a.csv", {"t": t})), parse_map(GOOD, "m"))
 
 
 COMMANDED = {
@@ -237,7 +237,7 @@ def test_a_stated_curve_turns_commands_into_speeds(tmp_path: Path) -> None:
 
 def test_commands_of_another_range_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="expected motor commands from 1000 to 2000"):
-        read_mapped(table(tmp_path / "a.csv", {}), parse_map(COMMANDED, "m"))
+        map_table(open_table(table(tmp_path / "a.csv", {})), parse_map(COMMANDED, "m"))
 
 
 def _saved(folder: Path, given: dict[str, object]) -> Path:
