@@ -34,12 +34,12 @@ Array = NDArray[np.float64]
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])
 # from the log's world, or its body axes, to the kit's
-_WORLD_TURNS: dict[str, Array] = {
+WORLD_TURNS: dict[str, Array] = {
     "enu": np.eye(3),
     "ned": _HALF_TURN,
     "y_up": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
 }
-_BODY_TURNS: dict[str, Array] = {"flu": np.eye(3), "frd": _HALF_TURN}
+BODY_TURNS: dict[str, Array] = {"flu": np.eye(3), "frd": _HALF_TURN}
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,11 +90,11 @@ def in_kit_units(log_map: LogMap, section: str, part: Columns, values: Array) ->
         return np.asarray(values * VOLTAGE_UNITS[part.unit] * part.cells)
     if isinstance(part, Sensor):
         units = ACCELERATION_UNITS if section == "accelerometer" else RATE_UNITS
-        return np.asarray(values * units[part.unit] @ _BODY_TURNS[part.body or log_map.body].T)
+        return np.asarray(values * units[part.unit] @ BODY_TURNS[part.body or log_map.body].T)
     if section == "wrench":
         return values
     unit = LENGTH_UNITS.get(part.unit, 1e-3 if part.unit in ("mN", "mNm") else 1.0)
-    return np.asarray(values * unit @ _WORLD_TURNS[log_map.world].T)
+    return np.asarray(values * unit @ WORLD_TURNS[log_map.world].T)
 
 
 def quaternions(part: Attitude, values: Array) -> Array:
@@ -117,5 +117,5 @@ def in_kit_axes(log_map: LogMap, part: Attitude, attitude: Array) -> Array:
     if log_map.world == "ned" and log_map.body == "frd":  # of any length, NaN included
         return np.asarray(attitude * np.array([1.0, 1.0, -1.0, -1.0]))
     matrix = Rotation.from_quat(attitude, scalar_first=True).as_matrix()
-    turn = Rotation.from_matrix(_WORLD_TURNS[log_map.world] @ matrix @ _BODY_TURNS[log_map.body].T)
+    turn = Rotation.from_matrix(WORLD_TURNS[log_map.world] @ matrix @ BODY_TURNS[log_map.body].T)
     return np.asarray(turn.as_quat(scalar_first=True))

@@ -25,7 +25,7 @@ numbers still reads one.
 """  # noqa: E501
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -50,7 +50,7 @@ REQUIRED = ("t", *POSE, *ROTORS)
 
 VEHICLE = re.compile(r"vehicle=([A-Za-z0-9][A-Za-z0-9_.+ -]{0,63})")  # a column's name
 
-_NORM_TOLERANCE = 0.02  # of a quaternion's length
+NORM_TOLERANCE = 0.02  # of a quaternion's length
 _GAP = 3.0  # median time steps
 
 
@@ -192,11 +192,11 @@ def check_quaternions(
         rows: (N,) of the table in which they stand.
     """
     length = np.linalg.norm(quaternions, axis=1)
-    bad = np.flatnonzero(where & ~(np.abs(length - 1.0) <= _NORM_TOLERANCE))
+    bad = np.flatnonzero(where & ~(np.abs(length - 1.0) <= NORM_TOLERANCE))
     if bad.size:
         raise InputError(
             f"{table.path}: columns {columns}, {table.row(int(rows[bad[0]]))}: a quaternion of "
-            f"length {length[bad[0]]:.4g}; expected 1 within {_NORM_TOLERANCE:g}"
+            f"length {length[bad[0]]:.4g}; expected 1 within {NORM_TOLERANCE:g}"
         )
 
 
@@ -226,15 +226,10 @@ def with_rows(log: FlightLog, keep: Mask) -> FlightLog:
     return replace(log, **parts, extra={name: x[keep] for name, x in log.extra.items()})
 
 
-def write_log(log: FlightLog, path: str | Path) -> None:
-    """Write a log in the kit's own form to a ``.csv``, ``.csv.gz`` or ``.parquet`` file, whole or
-    not at all.
-
-    Raises:
-        InputError: the name's ending is unknown or the file cannot be written.
-    """
+def parts_of(log: FlightLog) -> list[tuple[tuple[str, ...], Array]]:
+    """Return what a log holds (N, k), beside the names of the columns that it has in a file."""
     pose = np.where(log.valid[:, None], np.column_stack([log.position, log.quaternion]), np.nan)
-    parts: list[tuple[Sequence[str], Array | None]] = [(("t",), log.t)]
+    parts: list[tuple[tuple[str, ...], Array | None]] = [(("t",), log.t)]
     if log.has_pose or log.accelerometer is None or log.gyro is None:
         parts.append((POSE, pose))
     elif np.isfinite(log.position).any():
@@ -245,10 +240,19 @@ def write_log(log: FlightLog, path: str | Path) -> None:
     if log.force is not None and log.torque is not None:
         parts.append((TRUTH, np.column_stack([log.force, log.torque])))
     parts += [(ACCELEROMETER, log.accelerometer), (GYRO, log.gyro)]
+    return [(names, values) for names, values in parts if values is not None]
+
+
+def write_log(log: FlightLog, path: str | Path) -> None:
+    """Write a log in the kit's own form to a ``.csv``, ``.csv.gz`` or ``.parquet`` file, whole or
+    not at all.
+
+    Raises:
+        InputError: the name's ending is unknown or the file cannot be written.
+    """
     columns: dict[str, Array] = {}
-    for names, values in parts:
-        if values is not None:
-            columns |= zip(names, values.reshape(len(log.t), -1).T, strict=True)
+    for names, values in parts_of(log):
+        columns |= zip(names, values.reshape(len(log.t), -1).T, strict=True)
     if VEHICLE.fullmatch(named := f"vehicle={log.vehicle}"):
         columns[named] = np.ones(len(log.t))
     write_table(columns, Path(path))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from .flight_log import ACCELEROMETER, GYRO, POSE, ROTORS, TRUTH, FlightLog
+from .flight_log import FlightLog, parts_of
 from .flight_phases import usual_thrust
 from .log_map import ROTOR_UNITS, TIME_UNITS, VOLTAGE_UNITS
 
@@ -172,18 +172,8 @@ def check_magnitudes(log: FlightLog) -> None:
             f"{log.source}: column t, row {longest + 2}: {step[longest]:.3g} s after the row "
             f"before; expected at most {MAGNITUDES.longest_step:g} s"
         )
-    groups = (
-        (POSE[:3], log.position),
-        (ROTORS, log.rotor_speeds),
-        (("vbat",), None if log.voltage is None else log.voltage[:, None]),
-        (TRUTH[:3], log.force),
-        (TRUTH[3:], log.torque),
-        (ACCELEROMETER, log.accelerometer),
-        (GYRO, log.gyro),
-    )
-    for names, values in groups:
-        if values is None:
-            continue
+    for names, values in parts_of(log)[1:]:
+        values = values.reshape(len(log.t), -1)
         beyond = np.argwhere(np.abs(values) > MAGNITUDES.largest)  # False where NaN
         if beyond.size:
             row, column = beyond[0]

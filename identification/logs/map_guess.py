@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
+from .channels import BODY_TURNS
 from .column_names import Group, Name, best_group, groups_of, take_apart, words
 from .evidence import EVIDENCE, Evidence, Ranking, likelihood
 from .excerpt import LONGEST
@@ -51,7 +52,7 @@ from .magnitudes import (
     voltage_unit,
     within,
 )
-from .readings import BODY_AXES, DECLARED, ROTORS, rotations, table_readings
+from .readings import DECLARED, ROTORS, rotations, table_readings
 from .rotor_orders import ORDERS, Order, order_names, order_words
 from .table import Table
 
@@ -366,8 +367,8 @@ class _Guessing:
         good, rotation = rotations(self.values["attitude"], self.ranking.best)
         times = self.t[good]
         seen = np.isfinite(times)
-        ways = list(product(units, BODY_AXES))
-        turns = [RATE_UNITS[unit] * BODY_AXES[body] for unit, body in ways]
+        ways = list(product(units, BODY_TURNS))
+        turns = [RATE_UNITS[unit] * BODY_TURNS[body] for unit, body in ways]
         shares = gyro_shares(self.t, values, times[seen], rotation[seen], turns)
         if shares is None:
             return ways[0][1], (ways[0][0], False, "the log is too short")
@@ -410,7 +411,7 @@ class _Guessing:
         evidence, best = None, DECLARED
         if "gyro" in self.sections:
             sensor = self.sections["gyro"]
-            rates = self.values["gyro"] * RATE_UNITS[sensor.unit] @ BODY_AXES[sensor.body]
+            rates = self.values["gyro"] * RATE_UNITS[sensor.unit] @ BODY_TURNS[sensor.body]
             evidence = Evidence(self.t, np.square(values), gyro=rates)
         elif self.ranking is not None and self.turning_known:
             best = self.ranking.best

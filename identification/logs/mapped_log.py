@@ -17,11 +17,11 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from .channels import Samples, in_kit_axes, in_kit_units, quaternions
 from .commanded_speeds import flown_vehicle
-from .flight_log import FlightLog, Mask, vehicle_of_columns
+from .flight_log import NORM_TOLERANCE, FlightLog, Mask, vehicle_of_columns
 from .log_map import Attitude, Battery, Columns, Commands, LogMap, Position, Rotors, constant
 from .map_fit import NO_QUATERNION, chosen, fitted, wanted_columns, ways
 from .rotor_orders import order_names, order_words
-from .streams import Recording, Stream, check_norms, readable, slerp
+from .streams import Recording, Stream, readable, slerp
 from .table import Table
 from .table_rows import LONGEST_STEPS, check_rows, has_several_rates, rows_of
 
@@ -108,14 +108,16 @@ def recording_of(
         elif isinstance(part, Battery) and part.late:
             streams[name] = replace(stream, t=stream.t - part.late)
             said.append(f"battery voltage put {part.late:g} s sooner, by which it is logged late")
+    absent = [name for name in _IMU if readable(streams.get(name)) is None]
+    must_move = log_map.rows != "whole" or (poses and not log_map.is_own)
+    if log_map.position is None and absent and must_move:
+        expected = " or ".join(way.label for way in poses)
+        expected = f"{expected}, with an attitude beside it" if poses else "a pose"
+        raise InputError(
+            f"{path}: no pose, and no {' and no '.join(absent)}; expected {expected}, or "
+            f"{' and '.join(_IMU)}"
+        )
     if log_map.position is None and not log_map.is_own:
-        absent = [name for name in _IMU if readable(streams.get(name)) is None]
-        if poses and absent:
-            raise InputError(
-                f"{path}: no pose, and no {' and no '.join(absent)}; expected "
-                f"{' or '.join(way.label for way in poses)}, with an attitude beside it, or "
-                f"{' and '.join(_IMU)}"
-            )
         what = ": no position that changes, with an attitude beside it, was logged"
         said.append(f"no pose{what if poses else ' in the log'}")
     if log_map.position is None and log_map.rows == "whole":  # all rows are the log's
@@ -208,7 +210,13 @@ def _attitude(path: Path, log_map: LogMap, part: Attitude, samples: Samples) -> 
     turns = quaternions(part, values[good])
     long = np.linalg.norm(turns, axis=1) > NO_QUATERNION
     raw, _ = Stream(part.label, samples.t[good][long], turns[long]).forward()
-    check_norms(path, raw)
+    length = np.linalg.norm(raw.values, axis=1)
+    off = np.flatnonzero(np.abs(length - 1.0) > NORM_TOLERANCE)
+    if off.size:
+        raise InputError(
+            f"{path}: {raw.name}, at {raw.t[off[0]]:.6g} s: a quaternion of length "
+            f"{length[off[0]]:.4g}; expected 1 within {NORM_TOLERANCE:g}"
+        )
     if not len(raw.t):
         return raw
     return replace(raw, values=in_kit_axes(log_map, part, raw.values))

@@ -13,17 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from .channels import WORLD_TURNS
 from .log_map import ANGLE_UNITS, LENGTH_UNITS, SENSES
 from .rotor_orders import ORDERS, Order, order_names
 
 Array = NDArray[np.float64]
 
 _I = np.eye(3)
-_DOWN = np.diag([1.0, -1.0, -1.0])  # forward, left, up <-> forward, right, down; the worlds alike
-_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # from a world with y up
+_DOWN, _Y_UP = WORLD_TURNS["ned"], WORLD_TURNS["y_up"]
 _SWAP_YZ = _I[[0, 2, 1]]
 _PLACE, _QUATERNION = ("px", "py", "pz"), ("qw", "qx", "qy", "qz")
-BODY_AXES = {"flu": _I, "frd": _DOWN}  # by which the readings of a sensor are multiplied
 
 
 @dataclass(frozen=True, eq=False)

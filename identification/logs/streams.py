@@ -20,7 +20,6 @@ from .log_map import LogMap
 
 Array = NDArray[np.float64]
 
-_NORM_TOLERANCE = 0.02  # of a quaternion's length
 _SENSOR_GAP = 3.5  # median steps, across which an inertial sensor is not interpolated
 _ROTOR_GAP = 0.5  # s without rotor speeds that deserves a note
 _MOTORS = {"rotors": "rotor speeds", "commands": "commands", "wrench": "commanded wrenches"}
@@ -169,14 +168,7 @@ class Recording:
         notes = (*self.notes, *words)
         sensors = {name: made[name] for name in ("gyro", "accelerometer") if name in made}
         of_motors = [name for name in _MOTORS if name in made]
-        if not of_motors:
-            raise InputError(f"{path}: no motors; expected rotor speeds or motor commands")
         motors = made[of_motors[0]].whole()
-        if "position" not in made and len(sensors) < 2:
-            absent = " and no ".join(x for x in ("accelerometer", "gyro") if x not in sensors)
-            raise InputError(
-                f"{path}: no pose, and no {absent}; expected a pose, or accelerometer and gyro"
-            )
         t, pose, words = _rows(path, made.get("position"), motors, [*sensors.values()])
         notes += words
         after = np.searchsorted(motors.t, t)  # rows lie within the motors' span
@@ -240,9 +232,7 @@ def _cleaned(
             )
         stream, words = stream.forward()
         values = stream.values
-        if name == "position":
-            check_norms(path, stream)
-        elif name in ("rotors", "commands", "wrench"):
+        if name in ("rotors", "commands", "wrench"):
             words += _check_motors(path, name, stream)
             values = np.abs(values) if name == "rotors" else values
             values = np.clip(values, 0.0, 1.0) if name == "commands" else values
@@ -256,18 +246,6 @@ def _cleaned(
             notes += (f"{stream.name}: no positive voltage; left out",)
         notes += words if needed else ()
     return made, notes
-
-
-def check_norms(path: Path, pose: Stream) -> None:
-    """Raise InputError at the first pose (N, 7) or quaternion (N, 4) whose length is not 1."""
-    whole = np.isfinite(pose.values).all(axis=1)
-    length = np.linalg.norm(pose.values[:, -4:], axis=1)
-    off = np.flatnonzero(whole & (np.abs(length - 1.0) > _NORM_TOLERANCE))
-    if off.size:
-        raise InputError(
-            f"{path}: {pose.name}, at {pose.t[off[0]]:.6g} s: a quaternion of length "
-            f"{length[off[0]]:.4g}; expected 1 within {_NORM_TOLERANCE:g}"
-        )
 
 
 def _check_motors(path: Path, name: str, motors: Stream) -> tuple[str, ...]:

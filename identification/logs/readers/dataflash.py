@@ -96,9 +96,16 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> DataFlash:
             f"{path}: cannot be read as {_WHAT}: begins with "
             f"{data[:2].tobytes().hex(' ') or 'nothing'}, {len(data)} bytes; expected a3 95"
         )
-    counts, used = _count(data)
+    counts, nowhere = np.zeros(256, np.int64), np.empty(0, np.int64)
+    used = _walk(data, counts, -1, nowhere)
+
+    def places(number: int, most: int) -> NDArray[np.int64]:
+        found = np.empty(min(int(counts[number]), most), np.int64)
+        _walk(data, np.zeros(256, np.int64), number, found)
+        return found
+
     kinds = {}
-    for place in _places(data, _FMT, min(int(counts[_FMT]), 100_000)):
+    for place in places(_FMT, 100_000):
         kind = _layout(data[place : place + _FMT_LENGTH].tobytes(), wanted)
         if kind is not None:
             kinds[kind[0]] = kind[1:]
@@ -111,7 +118,7 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> DataFlash:
             )
         if not count:
             continue
-        found[name] = Messages(name, _rows(data, _places(data, number, count), layout), units)
+        found[name] = Messages(name, _rows(data, places(number, count), layout), units)
     if not kinds and not counts[_FMT]:
         raise InputError(f"{path}: cannot be read as {_WHAT}: no FMT message; expected some")
     return DataFlash(found, len(data) - int(used))
@@ -148,19 +155,6 @@ def _layout(
     if layout.itemsize + 3 != length:
         return None
     return number, name, layout, {column: _LETTERS[letter][1] for column, letter in pairs}
-
-
-def _count(data: Bytes) -> tuple[NDArray[np.int64], int]:
-    """Return how many messages of each type there are (256,), and how many bytes they take."""
-    counts = np.zeros(256, np.int64)
-    return counts, _walk(data, counts, -1, np.empty(0, np.int64))
-
-
-def _places(data: Bytes, number: int, count: int) -> NDArray[np.int64]:
-    """Return where the messages of a type begin (count,)."""
-    places = np.empty(count, np.int64)
-    _walk(data, np.zeros(256, np.int64), number, places)
-    return places
 
 
 @compiled

@@ -1,6 +1,6 @@
 """PX4's motors: which is which rotor, which output drives it, and in what range, by parameters."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -81,8 +81,8 @@ def without_ranges(parameters: Parameters) -> Parameters:
 def slots_of_escs(fields: Mapping[str, Any]) -> list[int]:
     """Return the ESCs, from 0, of motors 1 to 4: by the function that each states, if all do."""
     functions = [f"esc[{i}].actuator_function" for i in range(_ESCS)]
-    named = [int(fields[name][-1]) - _MOTOR1 if name in fields else -1 for name in functions]
-    return _slots_of_motors(named) or list(range(4))
+    named = [int(fields[name][-1]) if name in fields else -1 for name in functions]
+    return slots_of_motors(named) or list(range(4))
 
 
 def outputs_of_motors(
@@ -117,14 +117,17 @@ def _output_slots(parameters: Parameters) -> tuple[str, list[int]]:
     """Return the bank and the outputs, from 0, of motors 1 to 4."""
     for bank in _BANKS:
         functions = (parameters.get(f"PWM_{bank}_FUNC{i + 1}", 0.0) for i in range(_OUTPUTS))
-        if slots := _slots_of_motors([int(function) - _MOTOR1 for function in functions]):
+        if slots := slots_of_motors([int(function) for function in functions]):
             return bank, slots
     return "MAIN", list(range(4))
 
 
-def _slots_of_motors(motors: list[int]) -> list[int]:
-    """Return the slots of motors 0 to 3 in a list of what each slot drives; none: not all do."""
-    return [motors.index(i) for i in range(4)] if set(range(4)) <= set(motors) else []
+def slots_of_motors(functions: Sequence[int]) -> list[int]:
+    """Return the slots of motors 1 to 4, by PX4's numbers of what each slot does; none: not all
+    are there.
+    """
+    motors = [_MOTOR1 + i for i in range(4)]
+    return [functions.index(motor) for motor in motors] if {*motors} <= {*functions} else []
 
 
 def _span(parameters: Parameters) -> str:

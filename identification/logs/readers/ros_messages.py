@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ....runtime.yaml_file import read_yaml
 from ..log_map import MAPS
+from .px4_motors import slots_of_motors
 
 Array = NDArray[np.float64]
 
@@ -26,7 +27,6 @@ ARRAYS = tuple(
 )
 PARTS = ("pose", "rotors", "command", "voltage", "imu")
 MOTORS = ("rotors", "command")  # parts
-_MOTOR1 = 101  # PX4's number of the output function "motor 1"
 _SECOND = 10**9  # ns
 _MICROSECOND = 1000  # ns
 _LATEST = 2**63  # ns
@@ -64,9 +64,8 @@ def _odometry(message: Any) -> list[float]:
 
 def _esc_rpm(message: Any) -> list[float]:
     """Return the rpm of motors 1 to 4, by the function that each ESC states where all do."""
-    slots = [int(esc.actuator_function) - _MOTOR1 for esc in message.esc]
-    order = [slots.index(i) for i in range(4)] if set(range(4)) <= set(slots) else range(4)
-    return [message.esc[i].esc_rpm for i in order]
+    slots = slots_of_motors([int(esc.actuator_function) for esc in message.esc])
+    return [message.esc[i].esc_rpm for i in slots or range(4)]
 
 
 def _item_rpm(message: Any) -> list[float]:
