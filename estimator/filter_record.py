@@ -16,6 +16,8 @@ from .tuning import UKFTuning
 N = 18  # error state (rho, omega, x, v, torque, force)
 BIASES = 6  # of gyro and accelerometer
 AGREEING = 5  # accelerometer samples in a row that make a push
+# of the hover's rotor speed: no vehicle lifts 900 of its weights, and a log in rpm still shows
+FASTEST = 30.0
 COMPANIONS = 12  # the biases, and the noise of the last step: ``bias_states``
 
 IMU = np.dtype(
@@ -73,6 +75,7 @@ FILTER = np.dtype(
         ("lost", "f8", (N,)),  # variances beyond which what is not measured is given up
         ("push", "f8", (2,)),  # rad/s2 and m/s2, of the hardest push
         ("response", "f8"),  # s
+        ("fastest", "f8"),  # rad/s, beyond which a rotor speed counts as not measured
         # tuning, as variances
         ("motor_torque", "f8", (3,)),
         ("torque_walk", "f8", (3,)),
@@ -153,6 +156,7 @@ def filter_record(
     f = record[0]
     built = load_model(f, vehicle)
     f["last_speeds"], f["uncertain"] = built.hover_rate, factors_of(built)
+    f["fastest"] = FASTEST * built.hover_rate
     f["kappa"], f["period"] = tuning.kappa, period
     load_recovery(f, built, gate, Recovery() if recovery is None else recovery)
     for name, deviation in (

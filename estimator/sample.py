@@ -105,8 +105,8 @@ def negative_speeds(where: str, rotor_speeds: Array) -> InputError:
 def check_sample(f: Record, z: Array, parts: int) -> int:
     """Return the ``parts`` of ``z`` (11,) that can be used, or -1 if the quaternion is no rotation.
 
-    Rotor speeds that are not finite become the last ones that were; the quaternion is brought to
-    length 1.
+    Rotor speeds that no vehicle has become the last ones that one may have; the quaternion is
+    brought to length 1.
     """
     usable = 0
     if parts & 1 != 0 and math.isfinite(z[4] + z[5] + z[6]):
@@ -121,7 +121,7 @@ def check_sample(f: Record, z: Array, parts: int) -> int:
                 z[i] *= scale
             usable += 2
     for i in range(4):
-        if not math.isfinite(z[i]):
+        if not abs(z[i]) <= f.fastest:
             z[i] = f.last_speeds[i]
         f.last_speeds[i] = z[i]
     return usable

@@ -47,7 +47,7 @@ def _check(f: Record) -> None:
     for i in range(7, 11):
         z[i] *= scale
     for i in range(4):
-        z[i] = choose(math.isfinite(z[i]), z[i], last[i])
+        z[i] = choose(abs(z[i]) <= f.fastest, z[i], last[i])
         last[i] = z[i]
 
 

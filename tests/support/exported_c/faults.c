@@ -1,4 +1,4 @@
-/* Every input may be odd; every output must be a number, and good poses bring the filter back. */
+/* Every input may be odd; every output must be a number, a standard deviation a positive one, and good poses bring the filter back. */
 #include <math.h>
 #include <stdio.h>
 #include "windwrench_filter.h"
@@ -40,7 +40,7 @@ int main(void)
         ww_get(&f, &e);
         const float *numbers = (const float *)&e;
         for (int i = 0; i < 37; i++)
-            if (!isfinite(numbers[i])) { printf("step %ld: number %d\n", k, i); return 2; }
+            if (!isfinite(numbers[i]) || (i >= 19 && !(numbers[i] > 0.0f))) { printf("step %ld: number %d\n", k, i); return 2; }
     }
     /* good poses bring it back */
     for (int k = 0; k < 2000; k++) {
