@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from ..runtime.compiled import Record, compiled, compiled_for_vectors, compiled_inline
-from ..runtime.vector_lanes import first_below, first_column, lanes_by
+from ..runtime.vector_lanes import choose, first_below, first_column, lanes_by
 from .estimate import Array
 from .filter_record import N
 
@@ -383,5 +383,23 @@ def whiten(f: Record) -> None:
 
 @compiled_for_vectors
 def subtract_squares(f: Record) -> None:
-    """Take ``W' W`` off P."""
-    add_squares(f.P, f.W, 0, -1.0, N)
+    """Take ``W' W`` off P. Of the rows that were measured that leaves ``R S^-1`` of them, which is
+    written as such: the difference would be rounding alone where the noise R is a 1e-16 of them.
+    """
+    P, W, L, c, T, noise = f.P, f.W, f.L, f.scales, f.E, f.noise
+    add_squares(P, W, 0, -1.0, N)
+    for j in range(N):
+        t5 = W[5, j] * c[5]
+        t4 = (W[4, j] - L[5, 4] * t5) * c[4]
+        t3 = (W[3, j] - L[4, 3] * t4 - L[5, 3] * t5) * c[3]
+        t2 = (W[2, j] - L[3, 2] * t3 - L[4, 2] * t4 - L[5, 2] * t5) * c[2]
+        t1 = (W[1, j] - L[2, 1] * t2 - L[3, 1] * t3 - L[4, 1] * t4 - L[5, 1] * t5) * c[1]
+        t0 = W[0, j] - L[1, 0] * t1 - L[2, 0] * t2 - L[3, 0] * t3 - L[4, 0] * t4 - L[5, 0] * t5
+        T[0, j], T[1, j], T[2, j] = t0 * c[0], t1, t2
+        T[3, j], T[4, j], T[5, j] = t3, t4, t5
+    for k in range(6):
+        row, measured = k if k < 3 else k + 3, c[k] > 0.0
+        for j in range(N):
+            kept = choose(measured, noise[k] * T[k, j], P[row, j])
+            P[row, j] = kept
+            P[j, row] = kept

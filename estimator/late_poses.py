@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..runtime.arguments import real_numbers
 from ..runtime.errors import InputError
 from .estimate import Array, WrenchEstimate
 from .ukf import WrenchUKF
@@ -277,7 +278,7 @@ def _numbers(values: ArrayLike) -> Array:
     Raises:
         InputError: they are no numbers.
     """
-    try:
-        return np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"TimedFilter: expected an array of numbers, got {values!r}") from None
+    numbers = real_numbers(values)
+    if numbers is None:
+        raise InputError(f"TimedFilter: expected an array of numbers, got {values!r}")
+    return numbers

@@ -13,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..dynamics.motion import LONG_TURN
 from ..dynamics.vehicle import Vehicle
 from .estimate import Array
 from .tuning import UKFTuning
@@ -152,14 +153,23 @@ class ReferenceUKF:
         # (12): the world torque enters as R' tau
         torque = torque + moment - cross(v.com, thrust) + n_m
         torque = torque + np.einsum("nji,nj->ni", C, s[:, TORQUE])
-        alpha = np.linalg.solve(v.inertia, (torque - cross(omega, omega @ v.inertia)).T).T
+        # beyond LONG_TURN a step, where (12) adds energy, the momentum turns by exp(-[omega T]x)
+        g, turned = (
+            cross(omega, omega @ v.inertia),
+            T * np.linalg.norm(omega, axis=1, keepdims=True),
+        )
+        far = np.maximum(turned, LONG_TURN)
+        second = T * (1 - np.cos(far)) / far**2
+        rest = (1 - np.sin(far) / far) * g + second * cross(omega, g)
+        torque = torque - g + np.where(turned > LONG_TURN, rest, 0)
+        alpha = np.linalg.solve(v.inertia, torque.T).T
         # (4), and the way from the centre of mass to the geometric centre
         a = (np.einsum("nij,nj->ni", C, thrust + n_c) + s[:, FORCE] + force) / v.mass
         a = a - [0, 0, v.gravity]
         offset = cross(alpha, v.com) + cross(omega, cross(omega, v.com))
         a = a - np.einsum("nij,nj->ni", C, offset)
         # (11), (13): multiplication from the right by the turn of the step
-        angle = np.linalg.norm(omega, axis=1, keepdims=True) * T / 2
+        angle = turned / 2
         turn = np.hstack([np.cos(angle), np.sinc(angle / np.pi) * omega * T / 2])
         return np.hstack(
             [

@@ -5,6 +5,7 @@ way out.
 import math
 
 import numpy as np
+from numpy.ma import MaskedArray
 from numpy.typing import ArrayLike
 
 from ..dynamics.model import rewrite_sample
@@ -38,9 +39,13 @@ class Sample:
     ) -> int:
         """Take in rotor speeds (4,) and what there is of a pose, (3,) and (4,); return its parts.
 
+        What an array masks was not measured.
+
         Raises:
             InputError: a shape or a type is wrong, or a rotor speed is negative.
         """
+        if MaskedArray in (type(rotor_speeds), type(position), type(quaternion)):
+            return self._convert(rotor_speeds, position, quaternion)
         try:
             # a memory view takes in arrays of doubles of its own shape, in half the time that NumPy
             # would need

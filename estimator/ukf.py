@@ -27,6 +27,7 @@ from ..dynamics.model import reset_model
 from ..dynamics.rotation import attitude_error, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
 from ..runtime.addresses import address_of
+from ..runtime.arguments import real_numbers
 from ..runtime.compiled import Record, compiled, compiled_inline, specialised
 from ..runtime.errors import InputError
 from ..runtime.vector_lanes import all_of, any_of, choose, first_below, first_column, lanes_by
@@ -691,8 +692,8 @@ def _finite(what: str, value: ArrayLike, size: int) -> Array:
     Raises:
         InputError: the shape is another, or a number is not finite.
     """
-    array = np.asarray(value, dtype=np.float64)
-    if array.shape != (size,) or not np.all(np.isfinite(array)):
+    array = real_numbers(value)
+    if array is None or array.shape != (size,) or not np.all(np.isfinite(array)):
         raise InputError(f"{what} must be {size} finite numbers, got {value!r}")
     return array
 

@@ -242,12 +242,9 @@ def _rows(name: str, value: ArrayLike, shape: tuple[int, ...], count: int) -> Ar
     Raises:
         InputError: it cannot be.
     """
-    try:
-        array = np.asarray(value, dtype=np.float64)
-        if array.shape not in (shape, (count, *shape)):
-            raise ValueError
-    except (TypeError, ValueError):
+    array = real_numbers(value)
+    if array is None or array.shape not in (shape, (count, *shape)):
         raise InputError(
-            f"WrenchUKFBatch: {name} must be {(count, *shape)}, got shape {np.shape(value)}"
-        ) from None
+            f"WrenchUKFBatch: {name} must be {(count, *shape)}, got {described(value)}"
+        )
     return np.array(np.broadcast_to(array, (count, *shape)))

@@ -7,12 +7,14 @@ from numpy.typing import NDArray
 
 
 def real_numbers(value: object) -> NDArray[np.float64] | None:
-    """Return an array of real numbers as one of doubles; None for anything else, strings of digits
-    among it.
+    """Return an array of real numbers as one of doubles, NaN where it is masked; None for anything
+    else, strings of digits among it.
     """
     try:
-        array: NDArray[Any] = np.asarray(value)
-        return array.astype(np.float64) if array.dtype.kind in "biuf" else None
+        array: NDArray[Any] = np.asanyarray(value)
+        if array.dtype.kind not in "biuf":
+            return None
+        return np.asarray(np.ma.filled(array.astype(np.float64), np.nan))
     except (TypeError, ValueError):
         return None
 
