@@ -108,16 +108,16 @@ def _piece(
         )
     )
     pushes, turns = _loads(s, body, needed)
-    pushes = np.stack([needed[:, :3] - acting[:, :3], *pushes], axis=2)
+    needs = np.stack([needed[:, :3] - acting[:, :3], *pushes], axis=2)
     inverse = np.linalg.inv(body.inertia)
     driven = np.einsum("ij,cnj->nic", inverse, np.stack([acting[:, 3:], *turns]))
-    force, torque = np.empty_like(pushes), np.empty_like(driven)
+    force, torque = np.empty_like(needs), np.empty_like(driven)
     spread = np.empty(6)
     for i in range(3):
         variance = (body.mass * noise[1]) ** 2 + miss_force[i] ** 2 / steps
         walk = walk_force[i] ** 2 * steps
         # a walk that white noise of this variance hides
-        y = pushes[:, i]
+        y = needs[:, i]
         walked, std = _two_sided(y, np.zeros_like(y)[:, None], np.eye(1), np.diag([walk]), variance)
         force[:, i], spread[i] = walked[:, 0], std[0]
         own = inverse[i, i]

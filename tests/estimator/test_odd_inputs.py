@@ -1,0 +1,68 @@
+"""Inputs that no vehicle makes, and numbers at the ends of what is stated."""
+
+import numpy as np
+import pytest
+
+from tests.support.flights import PERIOD, begin, fly, yawing_flight
+from tests.support.reference_filters import as_reference, initial_covariance
+from windwrench.dynamics import load_vehicle
+from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF
+from windwrench.estimator.ekf import WrenchEKF
+from windwrench.estimator.reference import ReferenceUKF
+from windwrench.paper import NonlinearObserver
+
+VEHICLE = load_vehicle("ardrone2")
+HOVER = np.full(4, VEHICLE.hover_rate)
+POSE = [0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0]
+FILTERS = {
+    "ukf": WrenchUKF,
+    "ekf": WrenchEKF,
+    "constant-gain": ConstantGainFilter,
+    "observer": NonlinearObserver,
+}
+
+
+def test_a_turn_of_sixty_radians_a_second_is_the_reference_s():
+    flight, tuning = yawing_flight(VEHICLE, 60, seed=3, yaw_rate=60.0), UKFTuning()
+    fast, slow = WrenchUKF(VEHICLE, tuning, PERIOD), ReferenceUKF(VEHICLE, tuning, PERIOD)
+    for one in (fast, slow):
+        begin(one, flight, initial_covariance())
+    for k, estimate in enumerate(fly(fast, flight, ()), 1):
+        slow.predict(flight["rotors"][k])
+        slow.correct(flight["position"][k], flight["quaternion"][k])
+        assert np.abs(as_reference(estimate, slow.state) - slow.state).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", FILTERS)
+@pytest.mark.parametrize("speed", [1e9, 1e150])
+def test_one_rotor_speed_that_no_vehicle_has_changes_nothing(name, speed):
+    clean, spoiled = FILTERS[name](VEHICLE), FILTERS[name](VEHICLE)
+    clean.reset(*POSE)
+    spoiled.reset(*POSE)
+    odd = HOVER.copy()
+    odd[1] = speed
+    for k in range(60):
+        kept = clean.step(HOVER, *POSE).force
+        found = spoiled.step(odd if k == 30 else HOVER, *POSE).force
+    np.testing.assert_array_equal(found, kept)
+
+
+def test_masked_entries_are_not_measured():
+    ukf = WrenchUKF(VEHICLE)
+    ukf.reset(*POSE)
+    masked = np.ma.masked_array([5.0, 0.0, 1.0], mask=[True, False, False])
+    assert ukf.step(HOVER, masked, None).status == "coasting"
+    speeds = np.ma.masked_array(50.0 * HOVER, mask=True)
+    assert np.abs(ukf.step(speeds, *POSE).force).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", ["ukf", "ekf"])
+@pytest.mark.parametrize("noise", [1e-6, 1e-8, 1e-10])
+def test_the_covariance_stays_positive_with_a_noise_of_nanometres(name, noise):
+    one = FILTERS[name](VEHICLE, UKFTuning(position_noise=noise, attitude_noise=noise))
+    one.reset(*POSE)
+    for k in range(400):
+        estimate = one.step(HOVER, *(POSE if not 50 < k < 250 else (None, None)))
+        size = np.sqrt(np.diag(estimate.covariance))
+        assert size.min() > 0.0
+        assert np.linalg.eigvalsh(estimate.covariance / np.outer(size, size))[0] > -1e-12
