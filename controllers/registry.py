@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from ..runtime.errors import unknown_name
 from .fan_laws import Admittance, AdmittancePID, Hover, Lead, Oracle, Ratio
+from .lqg import LQG, WindOracle
 from .tracker import InformedTracker, Limit, Tracker
-from .wind_laws import INDI, PID, FlightLoopAlone, L1Adaptive, PIDWithForce, WindOracle
+from .wind_laws import INDI, PID, FlightLoopAlone, L1Adaptive, PIDWithForce, PIDWithWrench
 
 STANDARD_TASK = "FanTracking"
 STANDARD_SCENARIO = "base"  # of the gains of a law that is called no more than tuned
@@ -80,8 +81,10 @@ _WIND: Laws = {
     "hover": FlightLoopAlone,
     "pid": PID,
     "pid-force": PIDWithForce,
+    "pid-wrench": PIDWithWrench,
     "indi": INDI,
     "l1": L1Adaptive,
+    "lqg": LQG,
     "oracle": WindOracle,
 }
 TASK_LAWS: dict[str, Laws] = {

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..runtime.errors import InputError
+from .axis_models import tilting
 from .wind_observation import (
     FORCE,
     MAX_ACCELERATION,
@@ -21,6 +22,7 @@ from .wind_observation import (
     REFERENCE_VELOCITY,
     ROTOR_FORCE,
     SPECIFIC_FORCE,
+    TORQUE,
     VELOCITY,
     WIND_PERIOD,
 )
@@ -104,6 +106,30 @@ class PIDWithForce(WindLaw):
         rate = 0.0 * force if self._last is None else (force - self._last) / WIND_PERIOD
         self._last = force
         against: Wide = -self.gain / self.mass * (force + self.lead * rate)
+        return against
+
+
+@dataclass(eq=False)
+class PIDWithWrench(PIDWithForce):
+    """The same with the estimated torque, too, which tilts the vehicle, and the tilt carries it
+    away: the flight loop is asked for the tilt that its own attitude loop turns against it.
+    """
+
+    tilt: float = 10.0  # m/s2 for 1 Nm; g / (J k_attitude) cancels all of a steady torque: 30
+    tilt_lead: float = 0.1  # s, by which the torque's change over a decision is added
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+        super().reset()
+        self._last_torque: Wide | None = None
+
+    def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
+        """Return the force's part, and ``- tilt (tau + tilt_lead dtau/dt)`` across."""
+        torque = np.array([*tilting(o[TORQUE]), 0.0])
+        last = torque if self._last_torque is None else self._last_torque
+        self._last_torque = torque
+        turned = torque + self.tilt_lead * (torque - last) / WIND_PERIOD
+        against: Wide = super().against_the_wind(o, info) - self.tilt * turned
         return against
 
 
@@ -204,31 +230,3 @@ class L1Adaptive(WindLaw):
             self._filtered = self._sigma + self._keep * (self._filtered - self._sigma)
         self._velocity = v.copy()
         return -self._filtered
-
-
-@dataclass(eq=False)
-class WindOracle(WindLaw):
-    """Knows the true external force, and the wind to come: ``- gain f(t + preview) / m``, so that
-    motors and tilt have turned the thrust when it is needed. The upper end of the score, 1.
-
-    ``f(t + preview)`` is the true force now, with the wind's part of it as the winds will blow at
-    the place where the vehicle is.
-    """
-
-    gain: float = 1.0  # share of the force that is cancelled
-    preview: float = 0.15  # s; the environment's ``preview`` is set to it
-    mass: float = _MASS  # kg
-
-    def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
-        """Return ``- gain f / m`` of the force to come.
-
-        Raises:
-            InputError: no ``info``, or one without the force to come.
-        """
-        if info is None or "force_ahead" not in info:
-            raise InputError(
-                "oracle: needs the environment's info (force_ahead), which it has where its "
-                "preview is above 0"
-            )
-        against: Wide = -self.gain / self.mass * np.asarray(info["force_ahead"], dtype=np.float64)
-        return against

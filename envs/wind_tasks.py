@@ -12,14 +12,15 @@ from ..controllers.wind_observation import (
     OBSERVATION_LIMITS,
     OBSERVATION_SCALES,
     WIND_OBSERVATION_SIZE,
+    WIND_PERIOD,
 )
-from ..dynamics.mean_jet import AIR_DENSITY
 from ..dynamics.motion import Array
+from ..dynamics.rotation import quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import compiled, specialised
 from ..runtime.errors import InputError
 from .closed_loop import ClosedLoop
-from .fan import STATIONS, Fan
+from .fan import Fan, jet_wrench
 from .plant import TICK
 from .task import EPISODE_SECONDS, LOST_OFFSET, SETTLE_TICKS, Frame, Task, keep_within
 from .wind import Sum, Wind
@@ -164,7 +165,7 @@ class WindHoverEnv(Task):
         self._see = specialised(see, np.empty(20), np.empty(10), three, three, three, frame)
         self.reference_name = ""
         self.blowing: Sequence[Wind] = []
-        self.preview = 0.0  # s; above 0, ``info["force_ahead"]`` is the true force to come
+        self.foresight = 0  # decisions that ``info["wrench_ahead"]`` tells, for the oracle
 
     def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> ClosedLoop:
         """Return the closed loop of a true vehicle, with an accelerometer."""
@@ -226,9 +227,7 @@ class WindHoverEnv(Task):
             "lost": not flying,
             "trajectory": self.reference_name,
         }
-        if self.preview > 0.0:
-            info["force_ahead"] = self._force_ahead(info)
-        return info
+        return info | self._truth() if self.foresight else info
 
     def _get_reward(self, info: dict[str, Any], change: Array) -> dict[str, float]:
         square = _square(info["position"] - info["reference"])
@@ -237,27 +236,32 @@ class WindHoverEnv(Task):
             "reward_change": -CHANGE_COST * _square(change),
         }
 
-    def _force_ahead(self, info: dict[str, Any]) -> Array:
-        """Return the true force (3,) N, with the wind's part of it as it will blow ``preview`` s
-        from now where the vehicle is; for the oracle.
+    def _truth(self) -> dict[str, Any]:
+        """Return what the oracle knows beyond ``info``: the true motion, and the wrench (foresight,
+        6) N and Nm, world, of the winds over each decision to come, where the vehicle is now.
         """
-        loop, fan = self.loop, self.loop.record[0]["fan"]
-        if not self.blowing:
-            return np.asarray(info["force"])
-        up, still = loop.attitude_of_points[:, 2], loop.velocity
-        then = Sum(*self.blowing).velocity(loop.points.T, info["time"] + self.preview)
-
-        def drag(air: Array) -> Array:
-            past = air - still
-            rotors = past[:4] - (past[:4] @ up)[:, None] * up
-            hull = 0.5 * AIR_DENSITY * float(fan["hull_area"]) / (STATIONS - 4)
-            speeds = np.sqrt(np.sum(past[4:] ** 2, axis=1))[:, None]
-            made: Array = float(fan["rotor_drag"]) * rotors.sum(axis=0) + hull * np.sum(
-                speeds * past[4:], axis=0
-            )
-            return made
-
-        return np.asarray(info["force"] + drag(then) - drag(loop.air))
+        loop = self.loop
+        record, R, wind = loop.record[0], np.empty((3, 3)), np.empty(3)
+        plant, fan = record["plant"], loop.record["fan"].copy()[0]
+        quaternion_to_matrix(loop.quaternion, R)
+        rate, body = loop.motion[1][3:6], plant["body"]
+        thrust, *torques = (self.vehicle.mixing @ plant["speeds"] ** 2).tolist()
+        ahead, moving = np.empty((self.foresight, 6)), (loop.velocity, rate, body["com"])
+        axial, radial = loop.jet_table
+        at, blowing = loop.time + 0.5 * WIND_PERIOD, Sum(*self.blowing)
+        for k in range(self.foresight):
+            fan["air"] = blowing.velocity(loop.points.T, at + k * WIND_PERIOD)
+            jet_wrench(fan, axial, radial, loop.position, R, *moving, wind, ahead[k])
+        return {
+            "wrench_ahead": ahead,
+            "disturbance": loop.disturbance.copy(),
+            "velocity": loop.velocity.copy(),
+            "rate": R @ rate,
+            "angular_acceleration": R @ np.linalg.solve(self.vehicle.inertia, torques),
+            "up": R[:, 2].copy(),
+            "lift": thrust * R[2, 2] / self.vehicle.mass - self.vehicle.gravity,
+            "integral": record["flight"]["sum"].copy(),
+        }
 
     def _make_viewer(self) -> Any:
         from .wind_drawing import WindViewer

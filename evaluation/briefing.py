@@ -5,18 +5,21 @@ from typing import Any
 
 from ..controllers.briefing import Air, Briefing, FilterNoise, Jet, Motions
 from ..dynamics.vehicle import Mocap
-from ..envs.fan_tracking import DISTANCE, FanTrackingEnv
+from ..envs.fan_tracking import DISTANCE, FanTask
 from ..envs.plant import TICK, PlantSettings
 from ..estimator.tuning import UKFTuning
 
 
 def briefing_of(env: Any) -> Briefing:
-    """Return the briefing of a fan-tracking environment that has been reset: the declared vehicle,
-    the standard fan, the noise of the pose, the tuning of the filter, the scenario's motions and
-    its air. Of what is drawn anew in an episode, and of undeclared effects, it says nothing.
+    """Return the briefing of an environment that has been reset: the declared vehicle, and in front
+    of a fan the standard one, the noise of the pose, the tuning of the filter, the scenario's
+    motions and its air. Of what is drawn anew in an episode, and of undeclared effects, it says
+    nothing.
     """
     inner = env.unwrapped
-    world: FanTrackingEnv = getattr(inner, "current", inner)  # one that mixes scenarios has one now
+    world = getattr(inner, "current", inner)  # one that mixes scenarios has one now
+    if not isinstance(world, FanTask):
+        return Briefing(world.vehicle)
     scenario, vehicle, fan = world.scenario, world.vehicle, world.fan
     pose = Mocap(1.0 / TICK, scenario.sigma_position, scenario.sigma_attitude)
     tuning = UKFTuning.for_vehicle(replace(vehicle, mocap=pose), TICK, scenario.rise_time)

@@ -86,14 +86,14 @@ def fly_episode(
     Args:
         env: the environment.
         controller: called with ``observation`` and ``info``. Its ``brief``, where it has one, is
-            called first, with ``briefing_of(env)``; its ``preview`` is how far ahead, s, it sees
-            the force of the wind.
+            called first, with ``briefing_of(env)``; its ``foresight`` is how many
+            decisions ahead it sees the wind.
         seed: of the episode.
         each: called with the ``info`` of every decision.
         decisions: of a whole episode.
     """
-    if hasattr(env, "preview"):
-        env.preview = getattr(controller, "preview", 0.0)
+    if hasattr(env, "foresight"):
+        env.foresight = getattr(controller, "foresight", 0)
     observation, info = env.reset(seed=seed)
     brief = getattr(controller, "brief", None)
     if brief is not None:

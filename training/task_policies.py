@@ -99,7 +99,7 @@ class TaskLesson:
 def _environment(task: str) -> Any:
     """Return the task's environment, with what its oracle must see."""
     env = TASKS[task].environment(SCENARIO)
-    env.preview = getattr(make_controller("oracle", task), "preview", 0.0)
+    env.foresight = getattr(make_controller("oracle", task), "foresight", 0)
     return env
 
 

@@ -1,0 +1,255 @@
+"""Optimal laws of the tasks in the wind: a linear-quadratic Gaussian regulator (LQG) that feels the
+wind through the estimated wrench, and the oracle, which knows the wrench and what comes of it.
+
+Both command the flight loop by the same model of it (``axis_models``), and both weigh a position
+error against an acceleration in one number. What they know differs, and nothing else.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..dynamics.vehicle import Vehicle
+from ..dynamics.vehicle_file import load_vehicle
+from ..runtime.errors import InputError
+from .axis_models import AxisModel, axis_models, tilting
+from .briefing import Briefing
+from .wind_observation import (
+    FORCE,
+    MAX_ACCELERATION,
+    POSITION_ERROR,
+    REFERENCE_ACCELERATION,
+    REFERENCE_VELOCITY,
+    ROTOR_FORCE,
+    SPECIFIC_FORCE,
+    TORQUE,
+    VELOCITY,
+    WIND_PERIOD,
+)
+
+Array = NDArray[np.floating[Any]]
+Wide = NDArray[np.float64]
+_BELIEVED = 1e-12  # variance, beside all others, of each state: equations are solved in rounding
+
+
+def _standard() -> Vehicle:
+    return load_vehicle("ardrone2")
+
+
+def _regulator(A: Wide, B: Wide, effort: float) -> tuple[Wide, Wide, Wide]:
+    """Return the gain (1, n) of the linear-quadratic regulator, the cost to go (n, n), and what
+    turns a slope of it into a command (1, n).
+    """
+    from scipy.linalg import solve_discrete_are
+
+    weight = 1e-9 * np.eye(len(A))
+    weight[0, 0] = 1.0
+    cost = np.asarray(solve_discrete_are(A, B, weight, np.array([[effort]])))
+    turned = B.T / (B.T @ cost @ B + effort)
+    return turned @ cost @ A, cost, turned
+
+
+@dataclass(eq=False)
+class LQG:
+    """A linear-quadratic Gaussian regulator with the external force and torque as states.
+
+    Each axis is a Kalman filter and a regulator (Anderson and Moore, *Optimal Control: Linear
+    Quadratic Methods*, 1990). Force and torque are Ornstein-Uhlenbeck processes. Their estimates,
+    as the wrench filter shows them, follow behind a lag of first order; the accelerometer less the
+    rotors' force shows the force at once, but biased; the rotors' force shows the tilt. The torque
+    matters since it tilts the vehicle before anything has moved.
+
+    Everything but ``effort`` describes what is measured, and no more than its order of size
+    matters: on WindHover halving or doubling any of them changed the error by less than 3 %.
+
+    Raises:
+        InputError: a number is not above zero.
+    """
+
+    effort: float = 1e-5  # m2 of error that an acceleration of 1 m/s2 is worth
+    force: float = 0.065  # of the weight, standard deviation of the external force
+    torque: float = 0.035  # of weight times arm, likewise
+    force_time: float = 1.0  # s, over which the force lasts
+    torque_time: float = 0.5  # s
+    estimate_lag: float = 0.2  # s, of the estimates; a rise time of 0.45 s over 2.2
+    noise: Mapping[str, float] = field(
+        default_factory=lambda: {
+            "place": 0.002,  # m
+            "speed": 0.02,  # m/s
+            "tilt": 0.01,  # rad
+            "force": 0.02,  # N, of the estimate
+            "torque": 0.002,  # Nm, likewise
+            "accelerometer": 0.11,  # m/s2, mean over a decision, with its bias
+        }
+    )
+    model: tuple[float, float] = (0.05, 0.5)  # m/s2 and rad/s2 that it lacks, per root of a second
+    vehicle: Vehicle = field(default_factory=_standard)
+
+    def __post_init__(self) -> None:
+        numbers = {name: getattr(self, name) for name in ("effort", "force", "torque")}
+        times = {name: getattr(self, name) for name in ("force_time", "torque_time")}
+        for name, value in (numbers | times | {"estimate_lag": self.estimate_lag}).items():
+            if not value > 0.0:
+                raise InputError(f"LQG: {name} must be above 0, got {value!r}")
+        self._axes = [self._axis(axis) for axis in axis_models(self.vehicle)]
+        self.reset()
+
+    def brief(self, briefing: Briefing) -> None:
+        """Fly the declared vehicle."""
+        self.vehicle = briefing.vehicle
+        self.__post_init__()
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+        self._states: list[Wide] = []
+        self._action = np.zeros(3)
+
+    def _axis(self, axis: AxisModel) -> tuple[Wide, ...]:
+        """Return A, B, C, the Kalman gain and the regulator's of an axis with its disturbances and
+        their estimates.
+        """
+        from scipy.linalg import solve_discrete_are
+
+        n, k = axis.D.shape
+        weight, said = self.vehicle.weight, self.noise
+        times = np.array([self.force_time, self.torque_time])[:k]
+        sizes = np.array([self.force * weight, self.torque * weight * self.vehicle.arm_l])[:k]
+        none, one = np.zeros((k, k)), np.eye(k)
+        A = np.block(
+            [
+                [axis.A, axis.D, np.zeros((n, k))],
+                [np.zeros((k, n)), -one / times, none],
+                [np.zeros((k, n)), one / self.estimate_lag, -one / self.estimate_lag],
+            ]
+        )
+        B = np.vstack([axis.B, np.zeros((2 * k, 1))])
+        spread = np.zeros(n + 2 * k)
+        spread[1], spread[n : n + k] = self.model[0] ** 2, 2.0 * sizes**2 / times
+        shown = [0, 1]
+        if k == 2:
+            spread[3] = self.model[1] ** 2
+            shown.append(2)
+        C = np.zeros((len(shown) + k + 1, n + 2 * k))
+        C[range(len(shown)), shown] = 1.0
+        C[len(shown) : -1, n + k :], C[-1, n] = one, axis.D[1, 0]
+        names = ("place", "speed", "tilt")[: len(shown)] + ("force", "torque")[:k]
+        noise = np.diag([said[name] ** 2 for name in (*names, "accelerometer")])
+        held = AxisModel(A, B, np.zeros((n + 2 * k, 0))).held(WIND_PERIOD)
+        process = _process_noise(A, np.diag(spread)) + _BELIEVED * np.eye(len(A))
+        P = solve_discrete_are(held[0].T, C.T, process, noise)
+        gain = P @ C.T @ np.linalg.inv(C @ P @ C.T + noise)
+        return held[0], held[1], C, gain, _regulator(held[0], held[1], self.effort)[0]
+
+    def __call__(self, observation: Array, info: Mapping[str, Any] | None = None) -> Array:
+        """Return the action (3,) m/s2 for an observation (27,)."""
+        o = np.asarray(observation, dtype=np.float64)
+        place, speed = -o[POSITION_ERROR], o[VELOCITY] - o[REFERENCE_VELOCITY]
+        rotors, felt = o[ROTOR_FORCE], o[SPECIFIC_FORCE] - o[ROTOR_FORCE]
+        tilt = (rotors - o[REFERENCE_ACCELERATION]) / self.vehicle.gravity
+        torque = tilting(o[TORQUE])
+        states, action = [], np.zeros(3)
+        for i, (A, B, C, gain, regulator) in enumerate(self._axes):
+            seen = [place[i], speed[i], o[FORCE][i], felt[i]]
+            if i < 2:
+                seen = [place[i], speed[i], tilt[i], o[FORCE][i], torque[i], felt[i]]
+            y = np.array(seen)
+            if self._states:
+                x = A @ self._states[i] + B[:, 0] * self._action[i]
+            else:
+                x = np.linalg.lstsq(C, y, rcond=None)[0]
+            x = x + gain @ (y - C @ x)
+            states.append(x)
+            action[i] = -float(regulator[0] @ x)
+        self._states = states
+        self._action = np.minimum(np.maximum(action, -MAX_ACCELERATION), MAX_ACCELERATION)
+        return self._action.astype(np.float32)
+
+
+def _process_noise(A: Wide, spread: Wide) -> Wide:
+    """Return what white noise of density ``spread`` (n, n) adds over a decision (Van Loan, IEEE TAC
+    23(3), 1978).
+    """
+    from scipy.linalg import expm
+
+    n = len(A)
+    whole = np.zeros((2 * n, 2 * n))
+    whole[:n, :n], whole[:n, n:], whole[n:, n:] = -A, spread, A.T
+    step = np.asarray(expm(WIND_PERIOD * whole))
+    noise: Wide = step[n:, n:].T @ step[:n, n:]
+    return 0.5 * (noise + noise.T)
+
+
+@lru_cache(maxsize=8)
+def _foresight(vehicle: Vehicle, effort: float, count: int) -> list[tuple[Wide, Wide]]:
+    """Return of each axis the gain (n,) on its state, and (count, 1 or 2) on each disturbance that
+    acts over the decisions from now on.
+    """
+    found = []
+    for axis in axis_models(vehicle):
+        A, B, D = axis.held(WIND_PERIOD)
+        gain, cost, turned = _regulator(A, B, effort)
+        closed, slope, ahead = (A - B @ gain).T, cost @ D, []
+        for _ in range(count):
+            ahead.append((turned @ slope)[0])
+            slope = closed @ slope
+        found.append((gain[0], np.array(ahead)))
+    return found
+
+
+@dataclass(eq=False)
+class WindOracle:
+    """Knows the true motion, force and torque, and the wind to come, and commands by the
+    linear-quadratic regulator with preview (Tomizuka, ASME J. Dyn. Sys. 97(2), 1975). The upper end
+    of the score, 1.
+
+    What the wind will do is computed where the vehicle is now. The actuators' own disturbance is
+    known as it is now; what becomes of it is only known on the average.
+    """
+
+    effort: float = 1e-5  # as of ``LQG``
+    foresight: int = 12  # decisions; the environment's is set to it
+    disturbance_time: float = 0.3  # s, over which the actuators' disturbance lasts
+    vehicle: Vehicle = field(default_factory=_standard)
+
+    def brief(self, briefing: Briefing) -> None:
+        """Fly the declared vehicle."""
+        self.vehicle = briefing.vehicle
+
+    def reset(self) -> None:
+        """Forget the last episode: nothing is remembered."""
+
+    def __call__(self, observation: Array, info: Mapping[str, Any] | None = None) -> Array:
+        """Return the action (3,) m/s2.
+
+        Raises:
+            InputError: no ``info``, or one without the wrench to come.
+        """
+        if info is None or "wrench_ahead" not in info:
+            raise InputError(
+                "oracle: needs the environment's info (wrench_ahead), which it has where its "
+                "foresight is above 0"
+            )
+        o = np.asarray(observation, dtype=np.float64)
+        last = np.exp(-WIND_PERIOD * (np.arange(self.foresight) + 0.5) / self.disturbance_time)
+        ahead = info["wrench_ahead"] + last[:, None] * info["disturbance"]
+        torque, turning = tilting(ahead[:, 3:]), tilting(info["rate"])
+        turned = tilting(info["angular_acceleration"])
+        place = info["position"] - info["reference"]
+        speed = info["velocity"] - o[REFERENCE_VELOCITY]
+        tilt = info["up"] / info["up"][2] - o[REFERENCE_ACCELERATION] / self.vehicle.gravity
+        action = np.zeros(3)
+        for i, (gain, shares) in enumerate(_foresight(self.vehicle, self.effort, self.foresight)):
+            middle = [info["lift"] - o[REFERENCE_ACCELERATION][2]]
+            comes = ahead[:, 2:3]
+            if i < 2:
+                middle = [tilt[i], turning[i], turned[i]]
+                comes = np.column_stack([ahead[:, i], torque[i]])
+            state = np.array([place[i], speed[i], *middle, info["integral"][i]])
+            action[i] = -float(gain @ state + np.sum(shares * comes))
+        return np.minimum(np.maximum(action, -MAX_ACCELERATION), MAX_ACCELERATION).astype(
+            np.float32
+        )

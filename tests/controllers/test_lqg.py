@@ -1,0 +1,107 @@
+"""The optimal laws of the tasks in the wind: their model is the flight loop's, and the oracle is
+ahead of what does not know what it knows.
+"""
+
+import numpy as np
+import pytest
+
+from windwrench.controllers.axis_models import PLACE, axis_models
+from windwrench.controllers.lqg import LQG, WindOracle
+from windwrench.controllers.registry import make_controller
+from windwrench.controllers.wind_laws import PIDWithWrench
+from windwrench.controllers.wind_observation import (
+    TORQUE,
+    WIND_OBSERVATION_SIZE,
+    WIND_PERIOD,
+)
+from windwrench.dynamics import InputError, load_vehicle
+from windwrench.envs.closed_loop import ClosedLoop
+from windwrench.envs.plant import TICK, PlantSettings
+from windwrench.evaluation.episodes import fly_episode
+from windwrench.evaluation.tasks import make_environment
+from windwrench.studies.kept_results import kept
+
+
+@pytest.mark.parametrize("pushed", ["action", "force", "torque"])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_an_axis_moves_as_the_vehicle_in_mujoco_does(axis, pushed):
+    """Steps of 0.5 m/s2, 0.2 N and 0.01 Nm, for 0.8 s, without any noise."""
+    if (axis, pushed) == (2, "torque"):
+        pytest.skip("a torque does not lift")
+    vehicle = load_vehicle("ardrone2")
+    quiet = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0, sensor_noise=False)
+    loop = ClosedLoop(vehicle, settings=quiet)
+    loop.reset(np.random.default_rng(0), np.array([0.0, 0.0, 1.5]), np.pi)
+    model = axis_models(vehicle)[axis]
+    A, B, D = model.held(TICK)
+    command, push = 0.0, np.zeros(D.shape[1])
+    if pushed == "action":
+        command = loop.action[axis] = 0.5
+    elif pushed == "force":
+        push[0] = loop.applied[axis] = 0.2
+    else:
+        push[1] = 0.01
+        loop.applied[3 + (1, 0)[axis]] = (1, -1)[axis] * 0.01
+    x, start, there, expected = np.zeros(len(A)), loop.position[axis], [], []
+    for _ in range(160):
+        loop.run(np.zeros((1, loop.noise_size)))
+        x = A @ x + B[:, 0] * command + D @ push
+        there.append(loop.position[axis] - start)
+        expected.append(x[PLACE])
+    largest = np.abs(expected).max()
+    assert largest > 0.005
+    # the filter and the ticks between sample and command are not in the model
+    assert np.abs(np.array(there) - expected).max() < 0.12 * largest
+
+
+def test_the_torque_is_answered_before_anything_has_moved():
+    law = LQG()
+    law(np.zeros(WIND_OBSERVATION_SIZE) + _hovering())
+    felt = _hovering()
+    felt[TORQUE] = [-0.02, 0.02, 0.0]
+    x, y, z = law(felt)
+    assert x < -0.05
+    assert y < -0.05
+    assert abs(z) < 1e-6
+    fed = PIDWithWrench(tilt=10.0, tilt_lead=0.1)
+    np.testing.assert_allclose(fed(felt), [-0.2, -0.2, 0.0], atol=1e-6)
+    felt[TORQUE] = [-0.02, 0.03, 0.0]
+    expected = -10.0 * (0.03 + 0.1 * 0.01 / WIND_PERIOD)
+    np.testing.assert_allclose(fed(felt)[0], expected, rtol=1e-5)
+
+
+def _hovering():
+    o = np.zeros(WIND_OBSERVATION_SIZE)
+    o[20] = o[23] = 9.81
+    return o
+
+
+def test_who_knows_more_flies_better():
+    """In the wash of another vehicle, on validation episodes, which the laws were not made for."""
+    env = make_environment("WindHover", "wash")
+    rmse = {
+        name: np.mean(
+            [
+                fly_episode(env, make_controller(name, "WindHover"), seed, decisions=250).rmse
+                for seed in range(900_100, 900_104)
+            ]
+        )
+        for name in ("pid-force", "lqg", "oracle")
+    }
+    assert rmse["oracle"] < 0.7 * rmse["lqg"]
+    assert rmse["lqg"] < 0.8 * rmse["pid-force"]
+
+
+@pytest.mark.parametrize("task", ["WindHover", "WindTrajectory"])
+def test_nothing_on_the_leaderboard_beats_the_oracle(task):
+    rows = kept(f"results/tasks/{task}.json.gz")
+    for scenario in {row["scenario"] for row in rows}:
+        means = {row["controller"]: row["rmse_m"] for row in rows if row["scenario"] == scenario}
+        assert min(means, key=means.__getitem__) == "oracle"
+
+
+def test_what_cannot_be_is_named():
+    with pytest.raises(InputError, match="effort must be above 0, got 0"):
+        LQG(effort=0.0)
+    with pytest.raises(InputError, match="wrench_ahead"):
+        WindOracle()(np.zeros(WIND_OBSERVATION_SIZE), {})
