@@ -91,7 +91,9 @@ def acceleration_message(
     scale[:3, :3] = np.eye(3) / vehicle.mass
     scale[3:, 3:] = R @ np.linalg.inv(vehicle.inertia) @ R.T
     order = [15, 16, 17, 12, 13, 14]  # force, then torque, in the error state
-    covariance = scale @ estimate.covariance[np.ix_(order, order)] @ scale.T
+    noise = estimate.covariance[np.ix_(order, order)]
+    stated = noise + np.diag(output.std**2 - np.diag(noise))  # with the vehicle's own uncertainty
+    covariance = scale @ stated @ scale.T
     values = scale @ np.concatenate([estimate.force, estimate.torque])
     accel = types["geometry_msgs/msg/Accel"](
         linear=_vector(types, values[:3]), angular=_vector(types, values[3:])
