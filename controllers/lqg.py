@@ -63,8 +63,9 @@ class LQG:
     rotors' force shows the force at once, but biased; the rotors' force shows the tilt. The torque
     matters since it tilts the vehicle before anything has moved.
 
-    Everything but ``effort`` describes what is measured, and no more than its order of size
-    matters: on WindHover halving or doubling any of them changed the error by less than 3 %.
+    Everything but ``effort`` describes what is measured, and little more than its order of size
+    matters: halving or doubling the sizes and times of the wrench, or the lag of its estimates,
+    changed the error on WindHover's base by at most 4.2 % (16 validation episodes).
 
     Raises:
         InputError: a number is not above zero.
