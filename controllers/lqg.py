@@ -33,7 +33,7 @@ from .wind_observation import (
 
 Array = NDArray[np.floating[Any]]
 Wide = NDArray[np.float64]
-_BELIEVED = 1e-12  # variance, beside all others, of each state: equations are solved in rounding
+_BELIEVED = 1e-12  # added to the variance of each state, so that the equations can be solved
 
 
 def _standard() -> Vehicle:

@@ -4,6 +4,7 @@ whether they are taken, taken slowly, or not at all.
 
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
@@ -18,7 +19,7 @@ WAITING = 8192
 _LAST = 5.0  # s that the end of a stream waits for a sink that still takes; a healthy one needs ms
 
 
-class Sink(Generic[Item]):
+class Sink(ABC, Generic[Item]):
     """What takes items, and may stall or fail."""
 
     name = ""  # for people
@@ -27,9 +28,9 @@ class Sink(Generic[Item]):
     rows = 0  # taken for good
     held = 0  # taken, and lost if it fails
 
+    @abstractmethod
     def add(self, item: Item, /) -> None:
         """Take an item."""
-        raise NotImplementedError
 
     def idle(self) -> None:
         """Finish what was taken: nothing has come for a while."""
