@@ -6,7 +6,8 @@ W R B' and what a sensor measures B v.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +30,10 @@ from .log_map import (
     Sensor,
     constant,
 )
+from .table import Table
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])
 # from the log's world, or its body axes, to the kit's
@@ -49,6 +52,8 @@ class Samples:
     t: Array  # (N,) s
     columns: Mapping[str, Array]  # by name (N,); NaN where there is no value
     topic: str = ""  # of the message in which they stood, where a log has several
+    table: Table | None = None  # in which they stand
+    rows: Rows | None = None  # (N,) of it
 
     def values(self, part: Columns) -> Array:
         """Return a section's columns (N, k), with their signs and scale."""
@@ -58,10 +63,23 @@ class Samples:
         """Return whether a section's columns are there."""
         return part.topic in ("", self.topic) and set(part.named) <= set(self.columns)
 
-    def cut(self, keep: slice | Mask) -> "Samples":
+    def cut(self, keep: slice | Mask | Rows) -> "Samples":
         """Return some of the rows."""
         columns = {name: column[keep] for name, column in self.columns.items()}
-        return Samples(self.t[keep], columns, self.topic)
+        rows = None if self.rows is None else self.rows[keep]
+        return replace(self, t=self.t[keep], columns=columns, rows=rows)
+
+    @property
+    def path(self) -> Path:
+        """The table's file."""
+        assert self.table is not None
+        return self.table.path
+
+    def place(self, index: int) -> str:
+        """Return where a sample stands, for errors: the table's row, else its time."""
+        if self.table is None or self.rows is None:
+            return f"at {self.t[index]:.6g} s"
+        return self.table.row(int(self.rows[index]))
 
     def _column(self, name: str) -> Array:
         """Return a column (N,), or the constant that ``=0`` stands for."""

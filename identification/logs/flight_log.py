@@ -127,28 +127,6 @@ class FlightLog:
         return float(np.median(np.diff(self.t)))
 
 
-def check_finite(
-    table: Table, name: str, column: Array, where: Mask | None = None, more: str = ""
-) -> None:
-    """Raise InputError at the first number of a column (N,) that is not finite.
-
-    Args:
-        table: of the column.
-        name: of the column.
-        column: (N,).
-        where: (N,) rows that are looked at; None: all.
-        more: said of what else may be empty.
-    """
-    bad = ~np.isfinite(column) if where is None else ~np.isfinite(column) & where
-    if bad.any():
-        i = int(np.flatnonzero(bad)[0])
-        found = "empty or NaN" if np.isnan(column[i]) else "infinite"
-        raise InputError(
-            f"{table.path}: column {name}, {table.row(i)} is {found}; expected a finite "
-            f"number{more and f'; {more}'}"
-        )
-
-
 def vehicle_of_columns(table: Table) -> str:
     """Return the name of the vehicle that a column's name gives, or nothing.
 
@@ -161,43 +139,6 @@ def vehicle_of_columns(table: Table) -> str:
             f"{table.path}: the columns name the vehicles {' and '.join(found)}; expected one"
         )
     return found[0] if found else ""
-
-
-def check_times(table: Table, t: Array) -> None:
-    """Raise InputError where times (N,) in s do not strictly increase, or are fewer than two."""
-    if len(t) < 2:
-        raise InputError(f"{table.path}: only one row; expected at least two")
-    back = np.flatnonzero(np.diff(t) <= 0)
-    if back.size:
-        i = int(back[0]) + 1
-        what = "repeats the time" if t[i] == t[i - 1] else "goes back from"
-        raise InputError(
-            f"{table.path}: column t, {table.row(i)}: {t[i]:.9g} s {what} {t[i - 1]:.9g} s of the "
-            f"row "
-            "before; expected strictly increasing times"
-        )
-
-
-def check_quaternions(
-    table: Table, quaternions: Array, where: Mask, columns: str, rows: NDArray[np.intp]
-) -> None:
-    """Raise InputError at the first quaternion (N, 4) ``where`` (N,) whose length differs from 1 by
-    more than 0.02.
-
-    Args:
-        table: they come from.
-        quaternions: (N, 4).
-        where: (N,) those that are looked at.
-        columns: their names.
-        rows: (N,) of the table in which they stand.
-    """
-    length = np.linalg.norm(quaternions, axis=1)
-    bad = np.flatnonzero(where & ~(np.abs(length - 1.0) <= NORM_TOLERANCE))
-    if bad.size:
-        raise InputError(
-            f"{table.path}: columns {columns}, {table.row(int(rows[bad[0]]))}: a quaternion of "
-            f"length {length[bad[0]]:.4g}; expected 1 within {NORM_TOLERANCE:g}"
-        )
 
 
 def time_notes(t: Array) -> tuple[str, ...]:

@@ -56,9 +56,9 @@ def map_table(
     notes = [*table.notes, *log_map.notes, *([log_map.time.note] if log_map.time.note else [])]
     if not log_map.is_own or log_map.rows == "mixed":
         notes.insert(0, f"columns: by the map {log_map.name}")
-    samples, rows, words = rows_of(table, columns, log_map)
+    samples, words = rows_of(table, columns, log_map)
     log_map, _ = chosen([samples], log_map)
-    notes += [*words, *check_rows(table, samples, rows, log_map)]
+    notes += [*words, *check_rows(samples, log_map)]
     return recording_of(table.path, [samples], log_map, reader, notes).log(vehicle)
 
 
@@ -205,18 +205,19 @@ def _attitude(path: Path, log_map: LogMap, part: Attitude, samples: Samples) -> 
     Raises:
         InputError: a quaternion's length is not 1.
     """
-    values = samples.values(part)
-    good = np.isfinite(values).all(axis=1)
-    turns = quaternions(part, values[good])
-    long = np.linalg.norm(turns, axis=1) > NO_QUATERNION
-    raw, _ = Stream(part.label, samples.t[good][long], turns[long]).forward()
-    length = np.linalg.norm(raw.values, axis=1)
-    off = np.flatnonzero(np.abs(length - 1.0) > NORM_TOLERANCE)
+    samples = samples.cut(np.asarray(np.isfinite(samples.values(part)).all(axis=1)))
+    turns = quaternions(part, samples.values(part))
+    with np.errstate(over="ignore"):
+        length = np.linalg.norm(turns, axis=1)
+    there = length > (-1.0 if log_map.rows == "whole" else NO_QUATERNION)
+    off = np.flatnonzero(there & ~(np.abs(length - 1.0) <= NORM_TOLERANCE))
     if off.size:
+        what = part.topic or f"columns {', '.join(part.columns)}"
         raise InputError(
-            f"{path}: {raw.name}, at {raw.t[off[0]]:.6g} s: a quaternion of length "
+            f"{path}: {what}, {samples.place(off[0])}: a quaternion of length "
             f"{length[off[0]]:.4g}; expected 1 within {NORM_TOLERANCE:g}"
         )
+    raw, _ = Stream(part.label, samples.t[there], turns[there]).forward()
     if not len(raw.t):
         return raw
     return replace(raw, values=in_kit_axes(log_map, part, raw.values))

@@ -190,7 +190,7 @@ def test_rows_of_one_time_are_one_row(tmp_path: Path) -> None:
 def test_times_that_go_back_are_refused_with_their_row(tmp_path: Path) -> None:
     t = [f"{0.01 * k:.2f}" for k in range(40)]
     t[7] = "0.01"
-    words = r"column t, row 8 \(line 9\): 0.01 goes back from 0.06"
+    words = r"column t, row 8 \(line 9\): 0.01 s goes back from 0.06 s"
     with pytest.raises(InputError, match=words):
         map_table(open_table(table(tmp_path / "a.csv", {"t": t})), parse_map(GOOD, "m"))
 
