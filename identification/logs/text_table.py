@@ -7,13 +7,14 @@ one another. That run is the table, and the line of names before it is its heade
 counted, and the columns asked for are turned into numbers a block of lines at a time.
 """
 
+import codecs
 import csv
 import io
 import math
+import re
 import zlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -32,12 +33,14 @@ from .table import WHAT, Array, Table
 MISSING_WORDS = frozenset({"na", "n/a", "null", "none", "nil", "-", "--", "?"})
 
 _SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "white space"}
+_LATIN = "windwrench-latin-1"  # name of an error handler
 _BUFFER = 2**18  # bytes unpacked at a time
 _BLOCK = 20_000  # lines turned into numbers at a time
 _LOOKED_AT = 2**18  # characters in which the layout is found
 _LINES = 600  # of them; what Betaflight's decoder writes before the header has 150
 _BETWEEN = 5  # lines between header and first row, at most
 _FEWEST = 2  # columns of a table
+_COMMENT = re.compile(r"^\s*(#|%|//)[#%/ ]*")
 # decimal commas to points; a point beside them may stand for thousands, and is no number's
 _POINTS = str.maketrans(",.", ".?")
 _DECIMAL_COMMA = (
@@ -71,7 +74,8 @@ class TextLayout:
         """Return the columns' names of a header; a separator behind the last name, and the mark of
         a comment before the first, belong to none.
         """
-        names = [name.strip('" ') for name in self.fields(_without_mark(line))]
+        bare = _COMMENT.sub("", line)
+        names = [name.strip('" ') for name in self.fields(bare)]
         while len(names) > 1 and not names[-1]:
             names.pop()
         return names
@@ -100,7 +104,7 @@ def open_text(path: Path) -> Table:
     Raises:
         InputError: unreadable, no text, no table, or more than ``FileLimits`` allows.
     """
-    head, encoding = _first_lines(path)
+    head = _first_lines(path)
     layout, first = _layout(path, head)
     header, first = _header(path, head, layout, first)
     between = [] if header is None else [line for line in head[header + 1 : first] if line.strip()]
@@ -119,7 +123,7 @@ def open_text(path: Path) -> Table:
     notes = [] if said == ["fields separated by comma"] else [f"layout: {', '.join(said)}"]
 
     rows, last, blank = 0, "", []
-    for line in islice(_lines(path, encoding), first, None):
+    for line in islice(_lines(path), first, None):
         if layout.is_blank(line):
             blank.append(rows)
         else:
@@ -129,7 +133,7 @@ def open_text(path: Path) -> Table:
         notes.append("the last line was cut off, and left out")
 
     def fill(table: Table, where: Sequence[int], columns: Array) -> None:
-        lines: Iterator[str] = islice(_lines(path, encoding), first, None)
+        lines: Iterator[str] = islice(_lines(path), first, None)
         if blank:
             lines = (line for line in lines if not layout.is_blank(line))
         kept, done = islice(lines, rows), 0
@@ -143,74 +147,57 @@ def open_text(path: Path) -> Table:
     return Table(path, tuple(names), rows, fill, first + 1, tuple(blank), units, tuple(notes))
 
 
-@contextmanager
-def _text(path: Path, encoding: str) -> Iterator[io.TextIOWrapper]:
-    """Give a file's text, unpacked.
+def _latin(error: UnicodeError) -> tuple[str, int]:
+    """Return bytes that are not UTF-8 as the Latin-1 of old programs."""
+    assert isinstance(error, UnicodeDecodeError)
+    return error.object[error.start : error.end].decode("latin-1"), error.end
+
+
+codecs.register_error(_LATIN, _latin)
+
+
+def _lines(path: Path) -> Iterator[str]:
+    """Yield a text's lines, unpacked, without their ends.
 
     Raises:
-        InputError: it cannot be read.
+        InputError: unreadable, no text, or more than ``FileLimits`` allows; everything is counted
+            as it comes.
     """
+
+    def more(what: str) -> InputError:
+        return InputError(f"{path}: more than {what}; expected one flight")
+
     file: BinaryIO = open_regular(path, WHAT)
     if path.name.lower().endswith(".gz"):
         file = cast(BinaryIO, io.BufferedReader(Gunzip(file, path, LIMITS.table_text), _BUFFER))
-    try:
-        with io.TextIOWrapper(file, encoding=encoding) as text:
-            yield text
-    except (OSError, EOFError, zlib.error) as error:
-        raise InputError(f"{path}: cannot be read as {WHAT}: {error}") from error
-
-
-def _lines(path: Path, encoding: str) -> Iterator[str]:
-    """Yield a text's lines, without their ends.
-
-    Raises:
-        InputError: no text, or more than ``FileLimits`` allows; everything is counted as it comes.
-    """
     size = number = 0
-    with _text(path, encoding) as text:
-        try:
+    try:
+        with io.TextIOWrapper(file, "utf-8-sig", _LATIN) as text:
             while line := text.readline(LIMITS.table_line + 1):
                 size, number = size + len(line), number + 1
                 if "\0" in line:
                     raise InputError(f"{path}: not a text file (it holds zero bytes); expected CSV")
                 if len(line) > LIMITS.table_line:
-                    raise InputError(
-                        f"{path}: more than {LIMITS.table_line} in line {number}; expected one "
-                        "flight"
-                    )
+                    raise more(f"{LIMITS.table_line} in line {number}")
                 if size > LIMITS.table_text:
-                    raise InputError(
-                        f"{path}: more than {LIMITS.table_text} characters of text; expected one "
-                        "flight"
-                    )
+                    raise more(f"{LIMITS.table_text} characters of text")
                 if number > LIMITS.table_rows + _LINES:
-                    raise InputError(
-                        f"{path}: more than {LIMITS.table_rows} rows; expected one flight"
-                    )
+                    raise more(f"{LIMITS.table_rows} rows")
                 yield line.rstrip("\n")
-        except UnicodeDecodeError as error:
-            raise InputError(
-                f"{path}: not a text file (behind line {number} it is not UTF-8); expected CSV"
-            ) from error
+    except (OSError, EOFError, zlib.error) as error:
+        raise InputError(f"{path}: cannot be read as {WHAT}: {error}") from error
 
 
-def _first_lines(path: Path) -> tuple[list[str], str]:
-    """Return a text's first lines, and its encoding: UTF-8, or Latin-1 where it is not that."""
-    for encoding in ("utf-8-sig", "latin-1"):
-        with _text(path, encoding) as text:
-            try:
-                text.read(_LOOKED_AT)
-            except UnicodeDecodeError:
-                continue
-        break
+def _first_lines(path: Path) -> list[str]:
+    """Return the lines in which the layout is found."""
     head: list[str] = []
     size = 0
-    for line in islice(_lines(path, encoding), _LINES):
+    for line in islice(_lines(path), _LINES):
         head.append(line)
         size += len(line)
         if size > _LOOKED_AT:
             break
-    return head, encoding
+    return head
 
 
 def _layout(path: Path, head: list[str]) -> tuple[TextLayout, int]:
@@ -341,25 +328,12 @@ def _plain_lines(layout: TextLayout, lines: Sequence[str], width: int) -> Sequen
     none where a row has quotation marks or another number of fields than ``width``.
     """
     mark = layout.separator
-    if mark == " ":
-        if any(len(line.split()) != width for line in lines):
-            return []
-    elif any(line.count(mark) != width - 1 or '"' in line for line in lines):
-        return []
     if layout.decimal == ",":
         lines = [line.translate(_POINTS) for line in lines]
+    if mark == " ":
+        return lines if all(len(line.split()) == width for line in lines) else []
+    if any(line.count(mark) != width - 1 or '"' in line for line in lines):
+        return []
     gap, filled = mark + mark, f"{mark}nan{mark}"
-    if mark != " " and any(gap in line or line[:1] == mark or line[-1:] == mark for line in lines):
-        # two passes, because neighbours share a separator
-        both = (f"{mark}{line}{mark}".replace(gap, filled).replace(gap, filled) for line in lines)
-        return [line[1:-1] for line in both]
-    return lines
-
-
-def _without_mark(line: str) -> str:
-    """Return a header without the mark of a comment in front of it."""
-    bare = line.lstrip()
-    for mark in ("#", "%", "//"):
-        if bare.startswith(mark):
-            return bare.removeprefix(mark).lstrip("#% /")
-    return line
+    # two passes, because neighbours share a separator
+    return [f"{mark}{line}{mark}".replace(gap, filled).replace(gap, filled)[1:-1] for line in lines]

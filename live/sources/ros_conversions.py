@@ -10,9 +10,8 @@ import numpy as np
 
 from ...dynamics.rotation import matrix_of
 from ...dynamics.vehicle import Vehicle
-from ...identification.logs.readers.ros_messages import kinds, stamp
-from ...identification.logs.readers.topic_map import UNITS, Setting, Topic
-from ...runtime.errors import InputError, unknown_name
+from ...identification.logs.readers.ros_messages import stamp
+from ...identification.logs.readers.topic_map import Setting, topic_of
 from ..field_map import FieldMap
 from ..filtering import Output
 from ..messages import Array, Malformed, Sample
@@ -37,14 +36,7 @@ class TopicReader:
     """
 
     def __init__(self, part: str, name: str, kind: str, setting: Setting, vehicle: Vehicle) -> None:
-        if kind not in kinds(part):
-            raise unknown_name("type", kind, kinds(part), f"{name}, for {part}")
-        self._topic = Topic(name, part, kinds(part)[kind], setting)
-        if part in UNITS and not self._topic.unit:
-            raise InputError(
-                f"{name}: {kind} does not say its unit; expected unit: one of "
-                f"{', '.join(UNITS[part])} for {part} in the map of topics"
-            )
+        self._topic = topic_of(part, name, kind, setting, ("ros2", "the map of topics"))
         self._fields = FieldMap(self._topic.log_map, vehicle, name)
 
     def sample(self, message: Any, arrival: int) -> Sample:

@@ -48,7 +48,7 @@ def test_a_pose_that_goes_over_the_wire():
 
 def test_rotors_of_a_multi_array_need_a_unit():
     kind = "std_msgs/msg/Float64MultiArray"
-    with pytest.raises(InputError, match="does not say its unit"):
+    with pytest.raises(InputError, match=r"ros2: rotors: topic /m is .* states no unit"):
         TopicReader("rotors", "/m", kind, Setting(), VEHICLE)
     setting = Setting(unit="rpm", order=(4, 3, 2, 1))
     topic = TopicReader("rotors", "/m", kind, setting, VEHICLE)
@@ -57,7 +57,7 @@ def test_rotors_of_a_multi_array_need_a_unit():
     assert sample.stamp is None
     with pytest.raises(Malformed):
         topic.sample(array([1.0, 2.0]), 0)
-    with pytest.raises(InputError, match="unknown type"):
+    with pytest.raises(InputError, match="ros2: pose: topic /m is of type"):
         TopicReader("pose", "/m", kind, Setting(), VEHICLE)
 
 

@@ -10,21 +10,15 @@ from operator import attrgetter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....runtime.yaml_file import read_yaml
+from ..channels import Array
 from ..log_map import MAPS
+from ..rotor_orders import ORDERS
 from .px4_motors import slots_of_motors
 
-Array = NDArray[np.float64]
-
-ARRAYS = tuple(
-    f"std_msgs/msg/{kind}MultiArray"
-    for kind in (
-        *("Float32", "Float64", "Int16", "Int32", "Int64"),
-        *("UInt8", "UInt16", "UInt32", "UInt64"),
-    )
-)
+_NUMBERS = ["Float32", "Float64", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64"]
+ARRAYS = tuple(f"std_msgs/msg/{kind}MultiArray" for kind in _NUMBERS)
 PARTS = ("pose", "rotors", "command", "voltage", "imu")
 MOTORS = ("rotors", "command")  # parts
 _SECOND = 10**9  # ns
@@ -34,12 +28,15 @@ _LATEST = 2**63  # ns
 
 @dataclass(frozen=True)
 class Kind:
-    """How one part is read from messages of one type."""
+    """How one part is read from messages of one type; a topic map may say another frame, unit,
+    order or range.
+    """
 
     fields: tuple[str, ...] | str  # paths in the message, or the name of a function of ``_SPECIAL``
-    frame: str = "flu"  # of a pose or an inertial sensor, unless the topic map says another
+    frame: str = "flu"  # of a pose or an inertial sensor
     unit: str = ""  # of rotor speeds or commands; nothing: the topic map must say it
-    order: str = "windwrench"  # of rotors, unless the topic map says another
+    order: tuple[int, ...] = ()  # elements of the message, from 1, that are the kit's rotors
+    range: tuple[float, float] = (0.0, 1.0)  # values of the commands 0 and 1
 
     def values(self, message: Any) -> Array:
         """Return what a message holds (K,), in the message's own frame and unit."""
@@ -68,14 +65,10 @@ def _esc_rpm(message: Any) -> list[float]:
     return [message.esc[i].esc_rpm for i in slots or range(4)]
 
 
-def _item_rpm(message: Any) -> list[float]:
-    return [item.rpm for item in message.esc_status]
-
-
 _SPECIAL: Mapping[str, Callable[[Any], list[float]]] = {
     "odometry": _odometry,
     "esc_rpm": _esc_rpm,
-    "item_rpm": _item_rpm,
+    "item_rpm": lambda message: [item.rpm for item in message.esc_status],
 }
 
 
@@ -88,12 +81,12 @@ def _stated() -> dict[str, Any]:
 @cache
 def kinds(part: str) -> dict[str, Kind]:
     """Return how a part is read from messages, by their types."""
-    found = {}
+    found = {name: Kind(("data",)) for name in ARRAYS if part in MOTORS}
     for name, stated in _stated()[part].items():
-        fields = stated["fields"]
+        fields, order = stated["fields"], stated.get("order")
         paths = fields if isinstance(fields, str) else tuple(fields)
-        found[name] = Kind(**stated | {"fields": paths})
-    return found | ({name: Kind(("data",)) for name in ARRAYS} if part in MOTORS else {})
+        found[name] = Kind(**stated | {"fields": paths, "order": ORDERS[order] if order else ()})
+    return found
 
 
 def definitions() -> list[dict[str, str]]:

@@ -32,9 +32,8 @@ so that nothing in a file decides what code runs; a bag whose definitions differ
 
 import os
 from array import array
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -44,11 +43,11 @@ from numpy.typing import NDArray
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS
-from ....runtime.regular_files import check_regular, open_regular
+from ....runtime.regular_files import open_regular
 from ..channels import Array, Samples
 from ..flight_log import FlightLog
 from ..mapped_log import recording_of
-from .ros_messages import definitions, stamp
+from .ros_messages import MOTORS, definitions, stamp
 from .topic_choice import chosen_topics
 from .topic_map import Topic, joined, topic_map
 from .unpacking import check_bag_files, limited_unpacking
@@ -57,17 +56,10 @@ SUFFIXES = (".bag", ".db3", ".mcap")
 _ROS1 = b"#ROSBAG V2.0"
 BEGINS = (_ROS1, b"\x89MCAP0\r\n", b"SQLite format 3\0")
 
+_Messages = Callable[[str], Iterator[tuple[int, Any]]]  # topic to (recorded at ns, message)
+
 _SAME_CLOCK = 1_000_000_000  # ns between a header's time and the recording's
 _NANOSECOND = 1e-9  # s
-
-
-@dataclass(frozen=True)
-class _Bag:
-    """An open bag: its topics and how to read the messages of one."""
-
-    path: Path
-    types: Mapping[str, str]  # topic to message type
-    messages: Callable[[str], Iterator[tuple[int, Any]]]  # topic to (recorded at ns, message)
 
 
 def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> FlightLog:
@@ -81,11 +73,11 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
     settings, where = topic_map(path, option)
     times: dict[str, NDArray[np.int64]] = {}
     columns: dict[str, dict[str, Array]] = {}
-    with _opened(path) as bag:
-        topics, doubts = chosen_topics(path, bag.types, settings, where)
+    with _opened(path) as (types, messages):
+        topics, doubts = chosen_topics(path, types, settings, where)
         for part, topic in list(topics.items()):
             try:
-                times[part], columns[part], said = _decoded_topic(bag, topic)
+                times[part], columns[part], said = _decoded_topic(path, topic, messages)
                 doubts += said
             except InputError as error:
                 if part in settings or part in ("pose", "rotors"):
@@ -94,14 +86,10 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
                 del topics[part]
     if not topics:
         raise InputError(f"{path}: {doubts[0] if doubts else 'nothing in it can be read'}")
-    notes = [note for topic in topics.values() for note in _notes(topic, bag.types[topic.name])]
+    notes = [note for topic in topics.values() for note in _notes(topic, types[topic.name])]
     origin = min(int(nanoseconds[0]) for nanoseconds in times.values())
     recorded = [
-        Samples(
-            _NANOSECOND * (times[part] - origin).astype(np.float64),
-            columns[part],
-            topic.name,
-        )
+        Samples(_NANOSECOND * (times[part] - origin), columns[part], topic.name)
         for part, topic in topics.items()
     ]
     found = recording_of(path, recorded, joined(topics), "rosbag", (*notes, *doubts))
@@ -110,21 +98,18 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
 
 def _notes(topic: Topic, kind: str) -> Iterator[str]:
     """Yield which topic holds a part, and what was assumed of its frame or order."""
-    part = topic.part
+    part, frame = topic.part, topic.kind.frame
     yield f"{part}: topic {topic.name} ({kind}){topic.why}"
-    if part in ("rotors", "command"):
-        named = topic.kind.order
-        is_assumed = not topic.setting.order and named != "windwrench"
-        pulses = ""
-        if part == "command" and topic.unit == "us":
-            low, high = topic.range
+    if part in MOTORS:
+        named, pulses = topic.assumed_order, ""
+        if part == "command" and topic.kind.unit == "us":
+            low, high = topic.kind.range
             pulses = f"; pulses of {low:g} to {high:g} us are the commands 0 to 1"
         yield (
             f"{part}: rotors 1, 2, 3, 4 are elements {', '.join(map(str, topic.elements))} of the "
-            f"message{f', as on {named}, which the bag does not state' if is_assumed else ''}"
-            f"{pulses}"
+            f"message{f', as on {named}, which the bag does not state' if named else ''}{pulses}"
         )
-    elif part != "voltage" and topic.frame == "flu":
+    elif part != "voltage" and frame == "flu":
         world = "world z up, " if part == "pose" else ""
         yield f"{part}: {world}body forward, left, up, as the bag has it"
     elif part != "voltage":
@@ -132,20 +117,30 @@ def _notes(topic: Topic, kind: str) -> Iterator[str]:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[_Bag]:
-    """Open a bag of either kind.
+def _one_line(what: str, expected: str) -> Iterator[None]:
+    """Make one line of whatever a parser raises of bytes that are none of its own."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        words = f"{what}: {error or type(error).__name__}; expected {expected}"
+        raise InputError(words) from error
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[tuple[dict[str, str], _Messages]]:
+    """Open a bag of either kind; give the types of its topics, and how to read the messages of one.
 
     Raises:
         InputError: rosbags is missing or the bag cannot be read.
     """
-    folder = os.path.isdir(path)
-    if not folder:
+    is_folder = os.path.isdir(path)
+    is_ros1 = not is_folder and path.suffix.lower() == ".bag"
+    if not is_folder:
         with open_regular(path, "a ROS bag") as file:
-            begins = file.read(len(_ROS1))
-        ros1 = begins == _ROS1 or path.suffix.lower() == ".bag"
-    else:
-        ros1 = False
-    if not (folder or ros1 or path.name.lower().endswith(SUFFIXES)):
+            is_ros1 |= file.read(len(_ROS1)) == _ROS1
+    if not (is_folder or is_ros1 or path.name.lower().endswith(SUFFIXES)):
         raise InputError(
             f"{path}: unknown kind of bag; expected {', '.join(SUFFIXES)} or the folder of a ROS 2 "
             f"bag"
@@ -156,63 +151,40 @@ def _opened(path: Path) -> Iterator[_Bag]:
     except ImportError as error:
         raise InputError(
             f"{path}: a bag needs rosbags, which is not installed: pip install 'windwrench[logs]', "
-            f"or pip "
-            "install rosbags"
+            f"or pip install rosbags"
         ) from error
     stores = []
     for variant in definitions():
-        store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+        store = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.ROS2_HUMBLE)
         for name, text in variant.items():
             store.register(get_types_from_msg(text, name))
         stores.append(store)
-    if ros1:
-        check_regular(path, "a ROS 1 bag")
-    else:
+    if not is_ros1:
         check_bag_files(path)
-    limits = ExitStack()
-    reader: Any = None
-    try:
-        limits.enter_context(limited_unpacking())
-        reader = rosbag1.Reader(path) if ros1 else rosbag2.Reader(path)
-        reader.open()
-        types = {connection.topic: connection.msgtype for connection in reader.connections}
-    except Exception as error:  # whatever a parser makes of bytes that are no bag
-        limits.close()
-        raise InputError(
-            f"{path}: cannot be read as a ROS {1 if ros1 else 2} bag: "
-            f"{error or type(error).__name__}; "
-            "expected a whole bag"
-        ) from error
 
     def messages(topic: str) -> Iterator[tuple[int, Any]]:
-        try:
+        kind = types[topic]
+        where = f"{path}: topic {topic}"
+        with _one_line(f"{where}: a message cannot be read", kind):
             wanted = [connection for connection in reader.connections if connection.topic == topic]
-            kind = types[topic]
-            fitting = [store for store in stores if all(_same(c, store, ros1) for c in wanted)]
+            fitting = [s for s in stores if all(_same(c, s, is_ros1) for c in wanted)]
             if not fitting:
                 raise InputError(
-                    f"{path}: topic {topic}: its {kind} has another definition "
-                    f"than the one "
-                    f"this reader knows (digest {wanted[0].digest}); expected the common one"
+                    f"{where}: its {kind} has another definition than the one this reader knows "
+                    f"(digest {wanted[0].digest}); expected the common one"
                 )
             for _, recorded, raw in reader.messages(wanted):
                 if not 0 <= int(recorded) < 2**63:
                     raise ValueError(f"recorded at {recorded} ns")
-                yield int(recorded), _decoded(raw, kind, fitting, ros1)
-        except InputError:
-            raise
-        except Exception as error:  # as above
-            raise InputError(
-                f"{path}: topic {topic}: a message cannot be read: "
-                f"{error or type(error).__name__}; expected "
-                f"{types[topic]}"
-            ) from error
+                yield int(recorded), _decoded(raw, kind, fitting, is_ros1)
 
-    try:
-        yield _Bag(path, types, messages)
-    finally:
-        reader.close()
-        limits.close()
+    with ExitStack() as opened:
+        what = f"{path}: cannot be read as a ROS {1 if is_ros1 else 2} bag"
+        with _one_line(what, "a whole bag"):
+            opened.enter_context(limited_unpacking())
+            reader = opened.enter_context((rosbag1 if is_ros1 else rosbag2).Reader(path))
+            types = {connection.topic: connection.msgtype for connection in reader.connections}
+        yield types, messages
 
 
 def _same(connection: Any, store: Any, ros1: bool) -> bool:
@@ -231,12 +203,9 @@ def _decoded(raw: Any, kind: str, stores: list[Any], ros1: bool) -> Any:
     dropped.
     """
     while True:
+        store = stores[0]
         try:
-            return (
-                stores[0].deserialize_ros1(raw, kind)
-                if ros1
-                else stores[0].deserialize_cdr(raw, kind)
-            )
+            return (store.deserialize_ros1 if ros1 else store.deserialize_cdr)(raw, kind)
         except Exception:
             if len(stores) == 1:
                 raise
@@ -244,7 +213,7 @@ def _decoded(raw: Any, kind: str, stores: list[Any], ros1: bool) -> Any:
 
 
 def _decoded_topic(
-    bag: _Bag, topic: Topic
+    path: Path, topic: Topic, messages: _Messages
 ) -> tuple[NDArray[np.int64], dict[str, Array], list[str]]:
     """Return times (N,) in ns, columns (N,) by name, and notes of a topic.
 
@@ -252,23 +221,21 @@ def _decoded_topic(
         InputError: it has no message or too many, or one that cannot be used.
     """
     recorded, stamped, values = array("q"), array("q"), array("d")
-    for index, (received, message) in enumerate(bag.messages(topic.name)):
+    where = f"{path}: topic {topic.name}"
+    for index, (received, message) in enumerate(messages(topic.name)):
         if index >= LIMITS.table_rows:
             raise InputError(
-                f"{bag.path}: topic {topic.name}: more than {LIMITS.table_rows} messages; expected "
-                f"one flight"
+                f"{where}: more than {LIMITS.table_rows} messages; expected one flight"
             )
         recorded.append(received)
         stamped.append(stamp(message))
         try:
             values.extend(topic.values(message))
         except ValueError as error:
-            raise InputError(
-                f"{bag.path}: topic {topic.name}, message {index + 1}: {error}"
-            ) from error
+            raise InputError(f"{where}, message {index + 1}: {error}") from error
     if not recorded:
         raise InputError(
-            f"{bag.path}: {topic.part}: topic {topic.name} has no messages; expected at least two"
+            f"{path}: {topic.part}: topic {topic.name} has no messages; expected at least two"
         )
     table = np.array(values).reshape(len(recorded), -1)
     columns = dict(zip(topic.columns, table.T, strict=True))

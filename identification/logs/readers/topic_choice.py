@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ....runtime.errors import InputError, unknown_name
-from .ros_messages import ARRAYS, PARTS, kinds
-from .topic_map import UNITS, Setting, Topic
+from .ros_messages import ARRAYS, MOTORS, PARTS, kinds
+from .topic_map import UNITS, Setting, Topic, topic_of
 
 _SETPOINTS = ("setpoint", "set_point", "reference", "command", "cmd", "desired", "target", "goal")
 _MOCAP = (
@@ -34,70 +34,45 @@ def chosen_topics(
     chosen: dict[str, Topic] = {}
     refused: dict[str, InputError] = {}
     for part in PARTS:
-        setting = settings.get(part, Setting())
         try:
-            choice = (
-                _named(path, types, part, setting, where)
-                if setting.topic
-                else _fitting(path, types, part, setting, where)
-            )
+            topic = _topic(path, types, part, settings.get(part, Setting()), where)
         except InputError as error:
             if part in settings:
                 raise
             refused[part] = error
         else:
-            if choice is not None:
-                chosen[part] = choice
+            chosen |= {part: topic} if topic is not None else {}
     if "rotors" not in chosen and "command" not in chosen:
-        raise refused.get("rotors") or _no_rotors(path, types, where)
+        raise refused.get("rotors") or _missing(path, types, "rotors", where)
     # an ambiguous pose is no reason to go on without one
     if "pose" not in chosen and ("imu" not in chosen or "pose" in refused):
-        raise refused.get("pose") or _no_pose(path, types, where)
+        raise refused.get("pose") or _missing(path, types, "pose", where)
     return chosen, [str(error).removeprefix(f"{path}: ") for error in refused.values()]
 
 
-def _named(path: Path, types: Mapping[str, str], part: str, setting: Setting, where: str) -> Topic:
-    """Return the topic of a part that the topic map names.
-
-    Raises:
-        InputError: it is not there, or of a type that cannot be the part.
-    """
-    topic, fitting = setting.topic, kinds(part)
-    if topic not in types:
-        raise unknown_name("topic", topic, types, f"{path}: {part} (named in {where})")
-    kind = types[topic]
-    if kind not in fitting:
-        raise InputError(
-            f"{path}: {part}: topic {topic} is of type {kind}; expected {' or '.join(fitting)}"
-        )
-    found = Topic(topic, part, fitting[kind], setting)
-    if part in UNITS and not found.unit:
-        raise InputError(
-            f"{path}: {part}: topic {topic} is a {kind}, which states no unit; expected "
-            f"unit: {', '.join(UNITS[part])} in {where}"
-        )
-    return found
-
-
-def _fitting(
+def _topic(
     path: Path, types: Mapping[str, str], part: str, setting: Setting, where: str
 ) -> Topic | None:
-    """Return the only topic that may be a part, or that which its name tells; None: there is none.
+    """Return the topic of a part: the one that the topic map names, the only one that may be it, or
+    that which its name tells; None: there is none.
 
     Raises:
-        InputError: several may be it.
+        InputError: it is not there, is of a type that cannot be the part, or several may be it.
     """
+    named = setting.topic
+    if named and named not in types:
+        raise unknown_name("topic", named, types, f"{path}: {part} (named in {where})")
     # an array of numbers may be anything until somebody names its unit
     fitting = [kind for kind in kinds(part) if kind not in ARRAYS or setting.unit]
     several = sorted(topic for topic, kind in types.items() if kind in fitting)
     if part in ("pose", "rotors"):
         flown = [t for t in several if not any(word in t.lower() for word in _SETPOINTS)]
         several = flown or (several if part == "rotors" else [])
-    found = several
-    if part == "pose" and len(several) > 1:
+    found = [named] if named else several
+    if part == "pose" and len(found) > 1:
         measured = [t for t in several if any(word in t.lower() for word in _MOCAP)]
         found = measured if len(measured) == 1 else several
-    elif part == "imu" and len(several) > 1:
+    elif part == "imu" and len(found) > 1:
         found = [t for t in several if not t.endswith("_raw")] or several
     if len(found) > 1:
         raise InputError(
@@ -106,41 +81,31 @@ def _fitting(
         )
     if not found:
         return None
-    others = ", ".join(topic for topic in several if topic not in found)
-    why = f", chosen by its name before {others}; a topic map says another" if others else ""
-    return Topic(found[0], part, kinds(part)[types[found[0]]], setting, why)
+    others = [] if named else [topic for topic in several if topic not in found]
+    why = f", chosen by its name before {', '.join(others)}; a topic map says another"
+    places = str(path), where
+    return topic_of(part, found[0], types[found[0]], setting, places, why if others else "")
 
 
-def _listed(types: Mapping[str, str]) -> str:
+def _missing(path: Path, types: Mapping[str, str], part: str, where: str) -> InputError:
+    """Return the error for a bag without rotor speeds and commands, or without a pose and inertial
+    sensors.
+    """
     topics = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(types.items())) or "none"
-    return f"The bag's topics: {topics}"
-
-
-def _no_rotors(path: Path, types: Mapping[str, str], where: str) -> InputError:
-    """Return the error for a bag without rotor speeds and commands."""
     arrays = sorted(topic for topic, kind in types.items() if kind in ARRAYS)
-    if arrays:
+    if part == "rotors" and arrays:
         return InputError(
             f"{path}: rotors: {', '.join(arrays)} could be it, but a multi-array states no "
             f"unit; expected in {where} the line rotors: {{topic: {arrays[0]}, unit: rad/s}} (or "
             f"{', '.join(UNITS['rotors'][1:])}), or command: {{topic: {arrays[0]}, unit: us}} "
-            f"(or {UNITS['command'][0]}). {_listed(types)}"
+            f"(or {UNITS['command'][0]}). The bag's topics: {topics}"
         )
-    known = [kind for part in UNITS for kind in kinds(part) if kind not in ARRAYS]
+    parts = ("pose",) if part == "pose" else MOTORS
+    known = dict.fromkeys(kind for one in parts for kind in kinds(one) if kind not in ARRAYS)
+    left_out = sorted(topic for topic, kind in types.items() if kind in known)
+    names = f"but set-points by their names ({', '.join(left_out)})"
+    more = "" if part == "pose" else " or a multi-array of std_msgs with a unit"
     return InputError(
-        f"{path}: rotors: no topic of a type that fits; expected one of "
-        f"{' or '.join(dict.fromkeys(known))} or a multi-array of std_msgs with a unit, or its "
-        f"name in {where}. {_listed(types)}"
-    )
-
-
-def _no_pose(path: Path, types: Mapping[str, str], where: str) -> InputError:
-    """Return the error for a bag without a pose and inertial sensors."""
-    left_out = sorted(topic for topic, kind in types.items() if kind in kinds("pose"))
-    why = "no topic of a type that fits"
-    if left_out:
-        why = f"no topic but set-points by their names ({', '.join(left_out)})"
-    return InputError(
-        f"{path}: pose: {why}; expected one of {' or '.join(kinds('pose'))}, or its name in "
-        f"{where}. {_listed(types)}"
+        f"{path}: {part}: no topic {names if left_out else 'of a type that fits'}; expected one of "
+        f"{' or '.join(known)}{more}, or its name in {where}. The bag's topics: {topics}"
     )

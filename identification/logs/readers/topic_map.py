@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, BeforeValidator, ConfigDict
 
 from ....runtime.errors import InputError, unknown_name
 from ....runtime.forms import STRICT, Number, checked, expected
 from ....runtime.yaml_file import read_yaml
+from ..channels import Array
 from ..log_map import (
     COMMAND_UNITS,
     Attitude,
@@ -29,10 +29,8 @@ from ..log_map import (
     TimeColumn,
     one_of,
 )
-from ..rotor_orders import ORDERS
-from .ros_messages import Kind
-
-Array = NDArray[np.float64]
+from ..rotor_orders import ORDERS, order_names
+from .ros_messages import MOTORS, Kind, kinds
 
 UNITS = {"rotors": ("rad/s", "rpm", "Hz"), "command": ("normalised", "us")}
 KEYS = {  # what may be said of a part
@@ -42,7 +40,7 @@ KEYS = {  # what may be said of a part
     "voltage": ("topic",),
     "imu": ("topic", "frame"),
 }
-_FRAMES = ("flu", "ned")
+_FRAMES = {"flu": ("enu", "flu"), "ned": ("ned", "frd")}  # world and body
 _LARGEST_COMMAND = 1e5
 _SECTIONS: Mapping[str, Mapping[str, Columns]] = {  # of a log map, that a part fills
     "pose": {
@@ -80,13 +78,6 @@ def _rising(values: tuple[float, float]) -> tuple[float, float]:
     return values
 
 
-_Range = Annotated[
-    tuple[Number, Number],
-    AfterValidator(_rising),
-    expected("the values of the commands 0 and 1, such as [1000, 2000]"),
-]
-
-
 @dataclass(frozen=True)
 class Setting:
     """What a topic map says of a part; what is left empty is usual of the type of messages."""
@@ -97,7 +88,11 @@ class Setting:
     frame: Annotated[str, one_of(_FRAMES)] = ""  # ned: world and body z down; flu: ROS's own
     unit: Annotated[str, one_of([*UNITS["rotors"], *UNITS["command"]])] = ""
     order: Annotated[tuple[int, ...], BeforeValidator(_elements)] = ()
-    range: _Range | None = None  # values of the commands 0 and 1
+    range: Annotated[  # values of the commands 0 and 1
+        tuple[Number, Number] | tuple[()],
+        AfterValidator(_rising),
+        expected("the values of the commands 0 and 1, such as [1000, 2000]"),
+    ] = ()
 
 
 def topic_map(path: Path, option: str) -> tuple[dict[str, Setting], str]:
@@ -123,19 +118,14 @@ def topic_map(path: Path, option: str) -> tuple[dict[str, Setting], str]:
     for part, value in data.items():
         if part not in KEYS:
             raise unknown_name("key", str(part), KEYS, str(file))
-        settings[part] = _setting(part, value, f"{file}: {part}")
+        where, given = f"{file}: {part}", {"topic": value} if isinstance(value, str) else value
+        for key in given if isinstance(given, dict) else ():
+            if key not in KEYS[part]:
+                raise unknown_name("key", str(key), KEYS[part], where)
+        settings[part] = found = checked(Setting, given, where, ", ".join(KEYS[part]))
+        if found.unit and found.unit not in UNITS[part]:
+            raise unknown_name("unit", found.unit, UNITS[part], where)
     return settings, str(file)
-
-
-def _setting(part: str, value: object, where: str) -> Setting:
-    given = {"topic": value} if isinstance(value, str) else value
-    for key in given if isinstance(given, dict) else ():
-        if key not in KEYS[part]:
-            raise unknown_name("key", str(key), KEYS[part], where)
-    found = checked(Setting, given, where, ", ".join(KEYS[part]))
-    if found.unit and found.unit not in UNITS[part]:
-        raise unknown_name("unit", found.unit, UNITS[part], where)
-    return found
 
 
 @dataclass(frozen=True)
@@ -144,44 +134,29 @@ class Topic:
 
     name: str
     part: str  # of ``KEYS``
-    kind: Kind
-    setting: Setting
+    kind: Kind  # with what the topic map says
     why: str = ""  # it was chosen, where it was not the only one
-
-    @property
-    def frame(self) -> str:
-        """Of a pose or an inertial sensor: flu or ned."""
-        return self.setting.frame or self.kind.frame
-
-    @property
-    def unit(self) -> str:
-        """Of rotor speeds or commands; nothing: not known."""
-        return self.setting.unit or self.kind.unit
+    assumed_order: str = ""  # of its motors: usual of its type, and not stated
 
     @property
     def elements(self) -> tuple[int, ...]:
         """Elements of the message, from 1, that are the kit's rotors."""
-        return self.setting.order or ORDERS[self.kind.order]
-
-    @property
-    def range(self) -> tuple[float, float]:
-        """What stands for the commands 0 and 1."""
-        return self.setting.range or COMMAND_UNITS[self.unit] or (0.0, 1.0)
+        return self.kind.order or (1, 2, 3, 4)
 
     @cached_property
     def log_map(self) -> LogMap:
         """What the columns of its messages mean."""
-        world, body = ("ned", "frd") if self.frame == "ned" else ("enu", "flu")
+        world, body = _FRAMES[self.kind.frame]
         stated: dict[str, Any] = {"topic": self.name}
         if self.part == "imu":
             stated["body"] = body
-        elif self.part in UNITS:
+        elif self.part in MOTORS:
             picked = sorted(self.elements)
             stated["columns"] = tuple(f"{self.part} {element}" for element in picked)
             stated["order"] = tuple(picked.index(element) + 1 for element in self.elements)
-            stated["unit"] = self.unit
+            stated["unit"] = self.kind.unit
         if self.part == "command":
-            stated["range"] = self.range
+            stated["range"] = self.kind.range
         parts: dict[str, Any] = {
             name: replace(part, **stated) for name, part in _SECTIONS[self.part].items()
         }
@@ -199,10 +174,10 @@ class Topic:
             ValueError: it has too few rotors, or more than four and no order.
         """
         found = self.kind.values(message)
-        if self.part not in UNITS:
+        if self.part not in MOTORS:
             return found
         what = "rotor speed(s)" if self.part == "rotors" else "command(s)"
-        if not self.setting.order and len(found) != 4 and self.kind.order == "windwrench":
+        if not self.kind.order and len(found) != 4:
             raise ValueError(f"{len(found)} {what}; expected 4, or an order in the topic map")
         if len(found) < max(self.elements):
             raise ValueError(
@@ -210,9 +185,43 @@ class Topic:
                 f"{list(self.elements)}"
             )
         found = found[np.array(sorted(self.elements)) - 1]
-        if self.part == "command":
-            found = np.where(np.isnan(found), self.range[0], found)
-        return found
+        is_off = np.isnan(found) & (self.part == "command")
+        return np.where(is_off, self.kind.range[0], found)
+
+
+def topic_of(
+    part: str, name: str, kind: str, setting: Setting, where: tuple[str, str], why: str = ""
+) -> Topic:
+    """Return a topic as the holder of a part.
+
+    Args:
+        part: of ``KEYS``.
+        name: of the topic.
+        kind: the type of its messages.
+        setting: what the topic map says of the part.
+        where: the bag or source, and the topic map, for errors.
+        why: it was chosen.
+
+    Raises:
+        InputError: messages of this type hold no such part, or need a unit that is not given.
+    """
+    source, map_file = where
+    fitting = kinds(part)
+    if kind not in fitting:
+        raise InputError(
+            f"{source}: {part}: topic {name} is of type {kind}; expected {' or '.join(fitting)}"
+        )
+    usual = fitting[kind]
+    unit, order = setting.unit or usual.unit, setting.order or usual.order
+    if part in MOTORS and not unit:
+        raise InputError(
+            f"{source}: {part}: topic {name} is a {kind}, which states no unit; expected "
+            f"unit: {', '.join(UNITS[part])} in {map_file}"
+        )
+    limits = setting.range or COMMAND_UNITS.get(unit) or usual.range
+    frame = setting.frame or usual.frame
+    found = replace(usual, frame=frame, unit=unit, order=order, range=limits)
+    return Topic(name, part, found, why, "" if setting.order else "".join(order_names(order)[:1]))
 
 
 def joined(topics: Mapping[str, Topic]) -> LogMap:
