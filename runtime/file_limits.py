@@ -39,7 +39,7 @@ class FileLimits:
         log_fields: variables in one kind of its records; ArduPilot's have at most 16.
         ulog_fields: fields of all topics that it subscribes to, those within fields written out;
             PX4's logs have some 10,000.
-        ulog_texts: information and parameters in it; PX4's logs have some 2,000.
+        ulog_texts: information, parameters, texts and dropouts in it; PX4's logs have some 2,000.
         ulog_damages: places in it where no message can be read; each takes some 0.1 ms.
     """
 

@@ -28,6 +28,11 @@ def _units() -> dict[str, str]:
     return {word: unit for unit, spellings in words()["units"].items() for word in spellings}
 
 
+def unit_spelled(text: str) -> str:
+    """Return the unit that a text is a spelling of, or nothing."""
+    return _units().get(text, "") or str(words()["unit_words"].get(text, ""))
+
+
 @cache
 def _ending() -> re.Pattern[str]:
     plain = [word for word, unit in _units().items() if unit and re.fullmatch("[a-z0-9_]+", word)]

@@ -65,6 +65,7 @@ from pydantic import (
 from ...runtime.errors import InputError, unknown_name
 from ...runtime.forms import STRICT, Number, Positive, checked, expected
 from ...runtime.yaml_file import read_yaml
+from .column_names import unit_spelled
 from .rotor_orders import ORDERS, Order, rotor_order
 
 MAPS = Path(__file__).parent / "maps"  # those that ship with the kit
@@ -99,32 +100,12 @@ SENSES = ("body_to_world", "world_to_body")
 QUATERNIONS = ("wxyz", "xyzw")
 EULER_ORDERS = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")
 
-# other spellings of units
-_SPELLINGS = {
-    "rad/sec": "rad/s",
-    "rev/s": "Hz",
-    "radps": "rad/s",
-    "rad_s": "rad/s",
-    "deg/sec": "deg/s",
-    "dps": "deg/s",
-    "degps": "deg/s",
-    "m/s^2": "m/s2",
-    "m/s/s": "m/s2",
-    "mps2": "m/s2",
-    "pwm": "us",
-    "µs": "us",
-    "normalized": "normalised",
-    "%": "percent",
-    "degrees": "deg",
-    "radians": "rad",
-}
-
 
 def _known(value: Any, known: Collection[str], what: str) -> str:
     """Return which of some words a value is, whatever its case, or in another spelling."""
     lower = {name.lower(): name for name in known}
     text = str(value).lower()
-    found = lower.get(text) or lower.get(_SPELLINGS.get(text, "").lower())
+    found = lower.get(text) or lower.get(unit_spelled(text).lower())
     if found is None:
         raise unknown_name(what, str(value), known)
     return found

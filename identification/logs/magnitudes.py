@@ -20,36 +20,23 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Magnitudes:
-    """How large and how small the numbers of a log may be.
+    """How large and how small the numbers of a log may be."""
 
-    Attributes:
-        shortest_period: s, of the median step: 100 kHz, far above any pose's rate.
-        longest_step: s, of any step; a log in nanoseconds has steps of 1e7, and more than a year
-            between two rows is no flight.
-        largest: of all other numbers, in SI units; logs in millimetres or rpm stay far below.
-        rates: Hz of rows, in which a unit of time is likely.
-        sure_rates: the same, in which the unit is certain.
-        voltages: V of a battery, in which a unit of voltage is likely.
-        sure_voltages: the same, in which the unit is certain.
-        widest: m, over which the positions of one flight spread.
-        carries: thrust by weight of rotors in their right unit; mass and thrust curve may be off.
-        flies: median thrust by weight beyond which a log is not of this vehicle.
-        doubtful: the same, beyond which it may not be.
-        gravity: specific force by 1 g in which one unit is certain.
-    """
-
-    shortest_period: float = 1e-5
+    shortest_period: float = 1e-5  # s, of the median step: 100 kHz, far above any pose's rate
+    # s, of any step; a log in nanoseconds has steps of 1e7, and more than a year between two rows
+    # is no flight
     longest_step: float = 1e12
-    largest: float = 1e9
-    rates: tuple[float, float] = (5.0, 5000.0)
-    sure_rates: tuple[float, float] = (15.0, 2500.0)
-    voltages: tuple[float, float] = (2.7, 100.0)
-    sure_voltages: tuple[float, float] = (2.7, 60.0)
-    widest: float = 300.0
+    largest: float = 1e9  # of all other numbers, in SI units; millimetres or rpm stay far below
+    rates: tuple[float, float] = (5.0, 5000.0)  # Hz of rows, in which a unit of time is likely
+    sure_rates: tuple[float, float] = (15.0, 2500.0)  # the same, in which the unit is certain
+    voltages: tuple[float, float] = (2.7, 100.0)  # V of a battery: the unit is likely
+    sure_voltages: tuple[float, float] = (2.7, 60.0)  # the same: the unit is certain
+    widest: float = 300.0  # m, over which the positions of one flight spread
+    # thrust by weight of rotors in their right unit; mass and thrust curve may be off
     carries: tuple[float, float] = (0.55, 1.8)
-    flies: tuple[float, float] = (0.2, 5.0)
-    doubtful: tuple[float, float] = (0.5, 2.0)
-    gravity: tuple[float, float] = (0.85, 1.15)
+    flies: tuple[float, float] = (0.2, 5.0)  # its median, beyond which a log is of another vehicle
+    doubtful: tuple[float, float] = (0.5, 2.0)  # the same, beyond which it may be
+    gravity: tuple[float, float] = (0.85, 1.15)  # specific force by 1 g: the unit is certain
 
 
 MAGNITUDES = Magnitudes()

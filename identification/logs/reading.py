@@ -107,19 +107,17 @@ def _read(
             raise InputError(f"{path}: both a reader and a map; expected one of them")
         return map_table(open_table(path), load_map(map), vehicle)
     chosen = reader_by_content(path) if reader is None else find_reader(reader)
-    if chosen is not None:
+    if chosen is not None and not chosen.signature:
         return chosen.read(path, vehicle)
-    if not is_table(path):
+    if chosen is None and not is_table(path):
         raise unknown_content(path)
     table = open_table(path)
     missing = missing_columns(table)
-    if not missing:
+    if chosen is None and not missing:
         return map_table(table, load_map(OWN_MAP), vehicle)
-    chosen = reader_by_columns(path, table.header)
-    if chosen is not None and chosen.log_map:
-        return map_table(table, load_map(chosen.log_map), vehicle, chosen.name)
+    chosen = chosen or reader_by_columns(path, table.header)
     if chosen is not None:
-        return chosen.read(path, vehicle)
+        return chosen.read(table, vehicle=vehicle)
     raise InputError(
         f"{path}: missing column(s) {', '.join(missing)}; expected {', '.join(REQUIRED)}, or the "
         f"columns of {looked_for_columns()}, found {', '.join(table.header[:_SHOWN])}. A table of "

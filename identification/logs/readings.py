@@ -27,23 +27,16 @@ _PLACE, _QUATERNION = ("px", "py", "pz"), ("qw", "qx", "qy", "qz")
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """Axes of the position's world, of the attitude's world and of the body.
+    """Axes of the position's world, of the attitude's world and of the body."""
 
-    Attributes:
-        fact: words for the axes; empty for the kit's own.
-        position: (3, 3) from the columns' world to the kit's (z up), of positions.
-        world: (3, 3) the same, of the attitude.
-        body: (3, 3) from the kit's body axes (forward, left, up) to those of the attitude.
-        names: of world and body in a map; empty where a map has no names for the axes.
-        unusual: whether its axes do not belong together in any usual convention.
-    """
-
-    fact: str = ""
+    fact: str = ""  # words for the axes; empty for the kit's own
+    # (3, 3) each: from the columns' world to the kit's (z up), of positions and of attitudes; and
+    # from the kit's body axes (forward, left, up) to those of the attitude
     position: Array = field(default_factory=lambda: _I)
     world: Array = field(default_factory=lambda: _I)
     body: Array = field(default_factory=lambda: _I)
-    names: tuple[str, str] = ("", "")
-    unusual: bool = False
+    names: tuple[str, str] = ("", "")  # of world and body in a map; empty where a map has none
+    unusual: bool = False  # its axes do not belong together in any usual convention
 
 
 PLAIN = Frames(names=("enu", "flu"))
@@ -111,17 +104,11 @@ ROTORS: Order = ORDERS["windwrench"]
 
 @dataclass(frozen=True, eq=False)
 class SensorReading:
-    """One way to read an inertial sensor.
+    """One way to read an inertial sensor."""
 
-    Attributes:
-        says: what the columns look like, what was expected, and what to do.
-        turn: (3, 3) by which the columns are multiplied.
-        lacks_gravity: the columns hold an acceleration in place of the specific force.
-    """
-
-    says: str = ""
-    turn: Array = field(default_factory=lambda: _I)
-    lacks_gravity: bool = False
+    says: str = ""  # what the columns look like, what was expected, and what to do
+    turn: Array = field(default_factory=lambda: _I)  # (3, 3), multiplies the columns
+    lacks_gravity: bool = False  # they hold an acceleration in place of the specific force
 
 
 AS_DECLARED = SensorReading()
@@ -157,35 +144,20 @@ ACCELEROMETER_READINGS = (
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """One way to read a flight's columns.
+    """One way to read a flight's columns."""
 
-    Attributes:
-        order: which of w, x, y, z the columns of a quaternion hold.
-        euler: order of turns of angles about x, y, z; empty: a quaternion.
-        unit: of the angles.
-        pitch_sign: of the angle about y.
-        sense: of the attitude.
-        frames: axes of worlds and body.
-        length: unit of the position.
-        gyro: reading of the gyro's columns.
-        rotors: the kit's rotor, from 1, in each column.
-        mirrored: rotors turn against the declared spin.
-        late: s, by which the rotors' columns come late against the motion.
-        unlikely: log-likelihood ratio that the reading must make up for being less usual.
-    """
-
-    order: str = "wxyz"
-    euler: str = ""
-    unit: str = "rad"
-    pitch_sign: int = 1
+    order: str = "wxyz"  # which of w, x, y, z the columns of a quaternion hold
+    euler: str = ""  # order of turns of angles about x, y, z; empty: a quaternion
+    unit: str = "rad"  # of the angles
+    pitch_sign: int = 1  # of the angle about y
     sense: str = "body_to_world"
     frames: Frames = PLAIN
-    length: str = "m"
+    length: str = "m"  # unit of the position
     gyro: SensorReading = AS_DECLARED
-    rotors: Order = ROTORS
-    mirrored: bool = False
-    late: float = 0.0
-    unlikely: float = 0.0
+    rotors: Order = ROTORS  # the kit's rotor, from 1, in each column
+    mirrored: bool = False  # rotors turn against the declared spin
+    late: float = 0.0  # s, by which the rotors' columns come late against the motion
+    unlikely: float = 0.0  # log-likelihood ratio to make up for being less usual
 
     @property
     def attitude(self) -> tuple[Any, ...]:

@@ -90,17 +90,6 @@ def readable(stream: Stream | None) -> Stream | None:
     return found if len(found.t) >= 2 else None
 
 
-def from_ned(position: Array, quaternion: Array) -> tuple[Array, Array]:
-    """Return positions (N, 3) and quaternions (N, 4) from NED and FRD (world and body z down) to z
-    up and y left.
-
-    Both frames turn by half a turn about their own x axis: x stays north and forward, east becomes
-    -y (west), down becomes -z. So the vector part of the quaternion changes like a position.
-    """
-    half_turn = np.array([1.0, -1.0, -1.0])
-    return position * half_turn, quaternion * np.concatenate([[1.0], half_turn])
-
-
 def slerp(t: Array, attitude: Stream, longest: float = np.inf) -> Array:
     """Return attitudes (M, 4), scalar first, at times (M,) in s; NaN before the first sample, after
     the last, and within a gap of more than ``longest`` s. Samples at all of the times are returned
@@ -125,26 +114,17 @@ def slerp(t: Array, attitude: Stream, longest: float = np.inf) -> Array:
 
 @dataclass(frozen=True)
 class Recording:
-    """The channels of a log in the kit's units, axes and order of rotors.
+    """The channels of a log in the kit's units, axes and order of rotors."""
 
-    Attributes:
-        path: the file, for errors and the log's name.
-        reader: its reader's name; nothing: the file is a table of the kit's own or of a map.
-        log_map: with the sections that are there.
-        streams: by section: ``position`` (N, 7) m, with its scalar-first quaternion; ``rotors``
-            (N, 4) rad/s, ``commands`` (N, 4) 0 to 1, or ``wrench`` (N, 4) N and Nm, commanded;
-            ``battery`` (N, 1) V; ``accelerometer`` (N, 3) m/s2 and ``gyro`` (N, 3) rad/s;
-            ``force`` and ``torque`` (N, 3), truth.
-        notes: what the reader assumed.
-        extra: what else is kept, by name.
-    """
-
-    path: Path
-    reader: str
-    log_map: LogMap
+    path: Path  # the file, for errors and the log's name
+    reader: str  # its name; nothing: the file is a table of the kit's own or of a map
+    log_map: LogMap  # with the sections that are there
+    # by section: position (N, 7) m, with its scalar-first quaternion; rotors (N, 4) rad/s, commands
+    # (N, 4) 0 to 1, or wrench (N, 4) N and Nm, commanded; battery (N, 1) V; accelerometer (N, 3)
+    # m/s2 and gyro (N, 3) rad/s; force and torque (N, 3), truth
     streams: dict[str, Stream]
-    notes: list[str]
-    extra: dict[str, Stream]
+    notes: list[str]  # what the reader assumed
+    extra: dict[str, Stream]  # what else is kept, by name
 
     def log(self, vehicle: Vehicle | None) -> FlightLog:
         """Return the flight log.

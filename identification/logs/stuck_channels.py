@@ -32,34 +32,16 @@ def stuck_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
     rotors, seen = log.rotor_speeds, np.flatnonzero(log.valid)
     aloft = np.square(rotors) @ vehicle.k > 0.3 * vehicle.weight
     turning = (rotors > 0.0) & (rotors < (_AT_LIMIT * vehicle.omega_max or np.inf))
+    place, turn, flown = log.position[seen], log.quaternion[seen], aloft[seen]
     notes = []
     for i in range(4):
+        others = np.delete(rotors, i, axis=1), "the other rotor speeds"
         rows = aloft & turning[:, i]
-        sisters = np.delete(rotors, i, axis=1)
-        notes += _note(
-            f"omega{i + 1} stands still for {{}} while the other rotor speeds",
-            log.t,
-            rows,
-            rotors[:, [i]],
-            sisters,
-        )
-    t, rows, position = log.t[seen], aloft[seen], log.position[seen]
+        notes += _note(f"omega{i + 1}", log.t, rows, rotors[:, [i]], *others)
     for i, axis in enumerate("xyz"):
-        sisters = np.delete(position, i, axis=1)
-        notes += _note(
-            f"p{axis} stands still for {{}} while the other coordinates",
-            t,
-            rows,
-            position[:, [i]],
-            sisters,
-        )
-    notes += _note(
-        "the attitude stands still for {} while the coordinates",
-        t,
-        rows,
-        log.quaternion[seen],
-        position,
-    )
+        others = np.delete(place, i, axis=1), "the other coordinates"
+        notes += _note(f"p{axis}", log.t[seen], flown, place[:, [i]], *others)
+    notes += _note("the attitude", log.t[seen], flown, turn, place, "the coordinates")
     # in every row; a flight in one plane without noise has two such pairs
     alike = [
         (i + 1, j + 1)
@@ -75,9 +57,9 @@ def stuck_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _note(says: str, t: Array, rows: Mask, channel: Array, sisters: Array) -> list[str]:
+def _note(name: str, t: Array, rows: Mask, channel: Array, sisters: Array, names: str) -> list[str]:
     """Return a note on the stretches of rows (N,) in which a channel (N, k) stands still and its
-    sisters (N, m) do not, if there is one.
+    sisters (N, m), called ``names``, do not, if there is one.
     """
     still = np.append(False, np.all(np.diff(channel, axis=0) == 0.0, axis=1)) & rows
     changes = np.cumsum(np.diff(sisters, axis=0, prepend=sisters[:1]) != 0.0, axis=0)
@@ -85,9 +67,9 @@ def _note(says: str, t: Array, rows: Mask, channel: Array, sisters: Array) -> li
         if np.min(changes[end - 1] - changes[first]) < SISTERS_CHANGE:
             still[first:end] = False
     found = stretches(still, t, LEAST_SECONDS)
-    text = says.format(found)
     wrong = "what depends on it there is wrong if its sensor hung"
-    return [f"warning: {text} change: {wrong}"] if found else []
+    text = f"warning: {name} stands still for {found} while {names} change: {wrong}"
+    return [text] if found else []
 
 
 def stretches(rows: Mask, t: Array, least: float) -> str:

@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 
 from ...dynamics.vehicle import Vehicle
 from ...identification.logs.rotor_orders import ORDERS
-from ...identification.logs.streams import from_ned
 from ..messages import Array, Malformed, Measured, Sample
 from .base import LARGEST_SHARE, command_of, unwrapped
 
@@ -93,7 +92,9 @@ class MessageReader:
         if not abs(length - 1.0) <= _NORM_TOLERANCE:
             raise Malformed("no quaternion")
         position = np.array((m.x, m.y, m.z), dtype=np.float64)
-        sample.position, sample.quaternion = from_ned(position, turn / length)
+        # world and body each turn about their own x axis: a quaternion's vector like a position
+        sample.position = position * HALF_TURN
+        sample.quaternion = turn / length * np.append(1.0, HALF_TURN)
         return True
 
     def _odometry(self, m: Any, sample: Sample) -> bool:

@@ -11,36 +11,22 @@ import yaml
 
 @dataclass(frozen=True)
 class Known:
-    """Something that is known of the flight.
+    """Something that is known of the flight."""
 
-    Attributes:
-        effects: names, any of which says it.
-        why: it is known.
-    """
-
-    effects: tuple[str, ...]
-    why: str
+    effects: tuple[str, ...]  # names, any of which says it
+    why: str  # it is known
 
 
 @dataclass(frozen=True)
 class Example:
-    """The flight.
-
-    Attributes:
-        log: its path.
-        vehicle: a preset's name.
-        what: flew, where and how long.
-        source: and licence.
-        known: of it.
-        unknown: of it.
-    """
+    """The flight."""
 
     log: Path
-    vehicle: str
-    what: str
-    source: str
+    vehicle: str  # that flew
+    what: str  # flew, where and how long
+    source: str  # and licence
     known: tuple[Known, ...]
-    unknown: str
+    unknown: str  # of it
 
 
 @contextmanager

@@ -3,8 +3,9 @@ in the log's notes.
 
 A table needs no code: a file in ``identification/logs/maps/`` that says what its columns mean, and
 its name in ``TABLES``. A reader of another form is a file in this folder with a function
-``read(path, vehicle)`` that returns a FlightLog, and a line in ``READERS``. It decodes the file
-into named columns, each group with its clock; a map in ``maps/recordings/`` says what they mean.
+``read(path, vehicle)`` that returns a FlightLog, and a line in ``READERS``; of a table, it takes
+the open table. It decodes the file into named columns, each group with its clock; a map in
+``maps/recordings/`` says what they mean.
 
 Which reader a log needs is told from what is in it: the first bytes of a file, or the columns of a
 table. A file's name decides nothing but how a table is packed.
@@ -16,14 +17,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError, unknown_name
 from ....runtime.regular_files import open_regular
 from ..flight_log import FlightLog
 from ..log_map import load_map
 from ..mapped_log import map_table
 from ..table import SUFFIXES
-from ..tables import open_table
 from . import ardupilot_bin, betaflight, crazyflie_sd, px4_ulog, rosbag
 
 _HEAD = 4096  # bytes of a file that are looked at
@@ -40,11 +39,11 @@ class Reader:
 
     name: str
     what: str  # a log of its form, in words
-    read: Callable[..., FlightLog]  # of a path and a vehicle, which may be None
+    # of a path, or of a table where there is a signature; and of a vehicle, which may be None
+    read: Callable[..., FlightLog]
     signature: tuple[str, ...] = ()  # columns of a table
     begins: tuple[bytes, ...] = ()  # first bytes of a file
     takes_option: bool = False  # ``read`` takes ``option``: the words behind the name's colon
-    log_map: str = ""  # by which ``read`` reads a table, where a map is enough
 
 
 # maps of tables that are known by their columns
@@ -96,10 +95,6 @@ READERS = {
 }
 
 
-def _read_table(path: Path, vehicle: Vehicle | None, name: str) -> FlightLog:
-    return map_table(open_table(path), load_map(TABLES[name]), vehicle, name)
-
-
 def find_reader(name: str) -> Reader:
     """Return the reader of a name, or of ``name:option`` with that option bound.
 
@@ -109,8 +104,8 @@ def find_reader(name: str) -> Reader:
     name, colon, option = name.partition(":")
     if name in TABLES:
         found = load_map(TABLES[name])
-        read = partial(_read_table, name=name)
-        reader = Reader(name, found.about, read, found.recognise, log_map=TABLES[name])
+        read = partial(map_table, log_map=found, reader=name)
+        reader = Reader(name, found.about, read, found.recognise)
     elif name in READERS:
         reader = READERS[name]
     else:

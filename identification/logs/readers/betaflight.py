@@ -27,7 +27,7 @@ from ..flight_log import FlightLog
 from ..log_map import recording_map
 from ..map_fit import wanted_columns
 from ..mapped_log import recording_of
-from ..tables import open_table
+from ..table import Table
 from .blackbox import BEGINS as BEGINS
 from .blackbox import read_blackbox
 
@@ -54,14 +54,14 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
     return _log(path, "betaflight", fields, set(), headers, poles, vehicle, notes)
 
 
-def read_table(path: Path, vehicle: Vehicle | None = None, option: str = "") -> FlightLog:
+def read_table(table: Table, vehicle: Vehicle | None = None, option: str = "") -> FlightLog:
     """Read a table of blackbox_decode; ``option``: number of the motors' magnet poles, for eRPM.
 
     Raises:
-        InputError: the file cannot be read, or lacks a column.
+        InputError: the table lacks a column.
     """
+    path = table.path
     poles = _magnet_poles(option, path)
-    table = open_table(path)
     missing = [name for name in SIGNATURE if name not in table.header]
     if missing:
         raise InputError(
