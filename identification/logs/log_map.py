@@ -399,19 +399,19 @@ def parse_map(value: object, where: str, name: str = "") -> LogMap:
         key: tuple(getattr(checked(LogMap, first | {key: way}, where), key) for way in listed[1:])
         for key, listed in ways.items()
     }
-    _check_whole(found, where)
+    check_whole(found, where)
     return replace(found, name=name or where, alternatives=others)
 
 
-def _check_whole(found: LogMap, where: str) -> None:
+def check_whole(found: LogMap, where: str) -> None:
     """Raise InputError where a map's sections are not enough for a flight log."""
-    if (found.position is None) != (found.attitude is None):
+    has_imu = found.accelerometer is not None and found.gyro is not None
+    if (found.position is None) != (found.attitude is None) and not (found.is_own and has_imu):
         missing = "attitude" if found.attitude is None else "position"
         raise InputError(
             f"{where}: no section {missing}; expected position and attitude, or neither where "
             "accelerometer and gyro are there"
         )
-    has_imu = found.accelerometer is not None and found.gyro is not None
     if found.position is None and not has_imu and not found.extra:
         raise InputError(
             f"{where}: no pose and no IMU; expected the sections position and attitude, or "

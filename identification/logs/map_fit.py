@@ -12,7 +12,7 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from .channels import Samples
-from .log_map import Attitude, Columns, LogMap, TimeColumn
+from .log_map import Attitude, Columns, LogMap, TimeColumn, check_whole
 from .table import Table
 
 _SHOWN = 30  # columns that an error lists
@@ -28,27 +28,17 @@ def fitted(table: Table, log_map: LogMap, vehicle: Vehicle | None, reader: str) 
     """
     header = set(table.header)
     where = f"{table.path}: map {log_map.name}"
-    moves = log_map.position is not None or log_map.gyro is not None
     clocks: list[TimeColumn] = [c for c in ways(log_map, "time") if c.column in {*header, ""}]
     missing = [] if clocks else [(log_map.time.column, "time")]
     kept: dict[str, Any] = {"time": clocks[0] if clocks else log_map.time}
     others: dict[str, tuple[Columns, ...]] = {}
     for section, part in log_map.sections.items():
         fitting = [way for way in ways(log_map, section) if set(way.named) <= header]
-        wanted = part.named
-        if log_map.is_own and log_map.force and log_map.torque and section in ("force", "torque"):
-            wanted = [*log_map.force.named, *log_map.torque.named]
-        absent = [name for name in wanted if name not in header]
-        none_there = len(absent) == len(wanted)
-        if fitting and not (log_map.is_own and absent):
+        absent = [name for name in part.named if name not in header]
+        if fitting:
             kept[section], others[section] = fitting[0], tuple(fitting[1:])
-        elif part.optional and (none_there or reader):
+        elif part.optional and (len(absent) == len(part.named) or reader):
             kept[section] = None
-        elif part.optional and log_map.is_own:
-            raise InputError(
-                f"{table.path}: missing column(s) {', '.join(absent)}; expected all of "
-                f"{', '.join(wanted)} or none"
-            )
         else:
             missing += [(name, section) for name in absent]
     if missing and reader:
@@ -60,11 +50,7 @@ def fitted(table: Table, log_map: LogMap, vehicle: Vehicle | None, reader: str) 
         raise InputError(f"{where} does not fit: {_missing_words(missing, table.header)}")
     extra = {name: part for name, part in log_map.extra.items() if set(part.named) <= header}
     log_map = replace(log_map, **kept, alternatives=others, extra=extra)
-    if not (log_map.rotors or log_map.commands or log_map.wrench):
-        raise InputError(f"{where} does not fit: no columns of rotors or of commands")
-    has_imu = log_map.accelerometer is not None and log_map.gyro is not None
-    if moves and not (log_map.position and log_map.attitude) and not has_imu:
-        raise InputError(f"{where} does not fit: no columns of a pose or of an IMU")
+    check_whole(log_map, f"{where} does not fit")
     return with_range(log_map, vehicle, where)
 
 

@@ -219,13 +219,18 @@ class _Guessing:
         """Keep why a field is what it is."""
         self.reasons.append(Reason(section, name, certain, why))
 
+    def take(self, section: str, name: str, choice: _Choice) -> str:
+        """Return what is taken for a field, and keep why."""
+        value, sure, why = choice
+        self.say(section, name, sure, f"{value}: {why}")
+        return value
+
     def unit(
         self, section: str, named: str, known: Container[str], guess: Callable[[], _Choice]
     ) -> str:
         """Return a section's unit: as its columns' names say, or as guessed."""
-        unit, sure, why = (named, True, "by the columns' names") if named in known else guess()
-        self.say(section, "unit", sure, f"{unit}: {why}")
-        return unit
+        choice = (named, True, "by the columns' names") if named in known else guess()
+        return self.take(section, "unit", choice)
 
     def time(self) -> None:
         """Find the unit of the time, and the middle of a long flight."""
@@ -238,12 +243,9 @@ class _Guessing:
                 f"{self.table.path}: column {column}: no increasing times; expected a time"
             )
         step = float(np.median(steps))
-
-        def guess() -> _Choice:
-            unit, sure = time_unit(step)
-            return unit, sure, f"{1.0 / max(step * TIME_UNITS[unit], 1e-300):.4g} rows a second"
-
-        unit = self.unit("time", self.clock.unit, TIME_UNITS, guess)
+        guessed, sure = time_unit(step)
+        rate = f"{1.0 / max(step * TIME_UNITS[guessed], 1e-300):.4g} rows a second"
+        unit = self.unit("time", self.clock.unit, TIME_UNITS, lambda: (guessed, sure, rate))
         self.t = (raw - raw[np.isfinite(raw)][0]) * TIME_UNITS[unit]
         middle = 0.5 * (np.nanmin(self.t) + np.nanmax(self.t))
         self.t[~(np.abs(self.t - middle) <= 0.5 * LONGEST)] = np.nan
@@ -261,12 +263,8 @@ class _Guessing:
 
     def pose(self) -> None:
         """Find frames, units, order and sense of the pose."""
-        place, group, attitude = (
-            self.parts["position"],
-            self.parts["attitude"],
-            self.values["attitude"],
-        )
-        is_quaternion = len(group.columns) == 4
+        place, group = self.parts["position"], self.parts["attitude"]
+        attitude, is_quaternion = self.values["attitude"], len(group.columns) == 4
         units: tuple[str, ...] = ("deg", "rad")
         if group.unit in units:
             units = (group.unit,)
@@ -290,20 +288,15 @@ class _Guessing:
             signs = (1, best.pitch_sign, 1) if best.pitch_sign < 0 else ()
             made = replace(made, unit=best.unit, euler=best.euler, signs=signs)
             beyond = best.unit, True, "angles beyond pi"
-            self.unit(
-                "attitude",
-                group.unit,
-                ANGLE_UNITS,
-                lambda: self.by_motion("unit") if len(units) > 1 else beyond,
-            )
+            guessed = self.by_motion("unit") if len(units) > 1 else beyond
+            self.unit("attitude", group.unit, ANGLE_UNITS, lambda: guessed)
             told += [("attitude", "euler", "euler"), ("attitude", "signs", "pitch_sign")]
         elif group.numbered:
             told.append(("attitude", "order", "order"))
         else:
             self.say("attitude", "order", True, "by the columns' names")
         for section, name, prop in told:
-            value, sure, why = self.by_motion(prop)
-            self.say(section, name, sure, f"{value}: {why}")
+            self.take(section, name, self.by_motion(prop))
         position = Columns(place.columns, best.length)
         self.sections |= {"world": best.world, "body": best.body}
         self.sections |= {"position": position, "attitude": made}
@@ -321,20 +314,19 @@ class _Guessing:
         group, values = self.parts["accelerometer"], self.values["accelerometer"]
         size = float(np.nanmedian(np.linalg.norm(values, axis=1)))
         z = float(np.nanmean(values[:, 2])) / max(size, 1e-12)
-        axes = "flu" if z > 0.0 else "frd"
         # without a pose, turned over may also be gravity in place of the specific force
         sure = abs(z) > 0.8 and (z > 0.0 or self.ranking is not None)
-        why = f"{axes}: along z it reads {'+' if z > 0 else '-'}{abs(z):.2f} of its size"
-        self.say("accelerometer", "body", sure, why)
+        why = f"along z it reads {'+' if z > 0 else '-'}{abs(z):.2f} of its size"
+        axes = self.take("accelerometer", "body", ("flu" if z > 0.0 else "frd", sure, why))
         units = {"m/s2": 1.0, "g": _G}
         likely = [u for u, one in units.items() if within(size * one / _G, MAGNITUDES.gravity)]
-        why, unit, scale = f"its median size is {size:.4g}", "raw", 1.0
+        why, scale = f"its median size is {size:.4g}", 1.0
         if group.unit in units or likely:
             unit = self.unit("accelerometer", group.unit, units, lambda: (likely[0], True, why))
         else:
             scale = float(f"{_G / max(size, 1e-12):.6g}")
-            why = f"raw: {why}, which is taken for the 9.81 m/s2 of a hover"
-            self.say("accelerometer", "scale", False, why)
+            why += ", which is taken for the 9.81 m/s2 of a hover"
+            unit = self.take("accelerometer", "scale", ("raw", False, why))
         self.sections["accelerometer"] = Sensor(group.columns, unit, scale=scale, body=axes)
         if self.ranking is None:
             self.sections["body"] = axes
@@ -357,7 +349,7 @@ class _Guessing:
         else:
             units = (group.unit,) if group.unit in ("rad/s", "deg/s") else ("rad/s", "deg/s")
             axes, guessed = self.gyro_by_pose(values, units)
-            self.say("gyro", "body", guessed[1], f"{axes}: {guessed[2]}")
+            self.take("gyro", "body", (axes, *guessed[1:]))
         unit = self.unit("gyro", group.unit, RATE_UNITS, lambda: guessed)
         self.sections["gyro"] = Sensor(group.columns, unit, body=axes)
 
@@ -383,10 +375,10 @@ class _Guessing:
         if part not in self.parts:
             return
         group, values = self.parts[part], self.values[part]
-        kind, unit, sure, why = motor_unit(group, values, self.vehicle)
+        kind, *choice = motor_unit(group, values, self.vehicle)
         if kind in self.sections:
             return
-        self.say(kind, "unit", sure, f"{unit}: {why}")
+        unit = self.take(kind, "unit", (choice[0], choice[1], choice[2]))
         order, sure, why = self.order(group, values)
         self.say(kind, "order", sure, why)
         if kind == "rotors":

@@ -12,6 +12,7 @@ that can be stated, so there they are notes; a diagnosis fits the whole log at o
 them. Length, rate and even steps are what a diagnosis needs to have evidence; an estimate does not.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -56,6 +57,25 @@ _ABOVE_MOST = 1.5  # of the vehicle's fastest rotor speed: no rotor turns that f
 _BEYOND = 20.0  # of the median rotor speed: the same where the vehicle states no fastest
 
 
+class Refused(str):
+    """What refuses the log."""
+
+
+class Needed(str):
+    """What refuses the log for a diagnosis, and is nothing to an estimate."""
+
+
+class Fault(str):
+    """What refuses the log for a diagnosis, and is a warning for an estimate."""
+
+
+class Note(str):
+    """What is said."""
+
+
+Findings = Iterable[str]
+
+
 def screen_log(
     log: FlightLog, vehicle: Vehicle, least_seconds: float = LEAST_SECONDS
 ) -> tuple[str, ...]:
@@ -75,7 +95,7 @@ def screen_log(
             jumps, its pose leaps, nothing flew, or it follows another convention than it declares;
             the message names the file, what was found and what to do.
     """
-    return _Screening(log, vehicle, least_seconds).run()[1]
+    return _screened(log, vehicle, least_seconds)[1]
 
 
 def screen_for_estimate(log: FlightLog, vehicle: Vehicle) -> tuple[FlightLog, tuple[str, ...]]:
@@ -97,277 +117,275 @@ def screen_for_estimate(log: FlightLog, vehicle: Vehicle) -> tuple[FlightLog, tu
         InputError: every number of an estimate would be wrong: other units or conventions than the
             log declares, nothing flew, or no pose is another one.
     """
-    return _Screening(log, vehicle, None).run()
+    return _screened(log, vehicle, None)
 
 
-class _Screening:
-    """The checks in their order.
-
-    Args:
-        log: the flight.
-        vehicle: as declared.
-        least: s of unbroken flight that a diagnosis needs; None: for an estimate.
+def _screened(
+    log: FlightLog, vehicle: Vehicle, least: float | None
+) -> tuple[FlightLog, tuple[str, ...]]:
+    """Return a log without held poses, and notes, after all checks in their order; ``least`` is the
+    unbroken flight in s that a diagnosis needs, None for an estimate.
     """
+    source, by_imu = log.source or log.name or "log", reads_imu(log)
+    notes: list[str] = []
 
-    def __init__(self, log: FlightLog, vehicle: Vehicle, least: float | None) -> None:
-        self.log, self.vehicle = log, vehicle
-        self.diagnosed, self.least = least is not None, least or 0.0
-        self.by_imu = reads_imu(log)
-        self.notes: list[str] = []
+    def hear(findings: Findings) -> None:
+        for text in findings:
+            kind = type(text)
+            if kind is Refused or (kind is not Note and least is not None):
+                raise InputError(f"{source}: {text}")
+            if kind is not Needed:
+                notes.append(str(text) if kind is Note else f"warning: {text}")
 
-    def refuse(self, text: str) -> None:
-        """Refuse the log for what a text says, where it says anything."""
-        if text:
-            raise InputError(f"{self.log.source or self.log.name or 'log'}: {text}")
-
-    def need(self, text: str) -> None:
-        """Refuse the log for what a diagnosis needs and an estimate does not."""
-        self.refuse(text if self.diagnosed else "")
-
-    def fault(self, text: str) -> None:
-        """Refuse or note what spoils a part of the log alone."""
-        self.need(text)
-        self.notes += [f"warning: {text}"] if text else []
-
-    def run(self) -> tuple[FlightLog, tuple[str, ...]]:
-        """Return the log without held poses, and the notes."""
-        self.channels()
-        self.rotors()
-        pieces = self.imu() if self.by_imu else self.pose()
-        self.notes += stuck_notes(self.log, self.vehicle)
-        others: list[Reading] = []
-        if pieces or self.by_imu:
-            evidence = Evidence.of_log(excerpt([self.log])[0], self.vehicle, self.by_imu)
-            others = departures(evidence)[:3]
+    hear(_channels(log, vehicle, by_imu))
+    hear(_rotors(log, vehicle, by_imu))
+    log = _without_racing(log, vehicle)
+    if by_imu:
+        hear(_imu(log, vehicle, least or 0.0))
+    else:
+        if least is not None:  # a filter predicts over steps of any length
+            hear(_uneven_steps(log))
+        same = _repeated(log)
+        hear(_held_pose(log, same))
+        log = replace(log, valid=log.valid & ~same)
+        hear(_pose(log, least or 0.0))
+    notes += stuck_notes(log, vehicle)
+    others: list[Reading] = []
+    if by_imu or _pieces(log):
+        evidence = Evidence.of_log(excerpt([log])[0], vehicle, by_imu)
+        others = departures(evidence)[:3]
+    if others and not others[0].late:
         says = "; or ".join(dict.fromkeys(reading.says for reading in others))
-        if others and not others[0].late:
-            contradicted = "the motion contradicts the rotor speeds and gravity"
-            if self.by_imu:
-                contradicted = "the gyro contradicts the rotors' torques"
-            self.refuse(f"{says}. As logged, {contradicted}")
-        if not self.by_imu:
-            self.steps()
-            if self.diagnosed:
-                self.length(pieces)
-        self.fault(others[0].says if others else "")
-        return self.log, tuple(self.notes)
+        whose = "gyro contradicts the rotors' torques"
+        whose = whose if by_imu else "motion contradicts the rotor speeds and gravity"
+        hear([Refused(f"{says}. As logged, the {whose}")])
+    if not by_imu:
+        hear(_steps(log))
+        hear([] if least is None else _length(log, vehicle, least))
+    hear(Fault(reading.says) for reading in others[:1])
+    return log, tuple(notes)
 
-    def channels(self) -> None:
-        """Check that there are a motion, rotor speeds and the declared vehicle."""
-        if not self.by_imu and not self.log.valid.any():
-            self.refuse(
-                "no row has a pose; expected at least one to start from, or gyro and accelerometer "
-                "(gx, gy, gz and ax, ay, az)"
-            )
-        if not self.log.has_rotor_speeds:
-            self.refuse(
-                f"has motor commands and no rotor speeds, and the vehicle {self.vehicle.name} "
-                "states no motor_curve; expected one, to turn commands into thrust"
-            )
-        if self.log.vehicle and self.log.vehicle != self.vehicle.name:
-            self.notes.append(
-                f"warning: the log names the vehicle {self.log.vehicle}; it is read as "
-                f"{self.vehicle.name}"
-            )
 
-    def rotors(self) -> None:
-        """Check that all four rotors turned, at speeds (rad/s) that carry the vehicle."""
-        speeds, vehicle = self.log.rotor_speeds, self.vehicle
-        with np.errstate(over="ignore"):
-            thrust = np.square(speeds) @ vehicle.k / vehicle.weight
-        most = float(np.quantile(thrust, 0.95))
-        hover = f"(about {vehicle.hover_rate:.3g} when {vehicle.name} hovers)"
-        zero, all_four = "is 0 while the other rotors turn", "expected the rotor speeds of all four"
-        if most < _AT_REST:
-            self.refuse(
-                "omega1..omega4 are at rest all the time, so nothing flew; expected rotor speeds "
-                f"in rad/s {hover}"
-            )
-        if not np.isfinite(most):
-            self.refuse(
-                f"omega1..omega4 are beyond all rotors; expected rotor speeds in rad/s {hover}"
-            )
-        for i, column in enumerate(speeds[thrust > 0.3 * most].T):
-            if float(np.max(column)) <= 0.0:
-                self.refuse(f"omega{i + 1} {zero}; {all_four}")
-        ratio = thrust_by_weight(speeds, vehicle)
-        self.refuse(rotor_doubt(ratio, vehicle))
-        if not within(ratio, MAGNITUDES.doubtful):
-            self.notes.append(
-                f"the rotor speeds make a median thrust of {ratio:.2g} times the weight of "
-                f"{vehicle.name}: is it this vehicle, and did it fly?"
-            )
-        times = self.log.t
-        if not self.by_imu and self.log.valid.sum() > 1:
-            times = times[self.log.valid]
-        self.refuse(time_doubt(float(np.median(np.diff(times)))))
-        for i, column in enumerate(speeds.T):
-            stopped = stretches((column == 0.0) & _carrying(self.log), self.log.t, _STOPPED)
-            self.fault(f"omega{i + 1} {zero}, for {stopped}; {all_four}" if stopped else "")
-        self.interpolate_racing()
-
-    def interpolate_racing(self) -> None:
-        """Interpolate rotor speeds that no rotor reaches, where they are no more than a note."""
-        log, vehicle = self.log, self.vehicle
-        middle = float(np.median(log.rotor_speeds[log.rotor_speeds.max(axis=1) > 0.0]))
-        most = min(_ABOVE_MOST * vehicle.omega_max, _BEYOND * max(middle, vehicle.hover_rate))
-        above = log.rotor_speeds > most
-        if not above.any():
-            return
-        row, rotor = np.argwhere(above)[0]
-        found = (
-            f"omega{rotor + 1} reads {log.rotor_speeds[row, rotor]:.4g} rad/s at t = "
-            f"{log.t[row]:.6g} s ({int(above.sum())} such value(s)), faster than {vehicle.name} "
-            f"turns its rotors; expected at most {most:.4g} rad/s"
+def _channels(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
+    """Check that there are a motion, rotor speeds and the declared vehicle."""
+    if not by_imu and not log.valid.any():
+        yield Refused(
+            "no row has a pose; expected at least one to start from, or gyro and accelerometer "
+            "(gx, gy, gz and ax, ay, az)"
         )
-        self.need(found)
-        self.fault(f"{found}. They were interpolated")
-        speeds = log.rotor_speeds.copy()
-        for column, bad in zip(speeds.T, above.T, strict=True):
-            column[bad] = np.interp(log.t[bad], log.t[~bad], column[~bad])
-        self.log = replace(log, rotor_speeds=speeds)
+    if not log.has_rotor_speeds:
+        yield Refused(
+            f"has motor commands and no rotor speeds, and the vehicle {vehicle.name} states no "
+            "motor_curve; expected one, to turn commands into thrust"
+        )
+    if log.vehicle and log.vehicle != vehicle.name:
+        yield Note(
+            f"warning: the log names the vehicle {log.vehicle}; it is read as {vehicle.name}"
+        )
 
-    def imu(self) -> list[Rows]:
-        """Check rate, length, unit and axes of an IMU, and return the rows of each unbroken run.
 
-        Gravity shows the accelerometer's unit and axes, and the rotors the gyro's. What neither
-        shows (an accelerometer turned about z) stays the log's word.
-        """
-        log = self.log
-        assert log.gyro is not None
-        assert log.accelerometer is not None
-        rows = np.flatnonzero(np.isfinite(log.gyro[:, 0]) & np.isfinite(log.accelerometer[:, 0]))
-        if len(rows) < INERTIAL.samples:
-            self.refuse(
-                f"ax, ay, az and gx, gy, gz are read together in {len(rows)} row(s); expected them "
-                "in the same rows, and a whole flight"
-            )
-        for names, x in (("ax, ay, az", log.accelerometer), ("gx, gy, gz", log.gyro)):
-            if is_stuck(x[rows]):
-                self.refuse(f"{names} never change: the sensor was not read")
-        rate = 1.0 / float(np.median(np.diff(log.t[rows])))
-        if rate < _LEAST_IMU_HZ:
-            self.refuse(
-                f"{rate:.3g} IMU readings a second and no pose as fast; expected at least "
-                f"{_LEAST_IMU_HZ:g}: a quadrotor turns within a tenth of a second"
-            )
-        pieces = inertial_pieces(log)
-        there = sum(float(log.t[piece[-1]] - log.t[piece[0]]) for piece in pieces)
-        if there < self.least - 1e-9:
-            self.need(
-                f"{there:.3g} s of unbroken gyro and accelerometer; expected at least "
-                f"{self.least:g} s of flight, in runs of more than 3 s"
-            )
-        thrust = np.square(log.rotor_speeds[rows]) @ self.vehicle.k
-        doubt = gravity_doubt(log.accelerometer[rows[flying(thrust)]], self.vehicle.gravity)
-        self.refuse(f"ax, ay, az {doubt}" if doubt else "")
-        return pieces
+def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
+    """Check that all four rotors turned, at speeds (rad/s) that carry the vehicle."""
+    speeds = log.rotor_speeds
+    with np.errstate(over="ignore"):
+        thrust = np.square(speeds) @ vehicle.k / vehicle.weight
+    most = float(np.quantile(thrust, 0.95))
+    hover = f"rotor speeds in rad/s (about {vehicle.hover_rate:.3g} when {vehicle.name} hovers)"
+    zero, all_four = "is 0 while the other rotors turn", "expected the rotor speeds of all four"
+    if most < _AT_REST:
+        still = "omega1..omega4 are at rest all the time, so nothing flew"
+        yield Refused(f"{still}; expected {hover}")
+    if not np.isfinite(most):
+        yield Refused(f"omega1..omega4 are beyond all rotors; expected {hover}")
+    for i, column in enumerate(speeds[thrust > 0.3 * most].T):
+        if float(np.max(column)) <= 0.0:
+            yield Refused(f"omega{i + 1} {zero}; {all_four}")
+    ratio = thrust_by_weight(speeds, vehicle)
+    if doubt := rotor_doubt(ratio, vehicle):
+        yield Refused(doubt)
+    if not within(ratio, MAGNITUDES.doubtful):
+        yield Note(
+            f"the rotor speeds make a median thrust of {ratio:.2g} times the weight of "
+            f"{vehicle.name}: is it this vehicle, and did it fly?"
+        )
+    times = log.t if by_imu or log.valid.sum() < 2 else log.t[log.valid]
+    if doubt := time_doubt(float(np.median(np.diff(times)))):
+        yield Refused(doubt)
+    for i, column in enumerate(speeds.T):
+        if stopped := stretches((column == 0.0) & _carrying(log), log.t, _STOPPED):
+            yield Fault(f"omega{i + 1} {zero}, for {stopped}; {all_four}")
+    most = _most_rad_s(log, vehicle)
+    if (above := np.argwhere(speeds > most)).size:
+        row, rotor = above[0]
+        found = (
+            f"omega{rotor + 1} reads {speeds[row, rotor]:.4g} rad/s at t = {log.t[row]:.6g} s "
+            f"({len(above)} such value(s)), faster than {vehicle.name} turns its rotors; expected "
+            f"at most {most:.4g} rad/s"
+        )
+        yield Needed(found)
+        yield Fault(f"{found}. They were interpolated")
 
-    def pose(self) -> list[Rows]:
-        """Check the clock of a pose, leave held poses out, and return the rows of each unbroken run
-        that is long enough to say something.
-        """
-        log = self.log
-        if self.diagnosed:  # a filter predicts over steps of any length
-            self.uneven_steps()
-        seen = np.flatnonzero(log.valid)
-        pose = np.column_stack([log.position, log.quaternion])[seen]
-        same = np.append(False, np.all(pose[1:] == pose[:-1], axis=1))  # it was held
-        if log.t[seen[-1]] - log.t[seen[0]] > _NEVER and np.all(pose == pose[0]):
-            self.refuse("the pose never changes, to the last digit; expected the poses of a flight")
-        held = stretches(same & _carrying(log)[seen], log.t[seen], _HELD)
-        if held:
-            self.notes.append(
-                f"warning: the pose is frozen for {held}: it repeats to the last digit while the "
-                "rotors turn. These rows count as without a pose"
-            )
-        valid = log.valid.copy()
-        valid[seen[same]] = False
-        self.log = log = replace(log, valid=valid)
-        seen = np.flatnonzero(valid)
-        period = float(np.median(np.diff(log.t[seen]))) if len(seen) > 1 else np.inf
-        if period * _LEAST_RATE_HZ > _SLACK:
-            self.need(
-                f"{1 / period:.3g} new poses a second; expected at least {_LEAST_RATE_HZ:g}: "
-                "accelerations come from differences of poses that are low-passed at 15 Hz, and a "
-                "quadrotor turns within a tenth of a second"
-            )
-        runs = unbroken(log.t, seen, max(0.1, 3.5 * log.period))
-        lengths = [float(log.t[run[-1]] - log.t[run[0]]) for run in runs]
-        pieces = [
-            run
-            for run, length in zip(runs, lengths, strict=True)
-            if len(run) > 8 and length > _LEAST_PIECE
-        ]
-        if not pieces:
-            self.need(
-                f"{_lost_words(log)}the longest unbroken run of poses is {max(lengths):.3g} s; "
-                f"expected at least {self.least:g} s in flight, in runs of more than "
-                f"{_LEAST_PIECE:g} s"
-            )
-        return pieces
 
-    def uneven_steps(self) -> None:
-        """Check that the steps of the clock are even."""
-        step = np.diff(self.log.t)
-        median = float(np.median(step))
-        uneven = float(np.mean((step < _UNEVEN[0] * median) | (step > _UNEVEN[1] * median)))
-        words = f"{100 * uneven:.0f} % of them far from the median of {median:.3g} s"
-        if uneven > _UNEVEN_SHARE:
-            self.refuse(
-                f"column t: time steps vary wildly, from {step.min():.3g} to {step.max():.3g} s, "
-                f"{words}; expected the times at which the poses were taken, not those at which "
-                "they arrived"
-            )
-        if uneven > _UNEVEN_NOTE:
-            self.notes.append(f"time steps are uneven: {words}")
+def _most_rad_s(log: FlightLog, vehicle: Vehicle) -> float:
+    """Return a rotor speed in rad/s that no rotor reaches."""
+    middle = float(np.median(log.rotor_speeds[log.rotor_speeds.max(axis=1) > 0.0]))
+    return min(_ABOVE_MOST * vehicle.omega_max, _BEYOND * max(middle, vehicle.hover_rate))
 
-    def steps(self) -> None:
-        """Check that no pose is farther from the one before than a quadrotor gets, and that the
-        clock does not jump.
-        """
-        log = self.log
-        seen = np.flatnonzero(log.valid)
-        step = np.diff(log.t[seen])
-        way = np.linalg.norm(np.diff(log.position[seen], axis=0), axis=1)
-        q = log.quaternion[seen]
-        angle = 2.0 * np.arccos(np.clip(np.abs(np.sum(q[1:] * q[:-1], axis=1)), 0.0, 1.0))
-        far, turned = way > _LEAP[0] + _LEAP[1] * step, angle > _TURN[0] + _TURN[1] * step
-        leaps = far | turned
-        if leaps.any():
-            i = int(np.argmax(leaps))
-            what = f"{way[i]:.3g} m" if far[i] else f"{np.degrees(angle[i]):.0f} degrees"
-            units = ": are px, py, pz in metres?" if far.mean() > 0.05 else ""
-            says = (
-                f"the pose leaps by {what} within {step[i]:.3g} s at t = {log.t[seen[i + 1]]:.6g} "
-                f"s, which no quadrotor flies ({int(leaps.sum())} such step(s)){units}; expected "
-                "poses of one vehicle on one clock: leave the bad rows' pose empty, or cut the log "
-                "there"
-            )
-            self.refuse(says if leaps.mean() > _MOST_LEAPS else "")
-            self.fault(says)
-        self.fault(_jump(log.t[seen], log.position[seen], way, angle))
 
-    def length(self, pieces: list[Rows]) -> None:
-        """Check that enough is left in unbroken runs in flight, and note where much is not."""
-        log = self.log
-        thrust = np.square(log.rotor_speeds) @ self.vehicle.k
-        thrust = low_pass(thrust, CUTOFFS.flying_hz, log.period)
-        aloft = thrust > 0.5 * usual_thrust(thrust)
-        step = np.minimum(np.diff(log.t, append=log.t[-1] + log.period), max(0.1, 3.5 * log.period))
-        step = np.where(aloft, step, 0.0)
-        left = sum(float(step[piece[0] : piece[-1] + 1].sum()) for piece in pieces)
-        whole = float(step.sum())
-        if left < self.least - 1e-9:
-            self.refuse(
-                f"{_lost_words(log)}{left:.3g} s of flight in unbroken runs of poses; expected at "
-                f"least {self.least:g} s, in runs of more than {_LEAST_PIECE:g} s"
-            )
-        if left < (1.0 - _LOST_SHARE) * whole:
-            self.notes.append(
-                f"{_lost_words(log)}{left:.3g} of {whole:.3g} s of flight lie in runs of poses "
-                "long enough to use"
-            )
+def _without_racing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
+    """Return a log whose rotor speeds are interpolated where no rotor reaches them."""
+    above = log.rotor_speeds > _most_rad_s(log, vehicle)
+    if not above.any():
+        return log
+    speeds = log.rotor_speeds.copy()
+    for column, bad in zip(speeds.T, above.T, strict=True):
+        column[bad] = np.interp(log.t[bad], log.t[~bad], column[~bad])
+    return replace(log, rotor_speeds=speeds)
+
+
+def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
+    """Check rate, length, unit and axes of an IMU.
+
+    Gravity shows the accelerometer's unit and axes, and the rotors the gyro's. What neither shows
+    (an accelerometer turned about z) stays the log's word.
+    """
+    assert log.gyro is not None
+    assert log.accelerometer is not None
+    rows = np.flatnonzero(np.isfinite(log.gyro[:, 0]) & np.isfinite(log.accelerometer[:, 0]))
+    if len(rows) < INERTIAL.samples:
+        yield Refused(
+            f"ax, ay, az and gx, gy, gz are read together in {len(rows)} row(s); expected them in "
+            "the same rows, and a whole flight"
+        )
+    for names, x in (("ax, ay, az", log.accelerometer), ("gx, gy, gz", log.gyro)):
+        if is_stuck(x[rows]):
+            yield Refused(f"{names} never change: the sensor was not read")
+    rate = 1.0 / float(np.median(np.diff(log.t[rows])))
+    if rate < _LEAST_IMU_HZ:
+        yield Refused(
+            f"{rate:.3g} IMU readings a second and no pose as fast; expected at least "
+            f"{_LEAST_IMU_HZ:g}: a quadrotor turns within a tenth of a second"
+        )
+    there = sum(float(log.t[piece[-1]] - log.t[piece[0]]) for piece in inertial_pieces(log))
+    if there < least - 1e-9:
+        yield Needed(
+            f"{there:.3g} s of unbroken gyro and accelerometer; expected at least {least:g} s of "
+            "flight, in runs of more than 3 s"
+        )
+    thrust = np.square(log.rotor_speeds[rows]) @ vehicle.k
+    if doubt := gravity_doubt(log.accelerometer[rows[flying(thrust)]], vehicle.gravity):
+        yield Refused(f"ax, ay, az {doubt}")
+
+
+def _repeated(log: FlightLog) -> Mask:
+    """Return in which rows (N,) a pose is the one before, to the last digit."""
+    seen = np.flatnonzero(log.valid)
+    pose = np.column_stack([log.position, log.quaternion])[seen]
+    same: Mask = np.zeros(len(log.t), np.bool_)
+    same[seen[1:]] = np.all(pose[1:] == pose[:-1], axis=1)
+    return same
+
+
+def _held_pose(log: FlightLog, same: Mask) -> Findings:
+    """Check that the pose changes; ``same`` (N,) as of ``_repeated``."""
+    seen = np.flatnonzero(log.valid)
+    if log.t[seen[-1]] - log.t[seen[0]] > _NEVER and np.all(same[seen[1:]]):
+        yield Refused("the pose never changes, to the last digit; expected the poses of a flight")
+    if held := stretches((same & _carrying(log))[seen], log.t[seen], _HELD):
+        yield Note(
+            f"warning: the pose is frozen for {held}: it repeats to the last digit while the "
+            "rotors turn. These rows count as without a pose"
+        )
+
+
+def _runs(log: FlightLog) -> list[tuple[float, Rows]]:
+    """Return the length in s and the rows of each unbroken run of poses."""
+    runs = unbroken(log.t, np.flatnonzero(log.valid), max(0.1, 3.5 * log.period))
+    return [(float(log.t[run[-1]] - log.t[run[0]]), run) for run in runs]
+
+
+def _pose(log: FlightLog, least: float) -> Findings:
+    """Check the rate of the poses, and that a run of them is long enough to say something."""
+    times = log.t[log.valid]
+    period = float(np.median(np.diff(times))) if len(times) > 1 else np.inf
+    if period * _LEAST_RATE_HZ > _SLACK:
+        yield Needed(
+            f"{1 / period:.3g} new poses a second; expected at least {_LEAST_RATE_HZ:g}: "
+            "accelerations come from differences of poses that are low-passed at 15 Hz, and a "
+            "quadrotor turns within a tenth of a second"
+        )
+    if not _pieces(log):
+        longest = max(length for length, _ in _runs(log))
+        yield Needed(
+            f"{_lost_words(log)}the longest unbroken run of poses is {longest:.3g} s; expected at "
+            f"least {least:g} s in flight, in runs of more than {_LEAST_PIECE:g} s"
+        )
+
+
+def _pieces(log: FlightLog) -> list[Rows]:
+    """Return the rows of each unbroken run of poses that is long enough to say something."""
+    return [run for length, run in _runs(log) if len(run) > 8 and length > _LEAST_PIECE]
+
+
+def _uneven_steps(log: FlightLog) -> Findings:
+    """Check that the steps of the clock are even."""
+    step = np.diff(log.t)
+    median = float(np.median(step))
+    uneven = float(np.mean((step < _UNEVEN[0] * median) | (step > _UNEVEN[1] * median)))
+    words = f"{100 * uneven:.0f} % of them far from the median of {median:.3g} s"
+    if uneven > _UNEVEN_SHARE:
+        yield Refused(
+            f"column t: time steps vary wildly, from {step.min():.3g} to {step.max():.3g} s, "
+            f"{words}; expected the times at which the poses were taken, not those at which they "
+            "arrived"
+        )
+    if uneven > _UNEVEN_NOTE:
+        yield Note(f"time steps are uneven: {words}")
+
+
+def _steps(log: FlightLog) -> Findings:
+    """Check that no pose is farther from the one before than a quadrotor gets, and that the clock
+    does not jump.
+    """
+    seen = np.flatnonzero(log.valid)
+    step = np.diff(log.t[seen])
+    way = np.linalg.norm(np.diff(log.position[seen], axis=0), axis=1)
+    q = log.quaternion[seen]
+    angle = 2.0 * np.arccos(np.clip(np.abs(np.sum(q[1:] * q[:-1], axis=1)), 0.0, 1.0))
+    far, turned = way > _LEAP[0] + _LEAP[1] * step, angle > _TURN[0] + _TURN[1] * step
+    leaps = far | turned
+    if leaps.any():
+        i = int(np.argmax(leaps))
+        what = f"{way[i]:.3g} m" if far[i] else f"{np.degrees(angle[i]):.0f} degrees"
+        units = ": are px, py, pz in metres?" if far.mean() > 0.05 else ""
+        kind = Refused if leaps.mean() > _MOST_LEAPS else Fault
+        yield kind(
+            f"the pose leaps by {what} within {step[i]:.3g} s at t = {log.t[seen[i + 1]]:.6g} s, "
+            f"which no quadrotor flies ({int(leaps.sum())} such step(s)){units}; expected poses of "
+            "one vehicle on one clock: leave the bad rows' pose empty, or cut the log there"
+        )
+    yield from _jumps(log.t[seen], log.position[seen], way, angle)
+
+
+def _length(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
+    """Check that enough is left in unbroken runs in flight, and note where much is not."""
+    thrust = np.square(log.rotor_speeds) @ vehicle.k
+    thrust = low_pass(thrust, CUTOFFS.flying_hz, log.period)
+    aloft = thrust > 0.5 * usual_thrust(thrust)
+    step = np.minimum(np.diff(log.t, append=log.t[-1] + log.period), max(0.1, 3.5 * log.period))
+    step = np.where(aloft, step, 0.0)
+    left = sum(float(step[piece[0] : piece[-1] + 1].sum()) for piece in _pieces(log))
+    whole = float(step.sum())
+    if left < least - 1e-9:
+        yield Refused(
+            f"{_lost_words(log)}{left:.3g} s of flight in unbroken runs of poses; expected at "
+            f"least {least:g} s, in runs of more than {_LEAST_PIECE:g} s"
+        )
+    if left < (1.0 - _LOST_SHARE) * whole:
+        yield Note(
+            f"{_lost_words(log)}{left:.3g} of {whole:.3g} s of flight lie in runs of poses long "
+            "enough to use"
+        )
 
 
 def _carrying(log: FlightLog) -> Mask:
@@ -381,9 +399,8 @@ def _lost_words(log: FlightLog) -> str:
     return f"the pose is lost in {runs} run(s), {lost} of {len(log.t)} rows; " if runs else ""
 
 
-def _jump(t: Array, position: Array, way: Array, angle: Array) -> str:
-    """Return where a long step in time lies between two poses that follow one another as if no time
-    had passed, or nothing.
+def _jumps(t: Array, position: Array, way: Array, angle: Array) -> Findings:
+    """Find a long step in time between two poses that follow one another as if no time had passed.
 
     Args:
         t: (n,) s, of the poses.
@@ -402,9 +419,9 @@ def _jump(t: Array, position: Array, way: Array, angle: Array) -> str:
         speed = min(float(np.linalg.norm(before)), float(np.linalg.norm(after)))
         is_alike = float(np.linalg.norm(after - before)) < 0.15 * speed + 0.05 and angle[i] < 0.05
         if speed > _MOVING and is_alike and way[i] < _SAME * speed * 0.5 * float(step[i]):
-            return (
+            yield Fault(
                 f"column t jumps by {step[i]:.3g} s at t = {t[i]:.6g} s, but the pose goes on from "
                 f"where it was ({1e3 * way[i]:.0f} mm on at {speed:.2g} m/s); expected one clock "
                 "for the whole log: set the clock's jump back, or cut the log there"
             )
-    return ""
+            return

@@ -8,10 +8,12 @@ the tests as a second opinion.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS
@@ -107,33 +109,20 @@ def _layout(path: Path, headers: Mapping[str, str], names: list[str]) -> Layout:
     """
     if len(names) > LIMITS.log_fields:
         raise InputError(f"{path}: more than {LIMITS.log_fields} fields; expected a blackbox")
-    lists = {}
-    for letter in _FRAMES:
-        for what, known in (("predictor", PREDICTORS), ("encoding", ENCODINGS)):
-            key = f"Field {letter} {what}"
-            numbers = _numbers(path, key, headers.get(key, ""))
-            if bad := [n for n in numbers if n not in known]:
-                raise InputError(
-                    f"{path}: header {key}: {bad[0]}; expected one of {', '.join(map(str, known))}"
-                )
-            lists[letter, what] = numbers
-        sizes = {len(lists[letter, what]) for what in ("predictor", "encoding")}
+    predictors = _frame_lists(path, headers, "predictor", PREDICTORS)
+    encodings = _frame_lists(path, headers, "encoding", ENCODINGS)
+    for letter, one, other in zip(_FRAMES, predictors, encodings, strict=True):
+        sizes = {len(one), len(other)}
         if len(sizes) > 1 or (letter in "IP" and sizes != {len(names)}):
             raise InputError(
                 f"{path}: headers Field {letter} predictor and encoding have "
                 f"{' and '.join(map(str, sorted(sizes)))} numbers; expected as many as the "
                 f"{len(names)} names of Field I"
             )
-    counts = [len(lists[letter, "encoding"]) for letter in _FRAMES]
-    width = max(*counts, 1)
-    tables = {what: np.zeros((5, width), np.int64) for what in ("predictor", "encoding")}
-    for row, letter in enumerate(_FRAMES):
-        for what, table in tables.items():
-            table[row, : counts[row]] = lists[letter, what]
     places = [
         names.index(name) if name in names else -1 for name in ("loopIteration", "time", "motor[0]")
     ]
-    if places[0] < 0 and 6 in tables["predictor"]:
+    if places[0] < 0 and any(6 in one for one in predictors):
         raise InputError(f"{path}: no field loopIteration, which its predictors count on")
     every, share = _interval(headers.get("I interval", "32")), headers.get("P interval", "1/1")
     top, _, bottom = share.partition("/")
@@ -148,9 +137,9 @@ def _layout(path: Path, headers: Mapping[str, str], names: list[str]) -> Layout:
         )
     ]
     return Layout(
-        tables["encoding"],
-        tables["predictor"],
-        np.array(counts, np.int64),
+        _rows(encodings),
+        _rows(predictors),
+        np.array([len(one) for one in encodings], np.int64),
         np.array([every, above, below], np.int64),
         np.array(constants, np.int64),
         np.array(places, np.int64),
@@ -162,8 +151,28 @@ def _interval(text: str) -> int:
     return max(1, int(text)) if text.isdecimal() and len(text) < 8 else 1
 
 
-def _numbers(path: Path, key: str, text: str) -> list[int]:
-    parts = text.split(",") if text else []
-    if not all(part.strip().isdecimal() and len(part) < 6 for part in parts):
-        raise InputError(f"{path}: header {key}: {text[:60]!r}; expected numbers, comma, numbers")
-    return [int(part) for part in parts]
+def _frame_lists(
+    path: Path, headers: Mapping[str, str], what: str, known: Collection[int]
+) -> list[list[int]]:
+    """Return the predictors or the encodings of each kind of frame.
+
+    Raises:
+        InputError: one is none that is known.
+    """
+    lists = []
+    for letter in _FRAMES:
+        key = f"Field {letter} {what}"
+        texts = headers.get(key, "").split(",") if headers.get(key) else []
+        for text in texts:
+            if not (text.strip().isdecimal() and len(text) < 6 and int(text) in known):
+                raise InputError(
+                    f"{path}: header {key}: {text[:20]}; expected one of "
+                    f"{', '.join(map(str, known))}"
+                )
+        lists.append([int(text) for text in texts])
+    return lists
+
+
+def _rows(lists: list[list[int]]) -> NDArray[np.int64]:
+    """Return lists as rows, with zeros behind them."""
+    return np.array(list(zip_longest(*lists, [0], fillvalue=0)), np.int64).T.copy()

@@ -10,6 +10,7 @@ The last four bytes are a CRC-32 of all before them.
 The map ``cflib`` says what the variables become.
 """
 
+import re
 import struct
 import zlib
 from collections.abc import Mapping
@@ -33,8 +34,9 @@ BEGINS = (b"\xbc\x01\x00", b"\xbc\x02\x00")
 Layout = np.dtype[Any]  # of one event: its number, time and variables
 
 _WHAT = "a Crazyflie's SD-card log"
-_TYPES = frozenset("bBhHiIqQefd")
-_TEXT = 200  # bytes of a name
+_EVENT = re.compile(rb"(..)([^\0]{0,200})\0(..)", re.DOTALL)
+_VARIABLE = re.compile(rb"([^\0]{1,200})\(([bBhHiIqQefd])\)\0")
+_VARIABLES = "a variable's name and the letter of its type, one of b B h H i I q Q e f d"
 _RUN = 4096  # events looked at together
 _TIMES = {1: ("<u4", 1e-3), 2: ("<u8", 1e-6)}  # of a version: type, and s per unit
 
@@ -86,56 +88,40 @@ def _header(path: Path, data: bytes) -> tuple[int, dict[int, Layout], int]:
     Raises:
         InputError: the header is cut or says something else.
     """
-    place = 5
-
-    def word() -> int:
-        nonlocal place
-        if place + 2 > len(data):
-            raise InputError(f"{path}: ends within its header; expected {_WHAT}")
-        (value,) = struct.unpack_from("<H", data, place)
-        place += 2
-        return int(value)
-
-    def text() -> str:
-        nonlocal place
-        end = data.find(b"\0", place, place + _TEXT)
-        if end < 0:
-            raise InputError(
-                f"{path}: a name in its header does not end within {_TEXT} bytes; expected {_WHAT}"
-            )
-        found = data[place:end].decode("ascii", "replace")
-        place = end + 1
-        return found
-
-    if len(data) < place or not data.startswith(BEGINS):
+    if len(data) < 5 or not data.startswith(BEGINS):
         raise InputError(
             f"{path}: cannot be read as {_WHAT}: begins with {data[:3].hex(' ') or 'nothing'}; "
             f"expected bc and the version 1 or 2"
         )
     version, count = struct.unpack_from("<HH", data, 1)
+    place = 5
+
+    def next_part(pattern: re.Pattern[bytes], expected: str) -> tuple[bytes, ...]:
+        nonlocal place
+        found = pattern.match(data, place)
+        if found is None:
+            raise InputError(f"{path}: byte {place} of its header: expected {expected}")
+        place = found.end()
+        return found.groups()
+
     kinds: dict[int, Layout] = {}
     for _ in range(count):
-        number, name = word(), text()
-        fields: list[tuple[str, str]] = []
-        for _ in range(word()):
-            variable, _, letter = text().removesuffix(")").rpartition("(")
-            if letter not in _TYPES or not variable:
-                raise InputError(
-                    f"{path}: event {name[:60]!r}: a variable of type {letter[:20]!r}; expected "
-                    f"one of {' '.join(sorted(_TYPES))}"
-                )
-            fields.append((variable, f"<{letter}"))
-            if len(fields) > LIMITS.log_fields:
-                raise InputError(
-                    f"{path}: event {name[:60]!r}: more than {LIMITS.log_fields} variables"
-                )
+        number, name, variables = next_part(_EVENT, "an event's number, name and variables")
+        many, event = int.from_bytes(variables, "little"), name.decode("ascii", "replace")
+        if many > LIMITS.log_fields:
+            raise InputError(f"{path}: event {event!r}: more than {LIMITS.log_fields} variables")
+        fields = [
+            (variable.decode("ascii", "replace"), f"<{letter.decode()}")
+            for variable, letter in (next_part(_VARIABLE, _VARIABLES) for _ in range(many))
+        ]
         names = [variable for variable, _ in fields]
-        if len(set(names)) < len(names) or number in kinds or {"event", "time"} & set(names):
+        key = int.from_bytes(number, "little")
+        if len(set(names)) < len(names) or key in kinds or {"event", "time"} & set(names):
             raise InputError(
-                f"{path}: event {name[:60]!r}: a number or a variable stands there twice; "
-                "expected each once"
+                f"{path}: event {event!r}: a number or a variable stands there twice; expected "
+                "each once"
             )
-        kinds[number] = np.dtype([("event", "<u2"), ("time", _TIMES[version][0]), *fields])
+        kinds[key] = np.dtype([("event", "<u2"), ("time", _TIMES[version][0]), *fields])
     return version, kinds, place
 
 

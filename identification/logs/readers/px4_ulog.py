@@ -14,7 +14,6 @@ x, with f the parameter THR_MDL_FAC.
 import io
 from collections.abc import Iterator, Mapping
 from contextlib import redirect_stdout
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -47,15 +46,6 @@ _SENSORS = (  # field of an inertial sensor, and that of what it gained over a t
 _MICROSECOND = 1e-6  # s
 
 
-@dataclass(frozen=True)
-class ULog:
-    """What was read of a ULog: the instances of each topic, as mappings from field to column."""
-
-    topics: Mapping[str, list[Fields]]
-    parameters: Mapping[str, float]  # as they were when the log began
-    is_damaged: bool
-
-
 def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
     """Read a ULog; ``vehicle`` turns commands into rotor speeds where none were measured.
 
@@ -77,38 +67,35 @@ def channels(path: Path, has_ranges: bool = True) -> Recording:
     Raises:
         InputError: pyulog is missing, the file is no ULog, or lacks four motors.
     """
-    log = read_ulog(path)
-    parameters = log.parameters if has_ranges else without_ranges(log.parameters)
-    order, order_note = motor_order(path, log.parameters)
+    topics, stated, is_damaged = read_ulog(path)
+    parameters = stated if has_ranges else without_ranges(stated)
+    order, order_note = motor_order(path, stated)
     log_map = with_motors(recording_map("px4"), order, parameters)
     notes = [*log_map.notes, order_note]
-    if log.is_damaged:
+    if is_damaged:
         notes.append("the file is damaged; what could be read of it was used")
     recorded = [
         samples
-        for topic, instances in log.topics.items()
+        for topic, instances in topics.items()
         for fields in instances
         for samples in _samples(path, topic, fields, parameters)
     ]
     recording = recording_of(path, recorded, log_map, "px4_ulog", notes)
     position = recording.log_map.position
     if position is not None and position.topic == _FILTER:
-        fields = log.topics[_FILTER][0]
-        resets = [
-            name
-            for name in ("xy_reset_counter", "z_reset_counter")
-            if np.ptp(np.asarray(fields.get(name, 0))) > 0
-        ]
+        fields = topics[_FILTER][0]
+        counters = ("xy_reset_counter", "z_reset_counter")
+        resets = [name for name in counters if np.ptp(np.asarray(fields.get(name, 0))) > 0]
         if resets:
-            notes.append(
+            recording.notes.append(
                 f"the onboard position was reset in the log ({', '.join(resets)}): it jumps there"
             )
-            recording.notes.append(notes[-1])
     return recording
 
 
-def read_ulog(path: Path) -> ULog:
-    """Return the topics that the map names, and the parameters.
+def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bool]:
+    """Return the instances of each topic that the map names, as mappings from field to column; the
+    parameters as they were when the log began; and whether the file is damaged.
 
     Raises:
         InputError: pyulog is missing, the file is no ULog, or larger than ``FileLimits`` allows.
@@ -147,7 +134,7 @@ def read_ulog(path: Path) -> ULog:
         for name, value in parsed.initial_parameters.items()
         if isinstance(value, int | float) and np.isfinite(value)
     }
-    return ULog(topics, parameters, is_damaged)
+    return topics, parameters, is_damaged
 
 
 def _column(fields: Fields, name: str) -> Array:
@@ -179,7 +166,8 @@ def _samples(
             return
         columns = {f"esc[{i}].esc_rpm": columns[name] for i, name in enumerate(reported)}
     elif topic == "actuator_motors":
-        columns = {name: _command(values) for name, values in columns.items()}
+        # NaN stands for a motor that is off
+        columns = {n: np.clip(np.nan_to_num(x, nan=0.0), 0.0, 1.0) for n, x in columns.items()}
         if not any(np.any(columns.get(f"control[{i}]", 0.0) > 0.0) for i in range(4)):
             return
     elif topic == "actuator_outputs":
@@ -198,11 +186,6 @@ def _samples(
             yield from _sensor(topic, t, fields, columns, field, gained)
         return
     yield Samples(t, columns, topic)
-
-
-def _command(values: Array) -> Array:
-    """Return commands (N,) from 0 to 1; NaN stands for a motor that is off."""
-    return np.clip(np.nan_to_num(values, nan=0.0), 0.0, 1.0)
 
 
 def _is_in_earth_frame(fields: Fields) -> bool:
