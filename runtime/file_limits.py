@@ -7,6 +7,8 @@ that pass may take longer. Everything is counted while it is unpacked, never bel
 
 from dataclasses import dataclass
 
+from .errors import InputError
+
 
 @dataclass(frozen=True)
 class FileLimits:
@@ -70,3 +72,9 @@ class FileLimits:
 
 
 LIMITS = FileLimits()
+
+
+def check_count(where: object, count: int, most: int, what: str) -> None:
+    """Raise InputError where a file holds more than ``most`` of something."""
+    if count > most:
+        raise InputError(f"{where}: more than {most} {what}; expected one flight")

@@ -10,10 +10,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from .flight_log import Mask
 from .log_map import (
     ACCELERATION_UNITS,
     ANGLE_UNITS,
@@ -30,10 +28,7 @@ from .log_map import (
     Sensor,
     constant,
 )
-from .table import Table
-
-Array = NDArray[np.float64]
-Rows = NDArray[np.intp]
+from .table import Array, Mask, Rows, Table
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])
 # from the log's world, or its body axes, to the kit's
@@ -56,8 +51,14 @@ class Samples:
     rows: Rows | None = None  # (N,) of it
 
     def values(self, part: Columns) -> Array:
-        """Return a section's columns (N, k), with their signs and scale."""
-        return scaled(part, np.column_stack([self._column(name) for name in part.columns]))
+        """Return a section's columns (N, k), with their signs and scale; a constant such as ``=0``
+        in every row.
+        """
+        values = np.empty((len(self.t), len(part.columns)))
+        for i, name in enumerate(part.columns):
+            fixed = constant(name)
+            values[:, i] = self.columns[name] if fixed is None else fixed
+        return scaled(part, values)
 
     def has(self, part: Columns) -> bool:
         """Return whether a section's columns are there."""
@@ -80,11 +81,6 @@ class Samples:
         if self.table is None or self.rows is None:
             return f"at {self.t[index]:.6g} s"
         return self.table.row(int(self.rows[index]))
-
-    def _column(self, name: str) -> Array:
-        """Return a column (N,), or the constant that ``=0`` stands for."""
-        value = constant(name)
-        return self.columns[name] if value is None else np.full(len(self.t), value)
 
 
 def scaled(part: Columns, values: Array) -> Array:

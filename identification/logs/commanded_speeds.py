@@ -14,15 +14,13 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
 from ...dynamics.vehicle_file import load_vehicle, preset_names
 from .flight_log import FlightLog
 from .flight_phases import flying
 from .log_map import Commands
-
-Array = NDArray[np.float64]
+from .table import Array, Mask
 
 # s, up to which less is a dip in flight: without thrust a vehicle falls 5 m meanwhile. Without the
 # dips high thrusts alone would remain, whose mean is above the weight
@@ -54,22 +52,31 @@ def with_commanded_speeds(
     """
     if log.command is None or log.has_rotor_speeds:
         return log
+    speeds, notes = _speeds(log, log.command, vehicle, model or Commands(()))
+    if speeds is None:
+        return replace(log, notes=(*log.notes, *notes))
+    return replace(log, rotor_speeds=speeds, commanded=True, notes=(*log.notes, *notes))
+
+
+def _speeds(
+    log: FlightLog, command: Array, vehicle: Vehicle | None, model: Commands
+) -> tuple[Array | None, list[str]]:
+    """Return the rotor speeds (N, 4) in rad/s of commands (N, 4), None where nothing says what
+    these give, and notes.
+    """
+    unknown = "no rotor speeds: the log has motor commands"
     if vehicle is None:
-        text = "no rotor speeds: the log has motor commands, and no vehicle says what they give"
-        return replace(log, notes=(*log.notes, text))
+        return None, [f"{unknown}, and no vehicle says what they give"]
     if vehicle.motor_curve is not None:
-        terms = _polynomial(vehicle.motor_curve.thrust)
-        note = (
+        return vehicle.commanded_speeds(command, log.voltage), [
             f"rotor speeds: worked out from the motor commands by the motor curve of "
-            f"{vehicle.name}, thrust {terms} N a rotor, without the motors' lag"
-        )
-        speeds = vehicle.commanded_speeds(log.command, log.voltage)
-        return replace(log, rotor_speeds=speeds, commanded=True, notes=(*log.notes, note))
-    if model is not None and model.thrust:
-        return _with_stated_thrust(log, log.command, vehicle, model)
-    model = model or Commands(())
+            f"{vehicle.name}, thrust {_polynomial(vehicle.motor_curve.thrust)} N a rotor, without "
+            "the motors' lag"
+        ]
+    if model.thrust:
+        return _by_stated_thrust(command, vehicle, model)
     least, most = model.thrust_span
-    share = np.clip((log.command - least) / (most - least), 0.0, None)
+    share = np.clip((command - least) / (most - least), 0.0, None)
     relative = model.thrust_factor * np.square(share) + (1.0 - model.thrust_factor) * share
     total = relative.sum(axis=1)
     felt = _felt(log)
@@ -86,36 +93,29 @@ def with_commanded_speeds(
             f"({vehicle.weight:.4g} N)"
         )
     else:
-        text = (
-            f"no rotor speeds: the log has motor commands, no pose and no accelerometer, and the "
-            f"vehicle {vehicle.name} states no motor_curve; state it to turn commands into thrust"
-        )
-        return replace(log, notes=(*log.notes, text))
+        return None, [
+            f"{unknown}, no pose and no accelerometer, and the vehicle {vehicle.name} states no "
+            "motor_curve; state it to turn commands into thrust"
+        ]
     if scale is None:
-        text = f"no rotor speeds: the motor commands are 0 wherever there is {where}"
-        return replace(log, notes=(*log.notes, text))
-    note = (
+        return None, [f"no rotor speeds: the motor commands are 0 wherever there is {where}"]
+    return np.sqrt(scale * relative / vehicle.k), [
         "thrust model: no rotor speeds in the log; the relative thrust of a motor command u is "
         f"assumed to be {_words(model)}, and its unknown scale is set so that {balance}: "
         f"{scale:.4g} N a motor at full command. Mass or a factor on thrust cannot be found from "
         "this log, nor a thrust curve or the battery's sag; rotor speeds are sqrt(thrust / k) of "
         "commands, without the motors' lag. State motor_curve in the vehicle file to mend that"
-    )
-    speeds = np.sqrt(scale * relative / vehicle.k)
-    return replace(log, rotor_speeds=speeds, commanded=True, notes=(*log.notes, note))
+    ]
 
 
-def _with_stated_thrust(
-    log: FlightLog, command: Array, vehicle: Vehicle, model: Commands
-) -> FlightLog:
-    """Return a log with the rotor speeds of commands (N, 4) by the thrust that a map states."""
+def _by_stated_thrust(command: Array, vehicle: Vehicle, model: Commands) -> tuple[Array, list[str]]:
+    """Return the rotor speeds of commands (N, 4) by the thrust that a map states, and notes."""
     low, high = model.range or (0.0, 1.0)
     reference = vehicle.voltage_ref if vehicle.voltage_ref > 0.0 else model.full_voltage
     counts = low + command * (high - low)
     thrust = np.polynomial.polynomial.polyval(
         counts * (reference / model.full_voltage), model.thrust
     )
-    speeds = np.sqrt(np.where(command > 0.0, np.maximum(thrust, 0.0), 0.0) / vehicle.k)
     source = f" ({model.thrust_source})" if model.thrust_source else ""
     notes = [
         f"thrust model: no rotor speeds in the log; a motor is assumed to give "
@@ -127,7 +127,7 @@ def _with_stated_thrust(
     saturated = float(np.mean(command.max(axis=1) >= _SATURATED))
     if saturated > 0.0:
         notes.append(f"a motor is at full command in {100.0 * saturated:.1f} % of the samples")
-    return replace(log, rotor_speeds=speeds, commanded=True, notes=(*log.notes, *notes))
+    return np.sqrt(np.where(command > 0.0, np.maximum(thrust, 0.0), 0.0) / vehicle.k), notes
 
 
 def speeds_of_wrench(wrench: Array, vehicle: Vehicle) -> tuple[Array, list[str]]:
@@ -178,9 +178,10 @@ def _felt(log: FlightLog) -> Array | None:
 def _scale_by_weight(log: FlightLog, total: Array, vehicle: Vehicle) -> float | None:
     """Return N of a motor at full command, or None where no motor runs."""
     _, x, y, _ = log.quaternion[log.valid].T
-    vertical = total[log.valid] * (1.0 - 2.0 * (x * x + y * y))
-    flying = _flying(log.t[log.valid], total[log.valid])
-    mean = float(np.mean(vertical[flying])) if flying.any() else 0.0
+    total = total[log.valid]
+    aloft = _aloft(log.t[log.valid], total)
+    vertical = (total * (1.0 - 2.0 * (x * x + y * y)))[aloft]
+    mean = float(np.mean(vertical)) if len(vertical) else 0.0
     return vehicle.weight / mean if mean > 0.0 else None
 
 
@@ -188,19 +189,15 @@ def _scale_by_accelerometer(t: Array, total: Array, felt: Array, vehicle: Vehicl
     """Return N of a motor at full command, or None where no motor runs in flight."""
     read = np.isfinite(felt)
     t, total, felt = t[read], total[read], felt[read]
-    usable = _flying(t, total) & (total > 0.0) & (felt > 0.0)
-    if not usable.any():
-        return None
-    return vehicle.mass * float(np.median(felt[usable] / total[usable]))
+    usable = _aloft(t, total) & (total > 0.0) & (felt > 0.0)
+    return vehicle.mass * float(np.median(felt[usable] / total[usable])) if usable.any() else None
 
 
-def _flying(t: Array, total: Array) -> NDArray[np.bool_]:
-    """Return which samples (N,) are in flight, by a relative thrust."""
-    return _without_dips(t, flying(total))
-
-
-def _without_dips(t: Array, high: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which samples (N,) are high, or low for a moment between high ones."""
+def _aloft(t: Array, total: Array) -> Mask:
+    """Return which samples (N,) are in flight, by a relative thrust: those of high thrust, and of
+    low for a moment between high ones.
+    """
+    high = flying(total)
     rows = np.flatnonzero(high)
     if not len(rows):
         return high

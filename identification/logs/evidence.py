@@ -21,7 +21,6 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.vehicle import Vehicle
@@ -30,9 +29,7 @@ from .flight_log import FlightLog
 from .flight_phases import usual_thrust
 from .log_map import LENGTH_UNITS
 from .readings import DECLARED, Reading, as_written, log_readings
-
-Array = NDArray[np.float64]
-Rows = NDArray[np.intp]
+from .table import Array, Rows
 
 
 @dataclass(frozen=True)
@@ -94,8 +91,7 @@ def share(total: float, power: float, cross: float, gain: tuple[float, float]) -
 class Fit:
     """Shares of variance that a reading leaves unexplained, and its score."""
 
-    horizontal: float  # of the specific force
-    vertical: float
+    horizontal: float  # of the horizontal specific force
     torques: tuple[float, ...]  # about x, y and, with a vehicle, z
     score: float  # log-likelihood less what the reading must make up for being less usual
 
@@ -372,7 +368,7 @@ class Evidence:
         vertical, *others = max((left(delay) for delay in delays), key=likelihood)
         horizontal, cost, _ = self._moved(*reading.moves)
         score = likelihood([horizontal, horizontal, vertical, *others]) - cost - reading.unlikely
-        return Fit(horizontal, vertical, tuple(others), score)
+        return Fit(horizontal, tuple(others), score)
 
     @cached_property
     def _felt(self) -> Array:
@@ -395,7 +391,7 @@ class Ranking:
     @classmethod
     def of(cls, evidence: Evidence, readings: Sequence[Reading], torques: bool = True) -> "Ranking":
         """Return the ranking of readings; where a flight does not tell, the usual come first."""
-        nothing = Fit(1.0, 1.0, (), 0.0)
+        nothing = Fit(1.0, (), 0.0)
         fits = [
             evidence.fit(r, torques) if evidence.enough else replace(nothing, score=-r.unlikely)
             for r in readings

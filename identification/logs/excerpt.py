@@ -21,23 +21,19 @@ def excerpt(logs: Sequence[FlightLog]) -> list[FlightLog]:
     """
     seconds = [float(log.t[-1] - log.t[0]) for log in logs]
     share = LONGEST / max(sum(seconds), LONGEST)
-    return [
-        log
-        if share == 1.0 or length <= _WINDOW
-        else _windows(log, length, max(1, round(share * length / _WINDOW)))
-        for log, length in zip(logs, seconds, strict=True)
-    ]
-
-
-def _windows(log: FlightLog, seconds: float, count: int) -> FlightLog:
-    keep = np.zeros(len(log.t), dtype=np.bool_)
-    begins = (
-        np.linspace(0.0, seconds - _WINDOW, count) if count > 1 else [0.5 * (seconds - _WINDOW)]
-    )
-    for begin in begins:
-        keep |= (log.t >= log.t[0] + begin) & (log.t <= log.t[0] + begin + _WINDOW)
-    note = (
-        f"of {seconds:.0f} s, {count} windows of {_WINDOW:.0f} s, evenly spaced, were used; the "
-        "rest was left out"
-    )
-    return replace(with_rows(log, keep), notes=(*log.notes, note))
+    out = []
+    for log, length in zip(logs, seconds, strict=True):
+        if share == 1.0 or length <= _WINDOW:
+            out.append(log)
+            continue
+        count, spare = max(1, round(share * length / _WINDOW)), length - _WINDOW
+        begins = log.t[0] + (
+            np.linspace(0.0, spare, count) if count > 1 else np.array([0.5 * spare])
+        )
+        keep = np.any([(log.t >= at) & (log.t <= at + _WINDOW) for at in begins], axis=0)
+        note = (
+            f"of {length:.0f} s, {count} windows of {_WINDOW:.0f} s, evenly spaced, were used; the "
+            "rest was left out"
+        )
+        out.append(replace(with_rows(log, keep), notes=(*log.notes, note)))
+    return out

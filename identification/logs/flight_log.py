@@ -31,14 +31,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...runtime.errors import InputError
-from .table import Table
+from .table import Array, Mask, Table
 from .tables import write_table
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 POSE = ("px", "py", "pz", "qw", "qx", "qy", "qz")
 ROTORS = ("omega1", "omega2", "omega3", "omega4")

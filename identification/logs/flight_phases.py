@@ -5,11 +5,9 @@ landing.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
-
-Array = NDArray[np.float64]
+from .table import Array, Mask
 
 GROUND, TAKE_OFF, FLIGHT, LANDING = "ground", "take-off", "flight", "landing"
 
@@ -20,7 +18,7 @@ _CLIMB = 0.1  # m/s: slower is not climbing or sinking
 _CLIMB_WINDOW = 0.25  # s, either side, over which the climb rate is taken
 
 
-def flying(total: Array) -> NDArray[np.bool_]:
+def flying(total: Array) -> Mask:
     """Return at which samples (N,) the rotors carry a vehicle, by their thrust (N,) in any unit:
     above half of the level that a tenth of the samples exceed.
     """
@@ -102,6 +100,6 @@ def _climb_rate(t: Array, height: Array) -> Array:
     return rate
 
 
-def _run(true: NDArray[np.bool_]) -> int:
+def _run(true: Mask) -> int:
     """Return how many elements from the first on are True."""
     return len(true) if true.all() else int(np.argmin(true))

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation, Slerp
 
@@ -22,8 +21,7 @@ from ..motion.smoothing import resampled
 from .evidence import EVIDENCE, likelihood
 from .flight_log import ACCELEROMETER, GYRO, FlightLog
 from .readings import ACCELEROMETER_READINGS, AS_DECLARED, GYRO_READINGS, OTHER, SensorReading
-
-Array = NDArray[np.float64]
+from .table import Array
 
 
 @dataclass(frozen=True)

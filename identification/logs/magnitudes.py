@@ -7,15 +7,13 @@ and say the same sentence.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from .flight_log import FlightLog, parts_of
 from .flight_phases import usual_thrust
 from .log_map import ROTOR_UNITS, TIME_UNITS, VOLTAGE_UNITS
-
-Array = NDArray[np.float64]
+from .table import Array
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,8 @@ def fitted(table: Table, log_map: LogMap, vehicle: Vehicle | None, reader: str) 
         elif part.optional and (len(absent) == len(part.named) or reader):
             kept[section] = None
         else:
-            missing += [(name, section) for name in absent]
+            whose = f"{section} (all or none)" if part.optional else section
+            missing += [(name, whose) for name in absent]
     if missing and reader:
         names = ", ".join(name for name, _ in missing)
         raise InputError(
@@ -48,9 +49,10 @@ def fitted(table: Table, log_map: LogMap, vehicle: Vehicle | None, reader: str) 
         )
     if missing:
         raise InputError(f"{where} does not fit: {_missing_words(missing, table.header)}")
-    extra = {name: part for name, part in log_map.extra.items() if set(part.named) <= header}
-    log_map = replace(log_map, **kept, alternatives=others, extra=extra)
+    log_map = replace(log_map, **kept, alternatives=others)
     check_whole(log_map, f"{where} does not fit")
+    extra = {name: part for name, part in log_map.extra.items() if set(part.named) <= header}
+    log_map = replace(log_map, extra=extra)
     return with_range(log_map, vehicle, where)
 
 

@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
@@ -54,9 +53,7 @@ from .magnitudes import (
 )
 from .readings import DECLARED, ROTORS, rotations, table_readings
 from .rotor_orders import ORDERS, Order, order_names, order_words
-from .table import Table
-
-Array = NDArray[np.float64]
+from .table import Array, Table
 
 
 @dataclass(frozen=True)
@@ -375,10 +372,10 @@ class _Guessing:
         if part not in self.parts:
             return
         group, values = self.parts[part], self.values[part]
-        kind, *choice = motor_unit(group, values, self.vehicle)
+        kind, unit, sure, why = motor_unit(group, values, self.vehicle)
         if kind in self.sections:
             return
-        unit = self.take(kind, "unit", (choice[0], choice[1], choice[2]))
+        self.take(kind, "unit", (unit, sure, why))
         order, sure, why = self.order(group, values)
         self.say(kind, "order", sure, why)
         if kind == "rotors":

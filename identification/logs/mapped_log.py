@@ -17,12 +17,12 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from .channels import Samples, in_kit_axes, in_kit_units, quaternions
 from .commanded_speeds import flown_vehicle
-from .flight_log import NORM_TOLERANCE, FlightLog, Mask, vehicle_of_columns
+from .flight_log import NORM_TOLERANCE, FlightLog, vehicle_of_columns
 from .log_map import Attitude, Battery, Columns, Commands, LogMap, Position, Rotors, constant
 from .map_fit import NO_QUATERNION, chosen, fitted, wanted_columns, ways
 from .rotor_orders import order_names, order_words
 from .streams import Recording, Stream, readable, slerp
-from .table import Table
+from .table import Mask, Table
 from .table_rows import LONGEST_STEPS, check_rows, has_several_rates, rows_of
 
 _IMU = ("accelerometer", "gyro")

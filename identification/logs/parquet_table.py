@@ -7,10 +7,12 @@ copies. So columns must be numbers, whose rows take 8 bytes each, and no page ma
 
 import os
 from collections.abc import Mapping, Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 from ...runtime.errors import InputError
+from ...runtime.extras import need
 from ...runtime.file_limits import LIMITS
 from ...runtime.regular_files import check_regular, open_regular
 from .table import WHAT, Array, Table
@@ -31,8 +33,9 @@ def open_parquet(path: Path) -> Table:
     Raises:
         InputError: unreadable, not Parquet, or more than ``FileLimits`` allows.
     """
-    parquet = _import_parquet(path)
+    need("pyarrow", "parquet", path)
     import pyarrow
+    from pyarrow import parquet
 
     check_regular(path, WHAT, LIMITS.table_text)
     _check_footer(path)
@@ -52,8 +55,8 @@ def open_parquet(path: Path) -> Table:
             try:
                 for batch in file.iter_batches(batch_size=_BATCH, columns=[name]):
                     numbers = batch.column(0).cast(pyarrow.float64())
-                    if done + len(numbers) <= rows:
-                        column[done : done + len(numbers)] = numbers.to_numpy(zero_copy_only=False)
+                    part = column[done : done + len(numbers)]
+                    part[:] = numbers.to_numpy(zero_copy_only=False)[: len(part)]
                     done += len(numbers)
                     if done > rows:
                         break
@@ -76,22 +79,12 @@ def write_parquet(columns: Mapping[str, Array], path: Path, temporary: Path) -> 
     Raises:
         InputError: pyarrow is not installed.
     """
-    parquet = _import_parquet(path)
+    need("pyarrow", "parquet", path)
     import pyarrow
+    from pyarrow import parquet
 
     arrays = {name: pyarrow.array(column, from_pandas=True) for name, column in columns.items()}
     parquet.write_table(pyarrow.table(arrays), temporary)
-
-
-def _import_parquet(path: Path) -> Any:
-    try:
-        from pyarrow import parquet
-    except ImportError as error:
-        raise InputError(
-            f"{path}: Parquet needs pyarrow, which is not installed: pip install "
-            "'windwrench[parquet]', or use .csv.gz"
-        ) from error
-    return parquet
 
 
 def _check_footer(path: Path) -> None:
@@ -124,16 +117,13 @@ def _check_pages(path: Path, file: Any, names: Sequence[str]) -> None:
     metadata, pages = file.metadata, 0
     leaves = [metadata.schema.column(i).path for i in range(metadata.num_columns)]
     wanted = [i for i, leaf in enumerate(leaves) if leaf.split(".")[0] in names]
-    chunks = [
-        (leaves[i], metadata.row_group(group).column(i))
-        for group in range(metadata.num_row_groups)
-        for i in wanted
-    ]
     with open_regular(path, WHAT) as raw:
-        for name, chunk in chunks:
+        size = os.fstat(raw.fileno()).st_size
+        for group, i in product(range(metadata.num_row_groups), wanted):
+            chunk = metadata.row_group(group).column(i)
             starts = [chunk.data_page_offset, chunk.dictionary_page_offset or 0]
             at = min((start for start in starts if start > 0), default=0)
-            end = min(os.fstat(raw.fileno()).st_size, at + chunk.total_compressed_size)
+            end = min(size, at + chunk.total_compressed_size)
             while 0 < at < end:
                 raw.seek(at)
                 try:
@@ -145,14 +135,10 @@ def _check_pages(path: Path, file: Any, names: Sequence[str]) -> None:
                 unpacked, packed = header.get(_UNPACKED, 0), header.get(_PACKED, 0)
                 counts = (part.get(_COUNT, 0) for part in header.values() if isinstance(part, dict))
                 values, pages = max(counts, default=0), pages + 1
-                if (
-                    not 0 <= unpacked <= LIMITS.parquet_page
-                    or packed < 0
-                    or values > LIMITS.table_rows
-                    or pages > LIMITS.parquet_pages
-                ):
+                is_small = 0 <= unpacked <= LIMITS.parquet_page and packed >= 0
+                if not is_small or values > LIMITS.table_rows or pages > LIMITS.parquet_pages:
                     raise InputError(
-                        f"{path}: column {name}, page {pages}: {values} values in {unpacked} "
+                        f"{path}: column {leaves[i]}, page {pages}: {values} values in {unpacked} "
                         f"bytes; expected one flight, pages of at most {LIMITS.parquet_page} "
                         f"bytes, at most {LIMITS.parquet_pages} of them"
                     )

@@ -10,14 +10,12 @@ from itertools import permutations, product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from .channels import WORLD_TURNS
 from .log_map import ANGLE_UNITS, LENGTH_UNITS, SENSES
 from .rotor_orders import ORDERS, Order, order_names
-
-Array = NDArray[np.float64]
+from .table import Array, Mask
 
 _I = np.eye(3)
 _DOWN, _Y_UP = WORLD_TURNS["ned"], WORLD_TURNS["y_up"]
@@ -340,7 +338,7 @@ def table_readings(
     return _weighed(found, 0.0, hint or "enu")
 
 
-def rotations(columns: Array, reading: Reading) -> tuple[NDArray[np.bool_], Rotation]:
+def rotations(columns: Array, reading: Reading) -> tuple[Mask, Rotation]:
     """Return in which rows (N,) of an attitude's columns there is one, and the rotations of these
     rows by a reading, body to world in the kit's frames.
     """
@@ -349,9 +347,9 @@ def rotations(columns: Array, reading: Reading) -> tuple[NDArray[np.bool_], Rota
     return good, Rotation.from_matrix(frames.world @ rotation.as_matrix() @ frames.body)
 
 
-def as_written(columns: Array, reading: Reading) -> tuple[NDArray[np.bool_], Rotation]:
+def as_written(columns: Array, reading: Reading) -> tuple[Mask, Rotation]:
     """Return the same, body to world, in the columns' own frames."""
-    good: NDArray[np.bool_] = np.asarray(np.isfinite(columns).all(axis=1))
+    good: Mask = np.asarray(np.isfinite(columns).all(axis=1))
     if reading.euler:
         angles = columns[good] * ANGLE_UNITS[reading.unit] * [1.0, reading.pitch_sign, 1.0]
         axes = ["xyz".index(axis) for axis in reading.euler]

@@ -45,7 +45,7 @@ def rotor_order(value: object) -> Order:
     )
 
 
-def order_names(order: Order) -> list[str]:
+def order_names(order: tuple[int, ...]) -> list[str]:
     """Return the names of an order; none where it has none."""
     return [name for name, known in ORDERS.items() if known == order]
 

@@ -16,7 +16,6 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
@@ -25,15 +24,13 @@ from ..motion.signals import SIGNALS
 from ..motion.smoothing import CUTOFFS, low_pass, runs_of, unbroken
 from .evidence import Evidence, departures
 from .excerpt import excerpt
-from .flight_log import FlightLog, Mask
+from .flight_log import FlightLog
 from .flight_phases import flying, usual_thrust
 from .inertial import INERTIAL, gravity_doubt, is_stuck
 from .magnitudes import MAGNITUDES, rotor_doubt, thrust_by_weight, time_doubt, within
 from .readings import Reading
 from .stuck_channels import stretches, stuck_notes
-
-Array = NDArray[np.float64]
-Rows = NDArray[np.intp]
+from .table import Array, Mask, Rows
 
 LEAST_SECONDS = 10.0  # of unbroken pose in flight
 _LEAST_PIECE = SIGNALS.shortest_piece  # s; a shorter piece is all edge to the filters

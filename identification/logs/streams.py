@@ -9,16 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from .commanded_speeds import flown_vehicle, speeds_of_wrench, with_commanded_speeds
-from .flight_log import FlightLog, Mask, time_notes
+from .flight_log import FlightLog, time_notes
 from .log_map import LogMap
-
-Array = NDArray[np.float64]
+from .table import Array, Mask
 
 _SENSOR_GAP = 3.5  # median steps, across which an inertial sensor is not interpolated
 _ROTOR_GAP = 0.5  # s without rotor speeds that deserves a note

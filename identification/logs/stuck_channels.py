@@ -5,14 +5,11 @@ what a hung sensor and a wrong column leave.
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import runs_of
 from .flight_log import FlightLog
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from .table import Array, Mask
 
 LEAST_SECONDS = 0.5  # that a channel stands still; a busy link repeats a few samples
 # changes of each sister meanwhile: of channels that change equally often, the chance that one does

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.errors import InputError
-from ...runtime.file_limits import LIMITS
+from ...runtime.file_limits import LIMITS, check_count
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Rows = NDArray[np.intp]
 
 WHAT = "a flight log"  # for errors
 SUFFIXES = (".csv", ".csv.gz", ".parquet")  # of tables that the kit writes
@@ -37,10 +39,7 @@ class Table:
     notes: tuple[str, ...] = ()  # how it is laid out, and what was left out
 
     def __post_init__(self) -> None:
-        if self.rows > LIMITS.table_rows:
-            raise InputError(
-                f"{self.path}: {self.rows} rows; expected one flight, at most {LIMITS.table_rows}"
-            )
+        check_count(self.path, self.rows, LIMITS.table_rows, "rows")
         if self.rows < 1:
             raise InputError(
                 f"{self.path}: no rows; expected a header and at least one row of numbers"
@@ -58,11 +57,7 @@ class Table:
                 raise InputError(
                     f"{self.path}: column {name} stands there more than once; expected it once"
                 )
-        if self.rows * len(names) > LIMITS.table_numbers:
-            raise InputError(
-                f"{self.path}: {self.rows} rows of {len(names)} columns; expected one flight, at "
-                f"most {LIMITS.table_numbers} numbers"
-            )
+        check_count(self.path, self.rows * len(names), LIMITS.table_numbers, "numbers")
         columns = np.empty((len(names), self.rows))
         self.fill(self, [self.header.index(name) for name in names], columns)
         return dict(zip(names, columns, strict=True))

@@ -11,16 +11,16 @@ from dataclasses import replace
 import numpy as np
 
 from ...runtime.errors import InputError
-from .channels import Array, Rows, Samples
-from .flight_log import Mask
+from .channels import Samples
 from .log_map import TIME_UNITS, Columns, LogMap
-from .table import Table
+from .table import Array, Mask, Rows, Table
 
 _STRAY_GAP = 5.0  # median time steps; shorter gaps leave no stray rows
 # s that are interpolated over: the lag of a small vehicle's motors, over which their speed hardly
 # changes; and steps of the channel's own, since a slow one has longer gaps by nature
 _LONGEST_GAP = 0.06
 LONGEST_STEPS = 3.5
+_FINITE = "a finite number"
 _DENSE = 0.5  # share of the rows from which on a channel counts as one of every row
 
 
@@ -87,18 +87,24 @@ def rows_of(
     return samples, notes
 
 
+def _refuse(samples: Samples, name: str, column: Array, bad: Mask, expected: str) -> None:
+    """Raise InputError at the first of a column's values (N,) that is ``bad`` (N,)."""
+    if bad.any():
+        i = int(np.argmax(bad))
+        value = f"{column[i]:g}"
+        found = {"nan": "empty or NaN", "inf": "infinite", "-inf": "infinite"}.get(value, value)
+        raise InputError(
+            f"{samples.path}: column {name}, {samples.place(i)} is {found}; expected {expected}"
+        )
+
+
 def _check_finite(samples: Samples, name: str, where: Mask | None = None, more: str = "") -> None:
-    """Raise InputError at the first number of a table's column that is not finite, among the rows
-    ``where`` (N,); ``more`` says what else may be empty.
+    """Raise InputError at the first number of a column that is not finite, among the rows ``where``
+    (N,); ``more`` says what else may be empty.
     """
     column = samples.columns[name]
-    bad = np.flatnonzero(~np.isfinite(column) & (True if where is None else where))
-    if bad.size:
-        found = "empty or NaN" if np.isnan(column[bad[0]]) else "infinite"
-        raise InputError(
-            f"{samples.path}: column {name}, {samples.place(bad[0])} is {found}; expected a finite "
-            f"number{more and f'; {more}'}"
-        )
+    bad = ~np.isfinite(column) & (True if where is None else where)
+    _refuse(samples, name, column, bad, f"{_FINITE}{more}")
 
 
 def _check_whole(samples: Samples, log_map: LogMap) -> None:
@@ -120,7 +126,7 @@ def _check_whole(samples: Samples, log_map: LogMap) -> None:
         text = words.format(count if parts is pose else ", ".join(names))
         there = ~np.all(np.isnan([samples.columns[name] for name in names]), axis=0)
         for name in names:
-            _check_finite(samples, name, there, text)
+            _check_finite(samples, name, there, f"; {text}")
     others = (log_map.wrench, log_map.force, log_map.torque, *log_map.extra.values())
     for name in [name for part in others if part is not None for name in part.named]:
         if not any(name in part.named for part in pose):
@@ -217,12 +223,7 @@ def _longest_gap(samples: Samples, name: str, column: Array) -> float:
         InputError: one is infinite, or a gap is longer than 0.06 s and than 3.5 of the column's own
             steps.
     """
-    where = f"{samples.path}: column {name}"
-    infinite = np.flatnonzero(np.isinf(column))
-    if infinite.size:
-        raise InputError(
-            f"{where}, {samples.place(infinite[0])} is infinite; expected a finite number"
-        )
+    _refuse(samples, name, column, np.isinf(column), _FINITE)
     read = np.flatnonzero(~np.isnan(column))
     if len(read) == len(column):
         return 0.0
@@ -232,22 +233,17 @@ def _longest_gap(samples: Samples, name: str, column: Array) -> float:
     edges = np.concatenate([[t[0]], t[read], [t[-1]]])
     at = int(np.argmax(np.diff(edges)))
     gap = float(edges[at + 1] - edges[at])
-    if len(read) and gap <= limit * (1.0 + 1e-9):
-        return float(steps.max(initial=0.0))
+    is_long = not len(read) or gap > limit * (1.0 + 1e-9)
     first = int(read[at - 1]) + 1 if at and len(read) else 0
-    raise InputError(
-        f"{where}, {samples.place(first)} is empty or NaN; expected a finite number: it has no "
-        f"value for {gap:.3g} s, and gaps of up to {limit:.3g} s are interpolated over"
+    words = (
+        f"it has no value for {gap:.3g} s, and gaps of up to {limit:.3g} s are interpolated over"
     )
+    bad: Mask = np.asarray(is_long & (np.arange(len(t)) == first))
+    _refuse(samples, name, column, bad, f"{_FINITE}: {words}")
+    return float(steps.max(initial=0.0))
 
 
 def _check_range(samples: Samples, part: Columns, low: float, high: float, expected: str) -> None:
     """Raise InputError at the first value of a section that is below ``low`` or above ``high``."""
     for name, column in zip(part.columns, samples.values(part).T, strict=True):
-        outside = np.flatnonzero((column < low) | (column > high))
-        if outside.size:
-            found = f"{column[outside[0]]:g}{' is negative' if not np.isfinite(high) else ''}"
-            raise InputError(
-                f"{samples.path}: column {name}, {samples.place(outside[0])}: {found}; expected "
-                f"{expected}"
-            )
+        _refuse(samples, name, column, (column < low) | (column > high), expected)

@@ -23,7 +23,7 @@ from typing import BinaryIO, cast
 import numpy as np
 
 from ...runtime.errors import InputError
-from ...runtime.file_limits import LIMITS
+from ...runtime.file_limits import LIMITS, check_count
 from ...runtime.gunzipping import Gunzip
 from ...runtime.regular_files import open_regular
 from .column_names import is_unit
@@ -163,10 +163,6 @@ def _lines(path: Path) -> Iterator[str]:
         InputError: unreadable, no text, or more than ``FileLimits`` allows; everything is counted
             as it comes.
     """
-
-    def more(what: str) -> InputError:
-        return InputError(f"{path}: more than {what}; expected one flight")
-
     file: BinaryIO = open_regular(path, WHAT)
     if path.name.lower().endswith(".gz"):
         file = cast(BinaryIO, io.BufferedReader(Gunzip(file, path, LIMITS.table_text), _BUFFER))
@@ -177,12 +173,9 @@ def _lines(path: Path) -> Iterator[str]:
                 size, number = size + len(line), number + 1
                 if "\0" in line:
                     raise InputError(f"{path}: not a text file (it holds zero bytes); expected CSV")
-                if len(line) > LIMITS.table_line:
-                    raise more(f"{LIMITS.table_line} in line {number}")
-                if size > LIMITS.table_text:
-                    raise more(f"{LIMITS.table_text} characters of text")
-                if number > LIMITS.table_rows + _LINES:
-                    raise more(f"{LIMITS.table_rows} rows")
+                check_count(path, len(line), LIMITS.table_line, f"in line {number}")
+                check_count(path, size, LIMITS.table_text, "characters of text")
+                check_count(path, number - _LINES, LIMITS.table_rows, "rows")
                 yield line.rstrip("\n")
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"{path}: cannot be read as {WHAT}: {error}") from error

@@ -20,13 +20,14 @@ import numpy as np
 
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
-from ..channels import Array, Samples
+from ..channels import Samples
 from ..flight_log import FlightLog
 from ..log_map import Commands, LogMap, recording_map
 from ..map_fit import wanted_columns, ways
 from ..mapped_log import recording_of
 from ..rotor_orders import ORDERS, Order, order_words
 from ..streams import Stream
+from ..table import Array
 from .dataflash import BEGINS as BEGINS
 from .dataflash import Messages, read_dataflash
 

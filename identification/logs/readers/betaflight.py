@@ -22,12 +22,12 @@ import numpy as np
 
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
-from ..channels import Array, Samples
+from ..channels import Samples
 from ..flight_log import FlightLog
 from ..log_map import recording_map
 from ..map_fit import wanted_columns
 from ..mapped_log import recording_of
-from ..table import Table
+from ..table import Array, Table
 from .blackbox import BEGINS as BEGINS
 from .blackbox import read_blackbox
 

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....runtime.errors import InputError
-from ....runtime.file_limits import LIMITS
+from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
-from ..channels import Array
+from ..table import Array
 from .blackbox_frames import ENCODINGS, PREDICTORS, Layout, decode
 
 _START = b"H Product:Blackbox"
@@ -63,14 +63,12 @@ def read_blackbox(
     where = np.array([names.index(name) for name in keep], dtype=np.int64)
     frames = np.frombuffer(data[: ends[longest]], np.uint8)
     most = min(LIMITS.table_rows, LIMITS.table_numbers // len(keep))
-    nothing = np.zeros((0, len(keep)), np.int64)
-    count, _, _ = decode(frames, begin, layout, where, nothing, most + 1)
-    if count > most:
-        raise InputError(f"{path}: more than {most} frames; expected one flight")
+    rows = np.empty((most + 1, len(keep)), np.int64)  # takes memory as it is filled
+    count, lost = decode(frames, begin, layout, where, rows)
+    check_count(path, count, most, "frames")
     if count < 2:
         raise InputError(f"{path}: {count} frame(s) that can be decoded; expected at least two")
-    rows = np.zeros((count, len(keep)), np.int64)
-    _, lost, _ = decode(frames, begin, layout, where, rows, count)
+    rows = rows[:count]
     notes = [f"blackbox of {headers.get('Firmware revision', 'an unknown firmware')[:60]}"]
     if len(starts) > 1:
         notes.append(
@@ -107,8 +105,7 @@ def _layout(path: Path, headers: Mapping[str, str], names: list[str]) -> Layout:
     Raises:
         InputError: they contradict themselves, or name what is not known.
     """
-    if len(names) > LIMITS.log_fields:
-        raise InputError(f"{path}: more than {LIMITS.log_fields} fields; expected a blackbox")
+    check_count(path, len(names), LIMITS.log_fields, "fields")
     predictors = _frame_lists(path, headers, "predictor", PREDICTORS)
     encodings = _frame_lists(path, headers, "encoding", ENCODINGS)
     for letter, one, other in zip(_FRAMES, predictors, encodings, strict=True):

@@ -212,9 +212,7 @@ def _event(data: Bytes, at: Ints) -> int:
 
 
 @compiled
-def decode(
-    data: Bytes, begin: int, layout: Layout, keep: Ints, rows: Ints, most: int
-) -> tuple[int, int, int]:
+def decode(data: Bytes, begin: int, layout: Layout, keep: Ints, rows: Ints) -> tuple[int, int]:
     """Decode the main frames of a log.
 
     Args:
@@ -222,21 +220,17 @@ def decode(
         begin: where its frames begin.
         layout: of the frames.
         keep: (K,) fields that are wanted.
-        rows: (N, K) receives them; with N = 0 frames are counted alone.
-        most: frames after which to stop.
+        rows: (N, K) receives them; no more than N frames are decoded.
 
     Returns:
-        How many frames were decoded, how many were not, and the place behind the last.
+        How many frames were decoded, and how many were not.
     """
     fields = layout.encodings.shape[1]
-    out, before, older = (
-        np.zeros(fields, np.int64),
-        np.zeros(fields, np.int64),
-        np.zeros(fields, np.int64),
-    )
+    out, before = np.zeros(fields, np.int64), np.zeros(fields, np.int64)
+    older = np.zeros(fields, np.int64)
     at = np.zeros(1, np.int64)
     place, found, lost, based = begin, 0, 0, False
-    while place < len(data) and found < most and lost < _TOO_DAMAGED:
+    while place < len(data) and found < len(rows) and lost < _TOO_DAMAGED:
         letter = data[place]
         kind = -1
         for k, known in enumerate((73, 80, 83, 71, 72)):  # I P S G H
@@ -263,18 +257,16 @@ def decode(
                 place += 1
             continue
         if said == 1:
-            place = after
             break
         if kind == 0 or (kind == 1 and based):
             _predict(out, before, older, layout.counts[kind], layout.predictors[kind], layout)
             older[:] = out if kind == 0 else before
             before[:] = out
             based = True
-            if len(rows) > found:
-                for k in range(len(keep)):
-                    rows[found, k] = out[keep[k]]
+            for k in range(len(keep)):
+                rows[found, k] = out[keep[k]]
             found += 1
         elif kind == 1:
             lost += 1
         place = after
-    return found, lost, place
+    return found, lost

@@ -11,7 +11,6 @@ The map ``cflib`` says what the variables become.
 """
 
 import re
-import struct
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
-from ....runtime.file_limits import LIMITS
+from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
 from ..channels import Samples
 from ..flight_log import FlightLog
@@ -34,6 +33,7 @@ BEGINS = (b"\xbc\x01\x00", b"\xbc\x02\x00")
 Layout = np.dtype[Any]  # of one event: its number, time and variables
 
 _WHAT = "a Crazyflie's SD-card log"
+_START = re.compile(rb"\xbc([\x01\x02])\0(..)", re.DOTALL)
 _EVENT = re.compile(rb"(..)([^\0]{0,200})\0(..)", re.DOTALL)
 _VARIABLE = re.compile(rb"([^\0]{1,200})\(([bBhHiIqQefd])\)\0")
 _VARIABLES = "a variable's name and the letter of its type, one of b B h H i I q Q e f d"
@@ -52,7 +52,8 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
     version, kinds, begin = _header(path, data)
     found, end = _events(path, data, kinds, begin)
     notes = [f"{_WHAT}, version {version}"]
-    if not _whole(data, end):
+    # behind the last event stands nothing, or the checksum (CRC-32) of all before
+    if data[end:] not in (b"", zlib.crc32(data[:end]).to_bytes(4, "little")):
         notes.append(
             f"the file is damaged or was cut {end} bytes from its start ({len(data) - end} bytes "
             "are left); what stands before was used"
@@ -73,28 +74,13 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
     return recording.log(vehicle)
 
 
-def _whole(data: bytes, end: int) -> bool:
-    """Return whether the file ends behind its last event, or with the checksum (CRC-32) of all that
-    stands before.
-    """
-    if end == len(data):
-        return True
-    return len(data) - end == 4 and zlib.crc32(data[:end]) == int.from_bytes(data[end:], "little")
-
-
 def _header(path: Path, data: bytes) -> tuple[int, dict[int, Layout], int]:
     """Return the version, the layouts of the types of events by number, and where the events begin.
 
     Raises:
         InputError: the header is cut or says something else.
     """
-    if len(data) < 5 or not data.startswith(BEGINS):
-        raise InputError(
-            f"{path}: cannot be read as {_WHAT}: begins with {data[:3].hex(' ') or 'nothing'}; "
-            f"expected bc and the version 1 or 2"
-        )
-    version, count = struct.unpack_from("<HH", data, 1)
-    place = 5
+    place = 0
 
     def next_part(pattern: re.Pattern[bytes], expected: str) -> tuple[bytes, ...]:
         nonlocal place
@@ -104,12 +90,13 @@ def _header(path: Path, data: bytes) -> tuple[int, dict[int, Layout], int]:
         place = found.end()
         return found.groups()
 
+    first, count = next_part(_START, "bc, the version 1 or 2, and the number of events")
+    version = first[0]
     kinds: dict[int, Layout] = {}
-    for _ in range(count):
+    for _ in range(int.from_bytes(count, "little")):
         number, name, variables = next_part(_EVENT, "an event's number, name and variables")
         many, event = int.from_bytes(variables, "little"), name.decode("ascii", "replace")
-        if many > LIMITS.log_fields:
-            raise InputError(f"{path}: event {event!r}: more than {LIMITS.log_fields} variables")
+        check_count(f"{path}: event {event!r}", many, LIMITS.log_fields, "variables")
         fields = [
             (variable.decode("ascii", "replace"), f"<{letter.decode()}")
             for variable, letter in (next_part(_VARIABLE, _VARIABLES) for _ in range(many))
@@ -146,9 +133,6 @@ def _events(
         place += len(rows) * layout.itemsize
         count += len(rows)
         numbers += len(rows) * len((layout.names or ())[2:])
-        if count > LIMITS.table_rows or numbers > LIMITS.table_numbers:
-            raise InputError(
-                f"{path}: more than {LIMITS.table_rows} events or {LIMITS.table_numbers} numbers; "
-                "expected one flight"
-            )
+        check_count(path, count, LIMITS.table_rows, "events")
+        check_count(path, numbers, LIMITS.table_numbers, "numbers")
     return [np.concatenate(rows) for rows in runs.values() if rows], place

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from ....runtime.compiled import compiled
 from ....runtime.errors import InputError
-from ....runtime.file_limits import LIMITS
+from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
+from ..table import Array, Mask
 
 Bytes = NDArray[np.uint8]
-Array = NDArray[np.float64]
 
 BEGINS = (b"\xa3\x95",)
 
@@ -70,7 +70,7 @@ class Messages:
         with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
             return np.asarray(self.rows[name].astype(np.float64) * self.units[name])
 
-    def where(self, mask: NDArray[np.bool_]) -> "Messages":
+    def where(self, mask: Mask) -> "Messages":
         """Return the messages of a mask (N,)."""
         return Messages(self.name, self.rows[mask], self.units)
 
@@ -91,11 +91,6 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> DataFlash:
             ``FileLimits.table_rows``.
     """
     data = np.frombuffer(read_bytes(path, _WHAT, LIMITS.binary_log), np.uint8)
-    if len(data) < _FMT_LENGTH or data[:2].tobytes() != BEGINS[0]:
-        raise InputError(
-            f"{path}: cannot be read as {_WHAT}: begins with "
-            f"{data[:2].tobytes().hex(' ') or 'nothing'}, {len(data)} bytes; expected a3 95"
-        )
     counts, nowhere = np.zeros(256, np.int64), np.empty(0, np.int64)
     used = _walk(data, counts, -1, nowhere)
 
@@ -112,13 +107,9 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> DataFlash:
     found: dict[str, Messages] = {}
     for number, (name, layout, units) in kinds.items():
         count = int(counts[number])
-        if count > LIMITS.table_rows:
-            raise InputError(
-                f"{path}: {name}: more than {LIMITS.table_rows} messages; expected one flight"
-            )
-        if not count:
-            continue
-        found[name] = Messages(name, _rows(data, places(number, count), layout), units)
+        check_count(f"{path}: {name}", count, LIMITS.table_rows, "messages")
+        if count:
+            found[name] = Messages(name, _rows(data, places(number, count), layout), units)
     if not kinds and not counts[_FMT]:
         raise InputError(f"{path}: cannot be read as {_WHAT}: no FMT message; expected some")
     return DataFlash(found, len(data) - int(used))

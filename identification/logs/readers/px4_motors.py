@@ -1,5 +1,6 @@
 """PX4's motors: which is which rotor, which output drives it, and in what range, by parameters."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -8,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from ....runtime.errors import InputError
-from ..channels import Array
 from ..log_map import LogMap
 from ..map_fit import ways
 from ..rotor_orders import ORDERS, Order
+from ..table import Array
 
 Parameters = Mapping[str, float]
 
@@ -55,13 +56,15 @@ def motor_order(path: Path, parameters: Parameters) -> tuple[Order, str]:
 def with_motors(log_map: LogMap, order: Order, parameters: Parameters) -> LogMap:
     """Return the map with the order of the motors, and with the thrust curve of their outputs."""
     factor = min(max(parameters.get("THR_MDL_FAC", 0.0), 0.0), 1.0)
-    outputs = ", ".join(str(slot + 1) for slot in _output_slots(parameters)[1])
+    bank, slots = _output_slots(parameters)
+    low, high = _range(parameters, bank, slots)
     rotors, (motors, sent) = log_map.rotors, ways(log_map, "commands")
     assert rotors is not None
     note = (
         f"commands: actuator_outputs, x = 0 to 1 (pulses, of which one is above 1.5: "
-        f"{_span(parameters)} us), gives relative thrust f x^2 + (1 - f) x with THR_MDL_FAC "
-        f"f = {factor:g}; motors 1 to 4 at outputs {outputs}"
+        f"{low.min():g} to {high.max():g} us), gives relative thrust f x^2 + (1 - f) x with "
+        f"THR_MDL_FAC f = {factor:g}; motors 1 to 4 at outputs "
+        f"{', '.join(str(slot + 1) for slot in slots)}"
     )
     sent = replace(sent, order=order, thrust_factor=factor, note=note)
     return replace(
@@ -74,8 +77,7 @@ def with_motors(log_map: LogMap, order: Order, parameters: Parameters) -> LogMap
 
 def without_ranges(parameters: Parameters) -> Parameters:
     """Return the parameters but for the ranges of pulses."""
-    ends = ("_MIN", "_MAX")
-    return {n: x for n, x in parameters.items() if n.rstrip("0123456789")[-4:] not in ends}
+    return {n: x for n, x in parameters.items() if not re.search(r"_(MIN|MAX)\d*$", n)}
 
 
 def slots_of_escs(fields: Mapping[str, Any]) -> list[int]:
@@ -130,18 +132,14 @@ def slots_of_motors(functions: Sequence[int]) -> list[int]:
     return [functions.index(motor) for motor in motors] if {*motors} <= {*functions} else []
 
 
-def _span(parameters: Parameters) -> str:
-    low, high = _range(parameters, *_output_slots(parameters))
-    return f"{low.min():g} to {high.max():g}"
-
-
 def _range(parameters: Parameters, bank: str, slots: list[int]) -> tuple[Array, Array]:
     """Return the pulses (4,) in us at the ends of outputs' ranges: of each its own parameter, the
     bank's, or PX4's default.
     """
-    ends = []
-    for end, default in (("MIN", 1000.0), ("MAX", 2000.0)):
-        kin = (f"PWM_{bank}_{end}", f"PWM_{end}")
-        given = [[parameters.get(n, 0.0) for n in (f"{kin[0]}{s + 1}", *kin)] for s in slots]
-        ends.append(np.array([next((x for x in one if x > 0.0), default) for one in given]))
-    return ends[0], ends[1]
+
+    def ends(end: str, default: float) -> Array:
+        names = [(f"PWM_{bank}_{end}{s + 1}", f"PWM_{bank}_{end}", f"PWM_{end}") for s in slots]
+        given = [[parameters.get(name, 0.0) for name in one] for one in names]
+        return np.array([next((x for x in one if x > 0.0), default) for one in given])
+
+    return ends("MIN", 1000.0), ends("MAX", 2000.0)

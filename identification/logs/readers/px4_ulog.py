@@ -22,14 +22,16 @@ from numpy.typing import NDArray
 
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
-from ....runtime.file_limits import LIMITS
+from ....runtime.extras import need
+from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import check_regular, open_regular
-from ..channels import Array, Samples
+from ..channels import Samples
 from ..flight_log import FlightLog
 from ..log_map import recording_map
 from ..map_fit import ways
 from ..mapped_log import recording_of
 from ..streams import Recording
+from ..table import Array
 from .px4_motors import motor_order, outputs_of_motors, slots_of_escs, with_motors, without_ranges
 from .ulog_counting import counting
 
@@ -100,13 +102,9 @@ def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bo
     Raises:
         InputError: pyulog is missing, the file is no ULog, or larger than ``FileLimits`` allows.
     """
-    try:
-        from pyulog import ULog as Parser
-    except ImportError as error:
-        raise InputError(
-            f"{path}: a ULog needs pyulog, which is not installed: pip install 'windwrench[logs]', "
-            f"or pip install pyulog"
-        ) from error
+    need("pyulog", "logs", path)
+    from pyulog import ULog as Parser
+
     log_map = recording_map("px4")
     wanted = {way.topic for name in log_map.sections for way in ways(log_map, name)}
     check_regular(path, _WHAT, LIMITS.ulog_file)
@@ -123,11 +121,8 @@ def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bo
     topics: dict[str, list[Fields]] = {}
     for data in parsed.data_list:
         if "timestamp" in data.data:
-            if len(data.data["timestamp"]) > LIMITS.table_rows:
-                raise InputError(
-                    f"{path}: topic {data.name}: more than {LIMITS.table_rows} messages; expected "
-                    f"one flight"
-                )
+            where, count = f"{path}: topic {data.name}", len(data.data["timestamp"])
+            check_count(where, count, LIMITS.table_rows, "messages")
             topics.setdefault(data.name, []).append(data.data)
     parameters = {
         name: float(value)

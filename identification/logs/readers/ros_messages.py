@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from ....runtime.yaml_file import read_yaml
-from ..channels import Array
 from ..log_map import MAPS
 from ..rotor_orders import ORDERS
+from ..table import Array
 from .px4_motors import slots_of_motors
 
 _NUMBERS = ["Float32", "Float64", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64"]

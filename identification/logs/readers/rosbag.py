@@ -42,11 +42,13 @@ from numpy.typing import NDArray
 
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
-from ....runtime.file_limits import LIMITS
+from ....runtime.extras import need
+from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import open_regular
-from ..channels import Array, Samples
+from ..channels import Samples
 from ..flight_log import FlightLog
 from ..mapped_log import recording_of
+from ..table import Array
 from .ros_messages import MOTORS, definitions, stamp
 from .topic_choice import chosen_topics
 from .topic_map import Topic, joined, topic_map
@@ -89,7 +91,7 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
     notes = [note for topic in topics.values() for note in _notes(topic, types[topic.name])]
     origin = min(int(nanoseconds[0]) for nanoseconds in times.values())
     recorded = [
-        Samples(_NANOSECOND * (times[part] - origin), columns[part], topic.name)
+        Samples(_NANOSECOND * (times[part] - origin).astype(float), columns[part], topic.name)
         for part, topic in topics.items()
     ]
     found = recording_of(path, recorded, joined(topics), "rosbag", (*notes, *doubts))
@@ -145,14 +147,10 @@ def _opened(path: Path) -> Iterator[tuple[dict[str, str], _Messages]]:
             f"{path}: unknown kind of bag; expected {', '.join(SUFFIXES)} or the folder of a ROS 2 "
             f"bag"
         )
-    try:
-        from rosbags import rosbag1, rosbag2
-        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-    except ImportError as error:
-        raise InputError(
-            f"{path}: a bag needs rosbags, which is not installed: pip install 'windwrench[logs]', "
-            f"or pip install rosbags"
-        ) from error
+    need("rosbags", "logs", path)
+    from rosbags import rosbag1, rosbag2
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
     stores = []
     for variant in definitions():
         store = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.ROS2_HUMBLE)
@@ -223,10 +221,7 @@ def _decoded_topic(
     recorded, stamped, values = array("q"), array("q"), array("d")
     where = f"{path}: topic {topic.name}"
     for index, (received, message) in enumerate(messages(topic.name)):
-        if index >= LIMITS.table_rows:
-            raise InputError(
-                f"{where}: more than {LIMITS.table_rows} messages; expected one flight"
-            )
+        check_count(where, index + 1, LIMITS.table_rows, "messages")
         recorded.append(received)
         stamped.append(stamp(message))
         try:

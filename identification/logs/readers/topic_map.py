@@ -15,7 +15,6 @@ from pydantic import AfterValidator, BeforeValidator, ConfigDict
 from ....runtime.errors import InputError, unknown_name
 from ....runtime.forms import STRICT, Number, checked, expected
 from ....runtime.yaml_file import read_yaml
-from ..channels import Array
 from ..log_map import (
     COMMAND_UNITS,
     Attitude,
@@ -30,6 +29,7 @@ from ..log_map import (
     one_of,
 )
 from ..rotor_orders import ORDERS, order_names
+from ..table import Array
 from .ros_messages import MOTORS, Kind, kinds
 
 UNITS = {"rotors": ("rad/s", "rpm", "Hz"), "command": ("normalised", "us")}

@@ -106,7 +106,7 @@ def test_a_log_that_was_cut_or_spoiled(write):
 @pytest.mark.parametrize(
     ("data", "expected"),
     [
-        (b"\xbc\x02\x00", "byte 5 of its header|begins with"),
+        (b"\xbc\x02\x00", "byte 0 of its header: expected bc"),
         (
             b"\xbc\x02\x00\x01\x00\xff\xff" + b"a" * 300,
             "byte 5 .* expected an event's number",
@@ -135,7 +135,7 @@ def test_what_is_no_log_is_named(write, data, expected):
 
 def test_events_are_counted(write, monkeypatch):
     monkeypatch.setattr(crazyflie_sd, "LIMITS", replace(LIMITS, table_rows=100))
-    with pytest.raises(InputError, match=r"more than 100 events or .* expected one flight"):
+    with pytest.raises(InputError, match="more than 100 events; expected one flight"):
         read_log(write(sd_card({"imu": (T, fast(T))})))
 
 

@@ -51,7 +51,7 @@ def test_the_first_bytes_decide_whatever_the_name(tmp_path, begins, name):
 def test_a_missing_package_is_named(tmp_path, monkeypatch, name, begins, package, extra):
     (tmp_path / name).write_bytes(begins)
     monkeypatch.setitem(sys.modules, package, None)
-    words = rf"needs {package}.*: pip install 'windwrench\[{extra}\]', or "
+    words = rf"{name}: {package} is not installed; pip install 'windwrench\[{extra}\]'"
     with pytest.raises(InputError, match=words):
         read_log(tmp_path / name)
 

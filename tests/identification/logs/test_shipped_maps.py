@@ -110,7 +110,7 @@ def test_stray_samples_are_dropped(read, stray, left):
         (
             "nanobench",
             {"pwr_pm_vbat": -1.0},
-            "pwr_pm_vbat, row 1 .*: -1 is negative; expected a v",
+            "pwr_pm_vbat, row 1 .* is -1; expected a v",
         ),
         ("nanobench", {"motor_motor_m2": np.nan}, "motor_motor_m2, row 1 .* is empty or NaN"),
         ("racer", {"quat_w": None}, "quat_w; expected those of a table of the racer"),
