@@ -323,7 +323,9 @@ class Evidence:
         """
         reading = Reading(*moves)
         if self._attitude is None:
-            return 0.0, 0.0, np.column_stack([self._felt, self._torques(reading)])
+            force = np.zeros(len(self._t)) if self._along is None else self._along
+            felt = self._compared(lambda p: p.slow(p.even(self._t, force[:, None])))
+            return 0.0, 0.0, np.column_stack([felt, self._torques(reading)])
         frames, axes = reading.frames, self._motion(*reading.attitude)[0]
         push = np.einsum("ij,njk,k->ni", frames.world, axes, frames.body[:, 2])
         force = self._acceleration @ frames.position.T * LENGTH_UNITS[reading.length]
@@ -369,12 +371,6 @@ class Evidence:
         horizontal, cost, _ = self._moved(*reading.moves)
         score = likelihood([horizontal, horizontal, vertical, *others]) - cost - reading.unlikely
         return Fit(horizontal, tuple(others), score)
-
-    @cached_property
-    def _felt(self) -> Array:
-        """Specific force (n,) in m/s2 along the body's z axis, as an accelerometer reads it."""
-        force = np.zeros(len(self._t)) if self._along is None else self._along
-        return self._compared(lambda p: p.slow(p.even(self._t, force[:, None])))[:, 0]
 
     def turns(self, reading: Reading) -> float:
         """Return the root mean square of roll and pitch rates in the band of turning, rad/s."""

@@ -15,6 +15,7 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from inspect import signature
 from pathlib import Path
 
 from ....runtime.errors import InputError, unknown_name
@@ -39,11 +40,11 @@ class Reader:
 
     name: str
     what: str  # a log of its form, in words
-    # of a path, or of a table where there is a signature; and of a vehicle, which may be None
+    # of a path, or of a table where there is a signature; of a vehicle, which may be None; and,
+    # where it takes one, of the option behind the name's colon
     read: Callable[..., FlightLog]
     signature: tuple[str, ...] = ()  # columns of a table
     begins: tuple[bytes, ...] = ()  # first bytes of a file
-    takes_option: bool = False  # ``read`` takes ``option``: the words behind the name's colon
 
 
 # maps of tables that are known by their columns
@@ -55,44 +56,18 @@ TABLES = {
     "racer": "racer",
 }
 READERS = {
-    reader.name: reader
-    for reader in (
-        Reader(
-            "crazyflie_sd",
-            "a Crazyflie's SD-card log",
-            crazyflie_sd.read,
-            begins=crazyflie_sd.BEGINS,
-        ),
-        Reader(
-            "betaflight",
-            "a blackbox of Betaflight or INAV",
-            betaflight.read,
-            begins=betaflight.BEGINS,
-            takes_option=True,
-        ),
-        Reader(
-            "betaflight_csv",
-            "a blackbox_decode table",
-            betaflight.read_table,
-            betaflight.SIGNATURE,
-            takes_option=True,
-        ),
-        Reader(
-            "ardupilot_bin",
-            "an ArduPilot log (DataFlash .BIN)",
-            ardupilot_bin.read,
-            begins=ardupilot_bin.BEGINS,
-        ),
-        Reader("px4_ulog", "a PX4 log (ULog)", px4_ulog.read, begins=px4_ulog.BEGINS),
-        Reader(
-            "rosbag",
-            "a ROS bag (ROS 1, SQLite or MCAP)",
-            rosbag.read,
-            begins=rosbag.BEGINS,
-            takes_option=True,
-        ),
+    name: Reader(name, module.WHAT, module.read, begins=module.BEGINS)
+    for name, module in (
+        ("crazyflie_sd", crazyflie_sd),
+        ("betaflight", betaflight),
+        ("ardupilot_bin", ardupilot_bin),
+        ("px4_ulog", px4_ulog),
+        ("rosbag", rosbag),
     )
 }
+READERS["betaflight_csv"] = Reader(
+    "betaflight_csv", "a blackbox_decode table", betaflight.read_table, betaflight.SIGNATURE
+)
 
 
 def find_reader(name: str) -> Reader:
@@ -112,7 +87,7 @@ def find_reader(name: str) -> Reader:
         raise unknown_name("reader", name, [*TABLES, *READERS])
     if not colon:
         return reader
-    if not reader.takes_option:
+    if "option" not in signature(reader.read).parameters:
         raise InputError(
             f"reader {name!r} takes no option, got {option!r}; expected the name alone"
         )

@@ -29,6 +29,7 @@ from ..rotor_orders import ORDERS, Order, order_words
 from ..streams import Stream
 from ..table import Array
 from .dataflash import BEGINS as BEGINS
+from .dataflash import WHAT as WHAT
 from .dataflash import Messages, read_dataflash
 
 Parameters = Mapping[str, float]
@@ -58,21 +59,19 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
     """
     log_map = recording_map("ardupilot")
     topics = {way.topic for name in log_map.sections for way in ways(log_map, name)}
-    log = read_dataflash(path, {*topics, "PARM"})
-    parameters = _parameters(log.messages.get("PARM"))
+    messages, skipped = read_dataflash(path, {*topics, "PARM"})
+    parameters = _parameters(messages.get("PARM"))
     log_map, notes = _with_parameters(path, log_map, parameters)
     columns = {*wanted_columns(log_map), *_PLACE}
     recorded = [
         samples
-        for name, messages in log.messages.items()
-        if name not in ("PARM", "ESC") and (samples := _samples(messages, columns)) is not None
+        for name, rows in messages.items()
+        if name not in ("PARM", "ESC") and (samples := _samples(rows, columns)) is not None
     ]
-    telemetry, telemetry_notes = _telemetry(log.messages.get("ESC"), parameters)
+    telemetry, telemetry_notes = _telemetry(messages.get("ESC"), parameters)
     notes += telemetry_notes
-    if log.skipped:
-        notes.append(
-            f"{log.skipped} bytes of the file belong to no message; it was cut or is damaged"
-        )
+    if skipped:
+        notes.append(f"{skipped} bytes of the file belong to no message; it was cut or is damaged")
     recording = recording_of(path, [*recorded, *telemetry], log_map, "ardupilot_bin", notes)
     return recording.log(vehicle)
 

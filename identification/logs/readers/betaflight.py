@@ -29,6 +29,7 @@ from ..map_fit import wanted_columns
 from ..mapped_log import recording_of
 from ..table import Array, Table
 from .blackbox import BEGINS as BEGINS
+from .blackbox import WHAT as WHAT
 from .blackbox import read_blackbox
 
 SIGNATURE = ("time (us)", "motor[0]", "motor[3]")

@@ -24,9 +24,8 @@ from .blackbox_frames import ENCODINGS, PREDICTORS, Layout, decode
 _START = b"H Product:Blackbox"
 BEGINS = (_START,)
 
-_WHAT = "a blackbox of Betaflight or INAV"
-_HEADERS = 2_000  # lines
-_LINE = 20_000  # bytes
+WHAT = "a blackbox of Betaflight or INAV"
+_HEADERS = re.compile(rb"(H [^\n]{0,20000}\n){0,2000}")
 _FRAMES = "IPSGH"
 
 
@@ -43,10 +42,10 @@ def read_blackbox(
         InputError: the file cannot be read, is no blackbox, is damaged from its start, or has no
             times.
     """
-    data = read_bytes(path, _WHAT, LIMITS.binary_log)
+    data = read_bytes(path, WHAT, LIMITS.binary_log)
     if not data.startswith(_START):
         raise InputError(
-            f"{path}: cannot be read as {_WHAT}: it does not begin with {_START.decode()!r}"
+            f"{path}: cannot be read as {WHAT}: it does not begin with {_START.decode()!r}"
         )
     starts = [match.start() for match in re.finditer(re.escape(_START), data)]
     ends = [*starts[1:], len(data)]
@@ -85,18 +84,13 @@ def _headers(path: Path, data: bytes, start: int, end: int) -> tuple[dict[str, s
     Raises:
         InputError: the headers do not end.
     """
-    headers: dict[str, str] = {}
-    place = start
-    for _ in range(_HEADERS):
-        if data[place : place + 2] != b"H ":
-            return headers, place
-        stop = data.find(b"\n", place, min(end, place + _LINE))
-        if stop < 0:
-            break
-        key, _, value = data[place + 2 : stop].decode("ascii", "replace").partition(":")
-        headers[key.strip()] = value.strip()
-        place = stop + 1
-    raise InputError(f"{path}: its headers do not end; expected frames behind them")
+    block = _HEADERS.match(data, start, end)
+    begin = start if block is None else block.end()
+    if data[begin : begin + 2] == b"H ":
+        raise InputError(f"{path}: its headers do not end; expected frames behind them")
+    lines = data[start:begin].decode("ascii", "replace").split("\n")
+    pairs = (line.removeprefix("H ").partition(":") for line in lines)
+    return {key.strip(): value.strip() for key, _, value in pairs}, begin
 
 
 def _layout(path: Path, headers: Mapping[str, str], names: list[str]) -> Layout:

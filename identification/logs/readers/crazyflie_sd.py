@@ -32,7 +32,7 @@ BEGINS = (b"\xbc\x01\x00", b"\xbc\x02\x00")
 
 Layout = np.dtype[Any]  # of one event: its number, time and variables
 
-_WHAT = "a Crazyflie's SD-card log"
+WHAT = "a Crazyflie's SD-card log"
 _START = re.compile(rb"\xbc([\x01\x02])\0(..)", re.DOTALL)
 _EVENT = re.compile(rb"(..)([^\0]{0,200})\0(..)", re.DOTALL)
 _VARIABLE = re.compile(rb"([^\0]{1,200})\(([bBhHiIqQefd])\)\0")
@@ -48,10 +48,10 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         InputError: the file cannot be read, is no such log, or lacks motors, or a pose and inertial
             sensors.
     """
-    data = read_bytes(path, _WHAT, LIMITS.binary_log)
+    data = read_bytes(path, WHAT, LIMITS.binary_log)
     version, kinds, begin = _header(path, data)
     found, end = _events(path, data, kinds, begin)
-    notes = [f"{_WHAT}, version {version}"]
+    notes = [f"{WHAT}, version {version}"]
     # behind the last event stands nothing, or the checksum (CRC-32) of all before
     if data[end:] not in (b"", zlib.crc32(data[:end]).to_bytes(4, "little")):
         notes.append(

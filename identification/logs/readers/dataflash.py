@@ -25,7 +25,7 @@ Bytes = NDArray[np.uint8]
 
 BEGINS = (b"\xa3\x95",)
 
-_WHAT = "an ArduPilot log (.BIN)"
+WHAT = "an ArduPilot log (DataFlash .BIN)"
 _FMT, _FMT_LENGTH = 128, 89
 _GATHERED = 10_000  # messages copied at a time
 # letters of columns: type, and what one unit of it is
@@ -75,22 +75,15 @@ class Messages:
         return Messages(self.name, self.rows[mask], self.units)
 
 
-@dataclass(frozen=True)
-class DataFlash:
-    """The messages of a log by the name of their type, and how many bytes belonged to none."""
-
-    messages: Mapping[str, Messages]
-    skipped: int
-
-
-def read_dataflash(path: Path, wanted: Collection[str]) -> DataFlash:
-    """Return the messages of the types that are wanted and there.
+def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messages], int]:
+    """Return the messages of the types that are wanted and there, by the names of these, and how
+    many bytes belong to no message.
 
     Raises:
         InputError: the file cannot be read, is no such log, or has more messages of a type than
             ``FileLimits.table_rows``.
     """
-    data = np.frombuffer(read_bytes(path, _WHAT, LIMITS.binary_log), np.uint8)
+    data = np.frombuffer(read_bytes(path, WHAT, LIMITS.binary_log), np.uint8)
     counts, nowhere = np.zeros(256, np.int64), np.empty(0, np.int64)
     used = _walk(data, counts, -1, nowhere)
 
@@ -111,8 +104,8 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> DataFlash:
         if count:
             found[name] = Messages(name, _rows(data, places(number, count), layout), units)
     if not kinds and not counts[_FMT]:
-        raise InputError(f"{path}: cannot be read as {_WHAT}: no FMT message; expected some")
-    return DataFlash(found, len(data) - int(used))
+        raise InputError(f"{path}: cannot be read as {WHAT}: no FMT message; expected some")
+    return found, len(data) - int(used)
 
 
 def _rows(data: Bytes, places: NDArray[np.int64], layout: np.dtype[Any]) -> NDArray[Any]:

@@ -39,7 +39,7 @@ Fields = Mapping[str, NDArray[Any]]
 
 BEGINS = (b"ULog\x01\x12\x35",)
 
-_WHAT = "a PX4 log (.ulg)"
+WHAT = "a PX4 log (ULog)"
 _FILTER = "vehicle_local_position"
 _SENSORS = (  # field of an inertial sensor, and that of what it gained over a time
     ("gyro_rad", "delta_angle"),
@@ -107,9 +107,9 @@ def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bo
 
     log_map = recording_map("px4")
     wanted = {way.topic for name in log_map.sections for way in ways(log_map, name)}
-    check_regular(path, _WHAT, LIMITS.ulog_file)
+    check_regular(path, WHAT, LIMITS.ulog_file)
     try:
-        with open_regular(path, _WHAT) as file:
+        with open_regular(path, WHAT) as file:
             # pyulog prints its doubts; the notes say them
             with redirect_stdout(io.StringIO()):
                 parsed = counting(Parser)(file, sorted(wanted))
@@ -117,7 +117,9 @@ def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bo
     except InputError:
         raise
     except Exception as error:  # whatever a parser makes of bytes that are no ULog
-        raise InputError(f"{path}: cannot be read as a ULog: {error}; expected {_WHAT}") from error
+        raise InputError(
+            f"{path}: cannot be read as a ULog: {error}; expected a PX4 log (.ulg)"
+        ) from error
     topics: dict[str, list[Fields]] = {}
     for data in parsed.data_list:
         if "timestamp" in data.data:

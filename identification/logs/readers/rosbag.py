@@ -54,6 +54,7 @@ from .topic_choice import chosen_topics
 from .topic_map import Topic, joined, topic_map
 from .unpacking import check_bag_files, limited_unpacking
 
+WHAT = "a ROS bag (ROS 1, SQLite or MCAP)"
 SUFFIXES = (".bag", ".db3", ".mcap")
 _ROS1 = b"#ROSBAG V2.0"
 BEGINS = (_ROS1, b"\x89MCAP0\r\n", b"SQLite format 3\0")

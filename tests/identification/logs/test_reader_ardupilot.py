@@ -160,7 +160,7 @@ def test_pymavlink_reads_the_same_numbers():
     dfreader = pytest.importorskip("pymavlink.DFReader", reason="pip install pymavlink")
     path = data_file("ardupilot/backend_log_80k.BIN")
     wanted = ("IMU", "ATT", "XKF1", "XKQ", "RCOU", "BAT", "POS")
-    ours = read_dataflash(path, wanted).messages
+    ours, _ = read_dataflash(path, wanted)
     reader = dfreader.DFReader_binary(str(path))
     theirs: dict[str, list[object]] = {name: [] for name in wanted}
     while (message := reader.recv_msg()) is not None:
