@@ -166,16 +166,18 @@ def _lines(path: Path) -> Iterator[str]:
     file: BinaryIO = open_regular(path, WHAT)
     if path.name.lower().endswith(".gz"):
         file = cast(BinaryIO, io.BufferedReader(Gunzip(file, path, LIMITS.table_text), _BUFFER))
-    size = number = 0
+    size, number, most = 0, 0, LIMITS.table_rows + _LINES
     try:
         with io.TextIOWrapper(file, "utf-8-sig", _LATIN) as text:
             while line := text.readline(LIMITS.table_line + 1):
                 size, number = size + len(line), number + 1
                 if "\0" in line:
                     raise InputError(f"{path}: not a text file (it holds zero bytes); expected CSV")
-                check_count(path, len(line), LIMITS.table_line, f"in line {number}")
-                check_count(path, size, LIMITS.table_text, "characters of text")
-                check_count(path, number - _LINES, LIMITS.table_rows, "rows")
+                # asked before it is said: a table may have millions of lines
+                if len(line) > LIMITS.table_line or size > LIMITS.table_text or number > most:
+                    check_count(path, len(line), LIMITS.table_line, f"in line {number}")
+                    check_count(path, size, LIMITS.table_text, "characters of text")
+                    check_count(path, number - _LINES, LIMITS.table_rows, "rows")
                 yield line.rstrip("\n")
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"{path}: cannot be read as {WHAT}: {error}") from error
