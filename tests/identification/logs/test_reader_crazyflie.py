@@ -107,20 +107,11 @@ def test_a_log_that_was_cut_or_spoiled(write):
     ("data", "expected"),
     [
         (b"\xbc\x02\x00", "byte 0 of its header: expected bc"),
-        (
-            b"\xbc\x02\x00\x01\x00\xff\xff" + b"a" * 300,
-            "byte 5 .* expected an event's number",
-        ),
-        (
-            b"\xbc\x02\x00\x01\x00\xff\xffa\0\x01\x00x(s)\0",
-            "byte 11 .* the letter of its type, one of b B",
-        ),
+        (b"\xbc\x02\x00\x01\x00\xff\xff" + b"a" * 300, "byte 5 .* expected an event's number"),
+        (b"\xbc\x02\x00\x01\x00\xff\xffa\0\x01\x00x(s)\0", "byte 11 .* type, one of b B"),
         (b"\xbc\x02\x00\x01\x00\xff\xffa\0\x02\x00x(f)\0x(f)\0", "stands there twice"),
         (b"\xbc\x02\x00\x00\x00", "no event twice; expected at least two samples"),
-        (
-            b"\xbc\x02\x00\xff\xff" + b"\0" * 9,
-            "stands there twice|expected an event",
-        ),
+        (b"\xbc\x02\x00\xff\xff" + b"\0" * 9, "stands there twice|expected an event"),
         (sd_card({"imu": (T[:1], fast(T[:1]))}), "no event twice"),
         (
             sd_card({"pose": (SLOW, slow(SLOW))}),
