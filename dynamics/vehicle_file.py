@@ -1,7 +1,5 @@
 """Vehicles as YAML files: the presets in ``vehicles/`` and a user's own."""
 
-import math
-from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
@@ -15,8 +13,6 @@ from ..runtime.whole_files import replaced
 from ..runtime.yaml_file import parse_yaml, read_yaml
 from .effects import check_setting
 from .vehicle import Vehicle
-
-_ROTOR_STEPS = 255  # an 8-bit rotor speed
 
 
 def preset_names() -> list[str]:
@@ -70,8 +66,6 @@ def _vehicle(data: object, where: str) -> Vehicle:
     vehicle = checked(Vehicle, data, where, "mass and inertia")
     if not vehicle.floor_z < vehicle.ceiling_z:
         raise InputError(f"{where}: floor_z must lie below ceiling_z")
-    if math.isinf(vehicle.omega_max) and vehicle.omega_lsb > 0.0:
-        vehicle = replace(vehicle, omega_max=_ROTOR_STEPS * vehicle.omega_lsb)
     # a row is zero where all rotors stand in one line
     length = np.linalg.norm(vehicle.mixing, axis=1, keepdims=True)
     if np.any(length == 0.0) or np.linalg.cond(vehicle.mixing / length) > 1e6:

@@ -219,6 +219,8 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
             f"({len(above)} such value(s)), faster than {vehicle.name} turns its rotors; expected "
             f"at most {most:.4g} rad/s"
         )
+        if (speeds > most).all(axis=0).any():
+            yield Refused(found)
         yield Needed(found)
         yield Fault(f"{found}. They were interpolated")
 

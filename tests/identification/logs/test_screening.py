@@ -308,6 +308,12 @@ def test_rotors_that_stop_or_race_are_named():
         with pytest.raises(InputError, match=words):
             screen_log(spoiled, VEHICLE)
     assert checked.rotor_speeds.max() < 1.5 * log.rotor_speeds.max()
+    slower = replace(
+        VEHICLE,
+        omega_max=0.5 * float(log.rotor_speeds.min(initial=1e3, where=log.rotor_speeds > 0.0)),
+    )
+    with pytest.raises(InputError, match="faster than ardrone2 turns its rotors"):
+        screen_for_estimate(log, slower)  # nothing is left to interpolate from
 
 
 def test_another_vehicle_than_the_log_names_is_doubted():

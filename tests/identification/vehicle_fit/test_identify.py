@@ -1,9 +1,11 @@
 """Vehicles identified from nothing but mass and logs."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfiltfilt
 
 from tests.identification.vehicle_fit.flown import (
     ARM,
@@ -11,16 +13,25 @@ from tests.identification.vehicle_fit.flown import (
     INERTIA,
     MASS,
     REACH,
+    SPIN,
     K,
+    X,
+    Y,
     inertial_flights,
 )
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.dynamics.vehicle_file import dump_vehicle, parse_vehicle
 from windwrench.envs.recording import record_flight
+from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.logs.screening import screen_log
+from windwrench.identification.vehicle_fit.channels import MotionPiece, Sources
+from windwrench.identification.vehicle_fit.columns import Drive
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
 from windwrench.identification.vehicle_fit.identify import identify
+from windwrench.identification.vehicle_fit.parameters import first_model
+from windwrench.identification.wrench_series import estimate_log
 from windwrench.runtime.errors import InputError
 
 
@@ -65,6 +76,21 @@ def test_commanded_speeds_show_the_vehicle_and_its_lag(crazyflie, commanded):
     assert again.omega_source == "commanded"
 
 
+def test_a_vehicle_of_rounded_speeds_reads_the_log_that_it_comes_from(crazyflie):
+    """Its file states the step of the speeds and no fastest one: 255 steps are no limit."""
+    step = 3.490658
+    log = plant_flight(crazyflie, trajectory="shake")
+    log = replace(log, rotor_speeds=step * np.round(log.rotor_speeds / step))
+    assert np.median(log.rotor_speeds) > 1.5 * 255 * step
+    found = identify([log], crazyflie.mass, parse_geometry(str(crazyflie.arm_l)))
+    again = parse_vehicle(dump_vehicle(found.vehicle))
+    assert again.omega_lsb == pytest.approx(step)
+    assert not any("reads" in note for note in screen_log(log, again))
+    force = estimate_log(log, again).force
+    assert np.abs(np.mean(force[len(force) // 2 :], axis=0)).max() < 0.02 * again.weight
+    assert diagnose([log], again).declared.omega_lsb == again.omega_lsb
+
+
 def test_a_hover_does_not_show_what_it_does_not_excite(crazyflie):
     hover = [plant_flight(crazyflie, trajectory="hover", seconds=12.0)]
     found = identify(hover, crazyflie.mass, parse_geometry(str(crazyflie.arm_l)))
@@ -106,6 +132,44 @@ def test_rotors_in_another_order_are_refused(inertial):
     wrong = replace(log, command=log.command[:, [3, 2, 1, 0]])
     with pytest.raises(InputError, match="roll turns against"):
         identify([wrong], MASS, parse_geometry(str(ARM)))
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_turning_is_compared_with_torque_at_its_own_delay(sense):
+    """60 ms of 4 to 7 Hz are more than a quarter of a turn: at no delay all looks opposed."""
+    rng, period, late = np.random.default_rng(3), 0.01, 6
+    n, hover = 3000, np.sqrt(MASS * 9.81 / (4 * K))
+    band = butter(2, [8.0 * period, 14.0 * period], btype="bandpass", output="sos")
+    turn = sosfiltfilt(band, rng.standard_normal((n, 3)), axis=0) * [3.0, 3.0, 1.0]
+    mixing = np.array([Y, -X, -REACH * SPIN])
+    square = hover**2 + np.linalg.pinv(mixing) @ (INERTIA @ np.roll(turn, -late, axis=0).T) / K
+    square = np.maximum(square.T, 0.0)
+    still, force = np.zeros((n, 3)), np.zeros((n, 3))
+    force[:, 2] = K / MASS * square.sum(axis=1)
+    piece = MotionPiece(
+        0,
+        period * np.arange(n),
+        period,
+        force,
+        turn,
+        period * sense * np.cumsum(turn, axis=0),
+        still,
+        np.sqrt(square),
+        None,
+        None,
+    )
+    drive = Drive(parse_geometry(str(ARM)).positions, SPIN)
+    sources = Sources("accelerometer", "gyro", "rotor speeds", True)
+    asked = partial(first_model, [piece], sources, drive, MASS, 9.81, ("delay",))
+    if sense < 0.0:
+        with pytest.raises(InputError, match="roll turns against"):
+            asked()
+        return
+    model, start, _, turned = asked()
+    values = model.values(start)
+    assert not turned
+    assert values["Jx"] == pytest.approx(INERTIA[0, 0], rel=0.2)
+    assert values["Jy"] == pytest.approx(INERTIA[1, 1], rel=0.2)
 
 
 def test_rotors_that_turn_the_other_way_are_recognised(inertial):
