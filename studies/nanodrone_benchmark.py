@@ -1,0 +1,549 @@
+"""Flights of a small quadrotor predicted half a second ahead by named coefficients.
+
+The task is that of *Nonlinear System Identification for a Nano-drone Benchmark* (Control
+Engineering Practice 172, 2026): from the state at a sample and the rotor speeds that follow, 50
+steps of 10 ms. Its score is the mean over starts of the error's norm at each step, summed over the
+steps.
+
+The model: thrust, drag of turning rotors, inflow and translational lift; torque of rotors over
+inertia, and a moment proportional to velocity (flapping). Two facts of these logs have names of
+their own. The onboard filter states a horizontal velocity that is larger than the way it goes.
+And the flights are closed loops: moments that nothing measures are answered by the rotors, so that
+only a share of what rotors and velocity make turns the vehicle. That share, and the loop's damping
+and stiffness, are one part, ``reacts``, which can be switched off.
+"""
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from windwrench.dynamics.rotation import quaternion_to_matrix, turn_body
+from windwrench.identification.logs.tables import open_table
+from windwrench.identification.motion.smoothing import runs_of
+from windwrench.runtime.compiled import compiled
+from windwrench.runtime.errors import InputError
+from windwrench.runtime.page_files import write_json
+from windwrench.studies.kept_results import DOCS
+from windwrench.studies.runner import start
+
+Array = NDArray[np.float64]
+
+STEP, STEPS = 0.01, 50  # s, and how many a prediction has
+PAST = 20  # samples, of the option that knows them
+MASS, ARM, GRAVITY = 0.045, 0.0353, 9.81  # kg, m, m/s2: as the benchmark states them
+PUBLISHED_THRUST = 3.72e-8  # N/(rad/s)^2, the benchmark's own
+_POLE_PAIRS = 6
+_FASTEST = 4000.0  # rad/s: three samples of these logs are far above it, and broken
+_ALOFT = 0.3  # m
+_FRONT = np.array([1.0, -1.0, -1.0, 1.0])  # front-left, rear-left, rear-right, front-right
+_LEFT = np.array([1.0, 1.0, -1.0, -1.0])
+_SPIN = np.array([-1.0, 1.0, -1.0, 1.0])
+_BAND = (3.0, 15.0)  # Hz: torque alone turns the vehicle there; below, the loop answers
+_CLOCKS = np.arange(-0.04, 0.0401, 0.001)  # s, tried
+QUANTITIES = ("position", "velocity", "attitude", "rate")
+# of each quantity's error where the state stays as it is: the fit weighs them alike
+_SIZES = np.array([0.24, 0.6, 0.12, 0.7])
+_WEIGHTS = np.array([0.3, 1.0, 1.0, 1.0])
+
+
+class Numbers(NamedTuple):
+    """The coefficients, as ``COEFFICIENTS`` describes them."""
+
+    thrust: float = PUBLISHED_THRUST
+    rotor_drag: float = 2.5e-6
+    inflow: float = 3.1e-6
+    lift: float = 3.3e-3
+    velocity_scale: float = 0.91
+    inertia: float = 3.5e-5
+    flapping: float = 1.1e-7
+    reaction_torque: float = 8.0
+    unmeasured_moment: float = 26.0
+    damping: float = 4.0
+    damping_excited: float = -3.5
+    stiffness: float = 20.0
+    never_answered: float = 1.4
+    yaw_damping: float = 3.9
+    heading_stiffness: float = 7.0
+    force_share: float = 0.0
+    force_memory: float = 0.3
+    moment_share: float = 0.0
+    moment_memory: float = 0.3
+
+
+COEFFICIENTS: Mapping[str, tuple[str, str]] = {
+    "thrust": ("N/(rad/s)^2", "thrust of a rotor"),
+    "rotor_drag": ("N/(rad/s m/s)", "drag of a rotor along body x and y"),
+    "inflow": ("N/(rad/s m/s)", "loss of a rotor's thrust in a climb"),
+    "lift": ("N/(m/s)^2", "translational lift"),
+    "velocity_scale": ("1", "way gone over the horizontal velocity that the filter states"),
+    "inertia": ("kg m2", "about x and y; from 3 to 15 Hz, before the fit"),
+    "flapping": ("Nm/(rad/s m/s)", "moment of a rotor's velocity"),
+    "reaction_torque": ("1/(kg m)", "reaction torque over thrust and inertia about z"),
+    "unmeasured_moment": ("rad/s2", "reaction: moments that the rotors answer, rms"),
+    "damping": ("1/s", "reaction: damping of roll and pitch"),
+    "damping_excited": ("1/s", "reaction: what damping gains where all moments are measured"),
+    "stiffness": ("1/s2", "reaction: stiffness towards level, the same"),
+    "never_answered": ("rad/s2/(m/s)", "reaction: moment of velocity that no rotor answers"),
+    "yaw_damping": ("1/s", "reaction: damping of yaw"),
+    "heading_stiffness": ("1/s2", "reaction: stiffness towards heading 0"),
+    "force_share": ("1", "past: share of the force left over in 0.2 s"),
+    "force_memory": ("s", "past: the time in which it decays"),
+    "moment_share": ("1", "past: share of the moment left over"),
+    "moment_memory": ("s", "past: the time in which it decays"),
+}
+PAST_NAMES = tuple(name for name in COEFFICIENTS if name.endswith(("_share", "_memory")))
+FITTED = tuple(name for name in COEFFICIENTS if name not in ("inertia", *PAST_NAMES))
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """One flight in the air, n samples."""
+
+    name: str
+    path: str  # the benchmark's word for what was flown
+    states: Array  # (n, 13) position, velocity, quaternion body to world, body rate
+    speeds: Array  # (n, 4) rad/s
+    clock: float  # s, by which motion comes behind the logged rotor speeds
+
+
+class Starts(NamedTuple):
+    """m starts: where they begin, what the rotors do, and what came."""
+
+    flight: NDArray[np.intp]  # (m,)
+    states: Array  # (m, 13)
+    speeds: Array  # (m, STEPS + 1, 4) at the start and each step
+    truth: Array  # (m, STEPS, 13)
+    left: Array  # (m, 6) force (m/s2, world) and moment (rad/s2, body) left over before; or 0
+
+
+def read_flight(path: Path) -> Flight:
+    """Return the longest stretch of a file above 0.3 m; broken rotor speeds are interpolated.
+
+    Raises:
+        InputError: a column is missing, or nothing flies for 5 s.
+    """
+    names = ("x y z vx vy vz qw qx qy qz wx wy wz", "m4_erpm m3_erpm m2_erpm m1_erpm")
+    motion, rotors = (text.split() for text in names)
+    table = open_table(path).read([*motion, *rotors])
+    states = np.column_stack([table[name] for name in motion])
+    turn = 2.0 * math.pi / 60.0 / _POLE_PAIRS
+    speeds = turn * np.column_stack([table[name] for name in rotors])
+    rows = np.arange(len(speeds))
+    for column in speeds.T:
+        sound = column < _FASTEST  # False where there is no number
+        column[:] = np.interp(rows, rows[sound], column[sound])
+    first, last = max(
+        runs_of(states[:, 2] > _ALOFT), key=lambda run: run[1] - run[0], default=(0, 0)
+    )
+    if (last - first) * STEP < 5.0:
+        raise InputError(f"{path}: flies {(last - first) * STEP:.3g} s; expected at least 5 s")
+    states, speeds = states[first:last], speeds[first:last]
+    clock = _best_delay(_torques(speeds), np.gradient(states[:, 10:12], STEP, axis=0))
+    return Flight(path.stem, path.stem.split("_")[0], states, speeds, clock)
+
+
+def _torques(speeds: Array) -> Array:
+    """Return roll and pitch torque (n, 2) in Nm, at the published thrust."""
+    thrust = PUBLISHED_THRUST * np.square(speeds)
+    return np.column_stack([thrust @ (ARM * _LEFT), thrust @ (-ARM * _FRONT)])
+
+
+def _quick(x: Array) -> Array:
+    sections = butter(3, [2.0 * STEP * f for f in _BAND], btype="bandpass", output="sos")
+    return np.asarray(sosfiltfilt(sections, x, axis=0))
+
+
+def _delayed(x: Array, delay: float) -> Array:
+    turn = np.exp(-2j * math.pi * np.fft.rfftfreq(len(x), STEP) * delay)
+    return np.fft.irfft(np.fft.rfft(x, axis=0) * turn[:, None], len(x), axis=0)
+
+
+def _best_delay(torque: Array, turning: Array) -> float:
+    """Return the delay (s) of torque at which turning follows it best from 3 to 15 Hz."""
+    torque, turning = _quick(torque), _quick(turning)
+    alike = [float(np.sum(_delayed(torque, delay) * turning)) for delay in _CLOCKS]
+    return float(_CLOCKS[int(np.argmax(alike))])
+
+
+def quick_inertia(flights: Sequence[Flight]) -> float:
+    """Return the inertia (kg m2) that torque shows from 3 to 15 Hz, where no loop answers: both are
+    noisy, so that it is the ratio of their sizes (the reduced major axis).
+    """
+    torques = turnings = 0.0
+    for flight in flights:
+        torque = _delayed(_quick(_torques(flight.speeds)), flight.clock)
+        turning = _quick(np.gradient(flight.states[:, 10:12], STEP, axis=0))
+        torques += float(np.sum(np.square(torque)))
+        turnings += float(np.sum(np.square(turning)))
+    return math.sqrt(torques / turnings)
+
+
+@compiled
+def _predict(
+    c: Numbers, starts: Array, speeds: Array, left: Array, reacts: float, each: int, out: Array
+) -> None:
+    """Write the states (m, steps, 13) that follow into ``out``, in steps of ``each`` samples."""
+    steps, dt = out.shape[1], STEP * each
+    turning, thrust, total = np.empty((steps, 3)), np.empty(steps), np.empty(steps)
+    r, q, middle = np.empty((3, 3)), np.empty(4), np.empty(4)
+    vb, force, accel, w = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for s in range(len(starts)):
+        x = starts[s].copy()
+        for h in range(steps):
+            thrust[h], total[h], turning[h, :] = 0.0, 0.0, 0.0
+            for i in range(4):
+                mean = 0.0
+                for k in range(h * each, (h + 1) * each):
+                    mean += 0.5 * (speeds[s, k, i] + speeds[s, k + 1, i]) / each
+                one = c.thrust * mean * mean
+                thrust[h] += one
+                total[h] += mean
+                turning[h, 0] += one * ARM * _LEFT[i] / c.inertia
+                turning[h, 1] -= one * ARM * _FRONT[i] / c.inertia
+                turning[h, 2] -= one * _SPIN[i] * c.reaction_torque
+        sx, sy = 1.0, 1.0
+        for h in range(steps):
+            q[:] = x[6:10]
+            quaternion_to_matrix(q, r)
+            for i in range(3):
+                vb[i] = r[0, i] * x[3] + r[1, i] * x[4] + r[2, i] * x[5]
+            flap = c.flapping * total[h] / c.inertia
+            w[0], w[1], w[2] = (
+                turning[h, 0] + flap * vb[1],
+                turning[h, 1] - flap * vb[0],
+                turning[h, 2],
+            )
+            if reacts > 0.0:
+                if h == 0:  # how strong the measured moments are against those that are not
+                    a, b = 0.0, 0.0
+                    for k in range(steps):
+                        a += (turning[k, 0] + flap * vb[1]) ** 2 / steps
+                        b += (turning[k, 1] - flap * vb[0]) ** 2 / steps
+                    sx, sy = a / (a + c.unmeasured_moment**2), b / (b + c.unmeasured_moment**2)
+                w[0] = sx * (w[0] - c.stiffness * r[2, 1]) + c.never_answered * vb[1]
+                w[1] = sy * (w[1] + c.stiffness * r[2, 0]) - c.never_answered * vb[0]
+                w[0] -= (c.damping + sx * c.damping_excited) * x[10]
+                w[1] -= (c.damping + sy * c.damping_excited) * x[11]
+                w[2] -= c.heading_stiffness * math.atan2(r[1, 0], r[0, 0]) + c.yaw_damping * x[12]
+            keep = c.moment_share * math.exp(-(h + 0.5) * dt / c.moment_memory)
+            for i in range(3):
+                w[i] += keep * left[s, 3 + i]
+            force[0] = -c.rotor_drag * total[h] * vb[0] / MASS
+            force[1] = -c.rotor_drag * total[h] * vb[1] / MASS
+            force[2] = thrust[h] - c.inflow * total[h] * vb[2] + c.lift * (vb[0] ** 2 + vb[1] ** 2)
+            force[2] /= MASS
+            turn_body(
+                q,
+                x[10] + 0.25 * dt * w[0],
+                x[11] + 0.25 * dt * w[1],
+                x[12] + 0.25 * dt * w[2],
+                0.5 * dt,
+                middle,
+            )
+            quaternion_to_matrix(middle, r)
+            keep = c.force_share * math.exp(-(h + 0.5) * dt / c.force_memory)
+            for i in range(3):
+                accel[i] = keep * left[s, i]
+                for k in range(3):
+                    accel[i] += r[i, k] * force[k]
+            accel[2] -= GRAVITY
+            for i in range(3):
+                scale = c.velocity_scale if i < 2 else 1.0
+                x[i] += scale * dt * (x[3 + i] + 0.5 * dt * accel[i])
+                x[3 + i] += dt * accel[i]
+            turn_body(
+                q,
+                x[10] + 0.5 * dt * w[0],
+                x[11] + 0.5 * dt * w[1],
+                x[12] + 0.5 * dt * w[2],
+                dt,
+                middle,
+            )
+            x[6:10] = middle
+            for i in range(3):
+                x[10 + i] += dt * w[i]
+            out[s, h] = x
+
+
+def predicted(c: Numbers, starts: Starts, reacts: bool = True, each: int = 1) -> Array:
+    """Return the states (m, STEPS / each, 13) that the model predicts.
+
+    Args:
+        c: the coefficients.
+        starts: m of them.
+        reacts: with the closed loop's reaction.
+        each: samples in a step of the integration.
+    """
+    out = np.empty((len(starts.states), STEPS // each, 13))
+    _predict(c, starts.states, starts.speeds, starts.left, float(reacts), each, out)
+    return out
+
+
+def errors(path: Array, truth: Array) -> Array:
+    """Return the errors (m, steps, 4, 3) of ``QUANTITIES``; attitude as a rotation vector (rad)."""
+    out = np.subtract(
+        path[..., [0, 1, 2, 3, 4, 5, 10, 11, 12, 10, 11, 12]],
+        truth[..., [0, 1, 2, 3, 4, 5, 10, 11, 12, 10, 11, 12]],
+    )
+    (aw, av), (bw, bv) = ((q[..., :1], q[..., 1:]) for q in (truth[..., 6:10], path[..., 6:10]))
+    sign = np.sign(aw * bw + np.sum(av * bv, axis=-1, keepdims=True))
+    out[..., 6:9] = 2.0 * sign * (aw * bv - bw * av - np.cross(av, bv))
+    return out.reshape(*out.shape[:2], 4, 3)
+
+
+def score(path: Array, truth: Array) -> Array:
+    """Return the benchmark's score (4,): mean norms at each step, summed over the steps."""
+    norms = np.linalg.norm(errors(path, truth), axis=-1)
+    norms[..., 2] = 2.0 * np.arcsin(np.minimum(0.5 * norms[..., 2], 1.0))
+    return np.asarray(norms.mean(axis=0).sum(axis=0))
+
+
+def starts_of(
+    flights: Sequence[Flight], every: int, clock: float | None = None, past: Numbers | None = None
+) -> Starts:
+    """Return the starts of flights.
+
+    Args:
+        flights: the flights.
+        every: samples from start to start.
+        clock: s, by which motion comes behind rotor speeds; None: each flight's own. No rotor speed
+            from before a start is used.
+        past: coefficients that predict the 0.2 s before each start, whose errors are left over.
+    """
+    parts = []
+    for number, flight in enumerate(flights):
+        first = np.arange(PAST, len(flight.states) - STEPS, every)
+        rows = first[:, None] + np.arange(STEPS + 1)
+        late = (flight.clock if clock is None else clock) / STEP
+        left = np.zeros((len(first), 6))
+        if past is not None:
+            before = Starts(
+                np.zeros(len(first), np.intp),
+                flight.states[first - PAST],
+                _speeds(flight, rows - PAST, late),
+                flight.states[rows[:, 1:] - PAST],
+                left,
+            )
+            off = before.truth[:, PAST - 1] - predicted(past, before)[:, PAST - 1]
+            left = off[:, [3, 4, 5, 10, 11, 12]] / (PAST * STEP)
+        truth = flight.states[rows[:, 1:]]
+        speeds = _speeds(flight, rows, late)
+        parts.append((np.full(len(first), number), flight.states[first], speeds, truth, left))
+    return Starts(*(np.concatenate(x) for x in zip(*parts, strict=True)))
+
+
+def _speeds(flight: Flight, rows: NDArray[np.intp], late: float) -> Array:
+    """Return rotor speeds (m, STEPS + 1, 4) ``late`` samples before rows, held before the first."""
+    at = np.maximum(rows - late, rows[:, :1])
+    low = np.clip(np.floor(at).astype(np.intp), 0, len(flight.speeds) - 2)
+    share = (at - low)[..., None]
+    return (1.0 - share) * flight.speeds[low] + share * flight.speeds[low + 1]
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Coefficients that predict best, and what each flight says of the fitted ones."""
+
+    numbers: Numbers
+    names: tuple[str, ...]
+    steps: Array  # (p,) of each in its own unit: a unit of the two below
+    gradients: Array  # (flights, p)
+    grams: Array  # (flights, p, p)
+
+    def deviations(self, draws: int = 1000) -> dict[str, float]:
+        """Return standard deviations over drawn flights, by one step from here for each draw."""
+        rng, count = np.random.default_rng(0), len(self.grams)
+        weights = rng.multinomial(count, np.full(count, 1.0 / count), draws)
+        moved = [
+            np.linalg.solve(np.tensordot(w, self.grams, 1), w @ self.gradients) for w in weights
+        ]
+        return dict(zip(self.names, (np.std(moved, axis=0) * self.steps).tolist(), strict=True))
+
+
+def fit(
+    starts: Starts, names: Sequence[str], begin: Numbers, each: int = 2, rounds: int = 15
+) -> Fit:
+    """Return the coefficients that predict all steps best, by damped Gauss-Newton.
+
+    Errors count by their norm, not its square, as the score counts them: each norm is weighted by
+    its inverse (at least half of the median's) in turn.
+
+    Args:
+        starts: of training flights.
+        names: of the coefficients that are fitted.
+        begin: where the fit starts; the others stay there.
+        each: samples in a step of the integration.
+        rounds: at most.
+    """
+    truth = starts.truth[:, each - 1 :: each]
+    flights = [starts.flight == number for number in np.unique(starts.flight)]
+    here, damping = begin, 1e-3
+    units = np.array([abs(getattr(Numbers(), name)) or 1.0 for name in names])
+
+    def moved(step: Array) -> Numbers:
+        return here._replace(
+            **{n: getattr(here, n) + float(x) for n, x in zip(names, step * units, strict=True)}
+        )
+
+    def off(numbers: Numbers) -> tuple[Array, Array, float]:
+        e = errors(predicted(numbers, starts, each=each), truth) / _SIZES[:, None]
+        norms = np.linalg.norm(e, axis=-1)
+        return e, norms, float(np.mean(norms @ _WEIGHTS))
+
+    e, norms, loss = off(here)
+    for _ in range(rounds):
+        least = 0.5 * np.median(norms, axis=0)
+        root = np.sqrt(_WEIGHTS / np.maximum(norms, least))[..., None]
+        nothing = np.eye(len(names))
+        slopes = np.array([root * (off(moved(1e-3 * row))[0] - e) / 1e-3 for row in nothing])
+        residual = root * e
+        grams = np.array([np.tensordot(s := slopes[:, f], s, ((1, 2, 3, 4),) * 2) for f in flights])
+        gradients = np.array([np.tensordot(slopes[:, f], residual[f], 4) for f in flights])
+        gram, before = grams.sum(axis=0), loss
+        for _ in range(6):
+            damped = gram + damping * np.diag(np.diag(gram))
+            tried = moved(-np.linalg.solve(damped, gradients.sum(axis=0)))
+            found = off(tried)
+            if found[2] < loss:
+                here, (e, norms, loss), damping = tried, found, max(damping / 6.0, 1e-6)
+                break
+            damping *= 8.0
+        if before - loss < 1e-4 * before:
+            break
+    return Fit(here, tuple(names), units, gradients, grams)
+
+
+def train(flights: Sequence[Flight], begin: Numbers | None = None) -> Fit:
+    """Return the fit to flights from the state at the sample: inertia first, then the others."""
+    begin = (begin or Numbers())._replace(inertia=quick_inertia(flights))
+    return fit(starts_of(flights, 60), FITTED, begin)
+
+
+def train_past(flights: Sequence[Flight], known: Numbers) -> Fit:
+    """Return the fit of what the 0.2 s before a start add."""
+    begin = known._replace(force_share=0.5, moment_share=0.5)
+    return fit(starts_of(flights, 60, past=known), PAST_NAMES, begin)
+
+
+def stays(starts: Starts) -> Array:
+    """Return the states (m, STEPS, 13) if nothing changed but the attitude, which turns on."""
+    out = np.repeat(starts.states[:, None], STEPS, axis=1)
+    for s, x in enumerate(starts.states):
+        for h in range(STEPS):
+            turn_body(x[6:10], x[10], x[11], x[12], (h + 1) * STEP, out[s, h, 6:10])
+    return out
+
+
+def published(starts: Starts) -> Array:
+    """Return what the published thrust and mass predict if the rate stays as it is."""
+    still = Numbers()._replace(
+        rotor_drag=0.0,
+        inflow=0.0,
+        lift=0.0,
+        velocity_scale=1.0,
+        inertia=1e9,
+        flapping=0.0,
+        reaction_torque=0.0,
+    )
+    return predicted(still, starts, reacts=False)
+
+
+def judged(flights: Sequence[Flight], known: Fit, past: Fit, clock: float) -> list[dict[str, Any]]:
+    """Return the scores of flights that a fit has not seen.
+
+    Args:
+        flights: the flights.
+        known: the fit from the state at the sample.
+        past: what the past adds.
+        clock: s, of training flights.
+    """
+    rows = []
+    for flight in flights:
+        plain, own = starts_of([flight], 2, clock), starts_of([flight], 2)
+        before = starts_of([flight], 2, clock, known.numbers)
+        ways = {
+            "stays": stays(plain),
+            "published thrust, rate stays": published(plain),
+            "reaction off": predicted(known.numbers, plain, reacts=False),
+            "from the sample": predicted(known.numbers, plain),
+            "from the sample, the flight's own clock": predicted(known.numbers, own),
+            "with 0.2 s of past": predicted(past.numbers, before),
+        }
+        scores = {way: score(path, plain.truth).tolist() for way, path in ways.items()}
+        rows.append({"flight": flight.name, "path": flight.path, "scores": scores})
+    return rows
+
+
+def table(rows: Sequence[Mapping[str, Any]], draws: int = 2000) -> list[dict[str, Any]]:
+    """Return each way's mean scores over flights, with 95 % intervals of drawn flights."""
+    rng, out = np.random.default_rng(0), []
+    for way in rows[0]["scores"]:
+        values = np.array([row["scores"][way] for row in rows])
+        drawn = values[rng.integers(0, len(values), (draws, len(values)))].mean(axis=1)
+        low, high = np.quantile(drawn, (0.025, 0.975), axis=0)
+        means = values.mean(axis=0)
+        out.append({"way": way, "mean": means.tolist(), "low": low.tolist(), "high": high.tolist()})
+    return out
+
+
+def study(
+    data: Annotated[Path, typer.Option(help="Folder of the 13 training flights.")] = Path(
+        "../shared/data/idsia"
+    ),
+    test: Annotated[list[Path] | None, typer.Option(help="Other flights to predict.")] = None,
+    out: Annotated[Path, typer.Option(help="Results file.")] = DOCS / "identify" / "nanodrone.json",
+) -> None:
+    """Fit on the training flights, and predict each path from the others."""
+    paths = sorted(data.glob("*.parquet"))
+    if not paths:
+        print(f"{data}: no flights (*.parquet); skipped")
+        return
+    flights = [read_flight(path) for path in paths]
+    begun = time.process_time()
+    known = train(flights)
+    past = train_past(flights, known.numbers)
+    seconds, clock = time.process_time() - begun, float(np.mean([f.clock for f in flights]))
+    spread = known.deviations() | past.deviations()
+    coefficients = [
+        {
+            "name": name,
+            "value": getattr(past.numbers, name),
+            "std": spread.get(name),
+            "unit": unit,
+            "what": what,
+        }
+        for name, (unit, what) in COEFFICIENTS.items()
+    ]
+    result: dict[str, Any] = {"coefficients": coefficients, "clock_s": clock, "fit_s": seconds}
+    rows = []
+    for path in dict.fromkeys(f.path for f in flights):
+        seen = [f for f in flights if f.path != path]
+        fold = train(seen, known.numbers)
+        late = float(np.mean([f.clock for f in seen]))
+        held = [f for f in flights if f.path == path]
+        rows += judged(held, fold, train_past(seen, fold.numbers), late)
+        result[path] = table(rows[-len(held) :])
+    result |= {"flights": rows, "all": table(rows)}
+    for c in coefficients:
+        print(f"{c['name']:18} {c['value']:10.4g} +- {1.96 * (c['std'] or 0.0):8.2g} {c['unit']}")
+    if test:
+        rows = judged([read_flight(p) for p in test], known, past, clock)
+        result["test"] = table(rows)
+    for group in (*dict.fromkeys(f.path for f in flights), "all", *(["test"] if test else [])):
+        for row in result[group]:
+            print(f"{group:10} {row['way']:40}", *(f"{x:7.2f}" for x in row["mean"]))
+    print(f"fit: {seconds:.1f} s of processor time")
+    if not test:
+        write_json(result, out)
+
+
+if __name__ == "__main__":
+    start(study)
