@@ -15,6 +15,7 @@ and stiffness, are one part, ``reacts``, which can be switched off.
 
 import math
 import time
+from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,52 +55,32 @@ _SIZES = np.array([0.24, 0.6, 0.12, 0.7])
 _WEIGHTS = np.array([0.3, 1.0, 1.0, 1.0])
 
 
-class Numbers(NamedTuple):
-    """The coefficients, as ``COEFFICIENTS`` describes them."""
-
-    thrust: float = PUBLISHED_THRUST
-    rotor_drag: float = 2.5e-6
-    inflow: float = 3.1e-6
-    lift: float = 3.3e-3
-    velocity_scale: float = 0.91
-    inertia: float = 3.5e-5
-    flapping: float = 1.1e-7
-    reaction_torque: float = 8.0
-    unmeasured_moment: float = 26.0
-    damping: float = 4.0
-    damping_excited: float = -3.5
-    stiffness: float = 20.0
-    never_answered: float = 1.4
-    yaw_damping: float = 3.9
-    heading_stiffness: float = 7.0
-    force_share: float = 0.0
-    force_memory: float = 0.3
-    moment_share: float = 0.0
-    moment_memory: float = 0.3
-
-
-COEFFICIENTS: Mapping[str, tuple[str, str]] = {
-    "thrust": ("N/(rad/s)^2", "thrust of a rotor"),
-    "rotor_drag": ("N/(rad/s m/s)", "drag of a rotor along body x and y"),
-    "inflow": ("N/(rad/s m/s)", "loss of a rotor's thrust in a climb"),
-    "lift": ("N/(m/s)^2", "translational lift"),
-    "velocity_scale": ("1", "way gone over the horizontal velocity that the filter states"),
-    "inertia": ("kg m2", "about x and y; from 3 to 15 Hz, before the fit"),
-    "flapping": ("Nm/(rad/s m/s)", "moment of a rotor's velocity"),
-    "reaction_torque": ("1/(kg m)", "reaction torque over thrust and inertia about z"),
-    "unmeasured_moment": ("rad/s2", "reaction: moments that the rotors answer, rms"),
-    "damping": ("1/s", "reaction: damping of roll and pitch"),
-    "damping_excited": ("1/s", "reaction: what damping gains where all moments are measured"),
-    "stiffness": ("1/s2", "reaction: stiffness towards level, the same"),
-    "never_answered": ("rad/s2/(m/s)", "reaction: moment of velocity that no rotor answers"),
-    "yaw_damping": ("1/s", "reaction: damping of yaw"),
-    "heading_stiffness": ("1/s2", "reaction: stiffness towards heading 0"),
-    "force_share": ("1", "past: share of the force left over in 0.2 s"),
-    "force_memory": ("s", "past: the time in which it decays"),
-    "moment_share": ("1", "past: share of the moment left over"),
-    "moment_memory": ("s", "past: the time in which it decays"),
+# of each coefficient: where the fit starts, its unit, and what it is
+COEFFICIENTS: Mapping[str, tuple[float, str, str]] = {
+    "thrust": (PUBLISHED_THRUST, "N/(rad/s)^2", "thrust of a rotor"),
+    "rotor_drag": (2.5e-6, "N/(rad/s m/s)", "drag of a rotor along body x and y"),
+    "inflow": (3e-6, "N/(rad/s m/s)", "thrust that a rotor loses in a climb"),
+    "lift": (3e-3, "N/(m/s)^2", "translational lift"),
+    "velocity_scale": (0.91, "1", "way gone, over the horizontal velocity that the filter states"),
+    "inertia": (3.4e-5, "kg m2", "about x, from 3 to 15 Hz, before the fit"),
+    "pitch_share": (0.75, "1", "turning in pitch over that in roll, for one torque"),
+    "flapping": (1.1e-7, "Nm/(rad/s m/s)", "moment of a rotor's velocity"),
+    "reaction_torque": (12.0, "1/(kg m)", "of a rotor, over its thrust and the inertia about z"),
+    "unmeasured_moment": (30.0, "rad/s2", "reaction: moments that rotors answer, rms"),
+    "damping": (4.6, "1/s", "reaction: damping of roll and pitch"),
+    "damping_excited": (-4.2, "1/s", "reaction: change of damping where no moment is answered"),
+    "stiffness": (20.0, "1/s2", "reaction: stiffness towards level, there"),
+    "never_answered": (1.4, "rad/s2/(m/s)", "reaction: moment of velocity that no rotor answers"),
+    "yaw_damping": (5.0, "1/s", "reaction: damping of yaw"),
+    "heading_stiffness": (9.0, "1/s2", "reaction: stiffness towards heading 0"),
+    "force_share": (0.0, "1", "past: share of the force left over in 0.2 s that goes on"),
+    "force_memory": (0.3, "s", "past: the time in which it decays"),
+    "moment_share": (0.0, "1", "past: share of the moment left over"),
+    "moment_memory": (0.3, "s", "past: the time in which it decays"),
 }
-PAST_NAMES = tuple(name for name in COEFFICIENTS if name.endswith(("_share", "_memory")))
+Numbers: Any = namedtuple("Numbers", tuple(COEFFICIENTS))
+BEGIN = Numbers(*(begin for begin, *_ in COEFFICIENTS.values()))
+PAST_NAMES = tuple(name for name, row in COEFFICIENTS.items() if row[2].startswith("past"))
 FITTED = tuple(name for name in COEFFICIENTS if name not in ("inertia", *PAST_NAMES))
 
 
@@ -187,113 +168,85 @@ def quick_inertia(flights: Sequence[Flight]) -> float:
 
 
 @compiled
-def _predict(
-    c: Numbers, starts: Array, speeds: Array, left: Array, reacts: float, each: int, out: Array
-) -> None:
-    """Write the states (m, steps, 13) that follow into ``out``, in steps of ``each`` samples."""
-    steps, dt = out.shape[1], STEP * each
-    turning, thrust, total = np.empty((steps, 3)), np.empty(steps), np.empty(steps)
-    r, q, middle = np.empty((3, 3)), np.empty(4), np.empty(4)
-    vb, force, accel, w = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+def _turn(q: Array, x: Array, w: Array, lead: float, dt: float, out: Array) -> None:
+    """Write ``q`` turned for ``dt`` at a state's rate, ``lead`` s of ``w`` on, into ``out``."""
+    turn_body(q, x[10] + lead * w[0], x[11] + lead * w[1], x[12] + lead * w[2], dt, out)
+
+
+@compiled
+def _follow(c: Any, starts: Array, drive: Array, left: Array, reacts: bool, out: Array) -> None:
+    """Write the states (m, steps, 13) that follow into ``out``.
+
+    ``drive`` (m, steps, 5): thrust over mass, the rotors' angular acceleration of the body, and the
+    sum of rotor speeds.
+    """
+    steps, dt = out.shape[1], STEP * STEPS / out.shape[1]
+    r, q, middle, vb = np.empty((3, 3)), np.empty(4), np.empty(4), np.empty(3)
+    force, accel, w, share = np.empty(3), np.empty(3), np.empty(3), np.ones(2)
     for s in range(len(starts)):
         x = starts[s].copy()
         for h in range(steps):
-            thrust[h], total[h], turning[h, :] = 0.0, 0.0, 0.0
-            for i in range(4):
-                mean = 0.0
-                for k in range(h * each, (h + 1) * each):
-                    mean += 0.5 * (speeds[s, k, i] + speeds[s, k + 1, i]) / each
-                one = c.thrust * mean * mean
-                thrust[h] += one
-                total[h] += mean
-                turning[h, 0] += one * ARM * _LEFT[i] / c.inertia
-                turning[h, 1] -= one * ARM * _FRONT[i] / c.inertia
-                turning[h, 2] -= one * _SPIN[i] * c.reaction_torque
-        sx, sy = 1.0, 1.0
-        for h in range(steps):
+            d = drive[s, h]
             q[:] = x[6:10]
             quaternion_to_matrix(q, r)
             for i in range(3):
                 vb[i] = r[0, i] * x[3] + r[1, i] * x[4] + r[2, i] * x[5]
-            flap = c.flapping * total[h] / c.inertia
-            w[0], w[1], w[2] = (
-                turning[h, 0] + flap * vb[1],
-                turning[h, 1] - flap * vb[0],
-                turning[h, 2],
-            )
-            if reacts > 0.0:
-                if h == 0:  # how strong the measured moments are against those that are not
-                    a, b = 0.0, 0.0
-                    for k in range(steps):
-                        a += (turning[k, 0] + flap * vb[1]) ** 2 / steps
-                        b += (turning[k, 1] - flap * vb[0]) ** 2 / steps
-                    sx, sy = a / (a + c.unmeasured_moment**2), b / (b + c.unmeasured_moment**2)
-                w[0] = sx * (w[0] - c.stiffness * r[2, 1]) + c.never_answered * vb[1]
-                w[1] = sy * (w[1] + c.stiffness * r[2, 0]) - c.never_answered * vb[0]
-                w[0] -= (c.damping + sx * c.damping_excited) * x[10]
-                w[1] -= (c.damping + sy * c.damping_excited) * x[11]
+            flap, drag = c.flapping * d[4] / c.inertia, c.rotor_drag * d[4] / MASS
+            w[0], w[1], w[2] = d[1] + flap * vb[1], d[2] - flap * vb[0], d[3]
+            if reacts:
+                if h == 0:  # how strong measured moments are, against those that are not measured
+                    a = np.mean((drive[s, :, 1] + flap * vb[1]) ** 2)
+                    b = np.mean((drive[s, :, 2] - flap * vb[0]) ** 2)
+                    share[0] = a / (a + c.unmeasured_moment**2)
+                    share[1] = b / (b + c.unmeasured_moment**2)
+                w[0] = share[0] * (w[0] - c.stiffness * r[2, 1]) + c.never_answered * vb[1]
+                w[1] = share[1] * (w[1] + c.stiffness * r[2, 0]) - c.never_answered * vb[0]
+                for i in range(2):
+                    w[i] -= (c.damping + share[i] * c.damping_excited) * x[10 + i]
                 w[2] -= c.heading_stiffness * math.atan2(r[1, 0], r[0, 0]) + c.yaw_damping * x[12]
-            keep = c.moment_share * math.exp(-(h + 0.5) * dt / c.moment_memory)
+            force[0], force[1] = -drag * vb[0], -drag * vb[1]
+            lift = c.lift * (vb[0] ** 2 + vb[1] ** 2) - c.inflow * d[4] * vb[2]
+            force[2] = d[0] + lift / MASS
+            of_force = c.force_share * math.exp(-(h + 0.5) * dt / c.force_memory)
+            of_moment = c.moment_share * math.exp(-(h + 0.5) * dt / c.moment_memory)
             for i in range(3):
-                w[i] += keep * left[s, 3 + i]
-            force[0] = -c.rotor_drag * total[h] * vb[0] / MASS
-            force[1] = -c.rotor_drag * total[h] * vb[1] / MASS
-            force[2] = thrust[h] - c.inflow * total[h] * vb[2] + c.lift * (vb[0] ** 2 + vb[1] ** 2)
-            force[2] /= MASS
-            turn_body(
-                q,
-                x[10] + 0.25 * dt * w[0],
-                x[11] + 0.25 * dt * w[1],
-                x[12] + 0.25 * dt * w[2],
-                0.5 * dt,
-                middle,
-            )
+                w[i] += of_moment * left[s, 3 + i]
+            _turn(q, x, w, 0.25 * dt, 0.5 * dt, middle)
             quaternion_to_matrix(middle, r)
-            keep = c.force_share * math.exp(-(h + 0.5) * dt / c.force_memory)
             for i in range(3):
-                accel[i] = keep * left[s, i]
+                accel[i] = of_force * left[s, i]
                 for k in range(3):
                     accel[i] += r[i, k] * force[k]
             accel[2] -= GRAVITY
+            _turn(q, x, w, 0.5 * dt, dt, middle)
+            x[6:10] = middle
             for i in range(3):
                 scale = c.velocity_scale if i < 2 else 1.0
                 x[i] += scale * dt * (x[3 + i] + 0.5 * dt * accel[i])
                 x[3 + i] += dt * accel[i]
-            turn_body(
-                q,
-                x[10] + 0.5 * dt * w[0],
-                x[11] + 0.5 * dt * w[1],
-                x[12] + 0.5 * dt * w[2],
-                dt,
-                middle,
-            )
-            x[6:10] = middle
-            for i in range(3):
                 x[10 + i] += dt * w[i]
             out[s, h] = x
 
 
-def predicted(c: Numbers, starts: Starts, reacts: bool = True, each: int = 1) -> Array:
-    """Return the states (m, STEPS / each, 13) that the model predicts.
-
-    Args:
-        c: the coefficients.
-        starts: m of them.
-        reacts: with the closed loop's reaction.
-        each: samples in a step of the integration.
+def predicted(c: Any, starts: Starts, reacts: bool = True, each: int = 1) -> Array:
+    """Return the states (m, STEPS / each, 13) that coefficients predict, with or without the closed
+    loop's reaction, in steps of ``each`` samples.
     """
     out = np.empty((len(starts.states), STEPS // each, 13))
-    _predict(c, starts.states, starts.speeds, starts.left, float(reacts), each, out)
+    means = 0.5 * (starts.speeds[:, 1:] + starts.speeds[:, :-1])
+    means = means.reshape(*out.shape[:2], each, 4).mean(axis=2)
+    roll, pitch = ARM * _LEFT / c.inertia, -ARM * _FRONT * c.pitch_share / c.inertia
+    mixing = np.column_stack([np.full(4, 1.0 / MASS), roll, pitch, -_SPIN * c.reaction_torque])
+    thrust = c.thrust * np.square(means)
+    drive = np.concatenate([thrust @ mixing, means.sum(axis=2, keepdims=True)], axis=2)
+    _follow(c, starts.states, drive, starts.left, reacts, out)
     return out
 
 
 def errors(path: Array, truth: Array) -> Array:
     """Return the errors (m, steps, 4, 3) of ``QUANTITIES``; attitude as a rotation vector (rad)."""
-    out = np.subtract(
-        path[..., [0, 1, 2, 3, 4, 5, 10, 11, 12, 10, 11, 12]],
-        truth[..., [0, 1, 2, 3, 4, 5, 10, 11, 12, 10, 11, 12]],
-    )
-    (aw, av), (bw, bv) = ((q[..., :1], q[..., 1:]) for q in (truth[..., 6:10], path[..., 6:10]))
+    out = (path - truth)[..., [0, 1, 2, 3, 4, 5, 10, 11, 12, 10, 11, 12]]
+    (aw, av), (bw, bv) = ((q[..., 6:7], q[..., 7:10]) for q in (truth, path))
     sign = np.sign(aw * bw + np.sum(av * bv, axis=-1, keepdims=True))
     out[..., 6:9] = 2.0 * sign * (aw * bv - bw * av - np.cross(av, bv))
     return out.reshape(*out.shape[:2], 4, 3)
@@ -307,7 +260,7 @@ def score(path: Array, truth: Array) -> Array:
 
 
 def starts_of(
-    flights: Sequence[Flight], every: int, clock: float | None = None, past: Numbers | None = None
+    flights: Sequence[Flight], every: int, clock: float | None = None, past: Any = None
 ) -> Starts:
     """Return the starts of flights.
 
@@ -352,7 +305,7 @@ def _speeds(flight: Flight, rows: NDArray[np.intp], late: float) -> Array:
 class Fit:
     """Coefficients that predict best, and what each flight says of the fitted ones."""
 
-    numbers: Numbers
+    numbers: Any
     names: tuple[str, ...]
     steps: Array  # (p,) of each in its own unit: a unit of the two below
     gradients: Array  # (flights, p)
@@ -368,9 +321,7 @@ class Fit:
         return dict(zip(self.names, (np.std(moved, axis=0) * self.steps).tolist(), strict=True))
 
 
-def fit(
-    starts: Starts, names: Sequence[str], begin: Numbers, each: int = 2, rounds: int = 15
-) -> Fit:
+def fit(starts: Starts, names: Sequence[str], begin: Any, each: int = 2) -> Fit:
     """Return the coefficients that predict all steps best, by damped Gauss-Newton.
 
     Errors count by their norm, not its square, as the score counts them: each norm is weighted by
@@ -381,25 +332,24 @@ def fit(
         names: of the coefficients that are fitted.
         begin: where the fit starts; the others stay there.
         each: samples in a step of the integration.
-        rounds: at most.
     """
     truth = starts.truth[:, each - 1 :: each]
     flights = [starts.flight == number for number in np.unique(starts.flight)]
     here, damping = begin, 1e-3
-    units = np.array([abs(getattr(Numbers(), name)) or 1.0 for name in names])
+    units = np.array([abs(COEFFICIENTS[name][0]) or 1.0 for name in names])
 
-    def moved(step: Array) -> Numbers:
+    def moved(step: Array) -> Any:
         return here._replace(
             **{n: getattr(here, n) + float(x) for n, x in zip(names, step * units, strict=True)}
         )
 
-    def off(numbers: Numbers) -> tuple[Array, Array, float]:
+    def off(numbers: Any) -> tuple[Array, Array, float]:
         e = errors(predicted(numbers, starts, each=each), truth) / _SIZES[:, None]
         norms = np.linalg.norm(e, axis=-1)
         return e, norms, float(np.mean(norms @ _WEIGHTS))
 
     e, norms, loss = off(here)
-    for _ in range(rounds):
+    for _ in range(15):
         least = 0.5 * np.median(norms, axis=0)
         root = np.sqrt(_WEIGHTS / np.maximum(norms, least))[..., None]
         nothing = np.eye(len(names))
@@ -421,13 +371,13 @@ def fit(
     return Fit(here, tuple(names), units, gradients, grams)
 
 
-def train(flights: Sequence[Flight], begin: Numbers | None = None) -> Fit:
+def train(flights: Sequence[Flight], begin: Any = None) -> Fit:
     """Return the fit to flights from the state at the sample: inertia first, then the others."""
-    begin = (begin or Numbers())._replace(inertia=quick_inertia(flights))
+    begin = (begin or BEGIN)._replace(inertia=quick_inertia(flights))
     return fit(starts_of(flights, 60), FITTED, begin)
 
 
-def train_past(flights: Sequence[Flight], known: Numbers) -> Fit:
+def train_past(flights: Sequence[Flight], known: Any) -> Fit:
     """Return the fit of what the 0.2 s before a start add."""
     begin = known._replace(force_share=0.5, moment_share=0.5)
     return fit(starts_of(flights, 60, past=known), PAST_NAMES, begin)
@@ -444,15 +394,8 @@ def stays(starts: Starts) -> Array:
 
 def published(starts: Starts) -> Array:
     """Return what the published thrust and mass predict if the rate stays as it is."""
-    still = Numbers()._replace(
-        rotor_drag=0.0,
-        inflow=0.0,
-        lift=0.0,
-        velocity_scale=1.0,
-        inertia=1e9,
-        flapping=0.0,
-        reaction_torque=0.0,
-    )
+    nothing = dict.fromkeys(("rotor_drag", "inflow", "lift", "flapping", "reaction_torque"), 0.0)
+    still = BEGIN._replace(velocity_scale=1.0, pitch_share=0.0, inertia=math.inf, **nothing)
     return predicted(still, starts, reacts=False)
 
 
@@ -513,14 +456,8 @@ def study(
     seconds, clock = time.process_time() - begun, float(np.mean([f.clock for f in flights]))
     spread = known.deviations() | past.deviations()
     coefficients = [
-        {
-            "name": name,
-            "value": getattr(past.numbers, name),
-            "std": spread.get(name),
-            "unit": unit,
-            "what": what,
-        }
-        for name, (unit, what) in COEFFICIENTS.items()
+        {"name": name, "value": value, "std": spread.get(name), "unit": unit, "what": what}
+        for (name, (_, unit, what)), value in zip(COEFFICIENTS.items(), past.numbers, strict=True)
     ]
     result: dict[str, Any] = {"coefficients": coefficients, "clock_s": clock, "fit_s": seconds}
     rows = []
