@@ -25,13 +25,16 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
+from scipy.spatial.transform import Rotation
 
+from windwrench import __version__
 from windwrench.dynamics.rotation import quaternion_to_matrix, turn_body
 from windwrench.identification.logs.tables import open_table
 from windwrench.identification.motion.smoothing import runs_of
 from windwrench.runtime.compiled import compiled
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.page_files import write_json
+from windwrench.runtime.provenance import commit
 from windwrench.studies.kept_results import DOCS
 from windwrench.studies.runner import start
 
@@ -165,6 +168,11 @@ def quick_inertia(flights: Sequence[Flight]) -> float:
         torques += float(np.sum(np.square(torque)))
         turnings += float(np.sum(np.square(turning)))
     return math.sqrt(torques / turnings)
+
+
+def mean_clock(flights: Sequence[Flight]) -> float:
+    """Return the mean s by which motion comes behind rotor speeds."""
+    return float(np.mean([flight.clock for flight in flights]))
 
 
 @compiled
@@ -301,28 +309,11 @@ def _speeds(flight: Flight, rows: NDArray[np.intp], late: float) -> Array:
     return (1.0 - share) * flight.speeds[low] + share * flight.speeds[low + 1]
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """Coefficients that predict best, and what each flight says of the fitted ones."""
-
-    numbers: Any
-    names: tuple[str, ...]
-    steps: Array  # (p,) of each in its own unit: a unit of the two below
-    gradients: Array  # (flights, p)
-    grams: Array  # (flights, p, p)
-
-    def deviations(self, draws: int = 1000) -> dict[str, float]:
-        """Return standard deviations over drawn flights, by one step from here for each draw."""
-        rng, count = np.random.default_rng(0), len(self.grams)
-        weights = rng.multinomial(count, np.full(count, 1.0 / count), draws)
-        moved = [
-            np.linalg.solve(np.tensordot(w, self.grams, 1), w @ self.gradients) for w in weights
-        ]
-        return dict(zip(self.names, (np.std(moved, axis=0) * self.steps).tolist(), strict=True))
-
-
-def fit(starts: Starts, names: Sequence[str], begin: Any, each: int = 2) -> Fit:
-    """Return the coefficients that predict all steps best, by damped Gauss-Newton.
+def fit(
+    starts: Starts, names: Sequence[str], begin: Any, each: int = 2
+) -> tuple[Any, dict[str, float]]:
+    """Return the coefficients that predict all steps best, by damped Gauss-Newton, and their
+    standard deviations over drawn flights (one step from here for each of 1000 draws).
 
     Errors count by their norm, not its square, as the score counts them: each norm is weighted by
     its inverse (at least half of the median's) in turn.
@@ -368,27 +359,30 @@ def fit(starts: Starts, names: Sequence[str], begin: Any, each: int = 2) -> Fit:
             damping *= 8.0
         if before - loss < 1e-4 * before:
             break
-    return Fit(here, tuple(names), units, gradients, grams)
+    count = len(flights)
+    drawn = np.random.default_rng(0).multinomial(count, np.full(count, 1.0 / count), 1000)
+    steps = [np.linalg.solve(np.tensordot(w, grams, 1), w @ gradients) for w in drawn]
+    return here, dict(zip(names, (np.std(steps, axis=0) * units).tolist(), strict=True))
 
 
-def train(flights: Sequence[Flight], begin: Any = None) -> Fit:
-    """Return the fit to flights from the state at the sample: inertia first, then the others."""
-    begin = (begin or BEGIN)._replace(inertia=quick_inertia(flights))
-    return fit(starts_of(flights, 60), FITTED, begin)
-
-
-def train_past(flights: Sequence[Flight], known: Any) -> Fit:
-    """Return the fit of what the 0.2 s before a start add."""
-    begin = known._replace(force_share=0.5, moment_share=0.5)
-    return fit(starts_of(flights, 60, past=known), PAST_NAMES, begin)
+def train(flights: Sequence[Flight]) -> tuple[Any, dict[str, float]]:
+    """Return coefficients and their deviations: inertia first, then what the state at the sample
+    predicts by, then what the past adds.
+    """
+    begin = BEGIN._replace(inertia=quick_inertia(flights))
+    numbers, deviations = fit(starts_of(flights, 60), FITTED, begin)
+    begin = numbers._replace(force_share=0.5, moment_share=0.5)
+    past, more = fit(starts_of(flights, 60, past=numbers), PAST_NAMES, begin)
+    return past, deviations | more
 
 
 def stays(starts: Starts) -> Array:
     """Return the states (m, STEPS, 13) if nothing changed but the attitude, which turns on."""
     out = np.repeat(starts.states[:, None], STEPS, axis=1)
-    for s, x in enumerate(starts.states):
-        for h in range(STEPS):
-            turn_body(x[6:10], x[10], x[11], x[12], (h + 1) * STEP, out[s, h, 6:10])
+    for h in range(STEPS):
+        turned = Rotation.from_rotvec((h + 1) * STEP * starts.states[:, 10:13])
+        attitude = Rotation.from_quat(starts.states[:, 6:10], scalar_first=True) * turned
+        out[:, h, 6:10] = attitude.as_quat(scalar_first=True)
     return out
 
 
@@ -399,87 +393,89 @@ def published(starts: Starts) -> Array:
     return predicted(still, starts, reacts=False)
 
 
-def judged(flights: Sequence[Flight], known: Fit, past: Fit, clock: float) -> list[dict[str, Any]]:
-    """Return the scores of flights that a fit has not seen.
-
-    Args:
-        flights: the flights.
-        known: the fit from the state at the sample.
-        past: what the past adds.
-        clock: s, of training flights.
+def judged(flights: Sequence[Flight], c: Any, clock: float) -> list[dict[str, Any]]:
+    """Return the scores of flights that coefficients have not seen; ``clock`` (s) is that of the
+    training flights.
     """
     rows = []
     for flight in flights:
-        plain, own = starts_of([flight], 2, clock), starts_of([flight], 2)
-        before = starts_of([flight], 2, clock, known.numbers)
+        at_sample, own = starts_of([flight], 2, clock), starts_of([flight], 2)
         ways = {
-            "stays": stays(plain),
-            "published thrust, rate stays": published(plain),
-            "reaction off": predicted(known.numbers, plain, reacts=False),
-            "from the sample": predicted(known.numbers, plain),
-            "from the sample, the flight's own clock": predicted(known.numbers, own),
-            "with 0.2 s of past": predicted(past.numbers, before),
+            "the state stays as it is, attitude turns on": stays(at_sample),
+            "published thrust, rate stays": published(at_sample),
+            "named coefficients, reaction off": predicted(c, at_sample, reacts=False),
+            "**named coefficients**": predicted(c, at_sample),
+            "the same, each flight's own rotor clock": predicted(c, own),
+            "the same, with 0.2 s of past": predicted(c, starts_of([flight], 2, clock, c)),
         }
-        scores = {way: score(path, plain.truth).tolist() for way, path in ways.items()}
+        scores = {way: score(path, at_sample.truth).tolist() for way, path in ways.items()}
         rows.append({"flight": flight.name, "path": flight.path, "scores": scores})
     return rows
 
 
-def table(rows: Sequence[Mapping[str, Any]], draws: int = 2000) -> list[dict[str, Any]]:
+def table(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Return each way's mean scores over flights, with 95 % intervals of drawn flights."""
     rng, out = np.random.default_rng(0), []
     for way in rows[0]["scores"]:
         values = np.array([row["scores"][way] for row in rows])
-        drawn = values[rng.integers(0, len(values), (draws, len(values)))].mean(axis=1)
-        low, high = np.quantile(drawn, (0.025, 0.975), axis=0)
-        means = values.mean(axis=0)
-        out.append({"way": way, "mean": means.tolist(), "low": low.tolist(), "high": high.tolist()})
+        drawn = values[rng.integers(0, len(values), (2000, len(values)))].mean(axis=1)
+        low, high = np.quantile(drawn, (0.025, 0.975), axis=0).tolist()
+        out.append({"way": way, "mean": values.mean(axis=0).tolist(), "low": low, "high": high})
     return out
+
+
+def section(result: Mapping[str, Any]) -> str:
+    """Return the page's tables of a study's result, as Markdown."""
+    lines = [
+        "| path held out | prediction | position m | velocity m/s | attitude rad | rate rad/s |"
+    ]
+    lines.append("| --- " * 6 + "|")
+    for path, flights in result["paths"].items():
+        for row in result[path]:
+            ends = zip(row["mean"], row["low"], row["high"], strict=True)
+            cells = (f"{m:.3g} ({low:.3g}–{high:.3g})" for m, low, high in ends)
+            lines.append(f"| {path}, {flights} | {row['way']} | " + " | ".join(cells) + " |")
+    lines += ["", "| coefficient | value, 95 % | unit | what |", "| --- " * 4 + "|"]
+    for c in result["coefficients"]:
+        width = "" if c["std"] is None else f" ± {1.96 * c['std']:.2g}"
+        lines.append(f"| `{c['name']}` | {c['value']:.3g}{width} | {c['unit']} | {c['what']} |")
+    return "\n".join(lines) + "\n"
 
 
 def study(
     data: Annotated[Path, typer.Option(help="Folder of the 13 training flights.")] = Path(
         "../shared/data/idsia"
     ),
-    test: Annotated[list[Path] | None, typer.Option(help="Other flights to predict.")] = None,
+    test: Annotated[
+        list[Path] | None, typer.Option(help="Flights to predict, in place of the paths held out.")
+    ] = None,
     out: Annotated[Path, typer.Option(help="Results file.")] = DOCS / "identify" / "nanodrone.json",
 ) -> None:
     """Fit on the training flights, and predict each path from the others."""
-    paths = sorted(data.glob("*.parquet"))
-    if not paths:
+    files = sorted(data.glob("*.parquet"))
+    if not files:
         print(f"{data}: no flights (*.parquet); skipped")
         return
-    flights = [read_flight(path) for path in paths]
+    code, flights, rows = commit(), [read_flight(path) for path in files], []
+    result: dict[str, Any] = {"version": __version__, "commit": code, "paths": {}}
+    for path in [] if test else dict.fromkeys(f.path for f in flights):
+        seen, held = (
+            [f for f in flights if (f.path == path) == is_held] for is_held in (False, True)
+        )
+        rows += judged(held, train(seen)[0], mean_clock(seen))
+        result["paths"][path], result[path] = len(held), table(rows[-len(held) :])
     begun = time.process_time()
-    known = train(flights)
-    past = train_past(flights, known.numbers)
-    seconds, clock = time.process_time() - begun, float(np.mean([f.clock for f in flights]))
-    spread = known.deviations() | past.deviations()
-    coefficients = [
-        {"name": name, "value": value, "std": spread.get(name), "unit": unit, "what": what}
-        for (name, (_, unit, what)), value in zip(COEFFICIENTS.items(), past.numbers, strict=True)
-    ]
-    result: dict[str, Any] = {"coefficients": coefficients, "clock_s": clock, "fit_s": seconds}
-    rows = []
-    for path in dict.fromkeys(f.path for f in flights):
-        seen = [f for f in flights if f.path != path]
-        fold = train(seen, known.numbers)
-        late = float(np.mean([f.clock for f in seen]))
-        held = [f for f in flights if f.path == path]
-        rows += judged(held, fold, train_past(seen, fold.numbers), late)
-        result[path] = table(rows[-len(held) :])
-    result |= {"flights": rows, "all": table(rows)}
-    for c in coefficients:
-        print(f"{c['name']:18} {c['value']:10.4g} +- {1.96 * (c['std'] or 0.0):8.2g} {c['unit']}")
+    c, deviations = train(flights)
+    result["fit_s"], result["clock_s"] = time.process_time() - begun, mean_clock(flights)
     if test:
-        rows = judged([read_flight(p) for p in test], known, past, clock)
-        result["test"] = table(rows)
-    for group in (*dict.fromkeys(f.path for f in flights), "all", *(["test"] if test else [])):
-        for row in result[group]:
-            print(f"{group:10} {row['way']:40}", *(f"{x:7.2f}" for x in row["mean"]))
-    print(f"fit: {seconds:.1f} s of processor time")
-    if not test:
-        write_json(result, out)
+        rows = judged([read_flight(path) for path in test], c, result["clock_s"])
+    result["paths"]["all"], result["all"], result["flights"] = len(rows), table(rows), rows
+    result["coefficients"] = [
+        {"name": name, "value": value, "std": deviations.get(name), "unit": unit, "what": what}
+        for (name, (_, unit, what)), value in zip(COEFFICIENTS.items(), c, strict=True)
+    ]
+    print(f"{section(result)}fit: {result['fit_s']:.1f} s of processor time")
+    write_json(result, out)
 
 
 if __name__ == "__main__":
