@@ -52,6 +52,7 @@ _LEFT = np.array([1.0, 1.0, -1.0, -1.0])
 _SPIN = np.array([-1.0, 1.0, -1.0, 1.0])
 _BAND = (3.0, 15.0)  # Hz: torque alone turns the vehicle there; below, the loop answers
 _CLOCKS = np.arange(-0.04, 0.0401, 0.001)  # s, tried
+STAYS, NAMED = "the state stays as it is, attitude turns on", "**named coefficients**"
 QUANTITIES = ("position", "velocity", "attitude", "rate")
 # of each quantity's error where the state stays as it is: the fit weighs them alike
 _SIZES = np.array([0.24, 0.6, 0.12, 0.7])
@@ -62,24 +63,24 @@ _WEIGHTS = np.array([0.3, 1.0, 1.0, 1.0])
 COEFFICIENTS: Mapping[str, tuple[float, str, str]] = {
     "thrust": (PUBLISHED_THRUST, "N/(rad/s)^2", "thrust of a rotor"),
     "rotor_drag": (2.5e-6, "N/(rad/s m/s)", "drag of a rotor along body x and y"),
-    "inflow": (3e-6, "N/(rad/s m/s)", "thrust that a rotor loses in a climb"),
+    "inflow": (3e-6, "N/(rad/s m/s)", "loss of thrust in a climb"),
     "lift": (3e-3, "N/(m/s)^2", "translational lift"),
-    "velocity_scale": (0.91, "1", "way gone, over the horizontal velocity that the filter states"),
-    "inertia": (3.4e-5, "kg m2", "about x, from 3 to 15 Hz, before the fit"),
-    "pitch_share": (0.75, "1", "turning in pitch over that in roll, for one torque"),
-    "flapping": (1.1e-7, "Nm/(rad/s m/s)", "moment of a rotor's velocity"),
-    "reaction_torque": (12.0, "1/(kg m)", "of a rotor, over its thrust and the inertia about z"),
-    "unmeasured_moment": (30.0, "rad/s2", "reaction: moments that rotors answer, rms"),
+    "velocity_scale": (0.91, "1", "way gone over horizontal velocity"),
+    "inertia": (3.4e-5, "kg m2", "inertia about x, from 3 to 15 Hz"),
+    "pitch_share": (0.75, "1", "pitch over roll, for one torque"),
+    "flapping": (1.1e-7, "Nm/(rad/s m/s)", "flapping moment of a rotor"),
+    "reaction_torque": (12.0, "1/(kg m)", "reaction torque over thrust and inertia about z"),
+    "unmeasured_moment": (30.0, "rad/s2", "reaction: unmeasured moment, rms"),
     "damping": (4.6, "1/s", "reaction: damping of roll and pitch"),
-    "damping_excited": (-4.2, "1/s", "reaction: change of damping where no moment is answered"),
-    "stiffness": (20.0, "1/s2", "reaction: stiffness towards level, there"),
-    "never_answered": (1.4, "rad/s2/(m/s)", "reaction: moment of velocity that no rotor answers"),
+    "damping_excited": (-4.2, "1/s", "reaction: damping, change where all is measured"),
+    "stiffness": (20.0, "1/s2", "reaction: stiffness to level, there"),
+    "never_answered": (1.4, "rad/s2/(m/s)", "reaction: moment of velocity, never answered"),
     "yaw_damping": (5.0, "1/s", "reaction: damping of yaw"),
-    "heading_stiffness": (9.0, "1/s2", "reaction: stiffness towards heading 0"),
-    "force_share": (0.0, "1", "past: share of the force left over in 0.2 s that goes on"),
-    "force_memory": (0.3, "s", "past: the time in which it decays"),
+    "heading_stiffness": (9.0, "1/s2", "reaction: stiffness to heading 0"),
+    "force_share": (0.0, "1", "past: share of the force left over"),
+    "force_memory": (0.3, "s", "past: its decay"),
     "moment_share": (0.0, "1", "past: share of the moment left over"),
-    "moment_memory": (0.3, "s", "past: the time in which it decays"),
+    "moment_memory": (0.3, "s", "past: its decay"),
 }
 Numbers: Any = namedtuple("Numbers", tuple(COEFFICIENTS))
 BEGIN = Numbers(*(begin for begin, *_ in COEFFICIENTS.values()))
@@ -401,11 +402,11 @@ def judged(flights: Sequence[Flight], c: Any, clock: float) -> list[dict[str, An
     for flight in flights:
         at_sample, own = starts_of([flight], 2, clock), starts_of([flight], 2)
         ways = {
-            "the state stays as it is, attitude turns on": stays(at_sample),
+            STAYS: stays(at_sample),
             "published thrust, rate stays": published(at_sample),
             "named coefficients, reaction off": predicted(c, at_sample, reacts=False),
-            "**named coefficients**": predicted(c, at_sample),
-            "the same, each flight's own rotor clock": predicted(c, own),
+            NAMED: predicted(c, at_sample),
+            "the same, the flight's own rotor clock": predicted(c, own),
             "the same, with 0.2 s of past": predicted(c, starts_of([flight], 2, clock, c)),
         }
         scores = {way: score(path, at_sample.truth).tolist() for way, path in ways.items()}
@@ -425,20 +426,26 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def section(result: Mapping[str, Any]) -> str:
-    """Return the page's tables of a study's result, as Markdown."""
-    lines = [
-        "| path held out | prediction | position m | velocity m/s | attitude rad | rate rad/s |"
-    ]
-    lines.append("| --- " * 6 + "|")
-    for path, flights in result["paths"].items():
-        for row in result[path]:
-            ends = zip(row["mean"], row["low"], row["high"], strict=True)
-            cells = (f"{m:.3g} ({low:.3g}–{high:.3g})" for m, low, high in ends)
-            lines.append(f"| {path}, {flights} | {row['way']} | " + " | ".join(cells) + " |")
-    lines += ["", "| coefficient | value, 95 % | unit | what |", "| --- " * 4 + "|"]
+    """Return the page's tables of a study's result, as Markdown: all flights by way of prediction,
+    each path from the others, and the coefficients.
+    """
+    head = "position m | velocity m/s | attitude rad | rate rad/s |\n" + "| --- " * 5 + "|"
+    lines = [f"| {len(result['flights'])} flights, sum of mean errors over 50 steps | {head}"]
+    for row in result["all"]:
+        ends = zip(row["mean"], row["low"], row["high"], strict=True)
+        cells = " | ".join(f"{mean:.3g} ({low:.3g}–{high:.3g})" for mean, low, high in ends)
+        lines.append(f"| {row['way']} | {cells} |")
+    lines += ["", f"| path held out: named coefficients of what stays | {head}"]
+    for path, rows in result["paths"].items():
+        still, named = (
+            next(row["mean"] for row in rows if row["way"] == w) for w in (STAYS, NAMED)
+        )
+        cells = " | ".join(f"{x:.3g} of {y:.3g}" for x, y in zip(named, still, strict=True))
+        lines.append(f"| {path} | {cells} |")
+    lines += ["", "| coefficient | value, 95 % | unit |", "| --- " * 3 + "|"]
     for c in result["coefficients"]:
         width = "" if c["std"] is None else f" ± {1.96 * c['std']:.2g}"
-        lines.append(f"| `{c['name']}` | {c['value']:.3g}{width} | {c['unit']} | {c['what']} |")
+        lines.append(f"| {c['what']} | {c['value']:.3g}{width} | {c['unit']} |")
     return "\n".join(lines) + "\n"
 
 
@@ -463,13 +470,13 @@ def study(
             [f for f in flights if (f.path == path) == is_held] for is_held in (False, True)
         )
         rows += judged(held, train(seen)[0], mean_clock(seen))
-        result["paths"][path], result[path] = len(held), table(rows[-len(held) :])
+        result["paths"][path] = table(rows[-len(held) :])
     begun = time.process_time()
     c, deviations = train(flights)
     result["fit_s"], result["clock_s"] = time.process_time() - begun, mean_clock(flights)
     if test:
         rows = judged([read_flight(path) for path in test], c, result["clock_s"])
-    result["paths"]["all"], result["all"], result["flights"] = len(rows), table(rows), rows
+    result["all"], result["flights"] = table(rows), rows
     result["coefficients"] = [
         {"name": name, "value": value, "std": deviations.get(name), "unit": unit, "what": what}
         for (name, (_, unit, what)), value in zip(COEFFICIENTS.items(), c, strict=True)
