@@ -34,7 +34,7 @@ from windwrench.identification.motion.smoothing import runs_of
 from windwrench.runtime.compiled import compiled
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.page_files import write_json
-from windwrench.runtime.provenance import commit
+from windwrench.runtime.provenance import commit, made_by
 from windwrench.studies.kept_results import DOCS
 from windwrench.studies.runner import start
 
@@ -78,9 +78,9 @@ COEFFICIENTS: Mapping[str, tuple[float, str, str]] = {
     "yaw_damping": (5.0, "1/s", "reaction: damping of yaw"),
     "heading_stiffness": (9.0, "1/s2", "reaction: stiffness to heading 0"),
     "force_share": (0.0, "1", "past: share of the force left over"),
-    "force_memory": (0.3, "s", "past: its decay"),
+    "force_memory": (0.3, "s", "past: decay of the force"),
     "moment_share": (0.0, "1", "past: share of the moment left over"),
-    "moment_memory": (0.3, "s", "past: its decay"),
+    "moment_memory": (0.3, "s", "past: decay of the moment"),
 }
 Numbers: Any = namedtuple("Numbers", tuple(COEFFICIENTS))
 BEGIN = Numbers(*(begin for begin, *_ in COEFFICIENTS.values()))
@@ -158,17 +158,19 @@ def _best_delay(torque: Array, turning: Array) -> float:
     return float(_CLOCKS[int(np.argmax(alike))])
 
 
-def quick_inertia(flights: Sequence[Flight]) -> float:
-    """Return the inertia (kg m2) that torque shows from 3 to 15 Hz, where no loop answers: both are
-    noisy, so that it is the ratio of their sizes (the reduced major axis).
+def quick_inertia(flights: Sequence[Flight]) -> tuple[float, float]:
+    """Return the inertia (kg m2) that torque shows from 3 to 15 Hz, where no loop answers, and its
+    standard deviation over flights (jackknife). Torque and turning are both noisy, so that the
+    inertia is the ratio of their sizes (the reduced major axis).
     """
-    torques = turnings = 0.0
-    for flight in flights:
+    sizes = np.empty((len(flights), 2))
+    for k, flight in enumerate(flights):
         torque = _delayed(_quick(_torques(flight.speeds)), flight.clock)
         turning = _quick(np.gradient(flight.states[:, 10:12], STEP, axis=0))
-        torques += float(np.sum(np.square(torque)))
-        turnings += float(np.sum(np.square(turning)))
-    return math.sqrt(torques / turnings)
+        sizes[k] = np.sum(np.square(torque)), np.sum(np.square(turning))
+    whole = sizes.sum(axis=0)
+    without = np.sqrt(np.divide(*(whole - sizes).T)) if len(sizes) > 1 else np.zeros(1)
+    return float(np.sqrt(whole[0] / whole[1])), float(np.sqrt(len(sizes) - 1) * np.std(without))
 
 
 def mean_clock(flights: Sequence[Flight]) -> float:
@@ -370,11 +372,11 @@ def train(flights: Sequence[Flight]) -> tuple[Any, dict[str, float]]:
     """Return coefficients and their deviations: inertia first, then what the state at the sample
     predicts by, then what the past adds.
     """
-    begin = BEGIN._replace(inertia=quick_inertia(flights))
-    numbers, deviations = fit(starts_of(flights, 60), FITTED, begin)
+    inertia, spread = quick_inertia(flights)
+    numbers, deviations = fit(starts_of(flights, 60), FITTED, BEGIN._replace(inertia=inertia))
     begin = numbers._replace(force_share=0.5, moment_share=0.5)
     past, more = fit(starts_of(flights, 60, past=numbers), PAST_NAMES, begin)
-    return past, deviations | more
+    return past, {"inertia": spread} | deviations | more
 
 
 def stays(starts: Starts) -> Array:
@@ -426,9 +428,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def section(result: Mapping[str, Any]) -> str:
-    """Return the page's tables of a study's result, as Markdown: all flights by way of prediction,
-    each path from the others, and the coefficients.
-    """
+    """Return what the page shows of a study's result, as Markdown."""
     head = "position m | velocity m/s | attitude rad | rate rad/s |\n" + "| --- " * 5 + "|"
     lines = [f"| {len(result['flights'])} flights, sum of mean errors over 50 steps | {head}"]
     for row in result["all"]:
@@ -444,9 +444,10 @@ def section(result: Mapping[str, Any]) -> str:
         lines.append(f"| {path} | {cells} |")
     lines += ["", "| coefficient | value, 95 % | unit |", "| --- " * 3 + "|"]
     for c in result["coefficients"]:
-        width = "" if c["std"] is None else f" ± {1.96 * c['std']:.2g}"
-        lines.append(f"| {c['what']} | {c['value']:.3g}{width} | {c['unit']} |")
-    return "\n".join(lines) + "\n"
+        value = f"{c['value']:.3g} ± {1.96 * c['std']:.2g}"
+        lines.append(f"| {c['what']} | {value} | {c['unit']} |")
+    made = made_by("python -m studies.nanodrone_benchmark", [result["commit"]], result["version"])
+    return "\n".join([made, "", *lines, ""])
 
 
 def study(
@@ -478,7 +479,7 @@ def study(
         rows = judged([read_flight(path) for path in test], c, result["clock_s"])
     result["all"], result["flights"] = table(rows), rows
     result["coefficients"] = [
-        {"name": name, "value": value, "std": deviations.get(name), "unit": unit, "what": what}
+        {"name": name, "value": value, "std": deviations[name], "unit": unit, "what": what}
         for (name, (_, unit, what)), value in zip(COEFFICIENTS.items(), c, strict=True)
     ]
     print(f"{section(result)}fit: {result['fit_s']:.1f} s of processor time")
