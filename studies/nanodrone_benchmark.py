@@ -443,7 +443,7 @@ def section(result: Mapping[str, Any]) -> str:
         cells = " | ".join(f"{x:.3g} of {y:.3g}" for x, y in zip(named, still, strict=True))
         lines.append(f"| {path} | {cells} |")
     lines += ["", "| coefficient | value, 95 % | unit |", "| --- " * 3 + "|"]
-    for c in result["coefficients"]:
+    for c in result["coefficients"][: -len(PAST_NAMES)]:
         value = f"{c['value']:.3g} ± {1.96 * c['std']:.2g}"
         lines.append(f"| {c['what']} | {value} | {c['unit']} |")
     made = made_by("python -m studies.nanodrone_benchmark", [result["commit"]], result["version"])
