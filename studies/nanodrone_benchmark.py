@@ -82,7 +82,8 @@ COEFFICIENTS: Mapping[str, tuple[float, str, str]] = {
     "moment_share": (0.0, "1", "past: share of the moment left over"),
     "moment_memory": (0.3, "s", "past: decay of the moment"),
 }
-Numbers: Any = namedtuple("Numbers", tuple(COEFFICIENTS))
+_named: Any = namedtuple  # mypy wants its names written out, here they are the table's
+Numbers = _named("Numbers", tuple(COEFFICIENTS))
 BEGIN = Numbers(*(begin for begin, *_ in COEFFICIENTS.values()))
 PAST_NAMES = tuple(name for name, row in COEFFICIENTS.items() if row[2].startswith("past"))
 FITTED = tuple(name for name in COEFFICIENTS if name not in ("inertia", *PAST_NAMES))
@@ -260,7 +261,7 @@ def errors(path: Array, truth: Array) -> Array:
     (aw, av), (bw, bv) = ((q[..., 6:7], q[..., 7:10]) for q in (truth, path))
     sign = np.sign(aw * bw + np.sum(av * bv, axis=-1, keepdims=True))
     out[..., 6:9] = 2.0 * sign * (aw * bv - bw * av - np.cross(av, bv))
-    return out.reshape(*out.shape[:2], 4, 3)
+    return np.asarray(out.reshape(*out.shape[:2], 4, 3))
 
 
 def score(path: Array, truth: Array) -> Array:
