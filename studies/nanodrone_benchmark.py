@@ -310,7 +310,7 @@ def _speeds(flight: Flight, rows: NDArray[np.intp], late: float) -> Array:
     at = np.maximum(rows - late, rows[:, :1])
     low = np.clip(np.floor(at).astype(np.intp), 0, len(flight.speeds) - 2)
     share = (at - low)[..., None]
-    return (1.0 - share) * flight.speeds[low] + share * flight.speeds[low + 1]
+    return np.asarray((1.0 - share) * flight.speeds[low] + share * flight.speeds[low + 1])
 
 
 def fit(
