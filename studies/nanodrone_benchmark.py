@@ -458,7 +458,10 @@ def study(
     test: Annotated[
         list[Path] | None, typer.Option(help="Flights to predict, in place of the paths held out.")
     ] = None,
-    out: Annotated[Path, typer.Option(help="Results file.")] = DOCS / "identify" / "nanodrone.json",
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Results file; default: the page's, if no flights are given."),
+    ] = None,
 ) -> None:
     """Fit on the training flights, and predict each path from the others."""
     files = sorted(data.glob("*.parquet"))
@@ -484,7 +487,8 @@ def study(
         for (name, (_, unit, what)), value in zip(COEFFICIENTS.items(), c, strict=True)
     ]
     print(f"{section(result)}fit: {result['fit_s']:.1f} s of processor time")
-    write_json(result, out)
+    if out is not None or not test:
+        write_json(result, out or DOCS / "identify" / "nanodrone.json")
 
 
 if __name__ == "__main__":
