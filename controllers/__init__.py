@@ -1,6 +1,7 @@
 """Acting: the inner flight loop, and controllers from the estimated wrench to a velocity."""
 
-from .fan_laws import Admittance, AdmittancePID, Hover, Lead, Oracle, Ratio
+from .fan_laws import Admittance, AdmittancePID, Hover, Lead, Ratio
+from .preview import Oracle
 from .registry import CONTROLLERS, LAWS, Controller, make_controller
 from .tracker import InformedTracker, Limit, Tracker
 

@@ -47,6 +47,20 @@ class AxisModel:
         step = np.asarray(expm(period * whole))[:n]
         return step[:, :n], step[:, n : n + 1], step[:, n + 1 :]
 
+    def with_set_point(self, velocity: float = FlightGains.velocity) -> "AxisModel":
+        """Return the model with the place of the set point as its last state, and as its input the
+        velocity (m/s) with which the set point moves.
+
+        Args:
+            velocity: gain of the flight loop on a velocity error, 1/s.
+        """
+        n = len(self.A)
+        A = np.zeros((n + 1, n + 1))
+        # the flight loop sees the place less the set point alone
+        A[:n] = np.hstack([self.A, -self.A[:, :1]])
+        B = np.vstack([velocity * self.B, [[1.0]]])
+        return AxisModel(A, B, np.vstack([self.D, np.zeros((1, self.D.shape[1]))]))
+
 
 def axis_models(
     vehicle: Vehicle, gains: FlightGains | None = None, lag: float = MOTOR_LAG

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..runtime.errors import InputError
 from .observation import DECISION_PERIOD, FORCE_X, MAX_COMMAND, TORQUE_Y, TORQUE_Z
 
 Array = NDArray[np.floating[Any]]
@@ -32,11 +31,7 @@ class FanLaw:
         raise NotImplementedError
 
     def __call__(self, observation: Array, info: Mapping[str, Any] | None = None) -> Array:
-        """Return the command (1,) m/s for an observation (8,), or (2,) for one of (10,).
-
-        Raises:
-            InputError: an oracle without ``info``.
-        """
+        """Return the command (1,) m/s for an observation (8,), or (2,) for one of (10,)."""
         wanted = self.command(observation, info)
         return np.clip(wanted, -MAX_COMMAND, MAX_COMMAND).astype(np.float32)
 
@@ -50,29 +45,6 @@ class Hover(FanLaw):
     def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
         """Return no velocity."""
         return (0.0,) * self.axes
-
-
-@dataclass(eq=False)
-class Oracle(FanLaw):
-    """Sees the fan: moves with it and towards its axis. The upper bound, score 1."""
-
-    gain: float = 2.0  # 1/s, from the true offset to velocity
-    # entries of the environment's ``info``: the fan's place and velocity, and the vehicle's place
-    entries: tuple[str, str, str] = "fan_y", "fan_velocity", "y"
-
-    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
-        """Return the fan's velocity, and a share of the true offset.
-
-        Raises:
-            InputError: no ``info``.
-        """
-        if info is None:
-            raise InputError(
-                f"oracle: needs the environment's info ({', '.join(self.entries)}), which only a "
-                "simulator has"
-            )
-        fan, velocity, own = (info[name] for name in self.entries)
-        return tuple(np.atleast_1d(velocity + self.gain * (fan - own)).tolist())
 
 
 @dataclass(eq=False)

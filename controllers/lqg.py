@@ -1,23 +1,22 @@
-"""Optimal laws of the tasks in the wind: a linear-quadratic Gaussian regulator (LQG) that feels the
-wind through the estimated wrench, and the oracle, which knows the wrench and what comes of it.
+"""The optimal law of the tasks in the wind that feels the wind through the estimated wrench: a
+linear-quadratic Gaussian regulator (LQG).
 
-Both command the flight loop by the same model of it (``axis_models``), and both weigh a position
-error against an acceleration in one number. What they know differs, and nothing else.
+It commands the flight loop by the same model of it (``axis_models``) as the oracle (``preview``),
+and by the same weight of a position error. What they know differs, and nothing else.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..dynamics.vehicle import Vehicle
-from ..dynamics.vehicle_file import load_vehicle
 from ..runtime.errors import InputError
 from .axis_models import AxisModel, axis_models, tilting
 from .briefing import Briefing
+from .preview import regulator, standard_vehicle
 from .wind_observation import (
     FORCE,
     MAX_ACCELERATION,
@@ -34,23 +33,6 @@ from .wind_observation import (
 Array = NDArray[np.floating[Any]]
 Wide = NDArray[np.float64]
 _BELIEVED = 1e-12  # added to the variance of each state, so that the equations can be solved
-
-
-def _standard() -> Vehicle:
-    return load_vehicle("ardrone2")
-
-
-def _regulator(A: Wide, B: Wide, effort: float) -> tuple[Wide, Wide, Wide]:
-    """Return the gain (1, n) of the linear-quadratic regulator, the cost to go (n, n), and what
-    turns a slope of it into a command (1, n).
-    """
-    from scipy.linalg import solve_discrete_are
-
-    weight = 1e-9 * np.eye(len(A))
-    weight[0, 0] = 1.0
-    cost = np.asarray(solve_discrete_are(A, B, weight, np.array([[effort]])))
-    turned = B.T / (B.T @ cost @ B + effort)
-    return turned @ cost @ A, cost, turned
 
 
 @dataclass(eq=False)
@@ -88,7 +70,7 @@ class LQG:
         }
     )
     model: tuple[float, float] = (0.05, 0.5)  # m/s2 and rad/s2 that it lacks, per root of a second
-    vehicle: Vehicle = field(default_factory=_standard)
+    vehicle: Vehicle = field(default_factory=standard_vehicle)
 
     def __post_init__(self) -> None:
         numbers = {name: getattr(self, name) for name in ("effort", "force", "torque")}
@@ -143,7 +125,7 @@ class LQG:
         process = _process_noise(A, np.diag(spread)) + _BELIEVED * np.eye(len(A))
         P = solve_discrete_are(held[0].T, C.T, process, noise)
         gain = P @ C.T @ np.linalg.inv(C @ P @ C.T + noise)
-        return held[0], held[1], C, gain, _regulator(held[0], held[1], self.effort)[0]
+        return held[0], held[1], C, gain, regulator(held[0], held[1], self.effort)[0]
 
     def __call__(self, observation: Array, info: Mapping[str, Any] | None = None) -> Array:
         """Return the action (3,) m/s2 for an observation (27,)."""
@@ -153,7 +135,7 @@ class LQG:
         tilt = (rotors - o[REFERENCE_ACCELERATION]) / self.vehicle.gravity
         torque = tilting(o[TORQUE])
         states, action = [], np.zeros(3)
-        for i, (A, B, C, gain, regulator) in enumerate(self._axes):
+        for i, (A, B, C, gain, wanted) in enumerate(self._axes):
             seen = [place[i], speed[i], o[FORCE][i], felt[i]]
             if i < 2:
                 seen = [place[i], speed[i], tilt[i], o[FORCE][i], torque[i], felt[i]]
@@ -164,7 +146,7 @@ class LQG:
                 x = np.linalg.lstsq(C, y, rcond=None)[0]
             x = x + gain @ (y - C @ x)
             states.append(x)
-            action[i] = -float(regulator[0] @ x)
+            action[i] = -float(wanted[0] @ x)
         self._states = states
         self._action = np.minimum(np.maximum(action, -MAX_ACCELERATION), MAX_ACCELERATION)
         return self._action.astype(np.float32)
@@ -182,75 +164,3 @@ def _process_noise(A: Wide, spread: Wide) -> Wide:
     step = np.asarray(expm(WIND_PERIOD * whole))
     noise: Wide = step[n:, n:].T @ step[:n, n:]
     return 0.5 * (noise + noise.T)
-
-
-@lru_cache(maxsize=8)
-def _foresight(vehicle: Vehicle, effort: float, count: int) -> list[tuple[Wide, Wide]]:
-    """Return of each axis the gain (n,) on its state, and (count, 1 or 2) on each disturbance that
-    acts over the decisions from now on.
-    """
-    found = []
-    for axis in axis_models(vehicle):
-        A, B, D = axis.held(WIND_PERIOD)
-        gain, cost, turned = _regulator(A, B, effort)
-        closed, slope, ahead = (A - B @ gain).T, cost @ D, []
-        for _ in range(count):
-            ahead.append((turned @ slope)[0])
-            slope = closed @ slope
-        found.append((gain[0], np.array(ahead)))
-    return found
-
-
-@dataclass(eq=False)
-class WindOracle:
-    """Knows the true motion, force and torque, and the wind to come, and commands by the
-    linear-quadratic regulator with preview (Tomizuka, ASME J. Dyn. Sys. 97(2), 1975). The upper end
-    of the score, 1.
-
-    What the wind will do is computed where the vehicle is now. The actuators' own disturbance is
-    known as it is now; what becomes of it is only known on the average.
-    """
-
-    effort: float = 1e-5  # as of ``LQG``
-    foresight: int = 12  # decisions; the environment's is set to it
-    disturbance_time: float = 0.3  # s, over which the actuators' disturbance lasts
-    vehicle: Vehicle = field(default_factory=_standard)
-
-    def brief(self, briefing: Briefing) -> None:
-        """Fly the declared vehicle."""
-        self.vehicle = briefing.vehicle
-
-    def reset(self) -> None:
-        """Forget the last episode: nothing is remembered."""
-
-    def __call__(self, observation: Array, info: Mapping[str, Any] | None = None) -> Array:
-        """Return the action (3,) m/s2.
-
-        Raises:
-            InputError: no ``info``, or one without the wrench to come.
-        """
-        if info is None or "wrench_ahead" not in info:
-            raise InputError(
-                "oracle: needs the environment's info (wrench_ahead), which it has where its "
-                "foresight is above 0"
-            )
-        o = np.asarray(observation, dtype=np.float64)
-        last = np.exp(-WIND_PERIOD * (np.arange(self.foresight) + 0.5) / self.disturbance_time)
-        ahead = info["wrench_ahead"] + last[:, None] * info["disturbance"]
-        torque, turning = tilting(ahead[:, 3:]), tilting(info["rate"])
-        turned = tilting(info["angular_acceleration"])
-        place = info["position"] - info["reference"]
-        speed = info["velocity"] - o[REFERENCE_VELOCITY]
-        tilt = info["up"] / info["up"][2] - o[REFERENCE_ACCELERATION] / self.vehicle.gravity
-        action = np.zeros(3)
-        for i, (gain, shares) in enumerate(_foresight(self.vehicle, self.effort, self.foresight)):
-            middle = [info["lift"] - o[REFERENCE_ACCELERATION][2]]
-            comes = ahead[:, 2:3]
-            if i < 2:
-                middle = [tilt[i], turning[i], turned[i]]
-                comes = np.column_stack([ahead[:, i], torque[i]])
-            state = np.array([place[i], speed[i], *middle, info["integral"][i]])
-            action[i] = -float(gain @ state + np.sum(shares * comes))
-        return np.minimum(np.maximum(action, -MAX_ACCELERATION), MAX_ACCELERATION).astype(
-            np.float32
-        )

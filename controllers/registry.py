@@ -13,8 +13,9 @@ import yaml
 from numpy.typing import NDArray
 
 from ..runtime.errors import unknown_name
-from .fan_laws import Admittance, AdmittancePID, Hover, Lead, Oracle, Ratio
-from .lqg import LQG, WindOracle
+from .fan_laws import Admittance, AdmittancePID, Hover, Lead, Ratio
+from .lqg import LQG
+from .preview import Oracle, WindOracle
 from .tracker import InformedTracker, Limit, Tracker
 from .wind_laws import INDI, PID, FlightLoopAlone, L1Adaptive, PIDWithForce, PIDWithWrench
 
@@ -93,7 +94,7 @@ TASK_LAWS: dict[str, Laws] = {
         "hover": partial(Hover, axes=2),
         "admittance": partial(Admittance, gain_z=18.0),
         "ratio": partial(Ratio, gain_z=8.0),
-        "oracle": partial(Oracle, entries=("fan", "fan_velocity", "position")),
+        "oracle": partial(Oracle, axes=(1, 2)),
     },
     "WindHover": _WIND,
     "WindTrajectory": _WIND,

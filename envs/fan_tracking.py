@@ -64,6 +64,18 @@ class FanTask(Task):
         start = np.array([distance, *(path[0] + offset)])
         self.loop.reset(self.np_random, start, math.pi, fan_path=path[:1], settle=settle)
 
+    def _truth(self) -> dict[str, Any]:
+        """Return beside ``Task._truth`` the places (3,) m of vehicle and set point, and where the
+        fan's axis is now and after each decision to come, (foresight + 1, 2) m.
+        """
+        loop, path = self.loop, self.path
+        rows = loop.ticks - 1 + self.decision_ticks * np.arange(self.foresight + 1)
+        return super()._truth() | {
+            "place": loop.position.copy(),
+            "setpoint": loop.setpoint[:3].copy(),
+            "fan_ahead": path[np.clip(rows, 0, len(path) - 1)],
+        }
+
     def _fly(self, noise: Array) -> None:
         loop = self.loop
         loop.setpoint[4 : 4 + self.action_size] = self.command

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..dynamics.effects import check_setting
 from ..dynamics.motion import Array
+from ..dynamics.rotation import quaternion_to_matrix
 from ..dynamics.vehicle import EffectSetting, Mocap, Vehicle
 from ..dynamics.vehicle_file import load_vehicle
 from ..estimator.tuning import UKFTuning
@@ -119,6 +120,7 @@ class Task(gym.Env[Frame, Frame], ABC):
         self._in_flight = False
         self._generator: np.random.Generator | None = None
         self.command: Array = np.zeros(self.action_size)  # the last one, in SI units
+        self.foresight = 0  # decisions to come that ``info`` tells of, for the oracle
 
     def _observe(self, limits: Array, scales: Sequence[float]) -> None:
         """Set the observation's space, of numbers within ``limits`` that ``normalize`` divides by
@@ -195,6 +197,28 @@ class Task(gym.Env[Frame, Frame], ABC):
     def _get_info(self) -> dict[str, Any]:
         """Return the truth that the agent does not see, and whether the vehicle is lost."""
 
+    def _truth(self) -> dict[str, Any]:
+        """Return what the oracle knows beyond ``info``: the true motion and the integral of the
+        flight loop, world axes, SI units. A task adds what is to come.
+        """
+        loop, R = self.loop, np.empty((3, 3))
+        record = loop.record[0]
+        quaternion_to_matrix(loop.quaternion, R)
+        thrust, *torques = (self.vehicle.mixing @ record["plant"]["speeds"] ** 2).tolist()
+        return {
+            "velocity": loop.velocity.copy(),
+            "rate": R @ loop.motion[1][3:6],
+            "angular_acceleration": R @ np.linalg.solve(self.vehicle.inertia, torques),
+            "up": R[:, 2].copy(),
+            "lift": thrust * R[2, 2] / self.vehicle.mass - self.vehicle.gravity,
+            "integral": record["flight"]["sum"].copy(),
+        }
+
+    def _told(self) -> dict[str, Any]:
+        """Return ``info``, with the truth where somebody foresees."""
+        info = self._get_info()
+        return info | self._truth() if self.foresight else info
+
     @abstractmethod
     def _get_reward(self, info: dict[str, Any], change: Array) -> dict[str, float]:
         """Return the terms of the reward; ``change`` is that of the command."""
@@ -220,7 +244,7 @@ class Task(gym.Env[Frame, Frame], ABC):
         if self.render_mode == "human":
             self.render()
         # whether the vehicle is lost is decided by steps
-        info = {"reward_tracking": 0.0, "reward_change": 0.0, **self._get_info(), "lost": False}
+        info = {"reward_tracking": 0.0, "reward_change": 0.0, **self._told(), "lost": False}
         return self._get_obs(), info
 
     def step(self, action: Frame) -> tuple[Frame, float, bool, bool, dict[str, Any]]:
@@ -245,7 +269,7 @@ class Task(gym.Env[Frame, Frame], ABC):
         self.fly()
         if self.render_mode == "human":
             self.render()
-        info = self._get_info()
+        info = self._told()
         terms = self._get_reward(info, self.command - last)
         reward = sum(terms.values())
         return self._get_obs(), reward, info["lost"], False, {**terms, **info}

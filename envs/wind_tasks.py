@@ -165,7 +165,6 @@ class WindHoverEnv(Task):
         self._see = specialised(see, np.empty(20), np.empty(10), three, three, three, frame)
         self.reference_name = ""
         self.blowing: Sequence[Wind] = []
-        self.foresight = 0  # decisions that ``info["wrench_ahead"]`` tells, for the oracle
 
     def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> ClosedLoop:
         """Return the closed loop of a true vehicle, with an accelerometer."""
@@ -216,7 +215,7 @@ class WindHoverEnv(Task):
         loop, reference, position = self.loop, self._row()[:3], self.loop.position.copy()
         error = math.sqrt(_square(position - reference))
         flying = self.is_flying() and position.item(2) > 0.0 and error <= LOST_OFFSET
-        info = {
+        return {
             "error": error,
             "position": position,
             "reference": reference.copy(),
@@ -227,7 +226,6 @@ class WindHoverEnv(Task):
             "lost": not flying,
             "trajectory": self.reference_name,
         }
-        return info | self._truth() if self.foresight else info
 
     def _get_reward(self, info: dict[str, Any], change: Array) -> dict[str, float]:
         square = _square(info["position"] - info["reference"])
@@ -237,30 +235,21 @@ class WindHoverEnv(Task):
         }
 
     def _truth(self) -> dict[str, Any]:
-        """Return what the oracle knows beyond ``info``: the true motion, and the wrench (foresight,
-        6) N and Nm, world, of the winds over each decision to come, where the vehicle is now.
+        """Return beside ``Task._truth`` the actuators' disturbance (6,) N and Nm, world, and the
+        wrench (foresight, 6) of the winds over each decision to come, where the vehicle is now.
         """
-        loop = self.loop
-        record, R, wind = loop.record[0], np.empty((3, 3)), np.empty(3)
-        plant, fan = record["plant"], loop.record["fan"].copy()[0]
+        loop, R, wind = self.loop, np.empty((3, 3)), np.empty(3)
+        fan = loop.record["fan"].copy()[0]
         quaternion_to_matrix(loop.quaternion, R)
-        rate, body = loop.motion[1][3:6], plant["body"]
-        thrust, *torques = (self.vehicle.mixing @ plant["speeds"] ** 2).tolist()
-        ahead, moving = np.empty((self.foresight, 6)), (loop.velocity, rate, body["com"])
-        axial, radial = loop.jet_table
+        moving = loop.velocity, loop.motion[1][3:6], loop.record[0]["plant"]["body"]["com"]
+        ahead, (axial, radial) = np.empty((self.foresight, 6)), loop.jet_table
         at, blowing = loop.time + 0.5 * WIND_PERIOD, Sum(*self.blowing)
         for k in range(self.foresight):
             fan["air"] = blowing.velocity(loop.points.T, at + k * WIND_PERIOD)
             jet_wrench(fan, axial, radial, loop.position, R, *moving, wind, ahead[k])
-        return {
-            "wrench_ahead": ahead,
+        return super()._truth() | {
             "disturbance": loop.disturbance.copy(),
-            "velocity": loop.velocity.copy(),
-            "rate": R @ rate,
-            "angular_acceleration": R @ np.linalg.solve(self.vehicle.inertia, torques),
-            "up": R[:, 2].copy(),
-            "lift": thrust * R[2, 2] / self.vehicle.mass - self.vehicle.gravity,
-            "integral": record["flight"]["sum"].copy(),
+            "wrench_ahead": ahead,
         }
 
     def _make_viewer(self) -> Any:

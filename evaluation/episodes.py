@@ -87,13 +87,13 @@ def fly_episode(
         env: the environment.
         controller: called with ``observation`` and ``info``. Its ``brief``, where it has one, is
             called first, with ``briefing_of(env)``; its ``foresight`` is how many
-            decisions ahead it sees the wind.
+            decisions ahead it sees wind or fan.
         seed: of the episode.
         each: called with the ``info`` of every decision.
         decisions: of a whole episode.
     """
-    if hasattr(env, "foresight"):
-        env.foresight = getattr(controller, "foresight", 0)
+    if hasattr(env.unwrapped, "foresight"):
+        env.unwrapped.foresight = getattr(controller, "foresight", 0)
     observation, info = env.reset(seed=seed)
     brief = getattr(controller, "brief", None)
     if brief is not None:

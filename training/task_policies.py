@@ -99,7 +99,7 @@ class TaskLesson:
 def _environment(task: str) -> Any:
     """Return the task's environment, with what its oracle must see."""
     env = TASKS[task].environment(SCENARIO)
-    env.foresight = getattr(make_controller("oracle", task), "foresight", 0)
+    env.foresight = make_controller("oracle", task).foresight
     return env
 
 
