@@ -34,7 +34,7 @@ class Lesson(Protocol):
         ...
 
     def look(self, observations: Frames, infos: dict[str, Any]) -> tuple[Frames, Array]:
-        """Return frames (n, quantities) of the next decision, and the oracle's command (n, axes)
+        """Return frames (n, quantities) of the next decision, and the teacher's command (n, axes)
         there; after the last decision once more.
         """
         ...
@@ -47,7 +47,9 @@ class Lesson(Protocol):
 
 
 class FanLesson:
-    """FanTracking: the oracle's command, or where the fan is ``ahead`` decisions later."""
+    """FanTracking: the command of a law that sees the fan (its velocity, and a gain on the offset),
+    or where the fan is ``ahead`` decisions later.
+    """
 
     def __init__(self, config: Config) -> None:
         self._config, self._features = config, features_of(config)
@@ -61,7 +63,7 @@ class FanLesson:
         self._known: list[Array] = []
 
     def look(self, observations: Frames, infos: dict[str, Any]) -> tuple[Frames, Array]:
-        """Return frames (n, quantities) and the oracle's command (n, 1)."""
+        """Return frames (n, quantities) and the teacher's command (n, 1)."""
         frames = self._features.frames(observations, infos)
         if self._history is None:
             self._history = History(self._features, len(frames))
@@ -69,19 +71,19 @@ class FanLesson:
         else:
             self._history.push(frames)
         fan, own = infos["fan_y"], infos["y"]
-        oracle = infos["fan_velocity"] + self._config["gain"] * (fan - own)
-        self._known.append(np.array([fan, own, observations[:, VELOCITY_Y], oracle]))
-        return self._history.flat(), oracle[:, None]
+        wanted = infos["fan_velocity"] + self._config["gain"] * (fan - own)
+        self._known.append(np.array([fan, own, observations[:, VELOCITY_Y], wanted]))
+        return self._history.flat(), wanted[:, None]
 
     def taught(self, kept: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
         """Return the command (decisions, n, 1), or the fan's offset, its velocity and that less the
         vehicle's own (decisions, n, 3).
         """
-        fan, own, speed, oracle = np.stack(self._known, axis=1)
+        fan, own, speed, wanted = np.stack(self._known, axis=1)
         now = np.arange(self.decisions)
         ahead = np.minimum(now + self._config["ahead"], self.decisions)
         if self._config["says"] == "command":
-            truth = np.clip(oracle[:-1], -MAX_COMMAND, MAX_COMMAND)[..., None]
+            truth = np.clip(wanted[:-1], -MAX_COMMAND, MAX_COMMAND)[..., None]
         else:
             velocity = (fan[ahead] - fan[:-1]) / (self.period * (ahead - now))[:, None]
             truth = np.stack([(fan - own)[:-1], velocity, velocity - speed[:-1]], axis=-1)
@@ -126,7 +128,7 @@ class Flights:
     def fly(
         self, network: BeliefNetwork | None, shares: Frames, advance: Callable[[float], None]
     ) -> None:
-        """Fly a round, with the oracle where there is no network.
+        """Fly a round, with the teacher where there is no network.
 
         Args:
             network: whose means are flown.
