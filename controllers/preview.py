@@ -29,6 +29,7 @@ from .wind_observation import (
 
 Array = NDArray[np.floating[Any]]
 Wide = NDArray[np.float64]
+DISTURBANCE_TIME = 0.3  # s, over which the actuators' disturbance lasts
 Step = tuple[Wide, Wide, Wide]  # A (n, n), B (n, 1) and D (n, d) of a decision
 
 
@@ -72,7 +73,6 @@ class _PreviewLaw:
     effort: float  # m2 of error that a command of 1 is worth
     foresight: int  # decisions; the environment's is set to it
     axes: tuple[int, ...]  # of the world, that are commanded
-    disturbance_time: float = 0.3  # s, over which the actuators' disturbance lasts
     vehicle: Vehicle = field(default_factory=standard_vehicle)
     period: ClassVar[float]  # s, of a decision
     largest: ClassVar[float]  # command
@@ -124,12 +124,6 @@ class _PreviewLaw:
         middle.append([info["lift"] - pushed[2]])
         return [np.array([place[i], speed[i], *middle[i], info["integral"][i]]) for i in (0, 1, 2)]
 
-    def _lasting(self, wrench: Wide) -> Wide:
-        """Return what is left (foresight, 6) of a wrench (6,) in each decision, on the average."""
-        middles = self.period * (np.arange(self.foresight) + 0.5)
-        left: Wide = np.exp(-middles / self.disturbance_time)[:, None] * wrench
-        return left
-
 
 @lru_cache(maxsize=16)
 def _gains(
@@ -138,7 +132,16 @@ def _gains(
     return [preview(*step, effort, count) for step in steps(vehicle)]
 
 
-def _pushing(wrench: Wide) -> list[Wide]:
+def lasting(wrench: Wide, count: int, period: float) -> Wide:
+    """Return what is left (count, k) of a disturbance (k,) in decisions of ``period`` s, on the
+    average.
+    """
+    middles = period * (np.arange(count) + 0.5)
+    left: Wide = np.exp(-middles / DISTURBANCE_TIME)[:, None] * wrench
+    return left
+
+
+def pushing(wrench: Wide) -> list[Wide]:
     """Return what of wrenches (n, 6) moves each axis: force, and on the first two the torque."""
     torque = tilting(wrench[:, 3:])
     return [*(np.column_stack([wrench[:, i], torque[i]]) for i in (0, 1)), wrench[:, 2:3]]
@@ -168,7 +171,9 @@ class WindOracle(_PreviewLaw):
         place = info["position"] - info["reference"]
         speed = info["velocity"] - o[REFERENCE_VELOCITY]
         states = self._states(info, place, speed, o[REFERENCE_ACCELERATION])
-        return states, _pushing(info["wrench_ahead"] + self._lasting(info["disturbance"]))
+        return states, pushing(
+            info["wrench_ahead"] + lasting(info["disturbance"], self.foresight, WIND_PERIOD)
+        )
 
 
 @dataclass(eq=False)
@@ -209,8 +214,9 @@ class Oracle(_PreviewLaw):
         fan = np.insert(info["fan_ahead"], 0, own[0], axis=1)  # it keeps its distance
         moves, off = np.diff(fan, axis=0), info["setpoint"] - fan[0]
         states = self._states(info, own - fan[0], info["velocity"], np.zeros(3))
-        pushing = _pushing(self._lasting(np.concatenate([info["force"], info["torque"]])))
+        wrench = np.concatenate([info["force"], info["torque"]])
+        comes = pushing(lasting(wrench, self.foresight, DECISION_PERIOD))
         return (
             [np.append(state, off[i]) for i, state in enumerate(states)],
-            [np.column_stack([one, moves[:, i]]) for i, one in enumerate(pushing)],
+            [np.column_stack([one, moves[:, i]]) for i, one in enumerate(comes)],
         )

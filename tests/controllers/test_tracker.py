@@ -96,6 +96,20 @@ def test_only_the_limit_is_told_of_gusts():
         assert pilot._briefing.air.turbulence == told
 
 
+def test_the_limit_looks_ahead():
+    """With the same beliefs and the trackers' command it is worse on fast fans."""
+
+    class Behind(Limit):
+        _command = InformedTracker._command
+
+    env = FanTrackingEnv("fast")
+    ahead, behind = (
+        np.array([fly_episode(env, pilot, seed).rmse for seed in range(900_100, 900_106)])
+        for pilot in (Limit(particles=500), Behind(particles=500, gain=1.6, damping=0.3))
+    )
+    assert ahead.mean() < 0.95 * behind.mean()
+
+
 def test_a_fan_that_leaves_the_family_is_found_again():
     """It stands for 5 s and then goes, which no motion of the family does."""
     path = np.concatenate([np.zeros(60), np.cumsum(np.full(30, 0.2 * 0.08))])
