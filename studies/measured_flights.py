@@ -132,21 +132,21 @@ def compare(log: FlightLog, diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def linear_drag(diagnosis: Diagnosis) -> list[float]:
-    """Return the linear drag along body x and y in N per m/s; rotor drag at the rotor speeds of
-    hover.
+    """Return the linear drag along body x and y in N per m/s, of all named drags together; rotor
+    drag at the rotor speeds of hover.
     """
+    total, rate = np.zeros(2), 4.0 * diagnosis.declared.hover_rate
     for e in diagnosis.effects:
         if e.name == "body_drag":
-            return [e.coefficients["dx"], e.coefficients["dy"]]
+            total += [e.coefficients["dx"], e.coefficients["dy"]]
         if e.name == "rotor_drag":
-            rate = 4.0 * diagnosis.declared.hover_rate
-            return [rate * e.coefficients["kdx"], rate * e.coefficients["kdy"]]
-    return [0.0, 0.0]
+            total += [rate * e.coefficients["kdx"], rate * e.coefficients["kdy"]]
+    return [float(x) for x in total]
 
 
 def imu_check(path: Path, log: FlightLog, diagnosis: Diagnosis) -> dict[str, float]:
-    """Return how the model's vertical specific force agrees with an accelerometer that nothing else
-    here looks at (m/s2).
+    """Return how the model's vertical specific force agrees with the accelerometer of a flight that
+    no fit saw (m/s2).
     """
     table = open_table(path).read(["t", "imu_acc_z"])
     s = motion(log, replace(diagnosis.declared, effects=()))

@@ -18,7 +18,7 @@ zero. Kinds: *rotor input* changes what the rotors deliver, *wrench* adds force 
 body, *sensing* changes what the log holds. World z is up; body x points forward, y left.
 
 An effect declares what it is, and a diagnosis goes by that, not by its name. It declares its *family* and the *role* in which other
-effects know it. It also declares what logs must hold to show it, and which others leave much the same *trace* in slow flight. What
+effects know it. It also declares what logs must hold to show it. What
 can be confused in given flights is computed from them: `indistinguishable_from` in a report.
 
 """
@@ -63,9 +63,6 @@ def _declarations(effect: Effect) -> str:
         parts.append(f"Role: {effect.role}")
     if effect.needs:
         parts.append(f"Needs: {', '.join(effect.needs)}")
-    alike = [name for name in names() if get(name).trace == effect.trace and name != effect.name]
-    if effect.trace and alike:
-        parts.append(f"Trace: {effect.trace}, as {', '.join(alike)}")
     if effect.starting_points is not None:
         parts.append("A fit starts from several points")
     return ". ".join(parts) + "."

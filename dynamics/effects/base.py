@@ -155,9 +155,6 @@ class Effect:
         family: what kind of physics it is; the words are explained in ``declaration``.
         role: what it is to a fit that must know one effect by what it does, not by its name.
         needs: what a flight must have to show it.
-        trace: effects with the same word leave nearly the same force in slow flight that hardly
-            yaws; any word.
-        usual: it is as likely the cause as others of that trace.
         any_size: what it changes may be of any size: a load, a fault of assembly. Others are of
             the order of their typical sizes.
         scales_noise: a sensing effect that multiplies what is measured, and with it the
@@ -185,8 +182,6 @@ class Effect:
     family: Family = Family.OTHER
     role: Role | None = None
     needs: tuple[Need, ...] = ()
-    trace: str = ""
-    usual: bool = True
     any_size: bool = False
     scales_noise: bool = False
     starting_points: StartingPoints | None = None

@@ -85,5 +85,4 @@ EFFECT = Effect(
     family=Family.DRAG,
     role=Role.BODY_DRAG,
     implausible=implausible,
-    trace="drag",
 )

@@ -71,6 +71,4 @@ EFFECT = Effect(
     family=Family.ALIGNMENT,
     role=Role.DELAY,
     needs=(Need.FAST_MOTION, Need.FINE_ROTOR_SPEEDS),
-    trace="late rotors",
-    usual=False,
 )

@@ -25,7 +25,5 @@ EFFECT = Effect(
     model=effect_model,
     family=Family.STEADY,
     role=Role.STEADY_FORCE,
-    trace="sideways force",
-    usual=False,
     any_size=True,
 )

@@ -110,8 +110,6 @@ class Need(StrEnum):
     MOMENTS = "moments"
     # differences between single rotors, which commands do not tell
     SINGLE_ROTORS = "single rotors"
-    # a thrust that is known but for a factor: it would explain whatever a guessed curve lacks
-    THRUST_CURVE = "a known thrust curve"
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ from .base import (
     Coefficient,
     Effect,
 )
-from .declaration import Coefficients, Family, Unexplained
+from .declaration import Coefficients, Family, Found, Unexplained
 from .parts import add_force_at
 
 _AXIAL, _RADIAL = jet_table(0.45, 0.10)
@@ -37,6 +37,8 @@ _RING_X, _RING_Y = HULL_RADIUS * np.cos(_ANGLES), HULL_RADIUS * np.sin(_ANGLES)
 # where a fan may stand as a fit starts: the way it blows (rad), m from the flight against that
 # way, and m across
 _HEADINGS = tuple(2 * math.pi * k / 8 for k in range(8))
+# typical sizes; a slower fan blows nothing that its own drag does not do in still air
+_LEAST_SPEED = 0.1
 _DISTANCES, _ACROSS = (1.5, 2.5, 3.5), (-0.6, 0.0, 0.6)
 
 
@@ -104,6 +106,13 @@ def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
     return found
 
 
+def implausible(found: Found) -> str:
+    """Return why a found jet is none: its fan hardly blows."""
+    if found.coefficients["u0"] >= _LEAST_SPEED * found.typical["u0"]:
+        return ""
+    return "hardly blows, like a drag"
+
+
 EFFECT = Effect(
     name="fan_jet",
     kind="wrench",
@@ -134,4 +143,5 @@ EFFECT = Effect(
     model=effect_model,
     family=Family.SURROUNDINGS,
     starting_points=starting_points,
+    implausible=implausible,
 )

@@ -32,5 +32,4 @@ EFFECT = Effect(
     family=Family.ROTOR_DYNAMICS,
     role=Role.DELAY,
     needs=(Need.FAST_MOTION, Need.FINE_ROTOR_SPEEDS),
-    trace="late rotors",
 )

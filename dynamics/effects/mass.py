@@ -35,7 +35,5 @@ EFFECT = Effect(
     amend=amend,
     family=Family.RIGID_BODY,
     role=Role.MASS,
-    trace="upward force",
-    usual=False,
     any_size=True,
 )

@@ -37,5 +37,4 @@ EFFECT = Effect(
     family=Family.ROTOR_DYNAMICS,
     role=Role.LAG,
     needs=(Need.FAST_MOTION, Need.FINE_ROTOR_SPEEDS),
-    trace="late rotors",
 )

@@ -72,5 +72,4 @@ EFFECT = Effect(
     model=effect_model,
     family=Family.DRAG,
     role=Role.ROTOR_DRAG,
-    trace="drag",
 )

@@ -31,7 +31,7 @@ from .base import (
     Coefficient,
     Effect,
 )
-from .declaration import Coefficients, Family, Role, Unexplained
+from .declaration import Coefficients, Family, Found, Role, Unexplained
 from .parts import add_force_at
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 
 _LENGTHS = (0.15, 0.25, 0.4, 0.65, 1.0, 1.5)  # m, of cables from which a fit starts
 _DAMPINGS = (0.3, 2.0)  # 1/s, the same
+_LEAST_LENGTH = 0.1  # typical lengths
 _MOST_DAMPING_RATIO = 0.2  # of a load that swings in air
 # the effect's own state, from HIDDEN on: 0 whether it has started, 1-3 n, 4-6 n'
 _N, _RATE = HIDDEN + 1, HIDDEN + 4
@@ -126,6 +127,13 @@ def possible(coefficients: Coefficients, vehicle: "Vehicle") -> bool:
     )
 
 
+def implausible(found: Found) -> str:
+    """Return why a found load is none: its cable is too short to swing."""
+    if found.coefficients["l"] >= _LEAST_LENGTH * found.typical["l"]:
+        return ""
+    return "hangs on hardly any cable, like a mass"
+
+
 EFFECT = Effect(
     name="slung_payload",
     kind="wrench",
@@ -153,4 +161,5 @@ EFFECT = Effect(
     role=Role.SUSPENDED_LOAD,
     starting_points=starting_points,
     possible=possible,
+    implausible=implausible,
 )

@@ -62,6 +62,4 @@ EFFECT = Effect(
     model=effect_model,
     family=Family.ALIGNMENT,
     role=Role.THRUST_AXIS,
-    trace="sideways force",
-    usual=False,
 )

@@ -40,5 +40,5 @@ EFFECT = Effect(
     model=effect_model,
     family=Family.THRUST,
     role=Role.THRUST_CURVE,
-    needs=(Need.FINE_ROTOR_SPEEDS, Need.THRUST_CURVE),
+    needs=(Need.FINE_ROTOR_SPEEDS,),
 )

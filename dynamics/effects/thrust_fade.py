@@ -11,7 +11,7 @@ import math
 from numba import cfunc
 
 from .base import EFFECT_MODEL, ROTOR_TIME, Coefficient, Effect
-from .declaration import Family, Need, Role
+from .declaration import Family, Role
 
 
 @cfunc(EFFECT_MODEL, cache=True)
@@ -36,5 +36,4 @@ EFFECT = Effect(
     model=effect_model,
     family=Family.THRUST,
     role=Role.THRUST_OVER_TIME,
-    needs=(Need.THRUST_CURVE,),
 )

@@ -31,6 +31,5 @@ EFFECT = Effect(
     model=effect_model,
     family=Family.THRUST,
     role=Role.THRUST,
-    trace="upward force",
     any_size=True,
 )

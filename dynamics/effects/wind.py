@@ -77,7 +77,7 @@ EFFECT = Effect(
     coefficients=(
         Coefficient("wx", "m/s", (2.0, 1.0), "along world x"),
         Coefficient("wy", "m/s", (1.0, 0.5), "along world y"),
-        Coefficient("wz", "m/s", (0.0, 0.0), "along world z"),
+        Coefficient("wz", "m/s", (0.4, 0.2), "along world z"),
         Coefficient("cd", "N/(m/s)^2", (0.04, 0.001), "drag of its own", minimum=0.0),
     ),
     source="quadratic drag, 0.5 * 1.2 kg/m3 * C_d A with C_d A = 0.06 m2, 16 cm2; wind of an open "

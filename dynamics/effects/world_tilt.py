@@ -54,5 +54,4 @@ EFFECT = Effect(
     "frame that is tilted leaves just a constant force, of the weight times the tilt",
     model=effect_model,
     family=Family.ALIGNMENT,
-    trace="sideways force",
 )

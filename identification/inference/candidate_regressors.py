@@ -106,11 +106,9 @@ def explanatory_variables(flights: Flights, setting: Setting) -> list[Variable]:
 
 def _is_excited(flights: Flights, axis: int) -> bool:
     """Return whether an angular velocity is more than the sensors' noise, which is in the torque as
-    well; where no torque is balanced it does no harm.
+    well.
     """
-    return flights.commanded or bool(
-        flights.angular_velocity_noise[axis] <= REGRESSORS.most_noise_share
-    )
+    return bool(flights.angular_velocity_noise[axis] <= REGRESSORS.most_noise_share)
 
 
 def standardised(found: list[Variable]) -> dict[str, Array]:

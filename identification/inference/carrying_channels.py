@@ -5,7 +5,7 @@ Both are computed. The trace is the share of the effect's deviance in the balanc
 that of torques; what the model reads shows where its wrench changes with an input.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -49,14 +49,18 @@ ORDER = (
 )
 
 
-def carrying_channels(search: Search, fit: FittedEffects, effect: str) -> tuple[str, ...]:
-    """Return the channels that carry a named effect of a fit, in the order of ``ORDER``."""
-    flights = search.flights
-    found = set(_traces(search, fit, effect)) | set(_read(flights, fit.setting, effect))
+def carrying_channels(
+    flights: Flights, setting: Setting, effect: str, traces: Iterable[str]
+) -> tuple[str, ...]:
+    """Return the channels that carry a named effect at a setting, in the order of ``ORDER``; in
+    those of ``traces`` it leaves its trace.
+    """
+    found = set(traces) | set(_read(flights, setting, effect))
     return tuple(channel for channel in ORDER if channel in found)
 
 
-def _traces(search: Search, fit: FittedEffects, effect: str) -> Iterator[str]:
+def traces_of(search: Search, fit: FittedEffects, effect: str) -> Iterator[str]:
+    """Yield the channels in which an effect of a fit leaves its trace."""
     flights = search.flights
     part = flights.residual(fit.without(effect).setting) - flights.residual(fit.setting)
     power = np.sum(np.square(search.whiten(part)[flights.fit_rows]), axis=0)

@@ -5,13 +5,14 @@ needs a quadratic part below zero. A true coefficient of zero is at a bound too,
 not far outside.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Found
-from .regression import CENTRAL, typical_size
+from .regression import CENTRAL, Column, Flights, Setting, typical_size
 from .search import FittedEffects, Search
 
 
@@ -57,7 +58,7 @@ def implausible_coefficients(search: Search, fit: FittedEffects) -> list[str]:
     found += [
         f"{effect} {reason}: another effect may be the cause"
         for effect in fit.effects
-        if (reason := _implausible(search, fit, effect))
+        if (reason := why_implausible(search.flights, fit.setting, fit.std, effect))
     ]
     g = search.gram_at(fit)
     total, k = g.blocks.sum(axis=0), len(g.columns)
@@ -87,22 +88,23 @@ def implausible_coefficients(search: Search, fit: FittedEffects) -> list[str]:
     return found
 
 
-def _implausible(search: Search, fit: FittedEffects, effect: str) -> str:
-    """Return why an effect says that these coefficients are none of its own; empty where they may
-    be.
+def why_implausible(
+    flights: Flights, setting: Setting, std: Mapping[Column, float], effect: str
+) -> str:
+    """Return why an effect says that its coefficients at a setting are none of its own; empty where
+    they may be.
     """
     asked = get(effect).implausible
     if asked is None:
         return ""
-    vehicle = search.flights.vehicle
-    velocity = np.concatenate([p.signals.velocity[p.rows] for p in search.flights.pieces({})])
-    named = {*fit.effects, *(e.name for e in vehicle.effects)} - {effect}
+    vehicle = flights.vehicle
+    named = {*(e for e in setting if e), *(e.name for e in vehicle.effects)} - {effect}
     return asked(
         Found(
-            fit.setting[effect],
-            {name: fit.std.get((effect, name), 0.0) for name in fit.setting[effect]},
+            setting[effect],
+            {name: std.get((effect, name), 0.0) for name in setting[effect]},
             {c.name: typical_size((effect, c.name), vehicle) for c in get(effect).coefficients},
-            float(np.sqrt(np.mean(np.sum(np.square(velocity), axis=1)))),
+            flights.speed,
             frozenset(get(name).family for name in named),
         )
     )

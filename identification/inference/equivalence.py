@@ -19,7 +19,6 @@ from .regression import (
     unit_of_change,
 )
 from .search import SEARCH, FittedEffects, Search, coefficient_count
-from .turning_delay import same_delays
 
 Array = NDArray[np.float64]
 
@@ -29,6 +28,13 @@ class EquivalenceSettings:
     """From which deviance on, flights tell two explanations apart."""
 
     least_deviance: float = 30.0  # between two explanations; a little over five std deviations
+    # of an effect's own deviance, by which two explanations must differ: effect models are true to
+    # that
+    least_share_apart: float = 0.001
+    # share of the effect's deviance that another one must explain, linearised, to be worth a refit
+    least_linear_share: float = 0.1
+    # times the limit, which the linear fit of another one may leave of it to be worth a refit
+    most_linear_deviance_ratio: float = 40.0
     largest_size: float = 1.2 * GRAM.prior_std  # typical sizes
     most_reliable_effects: int = 2  # at once; aerodynamic ones count as one
     # share of what an inertia explains, which one that goes with the mass may leave of it
@@ -52,27 +58,22 @@ def equivalents(search: Search, fit: FittedEffects, effect: str) -> list[str]:
     """Return the effects of the library that would explain what ``effect`` explains, given all
     others of the fit.
     """
-    flights, rules = search.flights, search.flights.rules
-    if search.is_fixed(effect):
-        return same_delays(effect, search.library)
+    flights = search.flights
     less = fit.without(effect)
     regression = search.linearise(less)
     whole = flights.residual(fit.setting)
     part = flights.residual(less.setting) - whole
     g = gram(flights, less.setting, search.whiten, regression.columns, part)
     limit = limit_of(search, part)
-    if np.isfinite(rules.most_share_without):  # the other one must explain most of it
-        left = flights.residual(search.refit(less).setting) - whole
-        limit = min(limit, rules.most_share_without * search.deviance_of(left))
     # by the triangle inequality they are no farther apart
     enough = (np.sqrt(search.deviance_of(whole)) + np.sqrt(limit)) ** 2
     out = []
     for other in search.gains(less, regression, g):
         if (
             other.effect == effect
-            or other.share < rules.least_linear_share
+            or other.share < EQUIVALENCE.least_linear_share
             or other.size > EQUIVALENCE.largest_size
-            or other.deviance_left > rules.most_linear_deviance_ratio * limit
+            or other.deviance_left > EQUIVALENCE.most_linear_deviance_ratio * limit
         ):
             continue
         # a nonlinear effect is refitted to the flights
@@ -127,7 +128,6 @@ def unlisted_equivalent_doubts(search: Search, fit: FittedEffects) -> list[str]:
             playing(mate, among=search.library)
             or playing(Role.INERTIA, among=fit.effects)
             or not inertias
-            or flights.commanded
         ):
             continue
         name, value = next(iter(fit.setting[effect].items()))
@@ -173,7 +173,7 @@ def limit_of(search: Search, part: Array) -> float:
     """Return the deviance from which on two explanations of ``part`` (rows, 6) are told apart."""
     return max(
         EQUIVALENCE.least_deviance,
-        search.flights.rules.least_share_apart * search.deviance_of(part),
+        EQUIVALENCE.least_share_apart * search.deviance_of(part),
     )
 
 

@@ -24,7 +24,7 @@ from .regression import (
     is_nonlinear,
     typical_size,
 )
-from .search import FittedEffects, Search, unexplained_deviance
+from .search import SEARCH, FittedEffects, Search, unexplained_deviance
 from .sensor_bias import is_bias
 
 Array = NDArray[np.float64]
@@ -54,7 +54,7 @@ def hidden_by_bias(search: Search, fit: FittedEffects) -> frozenset[str]:
     if not flights.inertial:
         return frozenset()
     base = flights.residual(fit.setting)
-    biases = [c for c in flights.deviations if is_bias(c)]
+    biases = [c for c in flights.biases if is_bias(c)]
     columns = flights.columns(fit.setting, biases)
     whole: dict[str, Column] = {}
     for effect in search.library:
@@ -71,7 +71,7 @@ def hidden_by_bias(search: Search, fit: FittedEffects) -> frozenset[str]:
 
     def shows(column: Column, beside: list[Column]) -> bool:
         left = unexplained_deviance(g, total, [column], np.ones(1), beside)
-        return left >= search.flights.rules.least_deviance_reduction
+        return left >= SEARCH.least_deviance_reduction
 
     return frozenset(e for e, c in whole.items() if shows(c, []) and not shows(c, biases))
 

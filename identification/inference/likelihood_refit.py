@@ -18,7 +18,7 @@ import numpy as np
 from ...dynamics.effects import Role, get, playing
 from .innovations import Innovations
 from .regression import Column, coefficient, is_delay, moves_time
-from .search import FittedEffects, Search, with_changes
+from .search import SEARCH, FittedEffects, Search, with_changes
 from .time_offsets import ROTOR_TIME_OFFSET, TIMING
 
 
@@ -80,7 +80,7 @@ def refitted_by_likelihood(search: Search, fit: FittedEffects) -> FittedEffects:
     Standard deviations are no smaller than those of the residual.
     """
     late = _first_coefficients(Role.DELAY, fit.effects)
-    if search.flights.commanded or not any(map(is_biased, fit.effects)) or len(late) > 1:
+    if not any(map(is_biased, fit.effects)) or len(late) > 1:
         return fit
     # a delay is fitted as a rotor time offset: moving the pose would move its noise as well
     found = _maximum_likelihood(
@@ -115,12 +115,7 @@ def delay_kind(search: Search, fit: FittedEffects) -> DelayKind | None:
     offset; None where no late rotors are named.
     """
     late, of_lag = _late_rotor_effects(fit), _lag_coefficient(search, fit)
-    if (
-        search.flights.commanded
-        or len(late) != 1
-        or of_lag is None
-        or (behind := _total_delay(fit)) <= 0.0
-    ):
+    if len(late) != 1 or of_lag is None or (behind := _total_delay(fit)) <= 0.0:
         return None
     begun = _with_rotor_time_offset(fit)
     begun.setting[of_lag[0]] = {of_lag[1]: REFIT.first_lag_share * behind}
@@ -245,5 +240,5 @@ def _residual_agrees(search: Search, fit: FittedEffects, other: FittedEffects) -
     return (
         search.deviance(fit.setting)
         < REFIT.most_deviance_ratio * search.deviance(other.setting)
-        + search.flights.rules.least_deviance_reduction
+        + SEARCH.least_deviance_reduction
     )

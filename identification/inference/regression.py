@@ -9,6 +9,7 @@ through the same filter.
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,20 +26,15 @@ from ..motion.residual import acting_wrench, needed_wrench
 from ..motion.sensing_effects import undo_log_sensing
 from ..motion.sensor_noise import noisy_logs
 from ..motion.signals import Signals, log_signals
-from ..motion.smoothing import CUTOFFS, low_pass
+from ..motion.smoothing import CUTOFFS, low_pass, resampled
 from .commanded_rotors import (
-    THRUST_SCALE,
-    TILT_X,
-    TILT_Y,
+    COMMANDED,
     any_commanded,
-    deviation,
-    deviation_size,
-    deviations,
     downsampled,
     in_flight,
     in_flight_by_thrust,
+    thrust_is_assumed,
 )
-from .selection_rules import COMMANDED_ROTORS, FILTERED_POSE, MEASURED, SelectionSettings
 from .sensor_bias import BIAS, bias, bias_columns, is_bias
 from .time_offsets import (
     ATTITUDE_TIME_OFFSET,
@@ -69,11 +65,13 @@ class RegressionSettings:
     # rounding steps by which rotor speeds must vary; with less, the rounding is no noise but looks
     # like an effect
     least_steps_of_rotor_speed: float = 1.4
+    accelerometer_gap: float = 0.1  # s, the longest in which an accelerometer is read
     block: float = 3.0  # s of flight held out, or left out in cross-validation, in one piece
     short_block: float = 1.0  # s, the same of commanded flights of fewer than eight blocks
     blocks_per_held_out: int = 4  # one of so many blocks is held out
     # the golden ratio, by which the place of the held-out block moves: no flight keeps step with it
     held_out_step: float = 0.5 * (5.0**0.5 - 1.0)
+    filtered_band_hz: tuple[float, float] = (1.0, 2.0)
     memory: int = 2**28  # bytes, of results kept: of pieces, and of columns
     kept_residuals: int = 16  # a fit asks several times for the residual at its setting
     bytes_per_sample: int = 400  # of a piece
@@ -140,8 +138,6 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
         return timing.size
     if is_bias(column):
         return BIAS.step
-    if not column[0] and (size := deviation_size(column[1])) is not None:
-        return size[0]
     if column[1].startswith(START_PREFIX) or column[1] == CENTRAL:
         return 1.0
     c = coefficient(column)
@@ -158,16 +154,11 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
 
 
 def range_of(column: Column, filtered: bool = False) -> tuple[float, float]:
-    """Return the range of a time offset, or of a flight's deviation; ``filtered``: of flights whose
-    pose was filtered.
+    """Return the range of a time offset, or of a bias; ``filtered``: of flights whose pose was
+    filtered.
     """
-    if (timing := timing_of(column, filtered)) is not None:
-        return timing.range
-    if is_bias(column):
-        return -BIAS.largest, BIAS.largest
-    size = deviation_size(column[1])
-    assert size is not None
-    return -size[1], size[1]
+    timing = timing_of(column, filtered)
+    return (-BIAS.largest, BIAS.largest) if timing is None else timing.range
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,6 +201,10 @@ class Flights:
             self.logs = tuple(in_flight_by_thrust(log, vehicle) for log in self.logs)
         elif self.commanded:
             self.logs = tuple(in_flight(log, vehicle) for log in self.logs)
+        # relative standard deviation of the thrust that is assumed
+        self.thrust_std = (
+            COMMANDED.unstated_thrust_std if thrust_is_assumed(self.logs, vehicle) else 0.0
+        )
         # the noise of a filtered pose cannot be read from its log, nor can what the filter's delay
         # and bandwidth took away
         self.filtered = not (self.commanded or self.inertial) and any(
@@ -224,16 +219,11 @@ class Flights:
         )
         # whether innovations say what acts: they need poses as measured, or an IMU, and rotors
         self.has_innovations = not (self.commanded or self.filtered)
-        self.rules: SelectionSettings = (
-            COMMANDED_ROTORS if self.commanded else FILTERED_POSE if self.filtered else MEASURED
-        )
+        # Hz, by which the effects of a filtered pose are weighed: well below any filter; none: all
+        # that the residual holds
+        self.selection_band_hz = REGRESSION.filtered_band_hz if self.filtered else None
         self.logs = tuple(excerpt(self.logs))
-        self.deviating_flights = (
-            len(logs) if self.commanded else 0
-        )  # flights that have a thrust scale and a tilt of their own
-        self.deviations: tuple[Column, ...] = tuple(deviations(self.deviating_flights))
-        if self.inertial:
-            self.deviations += tuple(bias_columns(len(logs)))
+        self.biases: tuple[Column, ...] = tuple(bias_columns(len(logs)) if self.inertial else ())
         self._drift: np.random.Generator | None = None  # of a copy whose fusion errs otherwise
         self._fused: dict[
             int, tuple[FlightLog, list[InertialSignals]]
@@ -243,6 +233,7 @@ class Flights:
         self._offset_signals: dict[tuple[float, ...], tuple[Piece, Signals]] = {}
         self._columns: dict[tuple[object, ...], dict[Column, Array]] = {}
         self._residuals: dict[tuple[object, ...], Array] = {}
+        self._smooth_imu: dict[int, tuple[Array, Array]] = {}
         self._first: list[Piece] = []
         self._first = pieces = self.pieces({})
         log_of, block, fit, start, t = [], [], [], [], []
@@ -445,6 +436,12 @@ class Flights:
             ]
         )
 
+    @cached_property
+    def speed(self) -> float:
+        """RMS of the speed, m/s."""
+        velocity = np.concatenate([p.signals.velocity[p.rows] for p in self._first])
+        return float(np.sqrt(np.mean(np.sum(np.square(velocity), axis=1))))
+
     @property
     def rotor_speeds_vary(self) -> bool:
         """Whether the rotor speeds vary by enough of their rounding steps."""
@@ -545,6 +542,21 @@ class Flights:
         """
         return setting[effect] if effect in setting else self._declared.get(effect, {})
 
+    def stated(self, effect: str) -> Mapping[str, float]:
+        """Return the coefficients of an effect that the vehicle's file fixes: where it states not
+        all of them. Of one that is stated whole, all may have changed.
+        """
+        own = self._declared.get(effect, {})
+        every = {c.name for c in get(effect).coefficients} - {CENTRAL}
+        return own if every - set(own) else {}
+
+    def is_nonlinear(self, effect: str) -> bool:
+        """Return whether an effect's force is no sum over its coefficients, and no file states them
+        all, about which it would be one.
+        """
+        whole = effect in self._declared and not self.stated(effect)
+        return is_nonlinear(effect) and not whole
+
     def residual(self, setting: Setting) -> Array:
         """Return the residual (rows, 6) with these effects.
 
@@ -578,14 +590,9 @@ class Flights:
         offsets = setting.get(ROTOR_TIME_OFFSET[0], {})
         out = []
         for piece in self.pieces(setting):
-            scale, *tilt = (
-                deviation(setting, kind, piece.log, self.deviating_flights)
-                for kind in (THRUST_SCALE, TILT_X, TILT_Y)
-            )
-            s = self._with_time_offsets(piece, offsets, scale)
+            s = self._with_time_offsets(piece, offsets)
             s = with_uneven_lag(s, vehicle, offsets.get(LAG_ASYMMETRY[1], 0.0))
             model, _ = acting_wrench(s, vehicle, self.vehicle)
-            model[:, :2] += self.vehicle.weight * np.array(tilt)
             if self.inertial and (off := bias(setting, piece.log)).any():
                 model[:, :3] += self.vehicle.mass * np.einsum("nij,j->ni", s.rotation, off)
             if self.commanded:
@@ -607,21 +614,36 @@ class Flights:
             )
         return self._needs[id(piece)][1]
 
-    def _with_time_offsets(
-        self, piece: Piece, offsets: Mapping[str, float], scale: float
-    ) -> Signals:
+    def felt(self, setting: Setting) -> Array | None:
+        """Return the force (rows, 3) N, world, by which the accelerometers differ from what the
+        poses' motion needs, low-passed; None where a log has no accelerometer, or where the motion
+        is read from it.
+        """
+        if self.inertial or not all(map(_reads_throughout, self.logs)):
+            return None
+        out = []
+        for piece in self.pieces(setting):
+            s, log = piece.signals, self.logs[piece.log]
+            if piece.log not in self._smooth_imu:
+                self._smooth_imu[piece.log] = _smooth_accelerometer(log)
+            read = resampled(s.t, *self._smooth_imu[piece.log])
+            force = self.vehicle.mass * np.einsum("nij,nj->ni", s.rotation, read)
+            smooth = low_pass(force, CUTOFFS.residual_hz, s.period)[piece.rows]
+            out.append(smooth - self._needed(piece)[:, :3])
+        return np.concatenate(out)
+
+    def _with_time_offsets(self, piece: Piece, offsets: Mapping[str, float]) -> Signals:
         key = (
             id(piece),
             offsets.get(ROTOR_TIME_OFFSET[1], 0.0),
             offsets.get(ATTITUDE_TIME_OFFSET[1], 0.0),
             offsets.get(VELOCITY_TIME_OFFSET[1], 0.0),
             offsets.get(ROTOR_SPREAD[1], 0.0),
-            scale,
         )
         if key not in self._offset_signals:
             if len(self._offset_signals) > 4 * len(self._first):
                 self._offset_signals.clear()
-            self._offset_signals[key] = piece, with_time_offsets(piece.signals, offsets, scale)
+            self._offset_signals[key] = piece, with_time_offsets(piece.signals, offsets)
         return self._offset_signals[key][1]
 
     def _kept(self, setting: Setting) -> dict[Column, Array]:
@@ -706,6 +728,27 @@ class Flights:
                 part[:, :3] = 0.0
                 out[column] = part
         return out
+
+
+def _reads_throughout(log: FlightLog) -> bool:
+    """Return whether a log's accelerometer was read from its beginning to its end."""
+    if log.accelerometer is None:
+        return False
+    times = log.t[np.isfinite(log.accelerometer).all(axis=1)]
+    ends = np.concatenate([log.t[:1], times, log.t[-1:]])
+    return len(times) > 0 and float(np.diff(ends).max()) < REGRESSION.accelerometer_gap
+
+
+def _smooth_accelerometer(log: FlightLog) -> tuple[Array, Array]:
+    """Return times (n,) s, evenly spaced, and what the accelerometer reads (n, 3) m/s2, with the
+    same low-pass as the pose.
+    """
+    assert log.accelerometer is not None
+    read = np.isfinite(log.accelerometer).all(axis=1)
+    times, values = log.t[read], log.accelerometer[read]
+    period = float(np.median(np.diff(times)))
+    even = np.arange(times[0], times[-1], period)
+    return even, low_pass(resampled(even, times, values), CUTOFFS.pose_hz, period)
 
 
 def _most_noise_share(effect: str) -> float:

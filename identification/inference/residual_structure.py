@@ -49,6 +49,9 @@ class StructureSettings:
     # of the deviance that the named effects explain: effect models, and the plant in which they
     # act, are true to one per cent
     least_share_of_named: float = 1e-4
+    # gain of a candidate regressor over the root of the blocks' summed squares: an effect acts
+    # again and again, a transient disturbance once
+    least_spread: float = 1.5
     # times the least reduction, from which the least spread over blocks is smaller: an effect that
     # acts in one part of a flight, but strongly
     large_reduction_ratio: float = 3.0
@@ -89,7 +92,7 @@ def find_structure(search: Search, fit: FittedEffects) -> tuple[list[Structure],
     words: list[tuple[str, str, str]] = []  # test, where, and kind of test
     columns: list[Array] = []
     named: list[float] = []  # deviance of the effects whose model error a column may be
-    asked = [general_regressors, *([] if flights.commanded else [resonant_regressors])]
+    asked = [general_regressors, resonant_regressors]
     for channel_words, drive, column in itertools.chain.from_iterable(
         ask(flights, fit.setting) for ask in asked
     ):
@@ -97,10 +100,7 @@ def find_structure(search: Search, fit: FittedEffects) -> tuple[list[Structure],
         columns.append(column)
         named.append(every)
     known = standardised(explanatory_variables(flights, fit.setting))
-    # a fixed effect was not fitted to these forces
-    shares = {
-        e: _explained_part(flights, fit, e, residual) for e in fit.effects if not search.is_fixed(e)
-    }
+    shares = {e: _explained_part(flights, fit, e, residual) for e in fit.effects}
     for effect, share in shares.items():
         for name, x in known.items():
             test = f"{effect}'s coefficient is not constant"
@@ -118,14 +118,12 @@ def find_structure(search: Search, fit: FittedEffects) -> tuple[list[Structure],
         gains, spreads = _gains(search, regression, np.stack(batch, axis=2))
         for i, (column, gain, spread) in enumerate(zip(batch, gains, spreads, strict=True), at):
             if gain > least[i] and spread >= (
-                flights.rules.least_spread
+                STRUCTURE.least_spread
                 if gain < STRUCTURE.large_reduction_ratio * least[i]
                 else STRUCTURE.least_spread_of_large
             ):
                 found.append((Structure(*words[i][:2], float(gain) / error, words[i][2]), column))
     found.sort(key=lambda x: -x[0].gain)
-    if flights.commanded:
-        return [sign for sign, _ in found[: STRUCTURE.most_signs]], bool(found)
     block_signs = list(varying_coefficients(search, shares, regression))
     if not found:
         # a filtered pose has no innovations

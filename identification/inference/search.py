@@ -10,10 +10,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...dynamics.effects import Need, Role, get, playing
+from ...dynamics.effects import Role, get, playing
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from .commanded_rotors import similar_effects
 from .gram_matrix import Gram, columns_of, gram
 from .regression import (
     CENTRAL,
@@ -30,7 +29,6 @@ from .regression import (
 )
 from .starting_points import starting_points
 from .time_offsets import LAG_ASYMMETRY, ROTOR_TIME_OFFSET
-from .turning_delay import rotor_delay, turning_delay
 from .whitening import Whitener
 
 Array = NDArray[np.float64]
@@ -44,6 +42,10 @@ class SearchSettings:
     to a constant.
     """
 
+    # deviance on left-out blocks that an effect must explain; a spurious effect explains about 10
+    least_deviance_reduction: float = 40.0
+    # share of the deviance that is left unexplained, which an effect must explain as well
+    least_share_of_deviance: float = 0.01
     # typical sizes; a smaller effect is not worth a name
     least_size: float = 0.1
     # deviance by which an effect with one more coefficient must be better
@@ -96,46 +98,19 @@ class Search:
     ) -> None:
         self.flights = flights
         declared = {e.name for e in flights.vehicle.effects}
-        # nonlinear effects imitate too much where thrust itself is a guess: they must be declared
-        self.library = tuple(
+        self.library = tuple(e for e in library if e not in flights.not_identifiable)
+        # effects that are not identifiable are not searched for, but may be the cause of another
+        self.dominated_by_noise = tuple(
             e
             for e in library
-            if e not in flights.not_identifiable
-            and (not is_nonlinear(e) or e in declared or not flights.commanded)
-        )
-        # effects that are not identifiable are not searched for, but may be the cause of another
-        self.dominated_by_noise = (
-            ()
-            if flights.commanded
-            else tuple(
-                e
-                for e in library
-                if e
-                in flights.not_identifiable - flights.explained_by_rounding - flights.without_trace
-                and not (flights.inertial and is_nonlinear(e))
-            )
+            if e in flights.not_identifiable - flights.explained_by_rounding - flights.without_trace
+            and not (flights.inertial and is_nonlinear(e))
         )
         self.report = report
-        # coefficients in the vehicle file are fixed, unless the file states all of an effect: then
-        # the effect may have changed
-        self._fixed_coefficients = {
-            e.name: e.coefficients
-            for e in flights.vehicle.effects
-            if {c.name for c in get(e.name).coefficients} - {CENTRAL} - set(e.coefficients)
-        }
         # effects that are searched for from several starting points; a declared one is such a point
         self.nonlinear_effects = frozenset(
-            e
-            for e in (*library, *declared)
-            if is_nonlinear(e) and (e not in declared or e in self._fixed_coefficients)
+            e for e in (*library, *declared) if flights.is_nonlinear(e)
         )
-        # the delay of commands is known from the vehicle's rotation: it is fixed in the search
-        delay = turning_delay(
-            [p.signals for p in flights.pieces({}) if p.log < flights.deviating_flights],
-            flights.vehicle,
-        )
-        self.rotor_delay = rotor_delay(self.library)
-        self.delay = delay if flights.commanded and self.rotor_delay else None
         self.noise: Array = np.zeros((0, 6))
         self.whiten: Whitener
 
@@ -143,18 +118,10 @@ class Search:
 
     def columns_of(self, effect: str, fitted: bool) -> list[Column]:
         """Return the columns of an effect, without the coefficients that the vehicle file fixes."""
-        if self.is_fixed(effect):
-            return []
-        stated = self._fixed_coefficients.get(effect, {})
+        stated = self.flights.stated(effect)
         return [
             c for c in columns_of(effect, fitted) if c[1].removeprefix(MOMENT_PREFIX) not in stated
         ]
-
-    def is_fixed(self, effect: str) -> bool:
-        """Return whether an effect is fixed: known from another source than the residual, neither
-        fitted nor removed.
-        """
-        return self.delay is not None and effect == self.rotor_delay
 
     def model_columns(self, effects: Sequence[str], tried: Sequence[str] = ()) -> list[Column]:
         """Return the columns of a model: of its effects, of effects that are tried, and the time
@@ -164,7 +131,7 @@ class Search:
         return [
             *(c for c in self.flights.time_offsets if not (late and c == ROTOR_TIME_OFFSET)),
             *([LAG_ASYMMETRY] if playing(Role.LAG, among=effects) else []),
-            *self.flights.deviations,
+            *self.flights.biases,
             *(c for e in effects for c in self.columns_of(e, True)),
             *(c for e in tried for c in self.columns_of(e, False)),
         ]
@@ -192,7 +159,7 @@ class Search:
         starts: dict[Column, dict[str, float]] = {}
         for effect in self.library:
             if effect in self.nonlinear_effects and effect not in fit.effects:
-                stated = self._fixed_coefficients.get(effect, {})
+                stated = self.flights.stated(effect)
                 starting = starting_points(effect, self.flights, residual, stated)
                 for i, start in enumerate(starting):
                     column = (effect, f"{START_PREFIX}{i}")
@@ -223,14 +190,14 @@ class Search:
         noise = regression.residual
         columns = {c: x for c, x in regression.columns.items() if not c[1].startswith(START_PREFIX)}
         for _ in range(3):
-            self.whiten = self._whitener(noise, self.flights.rules.selection_band_hz)
+            self.whiten = self._whitener(noise, self.flights.selection_band_hz)
             g = gram(self.flights, fit.setting, self.whiten, columns, regression.residual)
             change = g.solve(g.blocks.sum(axis=0), np.arange(len(g.columns)))
             noise = regression.residual - np.tensordot(
                 np.stack(list(columns.values()), axis=2), change, axes=(2, 0)
             )
         self.noise = noise
-        self.whiten = self._whitener(noise, self.flights.rules.selection_band_hz)
+        self.whiten = self._whitener(noise, self.flights.selection_band_hz)
 
     # Fitting
 
@@ -254,26 +221,6 @@ class Search:
 
         A fit that is not going to reach a deviance of ``enough`` is given up early.
         """
-        if self.has_one_weighting:
-            return self._refit(fit, enough)
-        finding = self.whiten
-        self.weight_for_estimation()
-        out = self._refit(fit)
-        self.whiten = finding
-        return out
-
-    @property
-    def has_one_weighting(self) -> bool:
-        """Whether coefficients are estimated with the weights by which effects are selected."""
-        return self.flights.rules.estimation_band_hz is None
-
-    def weight_for_estimation(self) -> None:
-        """Weight the frequencies for the estimation of coefficients, not for the selection of
-        effects.
-        """
-        self.whiten = self._whitener(self.noise, self.flights.rules.estimation_band_hz)
-
-    def _refit(self, fit: FittedEffects, enough: float = np.inf) -> FittedEffects:
         setting = {k: dict(v) for k, v in fit.setting.items()}
         wanted = self.model_columns(fit.effects)
         for free in (ROTOR_TIME_OFFSET, LAG_ASYMMETRY):
@@ -322,9 +269,7 @@ class Search:
         total = g.blocks.sum(axis=0)
         out = []
         for effect in self.library:
-            if effect in fit.effects or (
-                self.flights.commanded and not _may_join(effect, fit.effects)
-            ):
+            if effect in fit.effects:
                 continue
             if effect in self.nonlinear_effects:
                 tries = [[*base, c] for c in regression.starts if c[0] == effect]
@@ -352,9 +297,7 @@ class Search:
         return sorted(
             found,
             key=lambda x: (
-                SEARCH.deviance_per_coefficient * coefficient_count(x.effect)
-                - x.deviance_reduction
-                * (1.0 if get(x.effect).usual else self.flights.rules.second_choice_factor)
+                SEARCH.deviance_per_coefficient * coefficient_count(x.effect) - x.deviance_reduction
             ),
         )
 
@@ -404,10 +347,8 @@ class Search:
         """
         g = self.gram_at(fit)
         error = g.error(np.arange(len(g.columns)))
-        # a fit that is weighted otherwise than judged need not be at the minimum
-        least = self.flights.rules.least_deviance_reduction
-        converged = self.deviance(fit.setting) < 1.05 * error + least
-        return error if converged or not self.has_one_weighting else np.inf
+        converged = self.deviance(fit.setting) < 1.05 * error + SEARCH.least_deviance_reduction
+        return error if converged else np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -450,18 +391,6 @@ def unexplained_deviance(
             )[0]
         )
     return float(deviance)
-
-
-def _may_join(effect: str, named: Sequence[str]) -> bool:
-    """Return whether an effect may be added to the named effects of commanded flights.
-
-    One that changes the thrust curve further may once thrust follows the battery's voltage: without
-    that it would explain whatever thrust lacks.
-    """
-    return not similar_effects(effect) & set(named) and (
-        Need.THRUST_CURVE not in get(effect).needs
-        or bool(playing(Role.THRUST_OVER_VOLTAGE, among=named))
-    )
 
 
 def is_possible(fit: FittedEffects, vehicle: Vehicle) -> bool:

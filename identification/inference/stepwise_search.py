@@ -12,10 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...dynamics.effects import get
-from .commanded_rotors import cancels_thrust_scale
 from .gram_matrix import Gram
 from .innovations import Innovations, confirms_addition
-from .regression import is_nonlinear
 from .search import (
     SEARCH,
     FittedEffects,
@@ -30,11 +28,13 @@ from .search import (
 
 @dataclass(frozen=True)
 class StepwiseSettings:
-    """What a move of the search must pay, beside the ``SelectionSettings`` of the flights.
+    """What a move of the search must pay.
 
     Deviances are on left-out blocks.
     """
 
+    most_effects: int = 4
+    rounds: int = 2  # of adding and pruning; what changes further stands for an unlisted effect
     # times the least reduction; an effect that explains so much may have half the least size
     large_reduction_ratio: float = 4.0
     # typical sizes, the least size of an effect that scales a measurement: it is wrong by the share
@@ -57,17 +57,17 @@ def find_effects(search: Search) -> tuple[FittedEffects, list[Gain]]:
     """Return the effects that are needed, and what each effect of the library explained alone at
     first.
     """
-    needed = FittedEffects(search.delay.setting(search.rotor_delay) if search.delay else {})
+    needed = FittedEffects({})
     first: list[Gain] = []
     asked: list[set[str]] = []
-    for _ in range(search.flights.rules.rounds):
+    for _ in range(STEPWISE.rounds):
         fit, gains = _forward(search, needed)
         first = first or gains
         if asked and fit.effects == needed.effects:
             break
         search.report("asking whether every effect is needed")
         # with the noise as estimated by now
-        needed = _prune(search, search.refit(fit) if search.has_one_weighting else fit)
+        needed = _prune(search, search.refit(fit))
         if needed.effects == fit.effects or set(needed.effects) in asked:
             break
         # one effect in place of two leaves room for more, and an effect that was small beside a
@@ -123,9 +123,9 @@ def _forward(search: Search, fit: FittedEffects) -> tuple[FittedEffects, list[Ga
     """Return ``fit`` with the effects that are worth adding one after the other, and what each
     explained at first.
     """
-    flights, most = search.flights, search.flights.rules.most_effects
+    flights, most = search.flights, STEPWISE.most_effects
     first: list[Gain] = []
-    for count in range(len([e for e in fit.effects if not search.is_fixed(e)]), most + 1):
+    for count in range(len(fit.effects), most + 1):
         regression = search.linearise(fit)
         search.set_noise(fit, regression)
         if count == 0:
@@ -133,8 +133,8 @@ def _forward(search: Search, fit: FittedEffects) -> tuple[FittedEffects, list[Ga
         g = search.gram(fit, regression)
         gains = search.gains(fit, regression, g)
         first = first or gains
-        least = _least(search, g.error(g.index(search.model_columns(fit.effects))))
-        better = [x for x in gains if _is_worth_naming(x, least) and _plausible(search, x, count)]
+        least = _least(g.error(g.index(search.model_columns(fit.effects))))
+        better = [x for x in gains if _is_worth_naming(x, least)]
         if not better or count == most:
             break
         for gain in better[: STEPWISE.most_candidates]:
@@ -153,16 +153,6 @@ def _forward(search: Search, fit: FittedEffects) -> tuple[FittedEffects, list[Ga
     return fit, first
 
 
-def _plausible(search: Search, gain: Gain, count: int) -> bool:
-    """Return whether an effect is plausible as the ``count``-th one."""
-    flights = search.flights
-    if flights.commanded and cancels_thrust_scale(gain.fit.setting, flights.vehicle.weight):
-        return False
-    return (gain.size < flights.rules.largest_size or count == 0) and (
-        not is_nonlinear(gain.effect) or gain.share > flights.rules.least_share_of_nonlinear
-    )
-
-
 def _prune(search: Search, fit: FittedEffects) -> FittedEffects:
     """Return a fit in which every effect is needed beside the others, and no one or two effects
     have a better replacement.
@@ -174,9 +164,6 @@ def _prune(search: Search, fit: FittedEffects) -> FittedEffects:
         if better is None:
             break
         fit, error = better
-    if not search.has_one_weighting:
-        fit = search.refit(fit)
-        search.weight_for_estimation()
     return fit
 
 
@@ -189,14 +176,12 @@ def _best_move(
     ``failed`` keeps the error that no replacement of these effects could reach, so that it is not
     tried again.
     """
-    least = _least(search, error)
+    least = _least(error)
     for effect in fit.effects:
-        if not search.is_fixed(effect) and search.error_without(fit, effect) < error + least:
+        if search.error_without(fit, effect) < error + least:
             search.report(f"{effect} is not needed")
             less = search.refit(fit.without(effect))
             return less, search.error(less)
-    if search.flights.commanded:  # similar effects are never named together here
-        return None
     few = len(fit.effects) <= STEPWISE.most_relinearised
     if not few:  # no small step leads from three or four effects to the right two
         less, spared = (
@@ -322,12 +307,11 @@ def _pair_swap(
         yield best
 
 
-def _least(search: Search, error: float) -> float:
+def _least(error: float) -> float:
     """Return the deviance that an effect must explain of flights with such an unexplained
     deviance.
     """
-    rules = search.flights.rules
-    return max(rules.least_deviance_reduction, rules.least_share_of_deviance * error)
+    return max(SEARCH.least_deviance_reduction, SEARCH.least_share_of_deviance * error)
 
 
 def _least_size(effect: str) -> float:

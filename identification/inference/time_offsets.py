@@ -98,14 +98,8 @@ def with_uneven_lag(signals: Signals, vehicle: Vehicle, asymmetry: float) -> Sig
     return replace(signals, rotor_speeds=u + asymmetry * rate)
 
 
-def with_time_offsets(
-    signals: Signals, offsets: Mapping[str, float], scale: float = 0.0
-) -> Signals:
-    """Return the signals with the time offsets of rotor speeds, velocity and attitude applied, and
-    with thrust multiplied by 1 + ``scale``.
-    """
-    if scale != 0.0:
-        signals = replace(signals, rotor_speeds=signals.rotor_speeds * np.sqrt(1.0 + scale))
+def with_time_offsets(signals: Signals, offsets: Mapping[str, float]) -> Signals:
+    """Return the signals with the time offsets of rotor speeds, velocity and attitude applied."""
     rotor_offset, attitude_offset = (
         offsets.get(ROTOR_TIME_OFFSET[1], 0.0),
         offsets.get(ATTITUDE_TIME_OFFSET[1], 0.0),

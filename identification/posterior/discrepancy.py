@@ -4,6 +4,7 @@ one.
 They are of the state as the filter predicts it, so none knows the noise of the pose to come.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,17 @@ DISCREPANCY = DiscrepancySettings()
 GROUPS = ("velocity", "place", "time", "rotors")
 
 
+@dataclass(frozen=True, eq=False)
+class State:
+    """A piece of flight (n samples)."""
+
+    position: Array  # (n, 3) m, world
+    rotation: Array  # (n, 3, 3) body to world
+    velocity: Array  # (n, 3) m/s, world
+    angular_velocity: Array  # (n, 3) rad/s, body
+    rotors: Array  # (n, 4) thrust (N) and torques (Nm) of the rotors
+
+
 def _scaled(x: Array) -> Array:
     x = x - x.mean()
     size = float(np.sqrt(np.mean(np.square(x))))
@@ -36,7 +48,7 @@ def _scaled(x: Array) -> Array:
 
 
 def discrepancy_columns(
-    tracks: list[Track], times: list[Array], weight: float, arm: float, inertias: Array
+    tracks: Sequence[State | Track], times: list[Array], weight: float, arm: float, inertias: Array
 ) -> dict[tuple[str, str], list[Array]]:
     """Return accelerations (n, 6) of each piece by group and name, each of a standard deviation of
     the weight, or of the weight times the arm.

@@ -229,16 +229,23 @@ def evidence_of_one_more(
         tried: the further columns.
         sizes: standard deviations that theirs may have.
     """
-    inner = normal[np.ix_(chosen, chosen)] * size[:, None] * size + np.eye(len(chosen))
-    cross = normal[np.ix_(chosen, tried)] * size[:, None]
-    both = np.linalg.solve(inner, np.column_stack([cross, right[chosen] * size]))
-    left = np.maximum(
-        normal[tried, tried] - np.einsum("ij,ij->j", cross, both[:, :-1]), 1e-9
-    )  # of each column, what the model does not have already
-    score = right[tried] - cross.T @ both[:, -1]
+    score, left = one_more(normal, right, chosen, size, tried)
     square = np.square(np.asarray(sizes))[:, None]
     factors = 0.5 * square * score**2 / (1.0 + square * left) - 0.5 * np.log1p(square * left)
     return log_sum(factors.ravel().tolist()) - math.log(factors.size)
+
+
+def one_more(
+    normal: Array, right: Array, chosen: Index, size: Array, tried: Index
+) -> tuple[Array, Array]:
+    """Return of each further column (len(tried),) its product with what the model leaves, and with
+    itself, less what the model has already; arguments as of ``evidence_of_one_more``.
+    """
+    inner = normal[np.ix_(chosen, chosen)] * size[:, None] * size + np.eye(len(chosen))
+    cross = normal[np.ix_(chosen, tried)] * size[:, None]
+    both = np.linalg.solve(inner, np.column_stack([cross, right[chosen] * size]))
+    left = np.maximum(normal[tried, tried] - np.einsum("ij,ij->j", cross, both[:, :-1]), 1e-9)
+    return right[tried] - cross.T @ both[:, -1], left
 
 
 def log_sum(values: Sequence[float]) -> float:

@@ -51,7 +51,7 @@ BETWEEN = "rotors between samples"
 STATES = (0, 1, 2)  # of an axis: pose, rate, disturbance
 # rad of tilt for a rad/s2 of roll or pitch: the unit of gains of sideways states
 SIDEWAYS = 0.01
-MODEL_ERROR, GAIN, UNKNOWN = "model error", "rotor gain of", "unknown "
+MODEL_ERROR, GAIN, UNKNOWN, NUISANCE = "model error", "rotor gain of", "unknown ", "nuisance "
 
 
 @dataclass(frozen=True)

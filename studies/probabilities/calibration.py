@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from windwrench.identification.diagnosis import DIAGNOSIS
 from windwrench.identification.findings import Probabilities
 from windwrench.identification.posterior.deviations import without_other_estimate
 from windwrench.identification.posterior.pooling import SEARCH_ALONE, PoolingSettings
+from windwrench.identification.search_verdict import SEARCH_VERDICT
 from windwrench.studies.pages import kept
 from windwrench.studies.probabilities.fitting import (
     acts_unknown,
@@ -230,7 +230,7 @@ def counts(flights: Sequence[Scored]) -> dict[str, str]:
     known = [x for x in flights if not acts_unknown(x.flight)]
     nothing = [x for x in known if not x.flight["truth"]]
     strange = [x for x in flights if acts_unknown(x.flight)]
-    least = DIAGNOSIS.least_sure_probability
+    least = SEARCH_VERDICT.least_sure_probability
     sure = [
         (e, x)
         for x in flights

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from windwrench.identification.diagnosis import SMALL, beyond_calm
 from windwrench.identification.findings import Disturbance, Probabilities
 from windwrench.identification.posterior.pooling import (
     POOLING,
@@ -19,6 +18,7 @@ from windwrench.identification.posterior.pooling import (
     features,
     pooled,
 )
+from windwrench.identification.search_verdict import SMALL, beyond_calm
 from windwrench.studies.scoring import EQUIVALENTS
 
 Array = NDArray[np.float64]

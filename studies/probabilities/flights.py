@@ -17,10 +17,11 @@ import numpy as np
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.dynamics.vehicle import Vehicle
-from windwrench.identification.diagnosis import IMPROBABLE, diagnose
+from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.findings import Ranking
 from windwrench.identification.inference.regression import lost_behind_a_filter
 from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.search_verdict import IMPROBABLE
 from windwrench.runtime.errors import InputError
 from windwrench.studies.scoring import EQUIVALENTS
 from windwrench.studies.trials.logged_poses import FILTERS, LOGS

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from windwrench.identification.diagnosis import DIAGNOSIS
+from windwrench.identification.search_verdict import SEARCH_VERDICT
 from windwrench.studies.scoring import (
     EQUIVALENTS,
     area_under_curve,
@@ -165,7 +165,7 @@ def _judge(outcome: Mapping[str, Any], found: Mapping[str, Any]) -> Judgement:
         probable=tuple(
             bool(stands_for(e) & set(truth))
             for e in effects
-            if (e.get("probability") or 0.0) >= DIAGNOSIS.least_sure_probability
+            if (e.get("probability") or 0.0) >= SEARCH_VERDICT.least_sure_probability
         ),
         unknown=_number(found.get("unknown")),
         gave_away=f"{structure[0]['test']}: {structure[0]['where']}" if structure else "",
@@ -441,7 +441,7 @@ def _probabilities(inside: Sequence[Judgement], foreign: Sequence[Judgement]) ->
         inside: diagnoses whose cause, if there is one, is in their library.
         foreign: those whose cause is not.
     """
-    least = f"{DIAGNOSIS.least_sure_probability:.0%}"
+    least = f"{SEARCH_VERDICT.least_sure_probability:.0%}"
     names = [true for j in inside for true in j.probable]
     known, unknown = (
         [j.unknown for j in some if np.isfinite(j.unknown)] for some in (inside, foreign)

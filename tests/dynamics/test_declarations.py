@@ -59,8 +59,6 @@ def test_effects_are_looked_up_by_what_they_declare():
 @pytest.mark.parametrize("name", names())
 def test_an_effect_does_something_one_by_one_or_says_where_to_start(name):
     assert not does_nothing_alone(get(name)) or get(name).starting_points is not None
-    if get(name).trace:
-        assert any(get(x).trace == get(name).trace for x in names() if x != name)
 
 
 def test_a_law_that_does_nothing_one_by_one_must_say_where_to_start(tmp_path):

@@ -12,7 +12,7 @@ import pytest
 
 from tests.support.data_paths import data_file
 from windwrench.dynamics import EffectSetting, Vehicle, load_vehicle
-from windwrench.identification import diagnosis
+from windwrench.identification import search_verdict
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.findings import Diagnosis
 from windwrench.identification.inference.regression import Flights, held_out
@@ -320,12 +320,14 @@ def test_a_rotor_that_stalls_now_and_then_is_no_certain_curvature():
 def test_a_name_that_is_not_probable_enough_is_tentative(least, monkeypatch):
     log = fly("thrust_curvature", a=-0.05)
     monkeypatch.setattr(
-        diagnosis, "DIAGNOSIS", replace(diagnosis.DIAGNOSIS, least_sure_probability=least)
+        search_verdict,
+        "SEARCH_VERDICT",
+        replace(search_verdict.SEARCH_VERDICT, least_sure_probability=least),
     )
     found = diagnose([log], VEHICLE, probabilities=True)
     assert 0.95 < found.probabilities.names["thrust_curvature"] < 0.999
     assert [(e.name, e.tentative) for e in found.effects] == [("thrust_curvature", least > 0.95)]
-    said = found.doubts.get(diagnosis.IMPROBABLE, ())
+    said = found.doubts.get(search_verdict.IMPROBABLE, ())
     assert bool(said) == (least > 0.95)
     assert set(said) <= set(found.notes)
 

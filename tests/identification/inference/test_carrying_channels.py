@@ -3,7 +3,11 @@
 import pytest
 
 from tests.support.searches import recorded, searched
-from windwrench.identification.inference.carrying_channels import ORDER, carrying_channels
+from windwrench.identification.inference.carrying_channels import (
+    ORDER,
+    carrying_channels,
+    traces_of,
+)
 
 CASES = {
     "constant_torque": ({"tx": 0.01, "ty": 0.01, "tz": 0.0}, {"attitude"}, {"rotor speeds"}),
@@ -18,7 +22,7 @@ def test_channels_are_those_of_the_trace_and_of_the_model(effect):
     coefficients, carried, others = CASES[effect]
     log = recorded(seconds=12.0, **{effect: coefficients})
     search, fit = searched(log, [effect], **{effect: coefficients})
-    found = carrying_channels(search, fit, effect)
+    found = carrying_channels(search.flights, fit.setting, effect, traces_of(search, fit, effect))
     assert carried <= set(found)
     assert not others & set(found)
     assert list(found) == [channel for channel in ORDER if channel in found]

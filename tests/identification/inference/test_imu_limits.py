@@ -15,8 +15,7 @@ from windwrench.identification.inference.imu_limits import (
     hidden_causes,
     with_errors_of_fusion,
 )
-from windwrench.identification.inference.search import FittedEffects
-from windwrench.identification.inference.selection_rules import MEASURED
+from windwrench.identification.inference.search import SEARCH, FittedEffects
 
 FORCE = {"fx": 0.2, "fy": 0.2}
 
@@ -74,4 +73,4 @@ def test_noise_of_rotor_speeds_is_averaged_and_is_no_lag():
         lag = search.refit(FittedEffects({**fit.setting, "motor_lag": {"tau": 0.01}}))
         gained.append(search.deviance(fit.setting) - search.deviance(lag.setting))
     assert spreads[0] < 0.3 * spreads[1]
-    assert max(gained) < MEASURED.least_deviance_reduction
+    assert max(gained) < SEARCH.least_deviance_reduction

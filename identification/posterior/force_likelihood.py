@@ -1,0 +1,311 @@
+"""The likelihood of a flight's force balance near a setting of effects, with one noise for all
+settings.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import lsq_linear
+
+from ...dynamics.effects import get
+from ...runtime.errors import InputError
+from ..inference.regression import CENTRAL, START_PREFIX, Column, Flights, coefficient
+from ..inference.sensor_bias import bias_columns, flight_and_axis
+from ..motion.smoothing import CUTOFFS, low_pass
+from .discrepancy import State, discrepancy_columns
+from .evidence import Index, marginal, set_evidence, tempering
+from .force_noise import ForceNoise, fitted_noise, white_noise
+from .force_nuisances import force_nuisances
+from .force_rows import ForceRows
+from .likelihood import NUISANCE, UNKNOWN, Sums
+from .priors import Base, Setting, declared, in_prior_units, prior_size
+
+Array = NDArray[np.float64]
+Starts = Mapping[Column, Mapping[str, float]]
+
+
+@dataclass(frozen=True)
+class ForceLikelihoodSettings:
+    """When fits stop."""
+
+    noise_rounds: int = 3
+    rounds: int = 4  # of Gauss-Newton
+    shares: tuple[float, ...] = (1.0, 0.5, 0.2, 0.05)  # of a step, tried in turn
+    most_in_std: float = 3.0  # of a prior, that others may differ in an effect's place
+    idle: float = 1e-6  # of the largest residual, up to which an effect does nothing
+    least_gain: float = 0.1  # nats; a step that gains less is the last
+
+
+FORCE_LIKELIHOOD = ForceLikelihoodSettings()
+
+
+class ForceLikelihood:
+    """The likelihood of flights.
+
+    ``library`` is what of the given one leaves a trace in them.
+
+    Args:
+        flights: of the vehicle.
+        library: effects that may act, those that any set has among them.
+        first: the setting of those that any set has.
+        fixed: effects that are known from elsewhere, with their coefficients.
+    """
+
+    def __init__(
+        self, flights: Flights, library: Sequence[str], first: Setting, fixed: Setting
+    ) -> None:
+        self.flights, self.library = flights, list(library)
+        self.rows = ForceRows(flights, fixed)
+        self.nuisances = {
+            ("", f"{NUISANCE}{name}"): x for name, x in force_nuisances(self.rows).items()
+        }
+        self.power = 1.0
+        self.noise: ForceNoise = self._noise(first)
+        self._use = self.rows.fit & self.noise.known
+        N = self._white(np.stack(list(self.nuisances.values()), axis=2))
+        self._given = N.reshape(-1, N.shape[2])
+
+    def columns_of(self, effects: Iterable[str]) -> list[Column]:
+        """Return the columns of effects whose force is a sum over their coefficients."""
+        return [(e, c.name) for e in effects for c in get(e).coefficients if c.name != CENTRAL]
+
+    def _noise(self, first: Setting) -> ForceNoise:
+        rows = self.rows
+        y = rows.residual(first)
+        linear = [e for e in self.library if not self.flights.is_nonlinear(e)]
+        found = rows.columns(first, self.columns_of(linear))
+        traced = {c[0] for c, x in found.items() if x.any()}
+        self.library = [e for e in self.library if e in traced or e not in linear]
+        wanted = self.columns_of(e for e in linear if e in traced)
+        X = np.stack(
+            [*self.nuisances.values(), *(found[c] * prior_size(c, self.flights) for c in wanted)],
+            axis=2,
+        )
+        noise = white_noise(y, rows.begins, rows.fit)
+        for _ in range(FORCE_LIKELIHOOD.noise_rounds):
+            use = rows.fit & noise.known
+            x = noise.white(X)[use].reshape(-1, X.shape[2])
+            z = noise.white(y)[use].ravel()
+            mode = np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ z)
+            noise = fitted_noise(y - X @ mode, rows.begins, rows.fit)
+        return noise
+
+    def _white(self, x: Array) -> Array:
+        return self.noise.white(x)[self._use]
+
+    # Sums
+
+    def sums(
+        self, setting: Setting, wanted: Iterable[Column], starts: Starts, unknown: bool = False
+    ) -> Sums:
+        """Return the sums of products about a setting, of these columns, of the nuisances and of
+        the residual.
+
+        Args:
+            setting: of effects.
+            wanted: coefficients of effects.
+            starts: columns of whole effects, with the coefficients of each.
+            unknown: whether the dictionary's columns are among them.
+        """
+        rows, residual = self.rows, self.rows.residual(setting)
+        columns = dict(self.nuisances)
+        columns |= rows.columns(setting, [c for c in wanted if not c[1].startswith(START_PREFIX)])
+        for c, start in starts.items():
+            columns[c] = residual - rows.residual({**setting, c[0]: dict(start)})
+        if unknown:
+            columns |= self._dictionary()
+        names = tuple(columns)
+        x = self._white(np.stack([*columns.values(), residual], axis=2))
+        block = self.rows.block[self._use]
+        ends = np.flatnonzero(np.diff(block)) + 1
+        parts = [p.reshape(-1, p.shape[2]) for p in np.split(x, ends)]
+        value = [
+            0.0
+            if not effect or name.startswith(START_PREFIX)
+            else self.flights.coefficients(setting, effect).get(name, 0.0)
+            - declared((effect, name), self.flights)
+            for effect, name in names
+        ]
+        return Sums(names, np.array([p.T @ p for p in parts]), np.array(value), 0.0)
+
+    def base(self, setting: Setting, starts: Starts, unknown: bool = False) -> Base:
+        """Return the likelihood about a setting, with all effects of the library."""
+        linear = [e for e in self.library if not self.flights.is_nonlinear(e) or e in setting]
+        sums = self.sums(setting, self.columns_of(linear), starts, unknown)
+        return in_prior_units(self.flights, sums, setting, starts)
+
+    def _dictionary(self) -> dict[Column, Array]:
+        flights, vehicle = self.flights, self.flights.vehicle
+        pieces = flights.pieces({})
+        seen = [
+            State(
+                s.position,
+                s.rotation,
+                s.velocity,
+                s.angular_velocity,
+                vehicle.rotor_wrench(s.rotor_speeds),
+            )
+            for s in (p.signals for p in pieces)
+        ]
+        inertias = np.array([vehicle.mass] * 3 + np.diagonal(vehicle.inertia).tolist())
+        found = discrepancy_columns(
+            seen, [p.signals.t for p in pieces], vehicle.weight, vehicle.arm_l, inertias
+        )
+        out: dict[Column, Array] = {}
+        for (group, name), parts in found.items():
+            if not any(x[:, :3].any() for x in parts):
+                continue
+            sampled = [
+                low_pass(x[:, :3], CUTOFFS.residual_hz, p.signals.period)[p.rows]
+                for x, p in zip(parts, pieces, strict=True)
+            ]
+            out["", f"{UNKNOWN}{group}: {name}"] = self.rows.from_world(np.concatenate(sampled))
+        return out
+
+    # Fits
+
+    def deviance(self, setting: Setting) -> float:
+        """Return -2 log-likelihood at a setting, with the nuisances integrated out, up to a
+        constant.
+
+        Raises:
+            InputError: no vehicle is like that.
+        """
+        w = self._white(self.rows.residual(setting)).ravel()
+        factor, b = self._nuisance_sums(w)
+        return self.power * float(w @ w) - float(b @ cho_solve(factor, b))
+
+    def criterion(self, setting: Setting) -> float:
+        """Return Schwarz's information criterion: the deviance, and for each coefficient the
+        logarithm of the number of rows.
+        """
+        cost = math.log(int(self._use.sum()))
+        return self.deviance(setting) + cost * len(self.columns_of(setting))
+
+    def _nuisance_sums(self, w: Array) -> tuple[tuple[Array, bool], Array]:
+        inner = self.power * self._given.T @ self._given + np.eye(self._given.shape[1])
+        return cho_factor(inner), self.power * self._given.T @ w
+
+    def objective(self, setting: Setting) -> float:
+        """Return minus the logarithm of likelihood and prior at a setting, up to a constant;
+        infinite where no vehicle is like that.
+        """
+        prior = sum(
+            ((setting[e].get(name, 0.0) - declared((e, name), self.flights)) / size) ** 2
+            for e, name in self.columns_of(setting)
+            if (size := prior_size((e, name), self.flights))
+        )
+        try:
+            return 0.5 * (self.deviance(setting) + prior)
+        except (InputError, np.linalg.LinAlgError):
+            return math.inf
+
+    def biases(self, setting: Setting) -> dict[str, float]:
+        """Return the likeliest biases of accelerometers from which the motion was read, as
+        ``Flights`` takes them out.
+        """
+        factor, b = self._nuisance_sums(self._white(self.rows.residual(setting)).ravel())
+        modes = dict(zip(self.nuisances, cho_solve(factor, b).tolist(), strict=True))
+        out = {}
+        for effect, name in bias_columns(len(self.flights.logs)):
+            flight, axis = flight_and_axis(name)
+            if (effect, NUISANCE + name) in modes:
+                out[name] = modes[effect, NUISANCE + name] * self.flights.bias_std(flight)[axis]
+        return out
+
+    def idle(self, setting: Setting) -> set[str]:
+        """Return the effects of a setting that do nothing there."""
+        here = self.rows.residual(setting)
+        least = FORCE_LIKELIHOOD.idle * float(np.abs(here).max())
+        return {
+            effect
+            for effect in setting
+            if np.abs(self.rows.residual(_without(setting, effect)) - here).max() <= least
+        }
+
+    def worth(self, setting: Setting) -> dict[str, float]:
+        """Return of each effect the RMS of what nuisances and effects of other families cannot do
+        in its place, within three standard deviations of their priors, over the RMS of what is
+        left: in the channel where that is most.
+        """
+        rows, fit = self.rows, self.rows.fit
+        left = rows.residual(setting)
+        size = np.sqrt(np.mean(np.square(left[fit]), axis=0)) + 1e-12
+        wanted = self.columns_of(setting)
+        columns = rows.columns(setting, wanted)
+        out = {}
+        for effect in setting:
+            less = _without(setting, effect)
+            part = rows.residual(less) - left
+            family = get(effect).family
+            # in still air a drag cannot do what it does in a wind
+            still = rows.columns(less, self.columns_of(less)) if get(effect).sets_wind else columns
+            others = [
+                still[c] * prior_size(c, self.flights)
+                for c in wanted
+                if c[0] != effect and get(c[0]).family != family
+            ]
+            X = np.stack([*self.nuisances.values(), *others], axis=2)[fit] / size[:, None]
+            y = part[fit] / size
+            most = FORCE_LIKELIHOOD.most_in_std
+            done = lsq_linear(X.reshape(-1, X.shape[2]), y.ravel(), (-most, most)).x
+            out[effect] = float(np.sqrt(np.mean(np.square(y - X @ done), axis=0)).max())
+        return out
+
+    def fitted(self, setting: Setting) -> Setting:
+        """Return the mode of the posterior of a setting's effects (damped Gauss-Newton)."""
+        here, value = setting, self.objective(setting)
+        wanted = self.columns_of(setting)
+        for _ in range(FORCE_LIKELIHOOD.rounds):
+            target = self._linear_mode(here, wanted)
+            for share in FORCE_LIKELIHOOD.shares:
+                trial = _between(here, target, share)
+                if (after := self.objective(trial)) < value:
+                    break
+            else:
+                break
+            gained, here, value = value - after, trial, after
+            if gained < FORCE_LIKELIHOOD.least_gain:
+                break
+        return here
+
+    def _linear_mode(self, setting: Setting, wanted: Sequence[Column]) -> Setting:
+        base = in_prior_units(self.flights, self.sums(setting, wanted, {}), setting, {})
+        asked = np.array([base.columns[c] for c in wanted], dtype=np.intp)
+        total = self.power * base.blocks.sum(axis=0)
+        m = marginal(
+            total[:-1, :-1], total[:-1, -1], 0.0, asked, base.plain, np.ones(len(base.plain))
+        )
+        found = set_evidence(m, range(len(asked)), base.low[asked], base.high[asked])
+        mode = found.mode * base.size[asked]
+        out = {e: dict(values) for e, values in setting.items()}
+        for c, x in zip(wanted, mode.tolist(), strict=True):
+            limits, own = coefficient(c), declared(c, self.flights)
+            out[c[0]][c[1]] = min(max(own + x, limits.minimum), limits.maximum)
+        return out
+
+    def tempered(self, setting: Setting) -> float:
+        """Return the power of the likelihood that its scatter beside a setting allows."""
+        wanted = self.columns_of(setting)
+        base = in_prior_units(self.flights, self.sums(setting, wanted, {}), setting, {})
+        chosen: Index = np.arange(len(base.columns))
+        return tempering(base.blocks, chosen)
+
+
+def _without(setting: Setting, effect: str) -> Setting:
+    return {e: x for e, x in setting.items() if e != effect}
+
+
+def _between(here: Setting, there: Setting, share: float) -> Setting:
+    """Return the setting that lies a share of the way from one to another of the same effects."""
+    return {
+        e: {
+            name: values.get(name, 0.0) + share * (there[e][name] - values.get(name, 0.0))
+            for name in there[e]
+        }
+        for e, values in here.items()
+    }

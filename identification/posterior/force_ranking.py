@@ -1,0 +1,182 @@
+"""Which effects act on flights whose rotors are known by commands: the posterior over sets, from
+the force balance alone.
+
+The likeliest set is fitted without linearisation, and so is each set that comes out likeliest after
+it, until none does that was not fitted.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..findings import Ranking
+from ..inference.regression import START_PREFIX, Column, Flights
+from .evidence import marginal, set_evidence
+from .force_likelihood import ForceLikelihood
+from .priors import Base, Setting, declared
+from .ranking import starts_of
+from .sets import Posterior, is_possible
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ForceRankingSettings:
+    """How many sets are fitted."""
+
+    most_fitted: int = 16
+    rounds: int = 2  # of tempering
+    most_starts: int = 2  # of an effect with nonlinear coefficients, the likeliest, that are fitted
+
+
+FORCE_RANKING = ForceRankingSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class ForceRanking:
+    """The posterior, and the likeliest set's fit."""
+
+    ranking: Ranking
+    likelihood: ForceLikelihood
+    setting: Setting  # of the likeliest set
+    strangest: tuple[Column, float]  # beside it, of the dictionary, and the deviance it explains
+    beside_unknown: Mapping[str, float]  # probability of each effect, where that acts as well
+    _base: Base  # about the likeliest set
+    _alone: Base  # about what every set has
+
+    def left(self) -> float:
+        """Return the deviance that the likeliest set leaves."""
+        return self.likelihood.deviance(self.setting)
+
+    def gain(self, effect: str) -> float:
+        """Return the deviance by which an effect of the likeliest set is better than all that the
+        others and the nuisances do without it.
+        """
+        base, flights = self._base, self.likelihood.flights
+        every = self.likelihood.columns_of(self.setting)
+        own = np.array([base.columns[c] for c in every if c[0] == effect], dtype=np.intp)
+        others = [base.columns[c] for c in every if c[0] != effect]
+        total = self.likelihood.power * base.blocks.sum(axis=0)
+        beside = np.array([*base.plain, *others], dtype=np.intp)
+        m = marginal(total[:-1, :-1], total[:-1, -1], 0.0, own, beside, np.ones(len(beside)))
+        names = list(base.columns)
+        z = np.array(
+            [
+                (self.setting[effect][names[i][1]] - declared(names[i], flights)) / base.size[i]
+                for i in own
+            ]
+        )
+        return float(z @ m.normal @ z)
+
+    def alone_shares(self) -> dict[str, float]:
+        """Return the share of the deviance that each effect of the library explains alone, beside
+        what every set has.
+        """
+        base, given = self._alone, self._alone.effects
+        total = self.likelihood.power * base.blocks.sum(axis=0)
+        beside = [*base.plain, *(i for (e, _), i in base.columns.items() if e in given)]
+        asked = np.array([i for (e, _), i in base.columns.items() if e and e not in given])
+        others = np.array(beside, dtype=np.intp)
+        inner = total[np.ix_(others, others)] + np.eye(len(others))
+        known = float(total[others, -1] @ np.linalg.solve(inner, total[others, -1]))
+        whole = float(total[-1, -1]) - known
+        m = marginal(total[:-1, :-1], total[:-1, -1], 0.0, asked, others, np.ones(len(others)))
+        names = list(base.columns)
+        ways: dict[tuple[str, str], list[int]] = {}
+        for k, i in enumerate(asked):
+            effect, name = names[i]
+            ways.setdefault((effect, name if name.startswith(START_PREFIX) else ""), []).append(k)
+        out: dict[str, float] = {}
+        for (effect, _), index in ways.items():
+            at = np.array(index)
+            z = set_evidence(m, index, base.low[asked], base.high[asked]).mode
+            gained = float(2.0 * m.right[at] @ z - z @ m.normal[np.ix_(at, at)] @ z)
+            out[effect] = max(out.get(effect, -math.inf), gained / whole)
+        return out
+
+
+def rank_by_force(
+    flights: Flights,
+    library: Sequence[str],
+    first: Setting,
+    fixed: Setting,
+    report: Callable[[str], None] = lambda text: None,
+) -> ForceRanking:
+    """Return the posterior over sets of effects of a library.
+
+    Args:
+        flights: with rotors that are known by commands.
+        library: effects that may act, those of ``first`` among them.
+        first: effects that any set has, with coefficients about which a fit begins.
+        fixed: effects that are known from elsewhere, with their coefficients.
+        report: called with a line of progress.
+    """
+    likelihood = ForceLikelihood(flights, library, first, fixed)
+    library = likelihood.library
+    first = {e: x for e, x in first.items() if e in library}
+    given = frozenset(first)
+    first = likelihood.fitted(first)
+    starts = starts_of(flights, library, first)
+    alone = likelihood.base(first, starts)
+    fitted: dict[frozenset[str], Setting] = {given: first}
+    bases: dict[frozenset[str], Base] = {given: alone}
+    lags: dict[Column, dict[str, float]] = {
+        c: dict(x) for c, x in starts.items() if not flights.is_nonlinear(c[0])
+    }
+
+    idle: set[frozenset[str]] = set()
+
+    def add(setting: Setting) -> None:
+        key = frozenset(setting)
+        fitted[key] = likelihood.fitted(setting)
+        found = set(fitted[key]) - given
+        if found & likelihood.idle(fitted[key]) or not all(
+            is_possible(flights, fitted[key], {}, e, plausible=True) for e in found
+        ):
+            idle.add(key)
+            return
+        others = {c: x for c, x in lags.items() if c[0] not in setting}
+        bases[key] = likelihood.base(fitted[key], others)
+
+    for effect in library:
+        if not flights.is_nonlinear(effect) or effect in given:
+            continue
+        report(f"trying {effect}")
+        tries = sorted(
+            (
+                likelihood.fitted({**first, effect: dict(x)})
+                for c, x in starts.items()
+                if c[0] == effect
+            ),
+            key=likelihood.objective,
+        )
+        if tries:
+            add(tries[0])
+    for _ in range(FORCE_RANKING.rounds):
+        found = Posterior(flights, library, list(bases.values()), likelihood.power, given, idle)
+        for _ in range(FORCE_RANKING.most_fitted):
+            setting = found.best_setting(len(library))
+            if frozenset(setting) in fitted:
+                break
+            report(f"trying {', '.join(e for e in setting if e not in given) or 'no effect'}")
+            add(setting)
+            found = Posterior(flights, library, list(bases.values()), likelihood.power, given, idle)
+        best = fitted[frozenset(found.best_setting(len(library)))]
+        likelihood.power = likelihood.tempered(best)
+    key = frozenset(found.best_setting(len(library)))
+    others = {c: x for c, x in lags.items() if c[0] not in key}
+    bases.pop(key)
+    bases[key] = likelihood.base(fitted[key], others, unknown=True)
+    found = Posterior(flights, library, list(bases.values()), likelihood.power, given, idle)
+    return ForceRanking(
+        found.ranking(),
+        likelihood,
+        fitted[key],
+        found.strangest(),
+        found.beside_unknown(),
+        bases[key],
+        alone,
+    )

@@ -1,0 +1,152 @@
+"""The force balance of flights as rows of a regression: specific force in body axes that the model
+leaves, by the pose and by the accelerometer, at all frequencies from zero to a few hertz.
+
+A steady wind has no power between 1 and 2 Hz, and a tilted frame none above them: what tells one
+from the other is the whole band down to zero. Above 3.5 Hz motors, filters and the flight loop
+decide what commands do.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...dynamics.effects import get
+from ..inference.regression import Column, Flights, Setting, coefficient, typical_size
+from ..motion.smoothing import low_pass
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Index = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class ForceRowSettings:
+    """The rows, and the steps by which columns are differences."""
+
+    cutoff_hz: float = 3.5
+    rate_hz: float = 25.0 / 3.0  # of the rows: 2.4 times the cut-off
+    block: float = 4.0  # s, of the sums by which the likelihood's scatter is judged
+    step: float = 0.1  # typical sizes
+
+
+FORCE_ROWS = ForceRowSettings()
+
+
+class ForceRows:
+    """Rows (n, channels) m/s2 of flights: body x, y and z by the pose; then, where each log has an
+    accelerometer beside it, the same by the accelerometer.
+
+    Of logs whose motion is read from an IMU the accelerometer is the motion, and there are three
+    channels.
+
+    Args:
+        flights: of the vehicle.
+        fixed: effects that are known from elsewhere, with their coefficients; they are in every
+            setting.
+
+    Attributes:
+        fit: (n,) rows that the fit may see.
+        begins: (n,) first row of an unbroken piece.
+        block: (n,) number of the block of 4 s.
+        log: (n,) which log.
+        t: (n,) s.
+        channels: 3 or 6.
+    """
+
+    def __init__(self, flights: Flights, fixed: Setting) -> None:
+        self.flights, self.fixed = flights, fixed
+        step = max(1, round(1.0 / (FORCE_ROWS.rate_hz * flights.period)))
+        self._pieces = np.split(np.arange(len(flights.t)), np.flatnonzero(flights.start)[1:])
+        kept = [rows[::step] for rows in self._pieces]
+        self._at: Index = np.concatenate(kept)
+        self.begins: Mask = np.concatenate([np.arange(len(rows)) == 0 for rows in kept])
+        self.t: Array = flights.t[self._at]
+        self.log = flights.log[self._at]
+        self.fit: Mask = flights.fit_rows[self._at]
+        since = self.t - self.t[self.begins][np.cumsum(self.begins) - 1]
+        number = (since // FORCE_ROWS.block).astype(np.int64)
+        new = self.begins | (np.diff(number, prepend=-1) != 0)
+        self.block = np.cumsum(new) - 1
+        self.has_accelerometer = flights.felt({}) is not None
+        self.channels = 6 if self.has_accelerometer else 3
+        self._rotation = self._axes({})
+
+    def _axes(self, setting: Setting) -> Array:
+        pieces = self.flights.pieces(setting)
+        return np.concatenate([p.signals.rotation[p.rows] for p in pieces])
+
+    def from_world(self, pose: Array, accelerometer: Array | None = None) -> Array:
+        """Return rows (n, channels, ...) of accelerations (samples, 3, ...) m/s2 in the world frame
+        at the samples of ``flights``.
+
+        Args:
+            pose: that the pose shows.
+            accelerometer: that the accelerometer shows, where there is one; default: the same.
+        """
+        both = [pose, pose if accelerometer is None else accelerometer]
+        return self._thinned([self._in_body(x, self._rotation) for x in both])
+
+    def from_body(self, pose: Array, accelerometer: Array | None = None) -> Array:
+        """Return rows of accelerations in body axes; arguments as of ``from_world``."""
+        return self._thinned([pose, pose if accelerometer is None else accelerometer])
+
+    @staticmethod
+    def _in_body(x: Array, rotation: Array) -> Array:
+        return np.asarray(np.einsum("nji,nj...->ni...", rotation, x))
+
+    def _thinned(self, channels: list[Array]) -> Array:
+        x = np.concatenate(channels[: self.channels // 3], axis=1)
+        smooth = [
+            low_pass(x[rows], FORCE_ROWS.cutoff_hz, self.flights.period) for rows in self._pieces
+        ]
+        return np.asarray(np.concatenate(smooth)[self._at])
+
+    def residual(self, setting: Setting) -> Array:
+        """Return what a model with these effects leaves (n, channels).
+
+        Raises:
+            InputError: no vehicle is like that.
+        """
+        mass, setting = self.flights.vehicle.mass, {**self.fixed, **setting}
+        left = self.flights.residual(setting)[:, :3] / mass
+        felt = self.flights.felt(setting)
+        both = [left] if felt is None else [left, left + felt / mass]
+        rotation = self._axes(setting)
+        return self._thinned([self._in_body(x, rotation) for x in both])
+
+    def columns(
+        self, setting: Setting, wanted: Iterable[Column], step: float = FORCE_ROWS.step
+    ) -> dict[Column, Array]:
+        """Return what a unit of each coefficient explains (n, channels), by differences of ``step``
+        typical sizes.
+        """
+        wanted = list(wanted)
+        if not wanted:
+            return {}
+        mass, setting = self.flights.vehicle.mass, {**self.fixed, **setting}
+        found = self.flights.columns(setting, wanted, step)
+        pose = np.stack([found[c][:, :3] / mass for c in wanted], axis=2)
+        both = pose.copy()
+        for i, (effect, name) in enumerate(wanted):
+            if self.has_accelerometer and effect and get(effect).kind == "sensing":
+                both[:, :, i] += self._felt_slope(setting, (effect, name), step) / mass
+        rows = self.from_world(pose, both)
+        return {c: rows[:, :, i] for i, c in enumerate(wanted)}
+
+    def _felt_slope(self, setting: Setting, column: Column, step: float) -> Array:
+        """Return how a unit of a sensing effect changes what the accelerometer has beyond the pose
+        (samples, 3), N.
+        """
+        effect, name = column
+        own = self.flights.coefficients(setting, effect)
+        value, c = own.get(name, 0.0), coefficient(column)
+        delta = step * typical_size(column, self.flights.vehicle)
+        if value + delta > c.maximum:
+            delta = -delta
+        moved = self.flights.felt({**setting, effect: {**own, name: value + delta}})
+        here = self.flights.felt(setting)
+        assert moved is not None
+        assert here is not None
+        return (here - moved) / delta

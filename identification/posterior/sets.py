@@ -1,0 +1,334 @@
+"""The posterior over sets of effects, from sums of products beside some settings of them."""
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...dynamics.effects import get
+from ..findings import RankedSet, Ranking
+from ..inference.coefficient_range import why_implausible
+from ..inference.regression import CENTRAL, START_PREFIX, Column, Flights, coefficient, moves_time
+from .discrepancy import DISCREPANCY
+from .evidence import (
+    Index,
+    Marginal,
+    SetEvidence,
+    evidence_of_one_more,
+    log_sum,
+    marginal,
+    one_more,
+    set_evidence,
+    tempering,
+)
+from .likelihood import WHOLE_PREFIX
+from .priors import PRIORS, Base, Setting, Variant, declared, variants_of
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SetSettings:
+    """How much of the sets is looked at."""
+
+    most_effects: int = 5
+    kept_sets: int = 8  # of each size, to which a further effect is added
+    kept_asked: int = 24  # sets, the best, that are asked for beside the noise of no effect too
+    least_probability: float = 1e-6  # of a set that is kept
+
+
+SETS = SetSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    base: int
+    variants: tuple[Variant, ...]
+    evidence: SetEvidence
+
+
+def is_possible(
+    flights: Flights, setting: Setting, std: Mapping[Column, float], effect: str, plausible: bool
+) -> bool:
+    """Return whether a vehicle can have an effect's coefficients at a setting; ``plausible``: and
+    whether they are physics of this effect.
+    """
+    possible = get(effect).possible
+    if possible is not None and not possible(setting[effect], flights.vehicle):
+        return False
+    return not (plausible and why_implausible(flights, setting, std, effect))
+
+
+class Posterior:
+    """The evidence of sets, of all bases together.
+
+    Args:
+        flights: whose motion is explained.
+        library: names of effects that may act.
+        bases: the likelihood beside some settings. The first has the noise of nothing explained.
+        power: of the likelihood.
+        given: effects that any set has; then the noise is one, and each set is judged beside the
+            base that has most of its effects; a single one has them all. Without them each has a
+            noise of its own, and of a set the likeliest counts.
+        idle: sets that are none: where they fit best an effect of them does nothing.
+    """
+
+    def __init__(
+        self,
+        flights: Flights,
+        library: Sequence[str],
+        bases: Sequence[Base],
+        power: float = 1.0,
+        given: frozenset[str] | None = None,
+        idle: Collection[frozenset[str]] = (),
+    ) -> None:
+        self.flights, self.library, self.bases, self.power = flights, library, bases, power
+        self.idle = idle
+        self.given = given
+        self.asked_about = len(library) - len(given or ())
+        self.inclusion = min(PRIORS.expected / max(self.asked_about, 1), 0.5)
+        self.known: dict[frozenset[str], _Candidate] = {}
+        self.scores: dict[frozenset[str], float] = {}
+        if given is not None:
+            for i in range(len(bases)):
+                self._search(i)
+            return
+        # beside the noise of nothing explained no effect shows: what others found is asked there
+        for i in range(1, len(bases)):
+            self._search(i)
+        found = sorted(self.scores, key=self.scores.__getitem__, reverse=True)
+        self._search(0, [self.known[k].variants for k in found[: SETS.kept_asked]])
+
+    def tempering(self) -> float:
+        """Return the power of the likelihood that the scatter beside the likeliest set allows."""
+        best = self.known[max(self.scores, key=self.scores.__getitem__)]
+        base = self.bases[best.base]
+        own = [base.columns[c] for v in best.variants for c in v[1]]
+        return tempering(base.blocks, np.array(sorted([*base.plain, *own]), dtype=np.intp))
+
+    def _marginal(self, base: Base) -> tuple[Marginal, Index, dict[Column, int]]:
+        total = self.power * base.blocks.sum(axis=0)
+        deviance = float(total[-1, -1]) + self.power * base.penalty
+        asked = np.array([i for (e, _), i in base.columns.items() if e], dtype=np.intp)
+        # what any flight may have, and a little of every effect
+        others = np.concatenate([base.plain, asked])
+        normal, right = total[:-1, :-1], total[:-1, -1]
+        little = np.ones(len(right))
+        little[asked] = PRIORS.negligible * base.typical[asked]
+        at = {c: i for i, c in enumerate(c for c in base.columns if c[0])}
+        return marginal(normal, right, deviance, asked, others, little[others]), asked, at
+
+    def _log_prior(self, effects: int) -> float:
+        p = self.inclusion
+        named = effects - len(self.given or ())
+        return named * math.log(p) + (self.asked_about - named) * math.log1p(-p)
+
+    def _counts(self, number: int, key: frozenset[str]) -> bool:
+        """Return whether a set is judged beside a base."""
+        if key in self.idle:
+            return False
+        own = self.bases[number].effects
+        if self.given is None:  # of a set in another base the columns are that base's
+            return number > 0 or not any(x.effects and key >= x.effects for x in self.bases[1:])
+        if len(self.bases) == 1:
+            return self.given <= key
+        return own <= key and len(own) == max(
+            len(x.effects) for x in self.bases if x.effects <= key
+        )
+
+    def _variants(self, base: Base) -> list[Variant]:
+        out = []
+        setting: dict[str, dict[str, float]] = {e: {} for e in base.effects}
+        from_start = [c for c in base.columns if c[1].startswith(START_PREFIX)]
+        starts: dict[Column, dict[str, float]] = {c: {} for c in from_start}
+        for effect in self.library:
+            for _, every in variants_of(effect, setting, starts):
+                # a force balance does not see where an effect acts, nor is what a file states asked
+                known = self.given is not None
+                columns = tuple(c for c in every if c in base.columns or not known)
+                if columns and all(c in base.columns for c in columns):
+                    out.append((effect, columns))
+        return out
+
+    def _search(self, number: int, asked_sets: Sequence[tuple[Variant, ...]] | None = None) -> None:
+        base = self.bases[number]
+        m, asked, at = self._marginal(base)
+        low, high = base.low[asked], base.high[asked]
+        variants = self._variants(base)
+        ways = {e: sum(v[0] == e for v in variants) for e, _ in variants}
+
+        def score(some: tuple[Variant, ...]) -> float:
+            index = [at[c] for v in some for c in v[1]]
+            try:
+                evidence = set_evidence(m, index, low, high)
+            except np.linalg.LinAlgError:
+                return -math.inf
+            value = evidence.log_evidence - sum(math.log(ways[e]) for e, _ in some)
+            if not self._possible(base, some, evidence):
+                return -math.inf
+            key = frozenset(e for e, _ in some)
+            if not self._counts(number, key):
+                return -math.inf
+            total = value + self._log_prior(len(some))
+            if total > self.scores.get(key, -math.inf):
+                self.scores[key] = total
+                self.known[key] = _Candidate(number, some, evidence)
+            return total
+
+        always = base.effects if len(self.bases) > 1 else self.given or frozenset()
+        first = tuple(v for v in variants if self.given is not None and v[0] in always)
+        score(first)
+        if asked_sets is not None:
+            for some in asked_sets:
+                if all(c in at for v in some for c in v[1]):
+                    score(some)
+        single = [(*first, v) for v in variants if v not in first]
+        level = [(score(some), some) for some in single]
+        most = 0 if asked_sets is not None else SETS.most_effects + len(self.given or ())
+        for size in range(len(first) + 2, most + 1):
+            level.sort(key=lambda x: x[0], reverse=True)
+            seen: set[frozenset[Variant]] = set()
+            more = []
+            kept = level[: SETS.kept_sets * (2 if size == len(first) + 2 else 1)]
+            for _, some in kept:
+                for v in variants:
+                    key = frozenset((*some, v))
+                    if v[0] in {e for e, _ in some} or key in seen:
+                        continue
+                    seen.add(key)
+                    more.append((score((*some, v)), (*some, v)))
+            level = more
+
+    def _possible(self, base: Base, some: Sequence[Variant], evidence: SetEvidence) -> bool:
+        """Return whether a vehicle can have the coefficients of a set at its mode."""
+        if not any(get(e).possible or get(e).implausible for e, _ in some):
+            return True
+        setting, std = self._at_mode(base, some, evidence)
+        for effect, columns in some:
+            if columns[0][1].startswith(START_PREFIX):
+                continue
+            own = {(effect, name): x for name, x in std[effect].items()}
+            if not is_possible(self.flights, setting, own, effect, self.given is not None):
+                return False
+        return True
+
+    def best_base(self) -> int:
+        """Return the number of the base in which the likeliest set is."""
+        return self.known[max(self.scores, key=self.scores.__getitem__)].base
+
+    def structure(self) -> float:
+        """Return the logarithm of the Bayes factor of one more column beside the likeliest set."""
+        return evidence_of_one_more(*self._beside_best(), DISCREPANCY.sizes)
+
+    def strangest(self) -> tuple[Column, float]:
+        """Return the column of the dictionary that explains most beside the likeliest set, and the
+        deviance that it explains.
+        """
+        score, left = one_more(*self._beside_best())
+        names = list(self.bases[-1].columns)
+        gains = np.square(score) / left
+        return names[self.bases[-1].dictionary[int(np.argmax(gains))]], float(gains.max())
+
+    def beside_unknown(self) -> dict[str, float]:
+        """Return the probability of each effect of the library where the column of the dictionary
+        that explains most acts as well.
+        """
+        base = self.bases[-1]
+        strange = base.columns[self.strangest()[0]]
+        plain = np.append(base.plain, strange)
+        blocks = base.blocks.copy()
+        largest = max(DISCREPANCY.sizes)
+        blocks[:, strange] *= largest
+        blocks[:, :, strange] *= largest
+        beside = replace(base, plain=plain, blocks=blocks)
+        found = Posterior(self.flights, self.library, [beside], self.power, self.given, self.idle)
+        total = log_sum(list(found.scores.values()))
+        return {
+            e: sum(math.exp(x - total) for k, x in found.scores.items() if e in k)
+            for e in self.library
+        }
+
+    def _beside_best(self) -> tuple[Array, Array, Index, Array, Index]:
+        """Return the sums of the last base, which has the dictionary's columns, those that the
+        likeliest set has there with their sizes, and the dictionary's.
+        """
+        base = self.bases[-1]
+        best = max(self.scores, key=self.scores.__getitem__)
+        own = [
+            base.columns[c] for v in self.known[best].variants for c in v[1] if c in base.columns
+        ]
+        asked = [i for (e, _), i in base.columns.items() if e]
+        little = PRIORS.negligible * base.typical[asked]
+        chosen = np.array([*base.plain, *asked, *own], dtype=np.intp)
+        total = self.power * base.blocks.sum(axis=0)
+        size = np.concatenate([np.ones(len(base.plain)), little, np.ones(len(own))])
+        return total[:-1, :-1], total[:-1, -1], chosen, size, base.dictionary
+
+    def best_setting(self, most: int = SETS.most_effects) -> Setting:
+        """Return the coefficients of the likeliest set of at most so many effects."""
+        key = max((k for k in self.scores if len(k) <= most), key=self.scores.__getitem__)
+        return self._setting(key)[0]
+
+    def is_elsewhere(self, new: Setting, tried: Mapping[frozenset[str], Setting]) -> bool:
+        """Return whether a set was not tried yet, or with coefficients that are more than a
+        standard deviation away.
+        """
+        if frozenset(new) not in tried:
+            return True
+        old = tried[frozenset(new)]
+        std = self._setting(frozenset(new))[1]
+        return any(
+            abs(value - old[effect].get(name, 0.0)) > std[effect].get(name, math.inf)
+            for effect, values in new.items()
+            for name, value in values.items()
+        )
+
+    def _setting(self, key: frozenset[str]) -> tuple[Setting, Setting]:
+        found = self.known[key]
+        return self._at_mode(self.bases[found.base], found.variants, found.evidence)
+
+    def _at_mode(
+        self, base: Base, some: Sequence[Variant], evidence: SetEvidence
+    ) -> tuple[Setting, Setting]:
+        """Return the coefficients of a set at the mode, and their standard deviations."""
+        setting: Setting = {}
+        std: Setting = {}
+        row = 0
+        for effect, columns in some:
+            own: dict[str, float] = dict(self.flights.coefficients({}, effect))
+            off: dict[str, float] = {}
+            for c in columns:
+                value = float(evidence.mode[row] * base.size[base.columns[c]])
+                deviation = float(evidence.std[row] * base.size[base.columns[c]])
+                row += 1
+                if c[1].startswith(START_PREFIX):
+                    own |= base.starts[c]
+                    if moves_time(effect):
+                        first = get(effect).coefficients[0].name
+                        own[first] *= float(evidence.mode[row - 1])
+                    continue
+                name = c[1].removeprefix(WHOLE_PREFIX)
+                limits = coefficient((effect, name))
+                value += declared(c, self.flights)
+                own[name] = float(np.clip(value, limits.minimum, limits.maximum))
+                off[name] = deviation
+                if c[1].startswith(WHOLE_PREFIX):
+                    own[CENTRAL] = 1.0
+            setting[effect], std[effect] = own, off
+        return setting, std
+
+    def ranking(self) -> Ranking:
+        """Return probabilities."""
+        total = log_sum(list(self.scores.values()))
+        p = {k: math.exp(v - total) for k, v in self.scores.items()}
+        probability = {e: sum(x for k, x in p.items() if e in k) for e in self.library}
+        best = sorted(p, key=p.__getitem__, reverse=True)
+        sets = []
+        for key in best:
+            if p[key] < SETS.least_probability:
+                break
+            setting, std = self._setting(key)
+            sets.append(RankedSet(tuple(sorted(key)), p[key], setting, std))
+        return Ranking(probability, tuple(sets), self.structure(), self.power)
