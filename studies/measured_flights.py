@@ -6,6 +6,7 @@ ULogs hold a motor that is commanded to fail.
 
 Every NanoBench fold is one call of ``diagnose`` on some flights, judged on flights left out of this
 fit. The diagnosis of commanded flights was developed on these very flights, which the page says.
+Flights in a fan wall are in ``fan_wall``.
 Forces are stated as accelerations by the declared mass, through a 4 Hz low-pass with zero phase,
 over the time in the air.
 """
@@ -44,6 +45,7 @@ from windwrench.identification.motion.smoothing import low_pass
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.page_files import write_json, write_png
 from windwrench.runtime.provenance import commit
+from windwrench.studies.fan_wall import fan_wall
 from windwrench.studies.pages import DOCS, kept, write_page
 from windwrench.studies.runner import start
 
@@ -532,6 +534,10 @@ def study(
             "motor_faults/."
         ),
     ] = Path("../shared/data"),
+    wall: Annotated[
+        Path | None,
+        typer.Option(help="Folder data/experiment of Neural-Fly; without it, as they were kept."),
+    ] = None,
     markdown: Annotated[Path | None, typer.Option(help="Markdown file of the page.")] = None,
 ) -> None:
     """Diagnose measured flights, test each on flights left out of its fit, and write the page."""
@@ -543,6 +549,7 @@ def study(
         "cutoff_hz": CUTOFF_HZ,
         "nanobench": nanobench(data / "nanobench", folder / "nanobench.png"),
         "slung_payload": slung_payload(data / "crazyswarm2_payload" / "csv"),
+        "fan_wall": fan_wall(wall) if wall else kept("real-flights/real_flights.json")["fan_wall"],
         "crazypad": crazypad(data / "crazypad"),
         "motor_faults": motor_faults(data / "motor_faults"),
     }
