@@ -35,6 +35,8 @@ STOREYS = (
     {"wrench_series"},
     {"prediction", "inference", "comparison", "vehicle_fit"},
     {"posterior"},
+    {"judged"},
+    {"search_verdict", "force_verdict"},
     {"diagnosis"},
     {"report"},
     {"fleet"},
