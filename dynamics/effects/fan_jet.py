@@ -34,11 +34,10 @@ _ROWS, _COLUMNS = _AXIAL.shape
 _ANGLES = np.arange(HULL_STATIONS) * math.pi / 4
 _RING_X, _RING_Y = HULL_RADIUS * np.cos(_ANGLES), HULL_RADIUS * np.sin(_ANGLES)
 
+_LEAST_SPEED_RATIO = 2.0  # times the vehicle's speed, of a jet at its source
 # where a fan may stand as a fit starts: the way it blows (rad), m from the flight against that
 # way, and m across
 _HEADINGS = tuple(2 * math.pi * k / 8 for k in range(8))
-# typical sizes; a slower fan blows nothing that its own drag does not do in still air
-_LEAST_SPEED = 0.1
 _DISTANCES, _ACROSS = (1.5, 2.5, 3.5), (-0.6, 0.0, 0.6)
 
 
@@ -107,10 +106,12 @@ def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
 
 
 def implausible(found: Found) -> str:
-    """Return why a found jet is none: its fan hardly blows."""
-    if found.coefficients["u0"] >= _LEAST_SPEED * found.typical["u0"]:
+    """Return why a found jet is none: it is not much faster than the vehicle, whose drag in still
+    air it may stand for.
+    """
+    if found.coefficients["u0"] >= _LEAST_SPEED_RATIO * found.speed:
         return ""
-    return "hardly blows, like a drag"
+    return "blows no faster than the vehicle flies, like a drag"
 
 
 EFFECT = Effect(

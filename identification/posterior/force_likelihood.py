@@ -70,8 +70,15 @@ class ForceLikelihood:
         self._given = N.reshape(-1, N.shape[2])
 
     def columns_of(self, effects: Iterable[str]) -> list[Column]:
-        """Return the columns of effects whose force is a sum over their coefficients."""
-        return [(e, c.name) for e in effects for c in get(e).coefficients if c.name != CENTRAL]
+        """Return the columns of effects: their coefficients, but those that the vehicle's file
+        fixes. Where an effect acts makes no force.
+        """
+        return [
+            (e, c.name)
+            for e in effects
+            for c in get(e).coefficients
+            if c.name != CENTRAL and c.name not in self.flights.stated(e)
+        ]
 
     def _noise(self, first: Setting) -> ForceNoise:
         rows = self.rows
