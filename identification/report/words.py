@@ -10,6 +10,14 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MISSING = "–"
 _SPACE = "\N{NO-BREAK SPACE}"
 _LONGEST = 190  # letters of a piece of advice on the first screen
+# of a size below 0.5: what people say in place of metres, seconds, kilograms and radians
+_SMALL = 0.5
+_SMALL_UNITS = {
+    "m": (1e3, "mm"),
+    "s": (1e3, "ms"),
+    "kg": (1e3, "g"),
+    "rad": (180.0 / math.pi, "degrees"),
+}
 _TELLING = 1.3  # times the floor, from which an error is worth a word in the first sentence
 
 
@@ -156,8 +164,8 @@ def _lacked(
         if e.name in declared and e.coefficients.keys() <= declared[e.name]
     ]
     if before and not changed:
-        return in_words([e.name for e in effects])
-    lacked = in_words([e.name for e in effects if e.name not in changed])
+        return in_words([_with_size(e) for e in effects])
+    lacked = in_words([_with_size(e) for e in effects if e.name not in changed])
     other = in_words([e.name for e in effects if e.name in changed])
     return in_words(
         [
@@ -165,6 +173,26 @@ def _lacked(
             *([f"declares {other} with wrong coefficients"] if other else []),
         ]
     )
+
+
+def _with_size(effect: NamedEffect) -> str:
+    """Return an effect's name, and of a sure one the coefficient that is known best, in a unit of
+    its size.
+    """
+    known = [
+        (abs(value) / std, name)
+        for name, value in effect.coefficients.items()
+        if (std := effect.std.get(name, 0.0)) > 0.0 and math.isfinite(std) and value
+    ]
+    if effect.tentative or not known:
+        return effect.name
+    name = max(known)[1]
+    value, std, unit = effect.coefficients[name], effect.std[name], effect.units[name]
+    factor, small = _SMALL_UNITS.get(unit, (1.0, unit))
+    if abs(value) < _SMALL:
+        value, std, unit = factor * value, factor * std, small
+    with_unit = "" if unit == "1" else f"{_SPACE}{unit}"
+    return f"{effect.name} ({name} {with_std(value, std)}{with_unit})"
 
 
 def error_sentences(diagnosis: Diagnosis) -> list[str]:

@@ -232,7 +232,7 @@ def test_the_page_says_it(reports):
     assert f"falls from {before} mN to {after} mN; the noise floor is 12 mN." in page.text
     kdx = with_std(diagnosis.effects[0].coefficients["kdx"], diagnosis.effects[0].std["kdx"])
     for words in (
-        "The model lacked rotor_drag.",
+        "The model lacked rotor_drag (kdx ",
         kdx,
         "per rotor, along body x",
         "looks random",
