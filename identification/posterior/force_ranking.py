@@ -25,10 +25,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ForceRankingSettings:
-    """How many sets are fitted."""
+    """Which starts are fitted."""
 
-    most_fitted: int = 16
-    rounds: int = 2  # of tempering
     most_starts: int = 2  # of an effect with nonlinear coefficients, the likeliest, that are fitted
 
 
@@ -145,36 +143,32 @@ def rank_by_force(
         if not flights.is_nonlinear(effect) or effect in given:
             continue
         report(f"trying {effect}")
-        tries = sorted(
-            (
-                likelihood.fitted({**first, effect: dict(x)})
-                for c, x in starts.items()
-                if c[0] == effect
-            ),
-            key=likelihood.objective,
-        )
-        if tries:
-            add(tries[0])
-    for _ in range(FORCE_RANKING.rounds):
-        found = Posterior(flights, library, list(bases.values()), likelihood.power, given, idle)
-        for _ in range(FORCE_RANKING.most_fitted):
+        own = [{**first, effect: dict(x)} for c, x in starts.items() if c[0] == effect]
+        near = sorted(own, key=likelihood.objective)[: FORCE_RANKING.most_starts]
+        if near:
+            add(min(map(likelihood.fitted, near), key=likelihood.objective))
+
+    def likeliest() -> Setting:
+        """Return the likeliest set's fit, once no set is likelier that was not fitted."""
+        while True:
+            found = Posterior(flights, library, list(bases.values()), likelihood.power, given, idle)
             setting = found.best_setting(len(library))
-            if frozenset(setting) in fitted:
-                break
+            if (key := frozenset(setting)) in bases:
+                return fitted[key]
             report(f"trying {', '.join(e for e in setting if e not in given) or 'no effect'}")
             add(setting)
-            found = Posterior(flights, library, list(bases.values()), likelihood.power, given, idle)
-        best = fitted[frozenset(found.best_setting(len(library)))]
-        likelihood.power = likelihood.tempered(best)
-    key = frozenset(found.best_setting(len(library)))
+
+    likelihood.power = likelihood.tempered(likeliest())
+    best = likeliest()
+    key = frozenset(best)
     others = {c: x for c, x in lags.items() if c[0] not in key}
     bases.pop(key)
-    bases[key] = likelihood.base(fitted[key], others, unknown=True)
+    bases[key] = likelihood.base(best, others, unknown=True)
     found = Posterior(flights, library, list(bases.values()), likelihood.power, given, idle)
     return ForceRanking(
         found.ranking(),
         likelihood,
-        fitted[key],
+        best,
         found.strangest(),
         found.beside_unknown(),
         bases[key],
