@@ -55,9 +55,7 @@ class ForceVerdictSettings:
     deviance_apart: float = 6.0
     most_rivals: int = 2  # that are tried in an effect's place, the likeliest
     least_stated: float = 0.001  # probability of an alternative that is reported
-    # typical sizes, and standard deviations, from which a calibration is worth a name
-    least_size: float = 0.1
-    least_in_std: float = 3.0
+    least_size: float = 0.1  # typical sizes, from which a calibration is worth a name
 
 
 FORCE_VERDICT = ForceVerdictSettings()
@@ -94,7 +92,9 @@ def judged_by_force(flights: Flights, library: Sequence[str], report: Report) ->
     setting: Setting = {**fixed, **found.setting}
     worth = found.likelihood.worth(found.setting)
     unknown = _unknown(found.ranking.structure)
-    named = [e for e in found.setting if e not in first or _is_worth_a_name(flights, best, e)]
+    differs = {e: _differs(flights, best, e) for e in first if e in found.setting}
+    least = FORCE_VERDICT.least_sure_probability
+    named = [e for e in found.setting if differs.get(e, 1.0) >= least]
     seconds = sum(float(p.signals.t[-1] - p.signals.t[0]) for p in flights.pieces({}))
     doubts: dict[str, tuple[str, ...]] = {}
     if unknown > 0.5:
@@ -111,7 +111,7 @@ def judged_by_force(flights: Flights, library: Sequence[str], report: Report) ->
     names = {
         e: (1.0 - unknown) * found.ranking.probability[e] + unknown * found.beside_unknown[e]
         for e in named
-    }
+    } | {e: x for e, x in differs.items() if e in named}
     others = {
         e: tuple(as_late)
         if e == late
@@ -158,18 +158,17 @@ def _unknown(structure: float) -> float:
     return float(1.0 / (1.0 + math.exp(-min(max(odds, -700.0), 700.0))))
 
 
-def _is_worth_a_name(flights: Flights, best: RankedSet, effect: str) -> bool:
-    """Return whether a calibration, which is in every set, differs from what the vehicle states."""
-    use = FORCE_VERDICT
+def _differs(flights: Flights, best: RankedSet, effect: str) -> float:
+    """Return the probability that a calibration, which is in every set, differs from what the
+    vehicle states; 0 where it does so by too little for a name.
+    """
     own = flights.coefficients({}, effect)
-    return any(
-        abs(value - own.get(name, 0.0))
-        > max(
-            use.least_size * typical_size((effect, name), flights.vehicle),
-            use.least_in_std * best.std[effect].get(name, math.inf),
-        )
-        for name, value in best.coefficients[effect].items()
-    )
+    most = 0.0
+    for name, value in best.coefficients[effect].items():
+        off, std = abs(value - own.get(name, 0.0)), best.std[effect].get(name, 0.0)
+        if off > FORCE_VERDICT.least_size * typical_size((effect, name), flights.vehicle) and std:
+            most = max(most, math.erf(off / std / math.sqrt(2.0)))
+    return most
 
 
 def _named(

@@ -103,8 +103,7 @@ def prior_size(column: Column, flights: Flights) -> float:
     column = (effect, name.removeprefix(WHOLE_PREFIX))
     factor = PRIORS.any_size if get(effect).any_size else PRIORS.size
     size = factor * typical_size(column, flights.vehicle)
-    assumed = get(effect).role in (Role.THRUST, Role.THRUST_CURVE)
-    return math.hypot(size, flights.thrust_std) if assumed else size
+    return math.hypot(size, flights.thrust_std) if get(effect).role == Role.THRUST else size
 
 
 def _typical(column: Column, flights: Flights) -> float:

@@ -103,7 +103,7 @@ def test_the_accelerometer_is_read_beside_the_pose():
     off = (left[:, 3:] - left[:, :3]).mean(axis=0)
     np.testing.assert_allclose(off, [0.15, -0.1, 0.2], atol=0.01)
     both = np.corrcoef(left[:, 0], left[:, 3])[0, 1]
-    assert both > 0.9
+    assert both > 0.85
 
 
 def test_the_noise_of_an_autoregression_is_found():
