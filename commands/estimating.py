@@ -45,6 +45,8 @@ def estimate(
 
     Example: windwrench estimate flight.csv --vehicle crazyflie --film
     """
+    import numpy as np
+
     from ..identification.motion.inertial_signals import reads_imu
     from ..identification.report.wrench_picture import plot_wrench
     from ..identification.wrench_series import (
@@ -100,6 +102,8 @@ def estimate(
     for i, (name, values, unit) in enumerate(
         (("force", series.force, "N"), ("torque", series.torque, "Nm"))
     ):
+        if not np.isfinite(values).any():  # the log tells no torque
+            continue
         measures = {"mean": values.mean(axis=0), "std": values.std(axis=0)}
         if truth is not None:
             measures["RMSE to truth"] = truth[i]

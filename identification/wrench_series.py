@@ -7,11 +7,21 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from ..dynamics.vehicle import Vehicle
 from ..estimator import NoiseFit, RecordingUKF, UKFTuning, WrenchEstimate, WrenchUKF, fit_noise
 from ..estimator.consistency import Consistency
-from ..estimator.estimate import COASTING, NIS, REJECTED, STATUS, STATUSES, WITHOUT_COVARIANCE
+from ..estimator.estimate import (
+    COASTING,
+    MODEL,
+    NIS,
+    REJECTED,
+    STATUS,
+    STATUSES,
+    TORQUE,
+    WITHOUT_COVARIANCE,
+)
 from ..estimator.model_uncertainty import LOAD, NAMES, factors_alone, variances_along
 from ..estimator.noise_fit import consistency_of
 from ..estimator.row_steps import steps_between
@@ -19,6 +29,7 @@ from ..runtime.errors import InputError
 from .inertial_wrench import inertial_wrench
 from .logs.flight_log import FlightLog
 from .logs.screening import screen_for_estimate
+from .logs.source_rates import MOTOR_RATES, between_samples
 from .logs.tables import write_csv
 from .motion.inertial_signals import reads_imu
 
@@ -34,7 +45,8 @@ _REPORTED = 10_000  # rows between two reports of progress
 class WrenchSeries(WrenchEstimate):
     """The estimate at every row (N,) of a log.
 
-    Standard deviations are those of noise and of the vehicle's stated uncertainty. NIS, status and
+    Standard deviations are those of noise, of the vehicle's stated uncertainty, and of rotors that
+    were measured too seldom; where these tell no torque, it is NaN. NIS, status and
     restarts are those of the filter, smoothed or not; NIS is NaN where there was no pose to compare
     with.
 
@@ -103,7 +115,8 @@ def estimate_log(
     if reads_imu(log) or (smooth and both):
         tuning = tuning or UKFTuning.for_vehicle(vehicle, log.period)
         found, loads, notes = inertial_wrench(log, vehicle, tuning)
-        return WrenchSeries(found, log.t, vehicle, tuning, (*log.notes, *doubts, *notes), loads)
+        notes = (*log.notes, *doubts, *notes, *_slow_motors(log, vehicle, found))
+        return WrenchSeries(found, log.t, vehicle, tuning, notes, loads)
     first, count = int(np.flatnonzero(log.valid)[0]), len(log.t)
     ukf = (RecordingUKF if smooth else WrenchUKF)(vehicle, tuning, log.period, gate)
     numbers, std = np.empty((count, WITHOUT_COVARIANCE)), np.empty((count, 18))
@@ -138,8 +151,31 @@ def estimate_log(
     found.numbers[~log.valid, NIS] = np.nan
     found.numbers[:first, STATUS] = COASTING
     series = WrenchSeries(found, log.t, vehicle, ukf.tuning, (*log.notes, *doubts), loads)
-    series.notes += tuple(_notes(log, series, smooth))
+    series.notes += (*_notes(log, series, smooth), *_slow_motors(log, vehicle, found))
     return series
+
+
+def _slow_motors(log: FlightLog, vehicle: Vehicle, estimate: WrenchEstimate) -> tuple[str, ...]:
+    """Take from an estimate the torque of rotors that were measured too seldom for one, and widen
+    its force where they were measured too seldom for that; return what is to be said of it.
+    """
+    rate, least = log.motor_rate, MOTOR_RATES
+    if least.serves(rate, least.torque_hz):
+        return ()
+    estimate.numbers[:, TORQUE] = np.nan
+    estimate.numbers[:, MODEL][:, :3] = np.nan
+    said = f"{'motor commands' if log.commanded else 'rotor speeds'} come {rate:.3g} times a second"
+    if least.serves(rate, least.force_hz):
+        return (f"warning: {said}: no torque is estimated. It takes {least.torque_hz:g}",)
+    slopes = 2.0 * log.rotor_speeds * vehicle.k  # of thrust, N/(rad/s)
+    std = np.linalg.norm(slopes * between_samples(log.t, log.rotor_speeds, rate), axis=1)
+    up = Rotation.from_quat(estimate.quaternion, scalar_first=True).apply([0.0, 0.0, 1.0])
+    estimate.numbers[:, MODEL][:, 3:] += np.square(up * std[:, None])
+    return (
+        f"warning: {said}: no torque is estimated, and what the thrust does between them, "
+        f"{np.sqrt(np.mean(np.square(std))):.2g} N, is in the force's deviation. A force takes "
+        f"{least.force_hz:g} a second, a torque {least.torque_hz:g}",
+    )
 
 
 def pose_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
@@ -163,9 +199,10 @@ def counts(series: WrenchSeries) -> dict[str, int]:
 def uncertainty_note(series: WrenchSeries) -> str:
     """Say how far force and torque are known, and what makes up most of that."""
     force = _largest_part(series, series.std_force, 3, "N")
-    return f"One standard deviation of the force is {force}; of the torque, " + _largest_part(
-        series, series.std_torque, 0, "Nm"
-    )
+    force = f"One standard deviation of the force is {force}"
+    if not np.isfinite(series.std_torque).any():
+        return force
+    return f"{force}; of the torque, {_largest_part(series, series.std_torque, 0, 'Nm')}"
 
 
 def _largest_part(series: WrenchSeries, std: Array, first: int, unit: str) -> str:
@@ -178,7 +215,9 @@ def _largest_part(series: WrenchSeries, std: Array, first: int, unit: str) -> st
         for name, factors in factors_alone(series.vehicle).items()
     }
     parts["noise"] = np.mean(np.square(series.std[:, 12 + first : 15 + first]))
-    name, total = max(parts, key=lambda part: parts[part]), np.mean(np.square(std))
+    total = np.mean(np.square(std))
+    parts["what the rotors do between samples"] = total - sum(parts.values())
+    name = max(parts, key=lambda part: parts[part])
     return (
         f"{np.sqrt(total):.2g} {unit} an axis, and {name} makes up "
         f"{100.0 * parts[name] / total:.0f} % of its square"

@@ -20,7 +20,7 @@ from ..logs.flight_log import FlightLog
 from ..logs.readers import px4_ulog, reader_by_content
 from ..logs.reading import read_log
 from ..logs.streams import readable
-from ..motion.smoothing import lagged, resampled
+from ..motion.smoothing import lagged, resampled, runs_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -34,6 +34,7 @@ IDLE, FLYING = 0.15, 0.5
 SETTLED = 1.5  # s after the rotors first carry the vehicle: it has left the ground
 LEAST_SECONDS = 3.0  # in flight: less says nothing of what is usual
 LONGEST_GAP = 0.1  # s without a sample, across which nothing is interpolated
+SHORTEST = 0.2  # s of unbroken samples; the noise of a shorter run has no past to be told from
 # an axis is clipped where it stays this long within this share of its magnitude, near the end of
 # a range that gyros have (a calibration moves that a little) or at the largest value of the log
 CLIPPED_SECONDS, CLIPPED_SHARE = 0.04, 0.01
@@ -187,12 +188,18 @@ def sample(channels: Channels) -> Samples:
     """Put the streams on the grid.
 
     Raises:
-        InputError: fewer than 3 s of flight.
+        InputError: fewer than 3 s of flight, or samples that come too seldom.
     """
     c = channels
     streams = (c.gyro_times, c.accelerometer_times, c.command_times)
     if min(map(len, streams)) < 10:
         raise InputError(f"{c.name}: fewer than ten samples of gyro, accelerometer or commands")
+    for what, stream in zip(_CHANNELS[:2], streams, strict=False):
+        if (step := float(np.median(np.diff(stream)))) > LONGEST_GAP:
+            raise InputError(
+                f"{c.name}: {what}: {1.0 / step:.3g} samples a second; expected at least "
+                f"{1.0 / LONGEST_GAP:g}, to see a rotor fail"
+            )
     begin, end = max(s[0] for s in streams), min(s[-1] for s in streams)
     edges = np.arange(begin, end, STEP)
     if len(edges) < 3:
@@ -210,10 +217,12 @@ def sample(channels: Channels) -> Samples:
     keep = flying & there & (t < stop)
     if keep.any():
         keep &= t > t[np.argmax(keep)] + SETTLED
+    for a, b in runs_of(keep):
+        keep[a:b] = (b - a) * STEP > SHORTEST
     if keep.sum() * STEP < LEAST_SECONDS:
         raise InputError(
             f"{c.name}: {keep.sum() * STEP:.3g} s in flight; expected at least {LEAST_SECONDS:g} s "
-            "to see what is usual"
+            "without a gap, to see what is usual"
         )
     follows = np.concatenate([[False], keep[1:] & keep[:-1]])
     return Samples(

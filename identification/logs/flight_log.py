@@ -75,6 +75,9 @@ class FlightLog:
             be trusted.
         command: (N, 4) motor commands, 0 to 1, in the rotors' order.
         vehicle: name of the vehicle that flew, where the log or its reader knows it.
+        rates: Hz, how often each channel was measured (``source_rates``), by its section of a log
+            map: position, rotors, commands, wrench, battery, accelerometer, gyro. A channel that
+            is not named was measured in every row.
     """
 
     t: Array
@@ -94,6 +97,7 @@ class FlightLog:
     commanded: bool = False
     command: Array | None = None
     vehicle: str = ""
+    rates: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if len(self.valid) != len(self.t):
@@ -116,6 +120,12 @@ class FlightLog:
     def has_rotor_speeds(self) -> bool:
         """Are rotor speeds known, measured or computed from commands?"""
         return bool(np.isfinite(self.rotor_speeds).all())
+
+    @property
+    def motor_rate(self) -> float:
+        """How often what tells the rotors was measured, Hz: speeds, else what was commanded."""
+        names = ("commands", "wrench") if self.commanded else ("rotors", "commands", "wrench")
+        return next((self.rates[name] for name in names if name in self.rates), np.inf)
 
     @property
     def period(self) -> float:

@@ -29,6 +29,7 @@ from .flight_phases import flying, usual_thrust
 from .inertial import INERTIAL, gravity_doubt, is_stuck
 from .magnitudes import MAGNITUDES, rotor_doubt, thrust_by_weight, time_doubt, within
 from .readings import Reading
+from .source_rates import MOTOR_RATES
 from .stuck_channels import stretches, stuck_notes
 from .table import Array, Mask, Rows
 
@@ -205,6 +206,13 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
             f"the rotor speeds make a median thrust of {ratio:.2g} times the weight of "
             f"{vehicle.name}: is it this vehicle, and did it fly?"
         )
+    least = MOTOR_RATES.force_hz if log.commanded else MOTOR_RATES.torque_hz
+    if not MOTOR_RATES.serves(log.motor_rate, least):
+        what = "motor commands" if log.commanded else "rotor speeds"
+        yield Needed(
+            f"{what} come {log.motor_rate:.3g} times a second; expected at least {least:g}: what "
+            "the rotors do between them is not known"
+        )
     times = log.t if by_imu or log.valid.sum() < 2 else log.t[log.valid]
     if doubt := time_doubt(float(np.median(np.diff(times)))):
         yield Refused(doubt)
@@ -260,6 +268,7 @@ def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
         if is_stuck(x[rows]):
             yield Refused(f"{names} never change: the sensor was not read")
     rate = 1.0 / float(np.median(np.diff(log.t[rows])))
+    rate = min(rate, *(log.rates.get(name, np.inf) for name in ("gyro", "accelerometer")))
     if rate < _LEAST_IMU_HZ:
         yield Refused(
             f"{rate:.3g} IMU readings a second and no pose as fast; expected at least "

@@ -16,6 +16,7 @@ from ...runtime.errors import InputError
 from .commanded_speeds import flown_vehicle, speeds_of_wrench, with_commanded_speeds
 from .flight_log import FlightLog, time_notes
 from .log_map import LogMap
+from .source_rates import source_rate
 from .table import Array, Mask
 
 _SENSOR_GAP = 3.5  # median steps, across which an inertial sensor is not interpolated
@@ -186,6 +187,7 @@ class Recording:
             commanded="wrench" in made and "rotors" not in made,
             command=made["commands"].at(t) if "commands" in made else None,
             vehicle=log_map.vehicle,
+            rates={name: source_rate(s.t, s.values) for name, s in made.items()},
             **truth,
         )
         return with_commanded_speeds(log, vehicle, log_map.commands)

@@ -44,19 +44,25 @@ def log_channels(log: FlightLog) -> list[Channel]:
         axis[log.valid] = turned.apply([0.0, 0.0, 1.0])
     tilt = np.degrees(np.arccos(np.clip(axis[:, 2:], -1.0, 1.0)))
     rotors = "rotor speeds (from commands)" if log.commanded else "rotor speeds"
-    given: list[tuple[str, str, Array | None, tuple[str, ...]]] = [
-        ("position", "m", log.position, _AXES),
-        ("attitude (tilt)", "deg", tilt, _AXES[:2]),
-        (rotors, "rad/s", log.rotor_speeds if log.has_rotor_speeds else None, _ROTORS),
-        ("motor commands", "0 to 1", log.command, _ROTORS),
-        ("battery", "V", None if log.voltage is None else log.voltage[:, None], ("",)),
-        ("accelerometer", "m/s2", log.accelerometer, _AXES),
-        ("gyro", "rad/s", log.gyro, _AXES),
-        ("true force", "N", log.force, _AXES),
-        ("true torque", "Nm", log.torque, _AXES),
+    given: list[tuple[str, str, Array | None, tuple[str, ...], str]] = [
+        ("position", "m", log.position, _AXES, "position"),
+        ("attitude (tilt)", "deg", tilt, _AXES[:2], "position"),
+        (
+            rotors,
+            "rad/s",
+            log.rotor_speeds if log.has_rotor_speeds else None,
+            _ROTORS,
+            "commands" if log.commanded else "rotors",
+        ),
+        ("motor commands", "0 to 1", log.command, _ROTORS, "commands"),
+        ("battery", "V", None if log.voltage is None else log.voltage[:, None], ("",), "battery"),
+        ("accelerometer", "m/s2", log.accelerometer, _AXES, "accelerometer"),
+        ("gyro", "rad/s", log.gyro, _AXES, "gyro"),
+        ("true force", "N", log.force, _AXES, "force"),
+        ("true torque", "Nm", log.torque, _AXES, "torque"),
     ]
     out = []
-    for name, unit, values, series in given:
+    for name, unit, values, series, section in given:
         if values is None:
             continue
         rows = np.flatnonzero(np.isfinite(values).all(axis=1))
@@ -68,8 +74,9 @@ def log_channels(log: FlightLog) -> list[Channel]:
             drawn, title = axis[rows, :2], "thrust axis\n(x, y of 1)"
         steps = np.diff(t)
         step = float(np.median(steps))
-        gaps, longest = int(np.sum(steps > _GAP * step)), float(steps.max())
-        found = (len(rows), 1.0 / step, gaps, longest, low, high)
+        rate = min(log.rates.get(section) or np.inf, 1.0 / step)
+        gaps, longest = int(np.sum(steps > _GAP * step)), max(float(steps.max()), 1.0 / rate)
+        found = (len(rows), rate, gaps, longest, low, high)
         out.append(Channel(name, unit, *found, t, drawn, title, series))
     return out
 

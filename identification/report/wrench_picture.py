@@ -71,7 +71,7 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
         panel.grid(alpha=0.3)
         panel.margins(x=0.0)
         _shade(backdrop if panel is height else panel, phases, log)
-        if panel is not height:
+        if panel is not height and panel.get_legend_handles_labels()[0]:
             panel.legend(loc="upper center", ncols=columns, fontsize=9, framealpha=0.9)
             low, high = panel.get_ylim()
             panel.set_ylim(low, high + room * (high - low))  # for the legend
@@ -100,8 +100,13 @@ def _draw_vectors(
     panel: "Axes", t: Array, mean: Array, std: Array, truth: Array | None, what: tuple[str, str]
 ) -> None:
     """Draw three components (N, 3) of a symbol and unit with their 2-sigma bands, and the truth
-    dashed with its RMSE in the legend.
+    dashed with its RMSE in the legend; where there are none, say so.
     """
+    if not np.isfinite(mean).any():
+        words = "not estimated: the rotors were measured too seldom"
+        panel.text(0.5, 0.5, words, transform=panel.transAxes, ha="center", fontsize=11)
+        panel.set_yticks([])
+        return
     symbol, unit = what
     low, high = mean - 2 * std, mean + 2 * std
     for i, (axis, colour) in enumerate(_AXES):

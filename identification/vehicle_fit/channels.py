@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
+from ..logs.source_rates import MOTOR_RATES
 from ..motion.signals import log_signals
 from ..motion.smoothing import derivative, low_pass, resampled, runs_of, unbroken
 
@@ -84,7 +85,8 @@ def sources_of(logs: Sequence[FlightLog]) -> Sources:
     """Return the sensors that all logs have.
 
     Raises:
-        InputError: a log has no motion, or logs differ in what their rotors are given as.
+        InputError: a log has no motion, its rotors were measured too seldom, or logs differ in what
+            their rotors are given as.
     """
     for log in logs:
         if not log.has_pose and log.gyro is None:
@@ -92,12 +94,15 @@ def sources_of(logs: Sequence[FlightLog]) -> Sources:
                 f"{log.source or log.name}: has neither a pose nor a gyro (gx, gy, gz); expected "
                 "one of them"
             )
-    commands = [log.command is not None for log in logs]
-    speeds = [log.has_rotor_speeds and not log.commanded for log in logs]
+    commands = [log.command is not None and _is_fast(log, "commands") for log in logs]
+    speeds = [
+        log.has_rotor_speeds and not log.commanded and _is_fast(log, "rotors") for log in logs
+    ]
     if not all(speeds) and not all(commands):
         raise InputError(
             f"{logs[speeds.index(False)].source or logs[0].name}: expected rotor speeds "
-            "(omega1..omega4) in every log, or motor commands (cmd1..cmd4) in every log"
+            "(omega1..omega4) in every log, or motor commands (cmd1..cmd4) in every log, "
+            f"{MOTOR_RATES.torque_hz:g} times a second"
         )
     accelerometer = all(log.accelerometer is not None for log in logs)
     gyro = all(log.gyro is not None for log in logs)
@@ -113,6 +118,11 @@ def sources_of(logs: Sequence[FlightLog]) -> Sources:
         "rotor speeds" if all(speeds) else "commands",
         pose,
     )
+
+
+def _is_fast(log: FlightLog, channel: str) -> bool:
+    """Return whether a channel of the rotors was measured often enough to tell their torque."""
+    return MOTOR_RATES.serves(log.rates.get(channel, np.inf), MOTOR_RATES.torque_hz)
 
 
 def rounding_step(logs: Sequence[FlightLog]) -> float:

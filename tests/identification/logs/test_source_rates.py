@@ -1,0 +1,98 @@
+"""How often a channel was measured, and what results do with rotors that were measured seldom."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from windwrench.dynamics import load_vehicle
+from windwrench.envs.recording import record_flight
+from windwrench.identification import diagnose, read_log
+from windwrench.identification.logs.flight_log import FlightLog, write_log
+from windwrench.identification.logs.screening import screen_log
+from windwrench.identification.logs.source_rates import between_samples, source_rate
+from windwrench.identification.wrench_series import estimate_log
+from windwrench.runtime.errors import InputError
+
+PERIOD = 0.005  # s
+
+
+def walk(rate, seconds=20.0, seed=0):
+    """Times and values (n, 4) of a random walk that was sampled at a rate."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, seconds, 1.0 / rate)
+    return t, 400.0 + np.cumsum(rng.normal(size=(len(t), 4)), axis=0)
+
+
+@pytest.mark.parametrize("rate", [4.0, 10.0, 25.0, 50.0])
+def test_a_channel_that_is_held_or_drawn_in_lines_keeps_its_own_rate(rate):
+    times, values = walk(rate)
+    t = np.arange(0.0, times[-1], PERIOD)
+    held = values[np.searchsorted(times, t, side="right") - 1]
+    lines = np.column_stack([np.interp(t, times + 0.0013, column) for column in values.T])
+    for rows in (held, np.round(held), lines, np.round(lines, 6)):
+        assert source_rate(t, rows) == pytest.approx(rate, rel=0.05)
+    t, values = walk(1.0 / PERIOD)
+    every = round(1.0 / (rate * PERIOD))  # in rows of its own
+    values[np.arange(len(t)) % every > 0] = np.nan
+    assert source_rate(t, values) == pytest.approx(rate)
+
+
+@pytest.mark.parametrize("step", [1e-6, 0.3, 3.0])
+def test_a_rounded_channel_is_as_fast_as_its_rows(step):
+    t = np.arange(0.0, 20.0, PERIOD)
+    noise = np.random.default_rng(1).normal(size=(len(t), 4))
+    slow = 400.0 + 10.0 * np.sin(np.pi * t[:, None] + np.arange(4))
+    for values in (slow, slow + noise, np.full((len(t), 4), 400.0)):
+        assert source_rate(t, step * np.round(values / step)) == pytest.approx(1.0 / PERIOD)
+
+
+def test_what_lies_between_samples_is_bounded_by_their_neighbours():
+    times, values = walk(200.0, seconds=100.0)
+    seldom = np.arange(0.0, times[-1], 0.25)
+    lines = np.column_stack(
+        [np.interp(times, seldom, np.interp(seldom, times, column)) for column in values.T]
+    )
+    left = np.sqrt(np.mean(np.square(values - lines), axis=0))
+    bound = between_samples(times, lines, 4.0)
+    assert np.all(left < bound)
+    assert np.all(bound < 3.0 * left)
+
+
+@pytest.fixture(scope="module")
+def flown():
+    """A simulated flight of 14 s at 200 Hz."""
+    columns = record_flight(load_vehicle("ardrone2"), seconds=14.0, seed=3)
+    return FlightLog(
+        *(columns[name] for name in ("t", "position", "quaternion", "rotor_speeds")), name="flown"
+    )
+
+
+def with_rotors_at(rate, log):
+    """The flight with rotor speeds that were measured at a rate, in lines between."""
+    beats = np.arange(log.t[0], log.t[-1], 1.0 / rate)
+    lines = [
+        np.interp(log.t, beats, np.interp(beats, log.t, column)) for column in log.rotor_speeds.T
+    ]
+    return replace(log, rotor_speeds=np.column_stack(lines))
+
+
+@pytest.mark.parametrize(("rate", "force"), [(4.0, True), (30.0, False)])
+def test_slow_rotors_tell_no_torque_and_no_effect(rate, force, flown, tmp_path):
+    vehicle, path = load_vehicle("ardrone2"), tmp_path / "slow.csv"
+    slow = with_rotors_at(rate, flown)
+    write_log(slow, path)
+    log = read_log(path)
+    said = rf"rotor speeds come {rate:g} times a second; expected at least 45"
+    with pytest.raises(InputError, match=said):
+        screen_log(log, vehicle)
+    with pytest.raises(InputError, match=said):
+        diagnose([log], vehicle)
+    series, told = estimate_log(log, vehicle), estimate_log(replace(log, rates={}), vehicle)
+    assert np.isnan(series.torque).all()
+    assert np.isnan(series.std_torque).all()
+    assert np.array_equal(series.force, told.force)
+    wider = series.std_force > told.std_force
+    assert wider.all() if force else not wider.any()
+    (words,) = [note for note in series.notes if "no torque is estimated" in note]
+    assert ("A force takes 20 a second" in words) == force
