@@ -2,16 +2,10 @@
 
 Each flight has four numbers: the differences of left and right, of front and rear, and of the
 diagonals, each in parts of the total, and the total itself, as a logarithm. Between flights of one
-unchanged vehicle they scatter, for a battery is never put in twice at the same place. Of that
-scatter little is known from two or three flights, so its covariance has an inverse-Wishart prior,
-and the difference of two sets is a multivariate Student's t (Gelman and others, *Bayesian Data
-Analysis*, third edition, section 3.6). How much more or less than usual one vehicle's flights
-scatter, all four numbers alike, is unknown too: it has a log-normal prior, is told by how the
-flights of each set agree (the evidence of the inverse-Wishart), and is summed over. No flight
-scatters by less than its own mean is off, from its batches. To it comes what the battery does to
-the total: a rotor's thrust for a request follows the voltage by a power that depends on the
-vehicle's motor controllers and on whether its firmware makes up for the battery, so that a
-difference of voltage makes the total less certain.
+unchanged vehicle they scatter, from session to session more than within one (``sessions``). To this
+comes what the battery does to the total: a rotor's thrust for a request follows the voltage by a
+power that depends on the vehicle's motor controllers and on whether its firmware makes up for the
+battery, so that a difference of voltage makes the total less certain.
 
 What may have changed, each by an amount that is integrated over:
 
@@ -33,9 +27,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln
 
 from ...runtime.errors import InputError
+from .sessions import difference
 from .trim import Trim
 
 Array = NDArray[np.float64]
@@ -52,31 +46,25 @@ _ROTORS = {
 _SIDES = {"left": (1.0, 0.0), "rear": (0.0, -1.0), "right": (-1.0, 0.0), "front": (0.0, 1.0)}
 
 _AMOUNTS = 80  # of a change, over which its evidence is summed
-_SCALES = np.linspace(-3.0, 3.0, 13)  # standard deviations of the scatter's logarithm, likewise
 
 
 @dataclass(frozen=True)
 class ChangeSettings:
-    """What is assumed of unchanged flights, and of changes."""
+    """What is assumed of changes."""
 
-    # standard deviations between flights of one unchanged vehicle: of the differences of sides, in
-    # parts of the total (a centre of mass that moves by 1 % of the arm), of the diagonals, whose
-    # balance hangs on each rotor's drag, and of the total's logarithm (battery and air)
-    scatter: tuple[float, float, float, float] = (0.01, 0.01, 0.015, 0.02)
-    prior_flights: float = 8.0  # degrees of freedom of that scatter: how many flights it is worth
-    # standard deviation of the logarithm by which one vehicle's scatter is larger or smaller than
-    # that, all four numbers alike: a factor of two, since places for batteries differ
-    scatter_spread: float = 0.7
     # share of the weight, or of one rotor's thrust, by which something that changed has changed:
     # the scale of a half-normal prior
     amount: float = 0.15
     # standard deviation of the power by which the request for one thrust falls with the battery's
     # voltage: 0 where the firmware makes up for the battery, up to 2 where rotor speed follows it
     voltage_power: float = 0.5
-    # how far a real rotor's request leaves what a linear one would need, as a share of the change:
-    # thrust that bends near full power shows in diagonals and total, little in the sides
-    bend: tuple[float, float, float, float] = (0.25, 0.25, 1.0, 0.5)
-    unchanged: float = 0.5  # probability of nothing, before the flights are looked at
+    # how far a real rotor's request leaves what a linear one would need, as a share of the change.
+    # A bent curve changes by how much one rotor's request rises, and this moves all four numbers
+    # alike; drag and thrust of a cut propeller do not shrink alike, which shows in the diagonals.
+    # Cuts of 2 to 4 mm moved the diagonals 0.9, and the total 1.0 times as much as the sides
+    bend: tuple[float, float, float, float] = (0.1, 0.1, 0.25, 0.25)
+    # probability of nothing, before the flights are looked at: who compares has a reason
+    unchanged: float = 0.4
     sure: float = 0.95  # probability from which a place is named without a doubt
 
 
@@ -123,19 +111,18 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     use = CHANGES
     if not (len(after) and len(before)):
         raise InputError("compare: expected at least one flight in each of the two sets")
-    a, b = (np.array([trim.features for trim in group]) for group in (after, before))
-    difference = a.mean(axis=0) - b.mean(axis=0)
-    scatters, scale_logs, freedom = _scatters(a, b, after, before)
-    unchanged = (1.0 / len(a) + 1.0 / len(b)) * scatters
-    unchanged[:, 3, 3] += (use.voltage_power * _voltage_ratio(after, before)) ** 2
+    found = difference(after, before)
+    moved, unchanged = found.mean[:, None], found.variance
+    unchanged[:, 3] += (use.voltage_power * _voltage_ratio(after, before)) ** 2
     shares = np.mean([trim.thrust / trim.total for trim in before], axis=0)
 
     def logs_of(means: Array, spread: Array) -> Array:
         """Logarithms (n,) of how likely the difference is, for changes whose ``means`` (n, 4) and
         standard deviations beside the scatter, ``spread`` (n, 4), are given.
         """
-        scales = unchanged[:, None] + spread[:, :, None] ** 2 * np.eye(4)
-        logs = scale_logs[:, None] + _log_t(difference, means, scales, freedom)
+        variance = unchanged[:, None] + spread**2
+        off = np.square(moved - means) / variance + np.log(2.0 * np.pi * variance)
+        logs = found.log[:, None] - 0.5 * off.sum(axis=2)
         return np.asarray(np.logaddexp.reduce(logs, axis=0))
 
     amounts = np.linspace(0.02, 4.0, _AMOUNTS) * use.amount
@@ -169,12 +156,12 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     total = np.logaddexp.reduce(list(kinds.values()))
     best = max(kinds, key=kinds.__getitem__)
     amount, amount_std = sizes[likeliest, best] if best else (0.0, 0.0)
-    usual = np.tensordot(np.exp(scale_logs), unchanged, 1)
+    shares_of_ways = np.exp(found.log)
     return Change(
         tuple(before),
         tuple(after),
-        difference,
-        np.sqrt(np.diagonal(usual)),
+        shares_of_ways @ found.mean,
+        np.sqrt(shares_of_ways @ unchanged),
         places,
         math.exp(kinds.get("weaker", -math.inf) - total),
         math.exp(kinds.get("carries more", -math.inf) - total),
@@ -218,44 +205,3 @@ def _moved(place: str, kind: str, amount: float, shares: Array) -> Array:
     # a weight m at a rotor moves the centre of mass by m / (1 + m) of the way there
     way = amount / (1.0 + amount)
     return np.array([way * left, way * front, 0.0, math.log1p(amount)])
-
-
-def _scatters(
-    a: Array, b: Array, after: Sequence[Trim], before: Sequence[Trim]
-) -> tuple[Array, Array, float]:
-    """Return the scale (scales, 4, 4) of one flight's scatter where it is so much larger or smaller
-    than usual, the logarithm of how likely each is (scales,), and the degrees of freedom.
-    """
-    use = CHANGES
-    freedom = use.prior_flights + len(a) + len(b) - 2
-    own_noise = np.mean([trim.noise for trim in (*after, *before)], axis=0)
-    apart = np.zeros((4, 4))
-    for group in (a, b):
-        off = group - group.mean(axis=0)
-        apart = apart + off.T @ off
-    factors = np.exp(2.0 * use.scatter_spread * _SCALES)
-    prior = use.prior_flights * (
-        factors[:, None, None] * np.diag(np.square(use.scatter)) + own_noise
-    )
-    logs = -0.5 * _SCALES**2 + 0.5 * (
-        use.prior_flights * np.linalg.slogdet(prior)[1]
-        - freedom * np.linalg.slogdet(prior + apart)[1]
-    )
-    return (prior + apart) / freedom, logs - np.logaddexp.reduce(logs), freedom
-
-
-def _log_t(x: Array, means: Array, scales: Array, freedom: float) -> Array:
-    """Return the logarithms (..., n) of multivariate Student's t densities with ``means`` (n, 4)
-    and ``scales`` (..., n, 4, 4) at ``x`` (4,).
-    """
-    dof = len(x)
-    constant = (
-        gammaln(0.5 * (freedom + dof))
-        - gammaln(0.5 * freedom)
-        - 0.5 * dof * math.log(freedom * math.pi)
-    )
-    root = np.linalg.cholesky(scales)
-    whitened = np.linalg.solve(root, (x - means)[..., None])[..., 0]
-    log_size = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)
-    bent = np.log1p(np.square(whitened).sum(axis=-1) / freedom)
-    return np.asarray(constant - log_size - 0.5 * (freedom + dof) * bent)

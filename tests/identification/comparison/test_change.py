@@ -14,9 +14,9 @@ from windwrench.envs.recording import record_flight
 from windwrench.identification.comparison.change import (
     NOWHERE,
     SOMETHING_ELSE,
-    ChangeSettings,
     compare,
 )
+from windwrench.identification.comparison.sessions import SCATTER, means_of
 from windwrench.identification.comparison.trim import Trim, trim_of, trim_of_log
 from windwrench.identification.comparison.words import change_headline, write_change
 from windwrench.identification.logs.flight_log import FlightLog
@@ -31,16 +31,18 @@ ROTORS = (
 MIX = np.array([[1, 1, -1, -1], [1, -1, -1, 1], [1, -1, 1, -1], [1, 1, 1, 1]]) / 1.0
 
 
-def drawn(rng, count, moved=(0.0, 0.0, 0.0, 0.0), vehicle=(0.02, -0.03, 0.05, 0.0), scale=1.0):
-    """Flights of one vehicle that scatter ``scale`` times as the settings say, with the four
-    numbers moved.
+def drawn(rng, count, moved=(0.0, 0.0, 0.0, 0.0), sessions=1):
+    """Flights of one vehicle, ``count`` in each session, which scatter as the settings say, with
+    the four numbers moved.
     """
-    scatter = scale * np.array(ChangeSettings().scatter)
     out = []
-    for i in range(count):
-        numbers = np.array(vehicle) + moved + scatter * rng.standard_normal(4)
-        thrust = np.linalg.solve(MIX, np.append(numbers[:3], 1.0)) * np.exp(numbers[3])
-        out.append(Trim(f"{i}", thrust, 20.0))
+    for session in range(sessions):
+        middle = np.array([0.02, -0.03, 0.05, 0.0]) + moved
+        middle += np.array(SCATTER.session) * rng.standard_normal(4)
+        for i in range(count):
+            numbers = middle + np.array(SCATTER.flight) * rng.standard_normal(4)
+            thrust = np.linalg.solve(MIX, np.append(numbers[:3], 1.0)) * np.exp(numbers[3])
+            out.append(Trim(f"{session}, {i}", thrust, 20.0))
     return out
 
 
@@ -51,6 +53,32 @@ def test_flights_without_a_change_are_never_given_a_sure_one():
     assert sum(c.sure and c.place != NOWHERE for c in found) <= 3
     assert sum(c.place == NOWHERE for c in found) > 280
     assert all(sum(c.places.values()) == pytest.approx(1.0) for c in found)
+
+
+def test_more_sessions_make_an_answer_surer_and_more_flights_of_one_do_not():
+    rng = np.random.default_rng(4)
+    moved = (0.06, -0.06, -0.06, 0.06)  # rotor 2 is asked for more
+    chances = {(count, sessions): [] for count, sessions in ((1, 1), (6, 1), (1, 6))}
+    for _ in range(60):
+        after = drawn(rng, 1, moved)
+        for count, sessions in chances:
+            found = compare(after, drawn(rng, count, sessions=sessions))
+            chances[count, sessions].append(found.places[ROTORS[1]])
+    one, more, apart = (float(np.mean(x)) for x in chances.values())
+    assert apart > one + 0.04
+    assert more < 0.5 * (one + apart)
+
+
+def test_a_session_ends_where_the_battery_was_changed():
+    """Flights with two batteries know their vehicle better than as many with one."""
+    flights = drawn(np.random.default_rng(5), 4)
+
+    def std(volts):
+        found = means_of([replace(x, voltage=v) for x, v in zip(flights, volts, strict=True)])
+        share = np.exp(found.log - np.logaddexp.reduce(found.log))
+        return np.sqrt(share @ found.variance)
+
+    assert np.all(std([12.4, 12.0, 12.4, 12.0]) < 0.95 * std([12.4, 12.2, 12.0, 11.8]))
 
 
 @pytest.mark.parametrize(
@@ -79,7 +107,7 @@ def test_a_weak_rotor_and_a_weight_are_named_at_their_place(rotor):
     for moved in (weak, weight):
         for _ in range(15):
             places.append(compare(drawn(rng, 3, moved), drawn(rng, 3)))
-    assert np.mean([c.place == ROTORS[rotor] for c in places]) > 0.9
+    assert np.mean([c.place == ROTORS[rotor] for c in places]) > 0.8
     assert not any(c.sure and c.place != ROTORS[rotor] for c in places)
 
 
@@ -89,16 +117,22 @@ def flight(vehicle, *effects, seed=0):
 
 
 @pytest.mark.parametrize(
-    ("effect", "place"),
+    ("effects", "place"),
     [
-        (EffectSetting("rotor_efficiency", {"e3": -0.12}), ROTORS[2]),
-        (EffectSetting("com_offset", {"cx": 0.0, "cy": 0.012, "cz": 0.0}), "left"),
+        ([EffectSetting("rotor_efficiency", {"e3": -0.12})], ROTORS[2]),
+        (  # a tenth of the weight, at the left
+            [
+                EffectSetting("mass", {"dm": 0.0429}),
+                EffectSetting("com_offset", {"cx": 0.0, "cy": 0.0115, "cz": 0.0}),
+            ],
+            "left",
+        ),
     ],
 )
-def test_simulated_changes_are_named_without_a_true_model(effect, place, tmp_path):
+def test_simulated_changes_are_named_without_a_true_model(effects, place, tmp_path):
     vehicle = load_vehicle("ardrone2")
     before = [trim_of_log(flight(vehicle, seed=s), vehicle) for s in (1, 2, 3)]
-    after = [trim_of_log(flight(vehicle, effect, seed=s), vehicle) for s in (4, 5, 6)]
+    after = [trim_of_log(flight(vehicle, *effects, seed=s), vehicle) for s in (4, 5, 6)]
     change = compare(after, before)
     assert change.place == place
     data, picture = write_change(change, tmp_path)
