@@ -89,7 +89,8 @@ def _diagnose(
     """
     from ..identification.diagnosis import diagnose as run
     from ..identification.report.files import report_data, write_report
-    from ..identification.report.words import error_sentences, headline, remainder_sentence
+    from ..identification.report.headline import headline
+    from ..identification.report.words import error_sentences, remainder_sentence
 
     (every, model), count = read, len(paths)
     folder = results_folder(out)
@@ -119,20 +120,21 @@ def _diagnose(
 
 def _show(found: "Diagnosis") -> None:
     """Print the tables of effects and of the error before and after."""
+    from ..identification.report.amounts import amount
     from ..identification.report.page import error_table
-    from ..identification.report.words import name_in_words, percent
+    from ..identification.report.words import chance, name_in_words
 
     stated = found.probabilities.names if found.probabilities else {}
     rows: list[tuple[str, ...]] = []
     for effect in found.effects:
-        head = [name_in_words(effect), *([percent(stated[effect.name])] if stated else [])]
-        for name, value in effect.coefficients.items():
-            numbers = f"{value:.4g}", f"{effect.std[name]:.2g}", effect.units[name]
-            rows.append((head[0], name, *numbers, *head[1:]))
+        head = [name_in_words(effect), *([chance(stated[effect.name])] if stated else [])]
+        for name in effect.coefficients:
+            acts = amount(effect, name, found.declared)
+            rows.append((head[0], name, f"{acts} {acts.when}".rstrip(), *head[1:]))
             head = [""] * len(head)
     if rows:
         last = ("probability",) if stated else ()
-        show_table(("effect", "coefficient", "value", "+-", "unit", *last), rows)
+        show_table(("effect", "", "what it does", *last), rows)
     rows = []
     for row in error_table(found):
         unit = f" ({row['unit']})" if row["unit"] else ""

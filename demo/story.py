@@ -23,7 +23,8 @@ from ..identification.diagnosis import diagnose
 from ..identification.findings import Diagnosis
 from ..identification.logs.flight_log import FlightLog, write_log
 from ..identification.report.files import write_report
-from ..identification.report.words import headline, name_in_words
+from ..identification.report.headline import headline
+from ..identification.report.words import name_in_words
 from ..runtime.page_files import page_template, write_png, write_text
 
 CONTROLLER, SCENARIO = "admittance", "base"

@@ -15,8 +15,8 @@ from ...dynamics.vehicle_file import save_vehicle
 from ...runtime.plain_values import as_text, plain
 from ...runtime.whole_files import replaced
 from ..findings import Diagnosis, Errors, Probabilities
+from .headline import headline
 from .page import report_page
-from .words import headline
 
 # MAJOR.MINOR of ``report.json``, which ``report.schema.json`` beside this file describes: a new key
 # is a new minor version, a key that goes or changes its meaning a new major one

@@ -16,7 +16,8 @@ from importlib import resources
 from ... import __version__
 from ...runtime.page_files import page_template
 from ..findings import Diagnosis
-from . import words
+from . import amounts, words
+from .headline import headline
 from .plot_numbers import candidate_bars, page_plots
 from .still_picture import still_picture
 
@@ -39,6 +40,8 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
     return page_template(__package__, "page.html.j2").render(
         found=diagnosis,
         words=words,
+        amounts=amounts,
+        headline=headline(diagnosis),
         tone=_TONES.get(diagnosis.verdict, "warn"),
         stated=diagnosis.probabilities,
         table=error_table(diagnosis),

@@ -8,16 +8,9 @@ from ..findings import CHANNELS, Diagnosis, NamedEffect
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MISSING = "–"
-_SPACE = "\N{NO-BREAK SPACE}"
+SPACE = "\N{NO-BREAK SPACE}"
 _LONGEST = 190  # letters of a piece of advice on the first screen
-# of a size below 0.5: what people say in place of metres, seconds, kilograms and radians
-_SMALL = 0.5
-_SMALL_UNITS = {
-    "m": (1e3, "mm"),
-    "s": (1e3, "ms"),
-    "kg": (1e3, "g"),
-    "rad": (180.0 / math.pi, "degrees"),
-}
+_CERTAIN = 0.001  # probability; closer to 0 or 1 no digit is meant
 _TELLING = 1.3  # times the floor, from which an error is worth a word in the first sentence
 
 
@@ -80,16 +73,23 @@ def percent(share: float) -> str:
         return MISSING
     number = f"{100.0 * share:.{0 if abs(share) >= 0.0995 or abs(share) < 0.0005 else 1}f}"
     return (
-        f"{number.replace('-0', '0') if abs(share) < 0.0005 else number.replace('-', '−')}{_SPACE}%"
+        f"{number.replace('-0', '0') if abs(share) < 0.0005 else number.replace('-', '−')}{SPACE}%"
     )
+
+
+def chance(probability: float) -> str:
+    """Return a probability in per cent; close to 0 or 1, the bound that it is beyond."""
+    if not _CERTAIN < probability < 1.0 - _CERTAIN:
+        return f"above 99.9{SPACE}%" if probability > 0.5 else f"below 0.1{SPACE}%"
+    return percent(probability)
 
 
 def duration(seconds: float) -> str:
     """Return a length of time in minutes and seconds."""
     if seconds < 99.5:
-        return f"{seconds:.3g}{_SPACE}s"
+        return f"{seconds:.3g}{SPACE}s"
     minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes}{_SPACE}min" + (f" {rest}{_SPACE}s" if rest else "")
+    return f"{minutes}{SPACE}min" + (f" {rest}{SPACE}s" if rest else "")
 
 
 def effect_summary(name: str) -> str:
@@ -105,94 +105,9 @@ def coefficient_meaning(effect: str, coefficient: str) -> str:
     return next((c.meaning for c in known if c.name == coefficient), "")
 
 
-def headline(diagnosis: Diagnosis) -> str:
-    """Return the verdict in plain words, as sure as its least sure part."""
-    undecided = [e for e in diagnosis.effects if e.indistinguishable_from]
-    sure = [e for e in diagnosis.effects if e not in undecided and not e.tentative]
-    unsure = [e for e in diagnosis.effects if e not in undecided and e.tentative]
-    if diagnosis.verdict == "nothing to explain":
-        return "The model explains these logs: nothing needs to be added to it."
-    if diagnosis.verdict == "unexplained" or not diagnosis.effects:
-        if diagnosis.remainder == "random":
-            return f"The model's error looks random: no effect {_tried(diagnosis)} explains it."
-        return f"The model's error has structure that no effect {_tried(diagnosis)} explains."
-    told = [_undecided(diagnosis, undecided)] if undecided else []
-    if sure:
-        told.append(
-            f"The model {_lacked(diagnosis, sure)}"
-            + (f", and perhaps {_lacked(diagnosis, unsure, sure)}" if unsure else "")
-        )
-    elif unsure:
-        told.append(f"The model perhaps {_lacked(diagnosis, unsure)}")
-    if diagnosis.verdict == "partly explained" and diagnosis.remainder != "none":
-        told[-1] += (
-            ", and an error is left that may or may not be the sensors' noise"
-            if diagnosis.floor_is_bound and diagnosis.remainder == "random"
-            else ", and an unexplained error is left"
-        )
-    return " ".join(f"{sentence}." for sentence in told)
-
-
-def _tried(diagnosis: Diagnosis) -> str:
+def tried(diagnosis: Diagnosis) -> str:
     """Return of which effects it was asked whether they explain an error."""
     return "that these logs can show" if diagnosis.needs_pose else "in the library"
-
-
-def _undecided(diagnosis: Diagnosis, effects: Sequence[NamedEffect]) -> str:
-    """Return which effects these logs cannot tell from which others, in one sentence."""
-    pairs = [f"{e.name} from {in_words(e.indistinguishable_from, 'or')}" for e in effects]
-    declared = {e.name for e in diagnosis.declared.effects}
-    known = declared & {x for e in effects for x in (e.name, *e.indistinguishable_from)}
-    perhaps = "perhaps " if any(e.tentative for e in effects) else ""
-    what = "one of them" if len(effects) == 1 else "one of each"
-    model = f"is {perhaps}wrong in" if known else f"{perhaps}lacked"
-    return f"These logs cannot tell {', or '.join(pairs)}: the model {model} {what}"
-
-
-def _lacked(
-    diagnosis: Diagnosis, effects: Sequence[NamedEffect], before: Sequence[NamedEffect] = ()
-) -> str:
-    """Return what effects are to the model, in words: new to it, or declared with other
-    coefficients.
-
-    After effects ``before`` that are all new as these are, the verb is not said again.
-    """
-    declared = {e.name: set(e.coefficients) for e in diagnosis.declared.effects}
-    changed = [
-        e.name
-        for e in (*before, *effects)
-        if e.name in declared and e.coefficients.keys() <= declared[e.name]
-    ]
-    if before and not changed:
-        return in_words([_with_size(e) for e in effects])
-    lacked = in_words([_with_size(e) for e in effects if e.name not in changed])
-    other = in_words([e.name for e in effects if e.name in changed])
-    return in_words(
-        [
-            *([f"lacked {lacked}"] if lacked else []),
-            *([f"declares {other} with wrong coefficients"] if other else []),
-        ]
-    )
-
-
-def _with_size(effect: NamedEffect) -> str:
-    """Return an effect's name, and of a sure one the coefficient that is known best, in a unit of
-    its size.
-    """
-    known = [
-        (abs(value) / std, name)
-        for name, value in effect.coefficients.items()
-        if (std := effect.std.get(name, 0.0)) > 0.0 and math.isfinite(std) and value
-    ]
-    if effect.tentative or not known:
-        return effect.name
-    name = max(known)[1]
-    value, std, unit = effect.coefficients[name], effect.std[name], effect.units[name]
-    factor, small = _SMALL_UNITS.get(unit, (1.0, unit))
-    if abs(value) < _SMALL:
-        value, std, unit = factor * value, factor * std, small
-    with_unit = "" if unit == "1" else f"{_SPACE}{unit}"
-    return f"{effect.name} ({name} {with_std(value, std)}{with_unit})"
 
 
 def error_sentences(diagnosis: Diagnosis) -> list[str]:
@@ -211,7 +126,7 @@ def error_sentences(diagnosis: Diagnosis) -> list[str]:
     told: list[str] = []
     for what, old, new, floor, unit in telling:
         factor, unit = scale_of((old, new, floor), unit)
-        start, end, least = (f"{rounded(factor * x, 2)}{_SPACE}{unit}" for x in (old, new, floor))
+        start, end, least = (f"{rounded(factor * x, 2)}{SPACE}{unit}" for x in (old, new, floor))
         where = f"The {what} error" if told else f"The {what} error on held-out data"
         change = f"falls from {start} to {end}" if new < 0.98 * old else f"is {end}"
         if new > 1.02 * old:
@@ -241,10 +156,10 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
             "no test found structure in it."
         )
     if not diagnosis.structure:
-        return f"The residual has structure that no effect {_tried(diagnosis)} explains."
+        return f"The residual has structure that no effect {tried(diagnosis)} explains."
     strongest = diagnosis.structure[0]
     return (
-        f"The residual has structure that no effect {_tried(diagnosis)} explains; the strongest is "
+        f"The residual has structure that no effect {tried(diagnosis)} explains; the strongest is "
         f"in {strongest.where} ({percent(strongest.gain)} of the residual)."
     )
 
@@ -258,8 +173,8 @@ def _disturbances(diagnosis: Diagnosis) -> str:
             largest = max(own, key=lambda gusts: gusts.rms)
             factor, unit = scale_of([largest.rms], unit)
             stated.append(
-                f"{rounded(factor * largest.rms, 2)}{_SPACE}{unit} rms (correlation time "
-                f"{rounded(largest.time, 2)}{_SPACE}s)"
+                f"{rounded(factor * largest.rms, 2)}{SPACE}{unit} rms (correlation time "
+                f"{rounded(largest.time, 2)}{SPACE}s)"
             )
     return f", with disturbances of up to {in_words(stated)}" if stated else ""
 
@@ -269,8 +184,8 @@ def _transient(diagnosis: Diagnosis) -> str:
     largest = diagnosis.pushes[0]
     factor, unit = scale_of([largest.peak], "Nm" if largest.channel.startswith("tau") else "N")
     where = f" of {largest.log}" if len(diagnosis.logs) + len(diagnosis.test_logs) > 1 else ""
-    size = f"{rounded(factor * largest.peak, 2)}{_SPACE}{unit}"
-    return f"{size} in {largest.channel} at {rounded(largest.t)}{_SPACE}s{where}"
+    size = f"{rounded(factor * largest.peak, 2)}{SPACE}{unit}"
+    return f"{size} in {largest.channel} at {rounded(largest.t)}{SPACE}s{where}"
 
 
 def ranking_sentences(diagnosis: Diagnosis) -> list[str]:
@@ -327,10 +242,9 @@ def sureness_sentences(diagnosis: Diagnosis) -> list[str]:
     sure = [e for e in diagnosis.effects if not e.tentative and not e.indistinguishable_from]
     told = _probability(diagnosis)
     if sure:
-        spreads = in_words([words for effect in sure for words in _spreads(effect)])
         told.append(
             f"{in_words([e.name for e in sure])}: no other effect of the library explains the "
-            f"flight as well{f' ({spreads}, standard deviations)' if spreads else ''}."
+            "flight as well."
         )
     told += _doubts(diagnosis)
     if not diagnosis.effects:
@@ -362,9 +276,9 @@ def _probability(diagnosis: Diagnosis) -> list[str]:
     stated = diagnosis.probabilities
     if stated is None:
         return []
-    names = [f"{e.name} {percent(stated.names.get(e.name, 0.0))}" for e in diagnosis.effects]
+    names = [f"{e.name} {chance(stated.names.get(e.name, 0.0))}" for e in diagnosis.effects]
     acts = f"Probability that it acts: {in_words(names)}. " if names else ""
-    return [f"{acts}Probability of a cause outside the library: {percent(stated.unknown)}."]
+    return [f"{acts}Probability of a cause outside the library: {chance(stated.unknown)}."]
 
 
 def _doubts(diagnosis: Diagnosis) -> list[str]:
@@ -383,16 +297,6 @@ def _doubts(diagnosis: Diagnosis) -> list[str]:
             "may be another effect, in the library or not."
         )
     return told
-
-
-def _spreads(effect: NamedEffect) -> list[str]:
-    """Return how well each coefficient is known, in per cent of it."""
-    found = []
-    for name, value in effect.coefficients.items():
-        std = effect.std.get(name, math.nan)
-        if value and math.isfinite(value) and math.isfinite(std) and std > 0:
-            found.append(f"{name} ± {percent(std / abs(value))}")
-    return found
 
 
 def next_step(diagnosis: Diagnosis) -> str:

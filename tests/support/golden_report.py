@@ -19,6 +19,7 @@ from windwrench.identification.findings import (
     TransientDisturbance,
 )
 from windwrench.identification.report import words
+from windwrench.identification.report.headline import headline
 
 GOLDEN = ROOT / "tests" / "golden" / "report_words.json"
 
@@ -83,7 +84,7 @@ def said():
     """Return all sentences of each diagnosis."""
     return {
         name: {
-            "headline": words.headline(found),
+            "headline": headline(found),
             "error": words.error_sentences(found),
             "remainder": words.remainder_sentence(found),
             "sureness": words.sureness_sentences(found),

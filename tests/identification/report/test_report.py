@@ -22,11 +22,8 @@ from windwrench.identification.findings import (
     Structure,
 )
 from windwrench.identification.report.files import write_report
-from windwrench.identification.report.words import (
-    headline,
-    rounded,
-    with_std,
-)
+from windwrench.identification.report.headline import headline
+from windwrench.identification.report.words import rounded, with_std
 
 DRAG = {"kdx": 2.4e-4, "kdy": 1.8e-4}
 TRIED = ("rotor_drag", "body_drag", "mass", *(f"effect_{i}" for i in range(14)))
@@ -232,7 +229,7 @@ def test_the_page_says_it(reports):
     assert f"falls from {before} mN to {after} mN; the noise floor is 12 mN." in page.text
     kdx = with_std(diagnosis.effects[0].coefficients["kdx"], diagnosis.effects[0].std["kdx"])
     for words in (
-        "The model lacked rotor_drag (kdx ",
+        "The model lacked rotor drag (0.3614",
         kdx,
         "per rotor, along body x",
         "looks random",

@@ -1,0 +1,147 @@
+"""What a coefficient does, in a quantity that one can act on: newtons at 1 m/s, millimetres
+forward, per cent of thrust.
+
+The unit of a coefficient and the words of its meaning say what it does, so an effect of a user's
+own is told in the same way.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...dynamics import effects as library
+from ...dynamics.vehicle import Vehicle
+from ..findings import CHANNELS, Diagnosis, NamedEffect
+from .words import SPACE, in_words, with_std
+
+_ROTORS = 4
+_SMALL = 0.5
+# of a size below that: what people say in place of metres, seconds, kilograms and radians
+_SMALL_UNITS = {
+    "m": (1e3, "mm"),
+    "s": (1e3, "ms"),
+    "kg": (1e3, "g"),
+    "rad": (180.0 / math.pi, "degrees"),
+    "N": (1e3, "mN"),
+    "Nm": (1e3, "mNm"),
+}
+_MILLI = 0.1  # the same of N and Nm
+_PLACE = re.compile(r"(along|about) (body|world) ([xyz])|(rotor \d)$")
+_SIDES = {"x": ("forward", "backward"), "y": ("left", "right"), "z": ("up", "down")}
+_KNOWN = 2.0  # standard deviations, from which a coefficient is worth a word
+_BLOCK = 3.0  # s: longer than what correlates in what a model leaves
+_LEAST_BLOCKS = 4
+_STEADY = 4.0  # standard errors of a mean over blocks, from which it is no chance
+
+
+@dataclass(frozen=True)
+class Amount:
+    """What a coefficient does.
+
+    Attributes:
+        value: in ``unit``.
+        std: standard deviation.
+        unit: empty for a pure number.
+        where: along which axis, or at which rotor; empty for neither.
+        when: at which speed; empty for always.
+    """
+
+    value: float
+    std: float
+    unit: str
+    where: str
+    when: str
+
+    def __str__(self) -> str:
+        """Return ``0.31 ± 0.01 N along x``."""
+        parts = [with_std(self.value, self.std) + (f"{SPACE}{self.unit}" if self.unit else "")]
+        return " ".join([*parts, *([self.where] if self.where else [])])
+
+
+def title(name: str) -> str:
+    """Return an effect's plain name: the words before the colon of what describes it."""
+    if name not in library.names():
+        return name
+    words = " ".join(library.model_in_words(name).split("\n\n")[0].split())
+    plain = words.split(":")[0] if ":" in words else name
+    return plain[:1].lower() + plain[1:]
+
+
+def amount(effect: NamedEffect, coefficient: str, vehicle: Vehicle) -> Amount:
+    """Return what a coefficient of a named effect does to a vehicle as it is declared."""
+    value, std = effect.coefficients[coefficient], effect.std.get(coefficient, 0.0)
+    unit = effect.units.get(coefficient, "1")
+    known = library.get(effect.name).coefficients if effect.name in library.names() else ()
+    meaning = next((c.meaning for c in known if c.name == coefficient), "")
+    factor, when = float(_ROTORS) if "per rotor" in meaning else 1.0, ""
+    if unit.endswith("/(rad/s m/s)"):
+        factor, unit, when = factor * vehicle.hover_rate, unit.split("/")[0], "at 1 m/s"
+    elif unit in ("N/(m/s)", "N/(m/s)^2"):
+        unit, when = "N", "at 1 m/s"
+    elif unit == "Nm/(rad/s)":
+        unit, when = "Nm", "at 1 rad/s"
+    elif unit == "1" and "relative" in meaning:
+        factor, unit = 100.0, "%"
+    elif unit == "1/s" and "relative" in meaning:
+        factor, unit = 6000.0, "% a minute"
+    value, std = factor * value, factor * std
+    where = ""
+    if place := _PLACE.search(meaning):
+        how, frame, axis, rotor = place.groups()
+        where = rotor or f"{how} {axis}"
+        if unit == "m" and frame == "body":
+            where, value = _SIDES[axis][value < 0.0], abs(value)
+    small, smaller = _SMALL_UNITS.get(unit, (1.0, unit))
+    if abs(value) < (_MILLI if unit in ("N", "Nm") else _SMALL):
+        value, std, unit = small * value, small * std, smaller
+    return Amount(value, std, "" if unit == "1" else unit, where, when)
+
+
+def with_amounts(effect: NamedEffect, vehicle: Vehicle) -> str:
+    """Return an effect's plain name, what its coefficients do, those that are known and of a sure
+    effect alone, and the name by which files and options have it.
+    """
+    plain = title(effect.name)
+    told = [] if plain.replace(" ", "_") == effect.name else [effect.name]
+    known = [
+        amount(effect, name, vehicle)
+        for name, value in effect.coefficients.items()
+        if abs(value) > _KNOWN * effect.std.get(name, math.inf) > 0.0
+    ]
+    if known and not effect.tentative:
+        when = known[0].when if len({one.when for one in known}) == 1 else ""
+        parts = [f"{one} {one.when}" if one.when and not when else f"{one}" for one in known]
+        told.insert(0, in_words(parts) + (f" {when}" if when else ""))
+    return f"{plain} ({'; '.join(told)})" if told else plain
+
+
+def steady_wrench(diagnosis: Diagnosis) -> str:
+    """Return the force and torque that are left on average, if these are no chance; else nothing.
+
+    The mean of a block of 3 s is one number; all blocks together say how sure their mean is.
+    """
+    blocks = [
+        part.mean(axis=0)
+        for trace in diagnosis.traces
+        for part in np.array_split(
+            trace.after, max(1, round(len(trace.after) * trace.period / _BLOCK))
+        )
+    ]
+    if len(blocks) < _LEAST_BLOCKS:
+        return ""
+    mean = np.mean(blocks, axis=0)
+    error = np.std(blocks, axis=0, ddof=1) / math.sqrt(len(blocks))
+    told = []
+    for what, unit, channels in (("force", "N", slice(0, 3)), ("torque", "Nm", slice(3, 6))):
+        i = channels.start + int(np.argmax(np.abs(mean[channels])))
+        floor = diagnosis.floor_force_rms if unit == "N" else diagnosis.floor_torque_rms
+        if abs(mean[i]) > _STEADY * error[i] and not abs(mean[i]) < floor:
+            factor, small = _SMALL_UNITS[unit] if abs(mean[i]) < _MILLI else (1.0, unit)
+            size = with_std(factor * float(mean[i]), factor * float(error[i]))
+            axis = CHANNELS[i][-1]
+            told.append(
+                f"a {what} of {size}{SPACE}{small} {'along' if unit == 'N' else 'about'} {axis}"
+            )
+    return in_words(told)

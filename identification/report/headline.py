@@ -1,0 +1,85 @@
+"""The first sentences of a diagnosis: what acts, by its plain name and by how much."""
+
+from collections.abc import Sequence
+
+from ..findings import Diagnosis, NamedEffect
+from .amounts import steady_wrench, title, with_amounts
+from .words import in_words, tried
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """Return the verdict in plain words, as sure as its least sure part."""
+    undecided = [e for e in diagnosis.effects if e.indistinguishable_from]
+    sure = [e for e in diagnosis.effects if e not in undecided and not e.tentative]
+    unsure = [e for e in diagnosis.effects if e not in undecided and e.tentative]
+    if diagnosis.verdict == "nothing to explain":
+        return "The model explains these logs: nothing needs to be added to it."
+    if diagnosis.verdict == "unexplained" or not diagnosis.effects:
+        rest = "looks random" if diagnosis.remainder == "random" else "has structure"
+        if steady := steady_wrench(diagnosis):
+            return (
+                f"On average {steady} acts that the model lacks. What changes of its error {rest}, "
+                f"and no effect {tried(diagnosis)} explains it."
+            )
+        joint = ": no effect" if rest == "looks random" else " that no effect"
+        it = " it" if rest == "looks random" else ""
+        return f"The model's error {rest}{joint} {tried(diagnosis)} explains{it}."
+    told = []
+    if sure:
+        told.append(
+            f"The model {_lacked(diagnosis, sure)}"
+            + (f", and perhaps {_lacked(diagnosis, unsure, sure)}" if unsure else "")
+        )
+    if undecided:
+        told.append(_undecided(diagnosis, undecided))
+    if unsure and not sure:
+        told.append(f"The model perhaps {_lacked(diagnosis, unsure)}")
+    if diagnosis.verdict == "partly explained" and diagnosis.remainder != "none":
+        told[-1] += (
+            ", and an error is left that may or may not be the sensors' noise"
+            if diagnosis.floor_is_bound and diagnosis.remainder == "random"
+            else ", and an unexplained error is left"
+        )
+    return " ".join(f"{sentence}." for sentence in told)
+
+
+def _undecided(diagnosis: Diagnosis, effects: Sequence[NamedEffect]) -> str:
+    """Return which effects these logs cannot tell from which others, in one sentence."""
+    pairs = [
+        f"{title(e.name)} from {in_words([title(x) for x in e.indistinguishable_from], 'or')}"
+        for e in effects
+    ]
+    declared = {e.name for e in diagnosis.declared.effects}
+    known = declared & {x for e in effects for x in (e.name, *e.indistinguishable_from)}
+    perhaps = "perhaps " if any(e.tentative for e in effects) else ""
+    what = "one of them" if len(effects) == 1 else "one of each"
+    model = f"is {perhaps}wrong in" if known else f"{perhaps}lacked"
+    return f"These logs cannot tell {', or '.join(pairs)}: the model {model} {what}"
+
+
+def _lacked(
+    diagnosis: Diagnosis, effects: Sequence[NamedEffect], before: Sequence[NamedEffect] = ()
+) -> str:
+    """Return what effects are to the model, in words: new to it, or declared with other
+    coefficients.
+
+    After effects ``before`` that are all new as these are, the verb is not said again.
+    """
+    declared = {e.name: set(e.coefficients) for e in diagnosis.declared.effects}
+    changed = [
+        e.name
+        for e in (*before, *effects)
+        if e.name in declared and e.coefficients.keys() <= declared[e.name]
+    ]
+    if before and not changed:
+        return in_words([with_amounts(e, diagnosis.declared) for e in effects])
+    lacked = in_words(
+        [with_amounts(e, diagnosis.declared) for e in effects if e.name not in changed]
+    )
+    other = in_words([title(e.name) for e in effects if e.name in changed])
+    return in_words(
+        [
+            *([f"lacked {lacked}"] if lacked else []),
+            *([f"declares {other} with wrong coefficients"] if other else []),
+        ]
+    )

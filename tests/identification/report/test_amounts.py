@@ -1,0 +1,76 @@
+"""What coefficients do, in words."""
+
+import numpy as np
+import pytest
+
+from tests.support.diagnoses import made_diagnosis, made_trace
+from windwrench.dynamics import effects, load_vehicle
+from windwrench.identification.findings import NamedEffect
+from windwrench.identification.report.amounts import (
+    amount,
+    steady_wrench,
+    title,
+    with_amounts,
+)
+from windwrench.identification.report.headline import headline
+
+VEHICLE = load_vehicle("crazyflie")
+
+
+def named(name, tentative=False, **values):
+    """An effect of which each coefficient is known to a tenth of it."""
+    units = {c.name: c.unit for c in effects.get(name).coefficients}
+    std = {key: 0.1 * abs(value) for key, value in values.items()}
+    return NamedEffect(name, values, std, units, tentative, (), {})
+
+
+@pytest.mark.parametrize(
+    ("effect", "words"),
+    [
+        (
+            named("com_offset", cx=0.004, cy=-0.002, cz=0.0),
+            "centre-of-mass offset (4.00 ± 0.40 mm forward and 2.00 ± 0.20 mm right; com_offset)",
+        ),
+        (named("mass", dm=0.005), "mass (5.00 ± 0.50 g)"),
+        (named("thrust_scale", s=-0.05), "thrust scale (−5.00 ± 0.50 %)"),
+        (named("rotor_efficiency", e2=-0.12), "rotor efficiency (−12.0 ± 1.2 % rotor 2)"),
+        (named("thrust_fade", rate=1e-3), "thrust fade (6.00 ± 0.60 % a minute)"),
+        (named("latency", d=0.02), "latency (20.0 ± 2.0 ms)"),
+        (named("constant_force", fx=0.6), "constant force (0.600 ± 0.060 N along x)"),
+        (named("world_tilt", ax=0.01), "world tilt (0.573 ± 0.057 degrees about x)"),
+        (named("mass", tentative=True, dm=0.005), "mass"),
+    ],
+)
+def test_an_effect_is_told_by_what_it_does(effect, words):
+    assert with_amounts(effect, VEHICLE).replace("\N{NO-BREAK SPACE}", " ") == words
+
+
+def test_a_drag_is_told_by_its_force_on_four_rotors():
+    effect = named("rotor_drag", kdx=1e-6)
+    found = amount(effect, "kdx", VEHICLE)
+    assert found.value == pytest.approx(1e3 * 4.0 * 1e-6 * VEHICLE.hover_rate)
+    assert (found.unit, found.where, found.when) == ("mN", "along x", "at 1 m/s")
+
+
+def test_each_effect_has_a_plain_name_and_a_quantity():
+    titles = [title(name) for name in effects.names()]
+    assert len(set(titles)) == len(titles)
+    assert all(len(words) < 30 and "_" not in words for words in titles)
+    for name in effects.names():
+        for coefficient in effects.get(name).coefficients:
+            found = amount(named(name, **{coefficient.name: 1.0}), coefficient.name, VEHICLE)
+            assert "rad/s m/s" not in found.unit
+            assert found.value > 0.0
+
+
+def test_a_steady_force_is_told_before_what_looks_random():
+    """0.6 N along x beside a disturbance, of which no effect was named."""
+    steady, calm = (made_trace(seconds=40.0, effects=(), seed=2) for _ in range(2))
+    steady.after[:, 0] += 0.6
+    found = made_diagnosis(steady, verdict="unexplained", remainder="random", effects=())
+    assert headline(found).startswith("On average a force of 0.6")
+    assert "N along x acts that the model lacks" in headline(found)
+    calm.after[:] -= np.mean(calm.after, axis=0)
+    found = made_diagnosis(calm, verdict="unexplained", remainder="random", effects=())
+    assert steady_wrench(found) == ""
+    assert headline(found).startswith("The model's error looks random")
