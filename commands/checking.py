@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 def check(
     log: Path,
     map: str | None = None,
+    piece: int | None = None,
     reader: str | None = None,
     vehicle: str | None = None,
     write_map: Path | None = None,
@@ -32,7 +33,7 @@ def check(
 
     model = None if vehicle is None else load_vehicle(vehicle)
     with working("reading"):
-        found = check_log(log, reader, model, map)
+        found = check_log(log, reader, model, map, piece)
     if write_map is not None and not found.map_text:
         raise InputError(
             f"--write-map {write_map}: {log} is read by {found.read_by} and needs no map"

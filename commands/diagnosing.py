@@ -35,6 +35,7 @@ def diagnose(
     test: list[Path] | None = None,
     reader: str | None = None,
     map: str | None = None,
+    piece: int | None = None,
     rotor_faults: bool = False,
     without: list[str] | None = None,
     probabilities: bool = True,
@@ -64,10 +65,11 @@ def diagnose(
     if not logs:
         raise InputError("diagnose: expected at least one flight log, or --example")
     if rotor_faults:
-        if test:
-            raise InputError("--rotor-faults: expected no --test with it")
+        if test or piece:
+            unwanted = "--test" if test else "--piece"
+            raise InputError(f"--rotor-faults: expected no {unwanted} with it")
         return _rotor_faults(logs, reader, vehicle, out, map)
-    read = read_flights([*logs, *(test or [])], reader, vehicle, map)
+    read = read_flights([*logs, *(test or [])], reader, vehicle, map, piece)
     return _diagnose(read, logs, without, out, probabilities)
 
 

@@ -27,6 +27,7 @@ def estimate(
     log: Path,
     reader: str | None = None,
     map: str | None = None,
+    piece: int | None = None,
     vehicle: str | None = None,
     smooth: bool | None = None,
     gate: float | None = None,
@@ -61,7 +62,7 @@ def estimate(
 
     level = gate_of(gate)
     kinds = film_kinds(view, video, film, "--film")
-    (flight,), model = read_flights([log], reader, vehicle, map)
+    (flight,), model = read_flights([log], reader, vehicle, map, piece)
     drawn = bool(kinds) or view or rrd
     rows = shown_rows(flight, log, begin, film_seconds) if drawn else None
     folder = results_folder(out)

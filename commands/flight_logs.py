@@ -15,7 +15,11 @@ if TYPE_CHECKING:
 
 
 def read_flights(
-    paths: Sequence[Path], reader: str | None, vehicle: str | None, log_map: str | None = None
+    paths: Sequence[Path],
+    reader: str | None,
+    vehicle: str | None,
+    log_map: str | None = None,
+    piece: int | None = None,
 ) -> "tuple[list[FlightLog], Vehicle]":
     """Read flights of one vehicle, the one given or the one that the logs name.
 
@@ -26,7 +30,7 @@ def read_flights(
     from ..dynamics.vehicle_file import load_vehicle, preset_names
 
     model = None if vehicle is None else load_vehicle(vehicle)
-    flights = read_logs(paths, reader, model, log_map)
+    flights = read_logs(paths, reader, model, log_map, piece)
     if model is not None:
         return flights, model
     expected = f"--vehicle {', '.join(preset_names())} or the path of a YAML file"
@@ -47,7 +51,11 @@ def read_flights(
 
 
 def read_logs(
-    paths: Iterable[Path], reader: str | None, vehicle: "Vehicle | None", log_map: str | None
+    paths: Iterable[Path],
+    reader: str | None,
+    vehicle: "Vehicle | None",
+    log_map: str | None,
+    piece: int | None = None,
 ) -> "list[FlightLog]":
     """Read flight logs. What a reader warns of stands in the notes of its log.
 
@@ -58,7 +66,7 @@ def read_logs(
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
-        return [read_log(path, reader, vehicle, log_map) for path in paths]
+        return [read_log(path, reader, vehicle, log_map, piece) for path in paths]
 
 
 def log_notes(texts: Iterable[str]) -> None:

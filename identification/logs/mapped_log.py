@@ -16,6 +16,7 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from .channels import Samples, in_kit_axes, in_kit_units, quaternions
+from .clocks import on_one_clock
 from .commanded_speeds import flown_vehicle
 from .flight_log import NORM_TOLERANCE, FlightLog, vehicle_of_columns
 from .log_map import Attitude, Battery, Columns, Commands, LogMap, Position, Rotors, constant
@@ -63,7 +64,12 @@ def map_table(
 
 
 def recording_of(
-    path: Path, recorded: Sequence[Samples], log_map: LogMap, reader: str, notes: Sequence[str]
+    path: Path,
+    recorded: Sequence[Samples],
+    log_map: LogMap,
+    reader: str,
+    notes: Sequence[str],
+    piece: int | None = None,
 ) -> Recording:
     """Return the channels that a map makes of columns whose groups have a clock each.
 
@@ -73,11 +79,13 @@ def recording_of(
         log_map: what the columns mean; sections without measurements are left out.
         reader: the reader's name.
         notes: what the reader assumed.
+        piece: which part is read where the clock starts anew, from 1; default: the longest.
 
     Raises:
-        InputError: no motors, neither a pose nor gyro and accelerometer, or numbers that no flight
-            has.
+        InputError: no such piece, no motors, neither a pose nor gyro and accelerometer, or numbers
+            that no flight has.
     """
+    recorded, of_clock = on_one_clock(path, recorded, piece)
     motors = (*ways(log_map, "rotors"), *ways(log_map, "commands"))
     poses = ways(log_map, "position")
     log_map, sources = chosen(recorded, log_map)
@@ -87,7 +95,7 @@ def recording_of(
             f"{path}: no motors that turn; expected {' or '.join(map(_wanted, motors))}, "
             f"found {', '.join(dict.fromkeys(names[:20])) or 'nothing'}"
         )
-    said = [*notes, *(part.note for part in log_map.sections.values() if part.note)]
+    said = [*notes, *of_clock, *(part.note for part in log_map.sections.values() if part.note)]
     streams: dict[str, Stream] = {}
     for name, part in log_map.sections.items():
         samples = sources[name]
@@ -217,7 +225,7 @@ def _attitude(path: Path, log_map: LogMap, part: Attitude, samples: Samples) -> 
             f"{path}: {what}, {samples.place(off[0])}: a quaternion of length "
             f"{length[off[0]]:.4g}; expected 1 within {NORM_TOLERANCE:g}"
         )
-    raw, _ = Stream(part.label, samples.t[there], turns[there]).forward()
+    raw = Stream(part.label, samples.t[there], turns[there])
     if not len(raw.t):
         return raw
     return replace(raw, values=in_kit_axes(log_map, part, raw.values))

@@ -2,12 +2,14 @@
 
 import warnings
 from dataclasses import replace
+from inspect import signature
 from pathlib import Path
 
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
+from .clocks import check_piece
 from .commanded_speeds import flown_vehicle
 from .flight_log import ACCELEROMETER, COMMANDS, GYRO, POSE, REQUIRED, ROTORS, FlightLog
 from .inertial import check_inertial
@@ -32,6 +34,7 @@ def read_log(
     reader: str | None = None,
     vehicle: Vehicle | None = None,
     map: str | Path | None = None,
+    piece: int | None = None,
 ) -> FlightLog:
     """Read a flight log.
 
@@ -44,6 +47,8 @@ def read_log(
             speeds; None: the one that the log or its map names, where it is a preset.
         map: for a table of other columns or another layout: the name of a map that ships with the
             kit, or the path of a map file (``log_map``).
+        piece: which part of the file is read, from 1, where its clock started anew or it holds
+            several logs (``clocks``); None: the longest.
 
     Raises:
         InputError: the file cannot be read or breaks a rule of the form; the message says where and
@@ -55,7 +60,7 @@ def read_log(
     """
     path = Path(path)
     with np.errstate(over="ignore", invalid="ignore"):  # absurd numbers are refused for themselves
-        log = _read(path, reader, vehicle, map)
+        log = _read(path, reader, vehicle, map, piece)
     return finished(log, vehicle)
 
 
@@ -99,7 +104,11 @@ def is_known_table(table: Table) -> bool:
 
 
 def _read(
-    path: Path, reader: str | None, vehicle: Vehicle | None, map: str | Path | None
+    path: Path,
+    reader: str | None,
+    vehicle: Vehicle | None,
+    map: str | Path | None,
+    piece: int | None,
 ) -> FlightLog:
     """Read a log by the map or the reader that is given, else as what is in it says."""
     if map is not None:
@@ -107,6 +116,9 @@ def _read(
             raise InputError(f"{path}: both a reader and a map; expected one of them")
         return map_table(open_table(path), load_map(map), vehicle)
     chosen = reader_by_content(path) if reader is None else find_reader(reader)
+    if chosen is not None and "piece" in signature(chosen.read).parameters:
+        return chosen.read(path, vehicle, piece=piece)
+    check_piece(path, piece, 1)
     if chosen is not None and not chosen.signature:
         return chosen.read(path, vehicle)
     if chosen is None and not is_table(path):

@@ -35,21 +35,6 @@ class Stream:
     t: Array  # (N,) s, all streams of a log on one clock
     values: Array  # (N, K); NaN: not measured
 
-    def forward(self) -> "tuple[Stream, tuple[str, ...]]":
-        """Return the samples that are later than every one before them, and a note where that left
-        some out.
-        """
-        keep: Mask = np.concatenate([[True], self.t[1:] > np.maximum.accumulate(self.t)[:-1]])[
-            : len(self.t)
-        ]
-        if keep.all():
-            return self, ()
-        note = (
-            f"{self.name}: {int(np.sum(~keep))} of {len(keep)} samples repeat or go back in time "
-            "and were left out"
-        )
-        return Stream(self.name, self.t[keep], self.values[keep]), (note,)
-
     def whole(self) -> "Stream":
         """Return the samples whose values are all finite."""
         good = np.isfinite(self.values).all(axis=1)
@@ -80,13 +65,9 @@ class Stream:
 
 
 def readable(stream: Stream | None) -> Stream | None:
-    """Return the samples (N, K) that are finite and in order of time; None where they are fewer
-    than two.
-    """
-    if stream is None:
-        return None
-    found, _ = stream.whole().forward()
-    return found if len(found.t) >= 2 else None
+    """Return the samples (N, K) that are finite; None where they are fewer than two."""
+    found = None if stream is None else stream.whole()
+    return None if found is None or len(found.t) < 2 else found
 
 
 def slerp(t: Array, attitude: Stream, longest: float = np.inf) -> Array:
@@ -196,8 +177,7 @@ class Recording:
 def _cleaned(
     path: Path, streams: Mapping[str, Stream]
 ) -> tuple[dict[str, Stream], tuple[str, ...]]:
-    """Return the streams that hold something, in order of time and within what a flight has, and
-    notes.
+    """Return the streams that hold something, within what a flight has, and notes.
 
     Raises:
         InputError: too few samples, an infinite rotor speed, or a quaternion that is none.
@@ -210,7 +190,7 @@ def _cleaned(
             raise InputError(
                 f"{path}: {stream.name}: {len(stream.t)} message(s); expected at least two"
             )
-        stream, words = stream.forward()
+        words: tuple[str, ...] = ()
         values = stream.values
         if name in ("rotors", "commands", "wrench"):
             words += _check_motors(path, name, stream)

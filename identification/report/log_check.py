@@ -70,6 +70,7 @@ def check_log(
     reader: str | None = None,
     vehicle: Vehicle | None = None,
     log_map: str | None = None,
+    piece: int | None = None,
 ) -> LogCheck:
     """Return what a log is; a table of unknown columns is read by a map that is guessed.
 
@@ -78,6 +79,7 @@ def check_log(
         reader: its reader, or None.
         vehicle: that flew, or None: the one that the log names, where it comes with the kit.
         log_map: its map, or None.
+        piece: as of ``read_log``.
 
     Raises:
         InputError: it cannot be read, and no map can be guessed.
@@ -86,11 +88,11 @@ def check_log(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the notes say the same
         if log_map is not None:
-            log = read_log(path, reader, vehicle, log_map)
+            log = read_log(path, reader, vehicle, log_map, piece)
             read_by, text = f"the map {log_map}", _map_text(log_map)
         else:
             try:
-                log = read_log(path, reader, vehicle)
+                log = read_log(path, reader, vehicle, piece=piece)
                 read_by, text = _read_by(path, log)
             except InputError as error:
                 if reader is not None or not is_table(path):

@@ -21,6 +21,7 @@ import numpy as np
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ..channels import Samples
+from ..clocks import in_order
 from ..flight_log import FlightLog
 from ..log_map import Commands, LogMap, recording_map
 from ..map_fit import wanted_columns, ways
@@ -50,8 +51,13 @@ _MOTOR1 = 33  # of SERVOn_FUNCTION
 _CHANNELS = 14  # of RCOU
 
 
-def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
-    """Read a DataFlash log; ``vehicle`` turns commands into rotor speeds where none were measured.
+def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -> FlightLog:
+    """Read a DataFlash log.
+
+    Args:
+        path: the file.
+        vehicle: turns commands into rotor speeds where none were measured.
+        piece: which part is read where the clock started anew, from 1; default: the longest.
 
     Raises:
         InputError: the file is no such log, is not a quadrotor's, or lacks motors, or a pose and
@@ -72,7 +78,7 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
     notes += telemetry_notes
     if skipped:
         notes.append(f"{skipped} bytes of the file belong to no message; it was cut or is damaged")
-    recording = recording_of(path, [*recorded, *telemetry], log_map, "ardupilot_bin", notes)
+    recording = recording_of(path, [*recorded, *telemetry], log_map, "ardupilot_bin", notes, piece)
     return recording.log(vehicle)
 
 
@@ -207,7 +213,9 @@ def _telemetry(
         one = messages.where(which == slot)
         if len(one.rows) < 2 or not np.any(one.column("RPM") > 0.0):
             return [], ["ESC telemetry: not of all four motors, or without rpm; left out"]
-        each.append(Stream("ESC", _times(one), one.column("RPM")[:, None]).forward()[0])
+        times = _times(one)
+        rows, _ = in_order(times)
+        each.append(Stream("ESC", times[rows], one.column("RPM")[rows, None]))
     t = each[0].t
     columns = {f"RPM {motor}": stream.at(t)[:, 0] for motor, stream in enumerate(each, 1)}
     poles = parameters.get("SERVO_BLH_POLES", 14.0)

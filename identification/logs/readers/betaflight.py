@@ -43,15 +43,23 @@ _ONE_G = 2.0 ** np.arange(8, 15)  # counts
 _DSHOT, _PWM = (48.0, 2047.0), (1000.0, 2000.0)
 
 
-def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> FlightLog:
-    """Read a blackbox; ``option``: number of the motors' magnet poles, for eRPM.
+def read(
+    path: Path, vehicle: Vehicle | None = None, option: str = "", piece: int | None = None
+) -> FlightLog:
+    """Read a blackbox.
+
+    Args:
+        path: the file.
+        vehicle: turns commands into rotor speeds where none were measured.
+        option: number of the motors' magnet poles, for eRPM.
+        piece: which of the file's logs is read, from 1; default: the longest.
 
     Raises:
         InputError: the file cannot be read, is no blackbox, is damaged from its start, or has no
             motors or inertial sensors.
     """
     poles = _magnet_poles(option, path)
-    headers, fields, notes = read_blackbox(path, wanted_columns(recording_map("betaflight")))
+    headers, fields, notes = read_blackbox(path, wanted_columns(recording_map("betaflight")), piece)
     return _log(path, "betaflight", fields, set(), headers, poles, vehicle, notes)
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
+from ..clocks import check_piece
 from ..table import Array
 from .blackbox_frames import ENCODINGS, PREDICTORS, Layout, decode
 
@@ -30,17 +31,18 @@ _FRAMES = "IPSGH"
 
 
 def read_blackbox(
-    path: Path, wanted: Sequence[str]
+    path: Path, wanted: Sequence[str], piece: int | None = None
 ) -> tuple[dict[str, str], dict[str, Array], list[str]]:
     """Return the headers of a file's longest log, its fields (N,) by name, and notes.
 
     Args:
         path: the file.
         wanted: names of fields, ``time`` among them; those that the log lacks are left out.
+        piece: which of its logs is read, from 1; default: the longest.
 
     Raises:
-        InputError: the file cannot be read, is no blackbox, is damaged from its start, or has no
-            times.
+        InputError: the file cannot be read, has no such log, is no blackbox, is damaged from its
+            start, or has no times.
     """
     data = read_bytes(path, WHAT, LIMITS.binary_log)
     if not data.startswith(_START):
@@ -49,8 +51,10 @@ def read_blackbox(
         )
     starts = [match.start() for match in re.finditer(re.escape(_START), data)]
     ends = [*starts[1:], len(data)]
+    check_piece(path, piece, len(starts))
     longest = max(range(len(starts)), key=lambda i: ends[i] - starts[i])
-    headers, begin = _headers(path, data, starts[longest], ends[longest])
+    chosen = longest if piece is None else piece - 1
+    headers, begin = _headers(path, data, starts[chosen], ends[chosen])
     version = headers.get("Data version", "2")
     if version != "2":
         raise InputError(f"{path}: header Data version: {version[:20]!r}; expected 2")
@@ -60,7 +64,7 @@ def read_blackbox(
     if "time" not in keep:
         raise InputError(f"{path}: no field time; found {', '.join(names[:20])}")
     where = np.array([names.index(name) for name in keep], dtype=np.int64)
-    frames = np.frombuffer(data[: ends[longest]], np.uint8)
+    frames = np.frombuffer(data[: ends[chosen]], np.uint8)
     most = min(LIMITS.table_rows, LIMITS.table_numbers // len(keep))
     rows = np.empty((most + 1, len(keep)), np.int64)  # takes memory as it is filled
     count, lost = decode(frames, begin, layout, where, rows)
@@ -71,7 +75,8 @@ def read_blackbox(
     notes = [f"blackbox of {headers.get('Firmware revision', 'an unknown firmware')[:60]}"]
     if len(starts) > 1:
         notes.append(
-            f"the file holds {len(starts)} logs; the longest, number {longest + 1}, was read"
+            f"the file holds {len(starts)} logs; number {chosen + 1} was read"
+            + ("" if piece else ", the longest; --piece reads another")
         )
     if lost:
         notes.append(f"{lost} frame(s) of {count + lost} could not be decoded and were left out")

@@ -48,23 +48,29 @@ _SENSORS = (  # field of an inertial sensor, and that of what it gained over a t
 _MICROSECOND = 1e-6  # s
 
 
-def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
-    """Read a ULog; ``vehicle`` turns commands into rotor speeds where none were measured.
+def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -> FlightLog:
+    """Read a ULog.
+
+    Args:
+        path: the file.
+        vehicle: turns commands into rotor speeds where none were measured.
+        piece: which part is read where the clock started anew, from 1; default: the longest.
 
     Raises:
         InputError: pyulog is missing, the file is no ULog, or lacks four motors, or a pose and
             inertial sensors.
     """
-    return channels(path).log(vehicle)
+    return channels(path, piece=piece).log(vehicle)
 
 
-def channels(path: Path, has_ranges: bool = True) -> Recording:
+def channels(path: Path, has_ranges: bool = True, piece: int | None = None) -> Recording:
     """Return a ULog's channels, each at its own rate.
 
     Args:
         path: the file.
         has_ranges: pulses are 0 to 1 in the range that parameters state; False: from 1000 to 2000
             us, for what finds the thrust of idling rotors itself.
+        piece: as of ``read``.
 
     Raises:
         InputError: pyulog is missing, the file is no ULog, or lacks four motors.
@@ -82,7 +88,7 @@ def channels(path: Path, has_ranges: bool = True) -> Recording:
         for fields in instances
         for samples in _samples(path, topic, fields, parameters)
     ]
-    recording = recording_of(path, recorded, log_map, "px4_ulog", notes)
+    recording = recording_of(path, recorded, log_map, "px4_ulog", notes, piece)
     position = recording.log_map.position
     if position is not None and position.topic == _FILTER:
         fields = topics[_FILTER][0]

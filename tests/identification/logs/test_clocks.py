@@ -1,0 +1,109 @@
+"""Times of a recording: wrong stamps, late rows, rollovers, and a file of two boots."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.support.dataflash_writer import dataflash, imu, parm, rcou
+from windwrench.dynamics import InputError
+from windwrench.identification.logs.channels import Samples
+from windwrench.identification.logs.clocks import CLOCK, in_order, on_one_clock
+from windwrench.identification.logs.reading import read_log
+
+T = 0.02 * np.arange(600)
+
+
+def stamped(changes):
+    t = T.copy()
+    for row, time in changes.items():
+        t[row] = time
+    return t
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {100: T[100] + 40.0},
+        {100: 1e12},
+        {100: -1e12},
+        {100: np.nan},
+        {300: T[100] + 1e-3},
+        {599: T[599] + 40.0},
+        {0: T[0] - 40.0},
+        {200: T[199]},
+    ],
+)
+def test_one_wrong_stamp_costs_one_sample(wrong):
+    rows, late = in_order(stamped(wrong))
+    assert late == 0
+    assert set(np.arange(600)) - set(rows.tolist()) == set(wrong)
+
+
+def test_rows_that_were_written_late_are_sorted_in():
+    order = np.arange(600)
+    order[[100, 101]] = order[[101, 100]]
+    order[[300, 303]] = order[[303, 300]]
+    rows, late = in_order(T[order])
+    assert late > 0
+    assert np.array_equal(T[order][rows], T)
+
+
+@given(st.sets(st.integers(2, 597), max_size=20), st.floats(-1e3, 1e3))
+@settings(max_examples=50, deadline=None)
+def test_what_is_right_is_kept_whatever_the_wrong_stamps_are(wrong, shift):
+    t = T.copy()
+    t[sorted(wrong)] += shift
+    rows, _ = in_order(t)
+    assert np.all(np.diff(t[rows]) > 0.0)
+    assert len(rows) >= 600 - len(wrong) - 2
+
+
+def test_a_clock_of_32_bits_goes_on_after_its_rollover():
+    t = np.mod(T + CLOCK.rollover - 5.0, CLOCK.rollover)
+    (found,), notes = on_one_clock("log", [Samples(t, {"x": T})])
+    np.testing.assert_allclose(np.diff(found.t), 0.02, atol=1e-9)
+    assert any("rolled over" in note for note in notes)
+
+
+def boots():
+    """A DataFlash log of two boots, of 4 and 8 s; the commands of the second are higher."""
+    first, second = T[:200] + 1.0, T[:400] + 0.5
+    t = np.concatenate([first, second])
+    name, letters, columns = rcou(t)
+    high = np.arange(600) >= 200
+    columns = {
+        key: [v + 50 * h for v, h in zip(values, high, strict=True)] if key != "TimeUS" else values
+        for key, values in columns.items()
+    }
+    return dataflash([parm(), imu(t), (name, letters, columns)])
+
+
+def test_of_two_boots_the_longest_is_read_or_the_one_that_is_asked_for(tmp_path):
+    path = tmp_path / "two.BIN"
+    path.write_bytes(boots())
+    log = read_log(path)
+    assert len(log.t) == 400
+    assert any("2 pieces of 3.98, 7.98 s; the longest, piece 2, was read" in x for x in log.notes)
+    first = read_log(path, piece=1)
+    assert len(first.t) == 200
+    assert first.command.mean() < log.command.mean() - 0.04
+    assert any("piece 1, was read" in note for note in first.notes)
+    with pytest.raises(InputError, match=r"two\.BIN: piece 3: it has 2; expected 1 to 2"):
+        read_log(path, piece=3)
+
+
+def test_a_file_of_one_piece_has_no_second(tmp_path):
+    path = tmp_path / "flight.csv"
+    names = "t,px,py,pz,qw,qx,qy,qz,omega1,omega2,omega3,omega4"
+    rows = np.column_stack([T, np.zeros((600, 3)), np.ones(600), np.zeros((600, 3))])
+    np.savetxt(
+        path,
+        np.column_stack([rows, np.full((600, 4), 400.0)]),
+        "%g",
+        ",",
+        header=names,
+        comments="",
+    )
+    with pytest.raises(InputError, match="piece 2: it has 1"):
+        read_log(path, piece=2)
