@@ -50,6 +50,8 @@ def check(
     flight = found.log
     seconds = float(flight.t[-1] - flight.t[0])
     console.print(f"{flight.name}: {len(flight.t)} rows, {seconds:.1f} s, read by {found.read_by}")
+    if known := flight.flown.rows():
+        show_table(("what flew", "", "by"), known)
     show_table(
         ("channel", "rate (Hz)", "gaps", "longest (s)", "from", "to", "unit"),
         [

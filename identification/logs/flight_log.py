@@ -35,6 +35,7 @@ import numpy as np
 from ...runtime.errors import InputError
 from .table import Array, Mask, Table
 from .tables import write_table
+from .what_flew import UNSTATED, WhatFlew
 
 POSE = ("px", "py", "pz", "qw", "qx", "qy", "qz")
 ROTORS = ("omega1", "omega2", "omega3", "omega4")
@@ -78,6 +79,7 @@ class FlightLog:
         rates: Hz, how often each channel was measured (``source_rates``), by its section of a log
             map: position, rotors, commands, wrench, battery, accelerometer, gyro. A channel that
             is not named was measured in every row.
+        flown: what the log states of its vehicle.
     """
 
     t: Array
@@ -98,6 +100,7 @@ class FlightLog:
     command: Array | None = None
     vehicle: str = ""
     rates: Mapping[str, float] = field(default_factory=dict)
+    flown: WhatFlew = UNSTATED
 
     def __post_init__(self) -> None:
         if len(self.valid) != len(self.t):

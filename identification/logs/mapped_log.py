@@ -25,6 +25,7 @@ from .rotor_orders import order_names, order_words
 from .streams import Recording, Stream, readable, slerp
 from .table import Mask, Table
 from .table_rows import LONGEST_STEPS, check_rows, has_several_rates, rows_of
+from .what_flew import UNSTATED, WhatFlew, check_flown
 
 _IMU = ("accelerometer", "gyro")
 _ATTITUDE_GAP = 0.1  # s, across which an attitude is not interpolated
@@ -70,6 +71,7 @@ def recording_of(
     reader: str,
     notes: Sequence[str],
     piece: int | None = None,
+    flown: WhatFlew = UNSTATED,
 ) -> Recording:
     """Return the channels that a map makes of columns whose groups have a clock each.
 
@@ -80,11 +82,13 @@ def recording_of(
         reader: the reader's name.
         notes: what the reader assumed.
         piece: which part is read where the clock starts anew, from 1; default: the longest.
+        flown: what the log states of its vehicle.
 
     Raises:
-        InputError: no such piece, no motors, neither a pose nor gyro and accelerometer, or numbers
-            that no flight has.
+        InputError: no quadrotor, no such piece, no motors, neither a pose nor gyro and
+            accelerometer, or numbers that no flight has.
     """
+    check_flown(path, flown)
     recorded, of_clock = on_one_clock(path, recorded, piece)
     motors = (*ways(log_map, "rotors"), *ways(log_map, "commands"))
     poses = ways(log_map, "position")
@@ -137,7 +141,7 @@ def recording_of(
         for samples in recorded
         if samples.has(part)
     }
-    return Recording(path, reader, log_map, streams, said, extra)
+    return Recording(path, reader, log_map, streams, said, extra, flown)
 
 
 def _wanted(way: Columns) -> str:

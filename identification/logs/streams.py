@@ -18,8 +18,11 @@ from .flight_log import FlightLog, time_notes
 from .log_map import LogMap
 from .source_rates import source_rate
 from .table import Array, Mask
+from .what_flew import UNSTATED, WhatFlew
 
 _SENSOR_GAP = 3.5  # median steps, across which an inertial sensor is not interpolated
+# V: below, a lithium cell is empty, and above no multirotor's pack of 14 cells of 4.35 V
+LEAST_VOLTS, MOST_VOLTS = 2.5, 61.0
 _ROTOR_GAP = 0.5  # s without rotor speeds that deserves a note
 _MOTORS = {"rotors": "rotor speeds", "commands": "commands", "wrench": "commanded wrenches"}
 # times faster than the pose from which an inertial sensor has rows of its own: a pose is put to the
@@ -105,6 +108,7 @@ class Recording:
     streams: dict[str, Stream]
     notes: list[str]  # what the reader assumed
     extra: dict[str, Stream]  # what else is kept, by name
+    flown: WhatFlew = UNSTATED
 
     def log(self, vehicle: Vehicle | None) -> FlightLog:
         """Return the flight log.
@@ -168,6 +172,7 @@ class Recording:
             commanded="wrench" in made and "rotors" not in made,
             command=made["commands"].at(t) if "commands" in made else None,
             vehicle=log_map.vehicle,
+            flown=self.flown,
             rates={name: source_rate(s.t, s.values) for name, s in made.items()},
             **truth,
         )
@@ -197,12 +202,19 @@ def _cleaned(
             values = np.abs(values) if name == "rotors" else values
             values = np.clip(values, 0.0, 1.0) if name == "commands" else values
         elif name == "battery":
-            values = np.where((values > 0.0) & np.isfinite(values), values, np.nan)
+            plausible = (values >= LEAST_VOLTS) & (values <= MOST_VOLTS)
+            wrong = values[~plausible & (values > 0.0)]
+            if len(wrong):
+                notes += (
+                    f"{stream.name}: {len(wrong)} of {len(values)} voltages, {wrong.min():.3g} to "
+                    f"{wrong.max():.3g} V, are none of a vehicle's battery; left out",
+                )
+            values = np.where(plausible, values, np.nan)
         elif name in ("accelerometer", "gyro"):
             values = np.where(np.isfinite(values).all(axis=1, keepdims=True), values, np.nan)
         if name == "position" or (np.isfinite(values).any() and len(values) > 1):
             made[name] = Stream(stream.name, stream.t, values)
-        elif name == "battery":
+        elif name == "battery" and not np.any(values > 0.0):
             notes += (f"{stream.name}: no positive voltage; left out",)
         notes += words if needed else ()
     return made, notes

@@ -4,7 +4,7 @@ what is doubtful about it.
 
 import re
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +51,7 @@ class LogCheck:
                 for c in self.channels
             },
             "vehicle": log.vehicle or None,
+            "flown": asdict(log.flown),
             "notes": list(log.notes),
             "doubts": list(self.doubts),
             "map": self.map_text or None,

@@ -12,6 +12,7 @@ Betaflight, of DJI, and clockwise from front-right; X is assumed where the log d
 """
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -29,6 +30,7 @@ from ..mapped_log import recording_of
 from ..rotor_orders import ORDERS, Order, order_words
 from ..streams import Stream
 from ..table import Array
+from ..what_flew import QUADROTOR, UNSTATED, WhatFlew, check_flown, order_by_places, running
 from .dataflash import BEGINS as BEGINS
 from .dataflash import WHAT as WHAT
 from .dataflash import Messages, read_dataflash
@@ -38,6 +40,9 @@ Parameters = Mapping[str, float]
 _EARTH = 6_378_137.0  # m
 _PLACE = ("Lat", "Lng", "Alt")  # of POS
 _NUMBERS = ("C", "I", "Inst")  # of a core, a sensor or a battery
+_PLUS = 0  # of FRAME_TYPE, and of FRAME before Copter 3.5
+# motors 1 to 4 of a plus: right, left, front, rear; x forward, y left
+_PLUS_PLACES = ((0.0, -1.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 0.0))
 _FRAMES: dict[int, Order] = {  # of FRAME_TYPE
     1: ORDERS["ardupilot-x"],
     3: ORDERS["ardupilot-x"],  # H: the same places
@@ -46,7 +51,51 @@ _FRAMES: dict[int, Order] = {  # of FRAME_TYPE
     14: ORDERS["crazyflie"],
     18: ORDERS["betaflight"],
 }
-_QUAD = 1  # of FRAME_CLASS
+_CLASSES = {  # of FRAME_CLASS and Q_FRAME_CLASS
+    1: QUADROTOR,
+    2: "a hexarotor",
+    3: "an octorotor",
+    4: "an octorotor",
+    5: "a hexarotor",
+    6: "a helicopter",
+    7: "a tricopter",
+    8: "a single rotor",
+    9: "a coaxial helicopter",
+    10: "a tail-sitter",
+    11: "a helicopter",
+    12: "a dodecarotor",
+    13: "a helicopter",
+    14: "a decarotor",
+}
+_FIRMWARES = {  # at the beginning of a MSG
+    "ArduPlane": "a fixed-wing plane",
+    "ArduSub": "a submarine",
+    "ArduRover": "a ground rover",
+    "APMrover2": "a ground rover",
+    "Rover": "a ground rover",
+    "Blimp": "an airship",
+    "AntennaTracker": "an antenna tracker",
+}
+_PARAMETERS = {  # that no multirotor has
+    "FRAME_CONFIG": "a submarine",
+    "LIM_ROLL_CD": "a fixed-wing plane",
+    "ROLL_LIMIT_DEG": "a fixed-wing plane",
+    "ARSPD_FBW_MIN": "a fixed-wing plane",
+    "AIRSPEED_MIN": "a fixed-wing plane",
+    "CRUISE_THROTTLE": "a ground rover",
+}
+_FRAME_WORDS = {  # in a MSG such as "Frame: HEXA" or "Frame: QUAD/X"
+    "QUAD": QUADROTOR,
+    "HEXA": "a hexarotor",
+    "OCTA": "an octorotor",
+    "Y6": "a hexarotor",
+    "TRI": "a tricopter",
+    "HELI": "a helicopter",
+    "COAX": "a coaxial helicopter",
+    "SINGLE": "a single rotor",
+    "DODECA": "a dodecarotor",
+    "DECA": "a decarotor",
+}
 _MOTOR1 = 33  # of SERVOn_FUNCTION
 _CHANNELS = 14  # of RCOU
 
@@ -65,9 +114,15 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
     """
     log_map = recording_map("ardupilot")
     topics = {way.topic for name in log_map.sections for way in ways(log_map, name)}
-    messages, skipped = read_dataflash(path, {*topics, "PARM"})
+    messages, skipped = read_dataflash(path, {*topics, "PARM", "MSG"})
     parameters = _parameters(messages.get("PARM"))
-    log_map, notes = _with_parameters(path, log_map, parameters)
+    flown = _what_flew(parameters, messages.pop("MSG", None))
+    check_flown(path, flown)
+    pulses = messages.get("RCOU")
+    letter = "Ch" if pulses is not None and "Ch1" in pulses else "C"  # before Copter 3.4
+    log_map, notes = _with_parameters(path, log_map, parameters, vehicle, letter)
+    if pulses is not None:
+        flown = replace(flown, running=_running(pulses, log_map))
     columns = {*wanted_columns(log_map), *_PLACE}
     recorded = [
         samples
@@ -78,7 +133,9 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
     notes += telemetry_notes
     if skipped:
         notes.append(f"{skipped} bytes of the file belong to no message; it was cut or is damaged")
-    recording = recording_of(path, [*recorded, *telemetry], log_map, "ardupilot_bin", notes, piece)
+    recording = recording_of(
+        path, [*recorded, *telemetry], log_map, "ardupilot_bin", notes, piece, flown
+    )
     return recording.log(vehicle)
 
 
@@ -127,22 +184,67 @@ def _parameters(messages: Messages | None) -> Parameters:
     return found
 
 
-def _order(path: Path, parameters: Parameters) -> tuple[Order, str]:
-    """Return which motor each of the kit's rotors is, and the note that says whence.
+def _what_flew(parameters: Parameters, messages: Messages | None) -> WhatFlew:
+    """Return what a log states of its vehicle: by its texts, else by its parameters."""
+    texts: list[bytes] = []
+    if messages is not None and "Message" in messages:
+        texts = messages.rows["Message"].tolist()
+    for text in (raw.decode("ascii", "replace").strip("\0 ") for raw in texts):
+        said = f"MSG {text[:40]!r}"
+        for firmware, airframe in _FIRMWARES.items():
+            if text.startswith(firmware):
+                plane = parameters.get("Q_ENABLE", 0.0) > 0.0 and firmware == "ArduPlane"
+                return WhatFlew("a VTOL plane" if plane else airframe, said)
+        if found := re.match(r"Frame: ([A-Z0-9]+)", text):
+            for word, airframe in _FRAME_WORDS.items():
+                if found[1].startswith(word):
+                    return WhatFlew(airframe, said)
+    if "FRAME_CLASS" in parameters:
+        number = int(parameters["FRAME_CLASS"])
+        by = f"parameter FRAME_CLASS = {number}"
+        return WhatFlew(_CLASSES.get(number, "an unknown frame"), by)
+    for name, airframe in _PARAMETERS.items():
+        if name in parameters:
+            return WhatFlew(airframe, f"parameter {name}")
+    functions = {int(parameters.get(f"SERVO{i}_FUNCTION", 0)) for i in range(1, _CHANNELS + 1)}
+    motors = len(functions & {*range(_MOTOR1, _MOTOR1 + 8)})
+    return WhatFlew("", "SERVOn_FUNCTION", motors) if motors else UNSTATED
+
+
+def _running(pulses: Messages, log_map: LogMap) -> int | None:
+    """Return how many outputs run as the motors do; None where the motors' are not there."""
+    sent = log_map.commands
+    assert sent is not None
+    assert sent.range is not None
+    if not all(name in pulses for name in sent.columns):
+        return None
+    others = [name for name in pulses.units if re.fullmatch(r"Ch?\d+", name)]
+    names = [*sent.columns, *(name for name in others if name not in sent.columns)]
+    return len(running(np.column_stack([pulses.column(name) for name in names]), *sent.range))
+
+
+def _order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> tuple[Order, str]:
+    """Return which motor each of the vehicle's rotors is, and the note that says whence.
 
     Raises:
-        InputError: the frame is no quad x.
+        InputError: the motors stand otherwise than the vehicle's rotors.
     """
-    if "FRAME_CLASS" not in parameters:
+    name = "FRAME_TYPE" if "FRAME_TYPE" in parameters or "FRAME" not in parameters else "FRAME"
+    if name not in parameters and "FRAME_CLASS" not in parameters:
         order = ORDERS["ardupilot-x"]
         return order, f"quad x assumed, which the log does not state: {order_words(order)}"
-    frame, kind = int(parameters["FRAME_CLASS"]), int(parameters.get("FRAME_TYPE", 1))
-    if frame != _QUAD or kind not in _FRAMES:
+    kind = int(parameters.get(name, 1))
+    if kind == _PLUS and (found := order_by_places(_PLUS_PLACES, vehicle)) is not None:
+        motors = ", ".join(map(str, found))
+        return found, f"{name} {kind}, a plus: rotors 1, 2, 3, 4 of the vehicle are motors {motors}"
+    if kind not in _FRAMES:
+        what = f"{kind}, a plus," if kind == _PLUS else str(kind)
         raise InputError(
-            f"{path}: parameters FRAME_CLASS and FRAME_TYPE are {frame} and {kind}; expected a "
-            f"quadrotor's 1 and one of {', '.join(map(str, _FRAMES))}, whose rotors stand in an x"
+            f"{path}: parameter {name} is {what} whose rotors do not stand as the vehicle's; "
+            f"expected one of {', '.join(map(str, _FRAMES))}, whose rotors stand in an x"
+            + (", or a vehicle file with rotor_positions of a plus" if kind == _PLUS else "")
         )
-    return _FRAMES[kind], f"FRAME_TYPE {kind}: {order_words(_FRAMES[kind])}"
+    return _FRAMES[kind], f"{name} {kind}: {order_words(_FRAMES[kind])}"
 
 
 def _outputs(parameters: Parameters) -> list[int]:
@@ -155,7 +257,7 @@ def _outputs(parameters: Parameters) -> list[int]:
 
 
 def _with_parameters(
-    path: Path, log_map: LogMap, parameters: Parameters
+    path: Path, log_map: LogMap, parameters: Parameters, vehicle: Vehicle | None, letter: str
 ) -> tuple[LogMap, list[str]]:
     """Return the map with the order of the motors, and with their outputs, range and thrust curve;
     and notes.
@@ -163,7 +265,7 @@ def _with_parameters(
     Raises:
         InputError: the frame is no quad x, or the pulses' range is none.
     """
-    order, note = _order(path, parameters)
+    order, note = _order(path, parameters, vehicle)
     low, high = parameters.get("MOT_PWM_MIN", 0.0), parameters.get("MOT_PWM_MAX", 0.0)
     whence = "MOT_PWM_MIN and MAX"
     if low <= 0.0 or high <= 0.0:
@@ -182,7 +284,7 @@ def _with_parameters(
     assert log_map.commands is not None
     commands: Commands = replace(
         log_map.commands,
-        columns=tuple(f"C{output}" for output in outputs),
+        columns=tuple(f"{letter}{output}" for output in outputs),
         order=order,
         range=(low, high),
         thrust_factor=expo,

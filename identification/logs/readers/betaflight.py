@@ -27,7 +27,9 @@ from ..flight_log import FlightLog
 from ..log_map import recording_map
 from ..map_fit import wanted_columns
 from ..mapped_log import recording_of
+from ..streams import MOST_VOLTS
 from ..table import Array, Table
+from ..what_flew import UNSTATED, WhatFlew
 from .blackbox import BEGINS as BEGINS
 from .blackbox import WHAT as WHAT
 from .blackbox import read_blackbox
@@ -41,6 +43,7 @@ _POLES = 14  # of most motors of 5 inch quadrotors
 _STANDING = 0.5  # s after arming in which a vehicle stands
 _ONE_G = 2.0 ** np.arange(8, 15)  # counts
 _DSHOT, _PWM = (48.0, 2047.0), (1000.0, 2000.0)
+_MORE_MOTORS = tuple(f"motor[{i}]" for i in range(4, 8))  # of vehicles that are no quadrotors
 
 
 def read(
@@ -59,7 +62,8 @@ def read(
             motors or inertial sensors.
     """
     poles = _magnet_poles(option, path)
-    headers, fields, notes = read_blackbox(path, wanted_columns(recording_map("betaflight")), piece)
+    wanted = [*wanted_columns(recording_map("betaflight")), *_MORE_MOTORS]
+    headers, fields, notes = read_blackbox(path, wanted, piece)
     return _log(path, "betaflight", fields, set(), headers, poles, vehicle, notes)
 
 
@@ -76,7 +80,7 @@ def read_table(table: Table, vehicle: Vehicle | None = None, option: str = "") -
         raise InputError(
             f"{path}: missing column(s) {', '.join(missing)}; expected those of blackbox_decode"
         )
-    wanted = wanted_columns(recording_map("betaflight"))
+    wanted = {*wanted_columns(recording_map("betaflight")), *_MORE_MOTORS}
     scales, names = {}, {"time": "time (us)"}
     for name in table.header:
         field, _, unit = name.removesuffix(")").partition(" (")
@@ -121,6 +125,10 @@ def _log(
         InputError: no motors, or no gyro and accelerometer.
     """
     log_map = recording_map("betaflight")
+    # the firmware logs as many motors as its mixer has
+    more = [fields.pop(name) for name in _MORE_MOTORS if name in fields]
+    count = 4 + sum(bool(np.ptp(x) > 0.0) for x in more)
+    flown = UNSTATED if count == 4 else WhatFlew("", f"motor[0] to motor[{count - 1}]", count)
     t = 1e-6 * fields.pop("time")
     groups = {
         kind: [name for name in fields if name.startswith(kind) and name not in stated]
@@ -143,7 +151,15 @@ def _log(
     for kind, scale in scales.items():
         for name in groups[kind]:
             fields[name] = (fields[name] - (low if kind == "motor" else 0.0)) * scale
-    return recording_of(path, [Samples(t, fields)], log_map, reader, said).log(vehicle)
+    for name in ("vbatLatest", "vbat"):
+        if name in stated and (volts := float(np.median(fields[name]))) > MOST_VOLTS:
+            fields[name] = 0.1 * fields[name]
+            said.append(
+                f"{name}: {volts:.4g} V is more than a vehicle's battery has: taken as a tenth, as "
+                "blackbox_decode writes logs of Betaflight before 4.3"
+            )
+    recording = recording_of(path, [Samples(t, fields)], log_map, reader, said, flown=flown)
+    return recording.log(vehicle)
 
 
 def _range(path: Path, motors: list[Array], headers: Mapping[str, str]) -> tuple[float, float, str]:

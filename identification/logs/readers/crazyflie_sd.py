@@ -13,6 +13,7 @@ The map ``cflib`` says what the variables become.
 import re
 import zlib
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from ....runtime.regular_files import read_bytes
 from ..channels import Samples
 from ..flight_log import FlightLog
 from ..log_map import load_map
+from ..map_fit import chosen
 from ..mapped_log import recording_of
 
 BEGINS = (b"\xbc\x01\x00", b"\xbc\x02\x00")
@@ -70,8 +72,18 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         raise InputError(f"{path}: no event twice; expected at least two samples")
     first = min(float(samples.t[0]) for samples in events)
     notes.append(f"times: the vehicle's clock, which stood at {first:.6g} s at the first event")
-    recording = recording_of(path, events, load_map("cflib"), "crazyflie_sd", notes)
-    return recording.log(vehicle)
+    log_map = load_map("cflib")
+    there, _ = chosen(events, log_map)
+    if there.position is None and (there.gyro is None or there.accelerometer is None):
+        # as CrazyPAD's logs: rows of motor commands, which compare flights
+        there = replace(there, rows="whole", gyro=None, accelerometer=None, alternatives={})
+        notes.append(
+            "no pose, no gyro and no accelerometer in the log: it shows how the rotors share the "
+            "work, and nothing else"
+        )
+    else:
+        there = log_map
+    return recording_of(path, events, there, "crazyflie_sd", notes).log(vehicle)
 
 
 def _header(path: Path, data: bytes) -> tuple[int, dict[int, Layout], int]:

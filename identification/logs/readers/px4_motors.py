@@ -1,70 +1,136 @@
-"""PX4's motors: which is which rotor, which output drives it, and in what range, by parameters."""
+"""PX4's vehicle and motors, by parameters: what flew, which motor is which rotor, which output
+drives it, and in what range.
+"""
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ..log_map import LogMap
 from ..map_fit import ways
 from ..rotor_orders import ORDERS, Order
 from ..table import Array
+from ..what_flew import MAV_TYPES, QUADROTOR, WhatFlew, order_by_places, running
 
 Parameters = Mapping[str, float]
 
-_QUADRANTS = ((1, 1), (-1, 1), (-1, -1), (1, -1))  # signs of x forward and y left of rotors 1 to 4
 _MOTOR1 = 101  # PX4's number of the output function "motor 1"
-_BANKS = ("MAIN", "AUX")
+_BANKS = {"MAIN": "PWM_MAIN_FUNC", "AUX": "PWM_AUX_FUNC", "UAVCAN": "UAVCAN_EC_FUNC"}
 _OUTPUTS = 16  # of a bank
 _ESCS = 8
-_LARGEST_SHARE = 1.5  # an output beyond is a pulse, in us
+_LARGEST_SHARE = 1.5  # an output beyond is no share, but of the protocol's range
+_DSHOT = (0.0, 1999.0)
+_UAVCAN = (0.0, 8191.0)
+_DSHOT_TIMERS = range(-5, -1)  # of PWM_MAIN_TIMn: DShot150 to DShot1200
+_PULSES = (700.0, 2500.0)  # us: no servo or speed controller is sent others while motors turn
+_PLUS = ((0.0, -1.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 0.0))  # motors 1 to 4, x forward, y left
+# CA_AIRFRAME, and thousands of SYS_AUTOSTART, that are no multirotor of four
+_AIRFRAMES = {1: MAV_TYPES[1], 2: MAV_TYPES[22], 3: MAV_TYPES[21], 4: MAV_TYPES[20]}
+_AIRFRAMES |= dict.fromkeys((5, 6, 13), MAV_TYPES[10]) | dict.fromkeys((10, 11, 12), MAV_TYPES[4])
+_STARTS = {2: MAV_TYPES[1], 3: MAV_TYPES[1], 4: QUADROTOR, 5: QUADROTOR, 6: MAV_TYPES[13]}
+_STARTS |= {7: MAV_TYPES[13], 8: MAV_TYPES[14], 9: MAV_TYPES[14], 10: QUADROTOR}
+_STARTS |= {11: MAV_TYPES[13], 12: MAV_TYPES[14], 13: MAV_TYPES[22], 14: MAV_TYPES[15]}
+_STARTS |= {15: MAV_TYPES[4], 50: MAV_TYPES[10], 60: MAV_TYPES[12]}
 
 
-def motor_order(path: Path, parameters: Parameters) -> tuple[Order, str]:
-    """Return PX4's motor of each of the kit's rotors, and the note that says whence: by the
-    positions CA_ROTORn_PX and PY, else as on PX4's quad x.
+@dataclass(frozen=True, eq=False)
+class Outputs:
+    """The outputs of motors 1 to 4, and what of them is 0 and 1.
+
+    Attributes:
+        slots: outputs, from 0.
+        low: (4,) what is 0.
+        high: (4,) what is 1.
+        words: protocol and range.
+    """
+
+    slots: list[int]
+    low: Array
+    high: Array
+    words: str
+
+
+def what_flew(parameters: Parameters, statuses: Sequence[Mapping[str, Any]]) -> WhatFlew:
+    """Return what a log states of its vehicle.
+
+    Args:
+        parameters: as the log begins.
+        statuses: of the topic vehicle_status.
+    """
+    count = int(parameters.get("CA_ROTOR_COUNT", 0)) or None
+    by_count = "parameter CA_ROTOR_COUNT" if count else ""
+    frame, start = int(parameters.get("CA_AIRFRAME", 0)), int(parameters.get("SYS_AUTOSTART", 0))
+    if frame in _AIRFRAMES:
+        return WhatFlew(_AIRFRAMES[frame], f"parameter CA_AIRFRAME = {frame}")
+    for fields in statuses:
+        if np.any(np.asarray(fields.get("is_vtol", 0))):
+            return WhatFlew(MAV_TYPES[22], "vehicle_status.is_vtol")
+    kinds = [("parameter MAV_TYPE", int(parameters.get("MAV_TYPE", 0)))]
+    kinds += [
+        ("vehicle_status.system_type", int(np.asarray(fields["system_type"])[-1]))
+        for fields in statuses
+        if "system_type" in fields and len(np.asarray(fields["system_type"]))
+    ]
+    for by, kind in kinds:
+        if kind in MAV_TYPES:
+            return WhatFlew(MAV_TYPES[kind], by_count or f"{by} = {kind}", count)
+    if start // 1000 in _STARTS:
+        by = by_count or f"parameter SYS_AUTOSTART = {start}"
+        return WhatFlew(_STARTS[start // 1000], by, count)
+    return WhatFlew(QUADROTOR if count == 4 else "", by_count, count)
+
+
+def motor_order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> tuple[Order, str]:
+    """Return PX4's motor of each of the vehicle's rotors, and the note that says whence: by the
+    positions CA_ROTORn_PX and PY or the airframe's, else as on PX4's quad x.
 
     Raises:
-        InputError: the vehicle is no quadrotor, or no rotor is in one of the quadrants.
+        InputError: the motors stand otherwise than the vehicle's rotors, by default one in each
+            quadrant.
     """
-    count = int(parameters.get("CA_ROTOR_COUNT", 0))
-    if count not in (0, 4):
-        raise InputError(f"{path}: parameter CA_ROTOR_COUNT is {count}; expected a quadrotor's 4")
+    start = int(parameters.get("SYS_AUTOSTART", 0))
     # PX4's body y points right
     places = [
         (parameters.get(f"CA_ROTOR{i}_PX", 0.0), -parameters.get(f"CA_ROTOR{i}_PY", 0.0))
         for i in range(4)
     ]
-    order, whence = ORDERS["px4-x"], "as on PX4's quad x, which the log does not state"
-    if count and any(x or y for x, y in places):
-        signs = [(int(np.sign(x)), int(np.sign(y))) for x, y in places]
-        if sorted(signs) != sorted(_QUADRANTS):
-            raise InputError(
-                f"{path}: parameters CA_ROTORn_PX and CA_ROTORn_PY put the rotors at {places} "
-                f"(x forward, y left); expected one in each quadrant, as on a quad x"
-            )
-        first, second, third, fourth = (signs.index(quadrant) + 1 for quadrant in _QUADRANTS)
-        order, whence = (first, second, third, fourth), "by the positions in CA_ROTORn_PX and PY"
+    if parameters.get("CA_ROTOR_COUNT") and any(x or y for x, y in places):
+        whence, said = "by the positions in CA_ROTORn_PX and PY", "CA_ROTORn_PX and CA_ROTORn_PY"
+    elif start // 1000 == 5:
+        places, whence = list(_PLUS), f"as on a quad plus (SYS_AUTOSTART = {start})"
+        said = f"SYS_AUTOSTART = {start}, a quad plus,"
+    else:
+        order, whence = ORDERS["px4-x"], "as on PX4's quad x, which the log does not state"
+        return order, _renumbered(order, whence)
+    found = order_by_places(places, vehicle)
+    if found is None:
+        raise InputError(
+            f"{path}: parameters {said} put the rotors at {places} (x forward, y left); expected "
+            "one in each quadrant, as on a quad x, or a vehicle file with these rotor_positions"
+        )
+    return found, _renumbered(found, whence)
+
+
+def _renumbered(order: Order, whence: str) -> str:
     motors = ", ".join(map(str, order))
-    return order, f"motors renumbered {whence}: rotors 1, 2, 3, 4 are motors {motors}"
+    return f"motors renumbered {whence}: rotors 1, 2, 3, 4 are motors {motors}"
 
 
-def with_motors(log_map: LogMap, order: Order, parameters: Parameters) -> LogMap:
+def with_motors(log_map: LogMap, order: Order, parameters: Parameters, outputs: Outputs) -> LogMap:
     """Return the map with the order of the motors, and with the thrust curve of their outputs."""
     factor = min(max(parameters.get("THR_MDL_FAC", 0.0), 0.0), 1.0)
-    bank, slots = _output_slots(parameters)
-    low, high = _range(parameters, bank, slots)
     rotors, (motors, sent) = log_map.rotors, ways(log_map, "commands")
     assert rotors is not None
     note = (
-        f"commands: actuator_outputs, x = 0 to 1 (pulses, of which one is above 1.5: "
-        f"{low.min():g} to {high.max():g} us), gives relative thrust f x^2 + (1 - f) x with "
-        f"THR_MDL_FAC f = {factor:g}; motors 1 to 4 at outputs "
-        f"{', '.join(str(slot + 1) for slot in slots)}"
+        f"commands: actuator_outputs, x = 0 to 1 ({outputs.words}), gives relative thrust "
+        f"f x^2 + (1 - f) x with THR_MDL_FAC f = {factor:g}; motors 1 to 4 at outputs "
+        f"{', '.join(str(slot + 1) for slot in outputs.slots)}"
     )
     sent = replace(sent, order=order, thrust_factor=factor, note=note)
     return replace(
@@ -87,38 +153,58 @@ def slots_of_escs(fields: Mapping[str, Any]) -> list[int]:
     return slots_of_motors(named) or list(range(4))
 
 
-def outputs_of_motors(
-    path: Path, columns: Mapping[str, Array], parameters: Parameters
-) -> dict[str, Array]:
-    """Return what was sent to motors 1 to 4 (N,) as 0 to 1, in their order; nothing, where one of
-    the outputs never changes: servos, or a bank that is not in use.
+def outputs_of(
+    path: Path, sent: Sequence[Mapping[str, Any]], parameters: Parameters
+) -> tuple[Outputs, int | None]:
+    """Return which outputs the motors are, and what of them is 0 and 1; and how many outputs run as
+    motors do, None where none was sent.
+
+    Args:
+        path: the file, for errors.
+        sent: the instances of actuator_outputs.
+        parameters: of the vehicle.
 
     Raises:
-        InputError: a range of pulses is none.
+        InputError: a range of pulses is none, or the outputs fit no protocol.
     """
     bank, slots = _output_slots(parameters)
-    names = [f"output[{slot}]" for slot in slots]
+    names = [f"output[{i}]" for i in range(_OUTPUTS)]
+    tables = [np.column_stack([fields[n] for n in names if n in fields]) for fields in sent]
+    tables = [table.astype(np.float64) for table in tables if _moving(table, slots)]
+    motors = tables[0][:, slots] if tables else np.zeros((0, 4))
+    outputs = _range(path, parameters, bank, slots, motors)
+    if not tables:
+        return outputs, None
+    others = [i for i in range(tables[0].shape[1]) if i not in slots]
+    every = tables[0][:, [*slots, *others]]
+    low, high = float(outputs.low.min()), float(outputs.high.max())
+    return outputs, len(running(every, low, high))
+
+
+def _moving(table: Array, slots: list[int]) -> bool:
+    """Return whether all outputs of motors change: no servos, and no bank that is not in use."""
+    inside = table.shape[1] > max(slots)
+    return inside and bool(np.all(np.ptp(np.nan_to_num(table[:, slots]), axis=0) > 0.0))
+
+
+def shares_of_motors(columns: Mapping[str, Array], outputs: Outputs) -> dict[str, Array]:
+    """Return what was sent to motors 1 to 4 (N,) as 0 to 1, in their order; nothing, where one of
+    the outputs never changes.
+    """
+    names = [f"output[{slot}]" for slot in outputs.slots]
     if not set(names) <= set(columns):
         return {}
-    outputs = np.nan_to_num(np.column_stack([columns[name] for name in names]), nan=0.0)
-    if not np.all(np.ptp(outputs, axis=0) > 0.0):
+    sent = np.nan_to_num(np.column_stack([columns[name] for name in names]), nan=0.0)
+    if not np.all(np.ptp(sent, axis=0) > 0.0):
         return {}
-    low, high = np.zeros(4), np.ones(4)
-    if outputs.max() > _LARGEST_SHARE:
-        low, high = _range(parameters, bank, slots)
-    if not np.all(high > low):
-        raise InputError(
-            f"{path}: the PWM_{bank}_MIN and MAX parameters of the motors' outputs are "
-            f"{low.tolist()} and {high.tolist()}; expected MIN below MAX"
-        )
-    shares = np.clip((outputs - low) / (high - low), 0.0, 1.0)
+    shares = np.clip((sent - outputs.low) / (outputs.high - outputs.low), 0.0, 1.0)
     return {f"output[{motor}]": share for motor, share in enumerate(shares.T)}
 
 
 def _output_slots(parameters: Parameters) -> tuple[str, list[int]]:
     """Return the bank and the outputs, from 0, of motors 1 to 4."""
-    for bank in _BANKS:
-        functions = (parameters.get(f"PWM_{bank}_FUNC{i + 1}", 0.0) for i in range(_OUTPUTS))
+    for bank, prefix in _BANKS.items():
+        functions = (parameters.get(f"{prefix}{i + 1}", 0.0) for i in range(_OUTPUTS))
         if slots := slots_of_motors([int(function) for function in functions]):
             return bank, slots
     return "MAIN", list(range(4))
@@ -132,14 +218,51 @@ def slots_of_motors(functions: Sequence[int]) -> list[int]:
     return [functions.index(motor) for motor in motors] if {*motors} <= {*functions} else []
 
 
-def _range(parameters: Parameters, bank: str, slots: list[int]) -> tuple[Array, Array]:
-    """Return the pulses (4,) in us at the ends of outputs' ranges: of each its own parameter, the
-    bank's, or PX4's default.
+def _range(
+    path: Path, parameters: Parameters, bank: str, slots: list[int], motors: Array
+) -> Outputs:
+    """Return what of the outputs is 0 and 1: shares as they are; of DShot and UAVCAN, which the
+    parameters state or no pulse can be, the protocol's range; of pulses each output's own
+    parameter, the bank's, or PX4's default.
+
+    Raises:
+        InputError: a range of pulses is none, or the outputs fit no protocol.
     """
+    most = float(np.nanmax(motors)) if np.isfinite(motors).any() else 0.0
+    turning = motors[motors > 0.5 * most]  # not what stops them
+    usual = float(np.median(turning)) if turning.size else _PULSES[0]
+    timers = [parameters.get(f"PWM_{bank}_TIM{i}", 0.0) for i in range(_OUTPUTS)]
+    is_dshot = parameters.get("DSHOT_CONFIG", 0.0) > 0.0 or any(x in _DSHOT_TIMERS for x in timers)
+    if 0.0 < most <= _LARGEST_SHARE:
+        return Outputs(slots, np.zeros(4), np.ones(4), "shares of 1")
+    if bank == "UAVCAN" or usual > _PULSES[1]:
+        protocol, (low, high), stated = "UAVCAN", _UAVCAN, bank == "UAVCAN"
+    elif is_dshot or usual < _PULSES[0]:
+        protocol, (low, high), stated = "DShot", _DSHOT, is_dshot
+    else:
+        lows, highs = (
+            _ends(parameters, bank, slots, end, default)
+            for end, default in (("MIN", 1000.0), ("MAX", 2000.0))
+        )
+        if not np.all(highs > lows):
+            raise InputError(
+                f"{path}: the PWM_{bank}_MIN and MAX parameters of the motors' outputs are "
+                f"{lows.tolist()} and {highs.tolist()}; expected MIN below MAX"
+            )
+        words = f"pulses, of which one is above {_LARGEST_SHARE:g}: {lows.min():g} to "
+        return Outputs(slots, lows, highs, f"{words}{highs.max():g} us")
+    if most > high:
+        raise InputError(
+            f"{path}: actuator_outputs reaches {most:g}; expected shares up to 1, pulses in us, "
+            f"or numbers of {protocol} up to {high:g}"
+        )
+    why = "as parameters state" if stated else "since no pulses are like that"
+    words = f"{protocol}, {low:g} to {high:g}, {why}"
+    return Outputs(slots, np.full(4, low), np.full(4, high), words)
 
-    def ends(end: str, default: float) -> Array:
-        names = [(f"PWM_{bank}_{end}{s + 1}", f"PWM_{bank}_{end}", f"PWM_{end}") for s in slots]
-        given = [[parameters.get(name, 0.0) for name in one] for one in names]
-        return np.array([next((x for x in one if x > 0.0), default) for one in given])
 
-    return ends("MIN", 1000.0), ends("MAX", 2000.0)
+def _ends(parameters: Parameters, bank: str, slots: list[int], end: str, default: float) -> Array:
+    """Return one end (4,) of the outputs' ranges of pulses, us."""
+    names = [(f"PWM_{bank}_{end}{s + 1}", f"PWM_{bank}_{end}", f"PWM_{end}") for s in slots]
+    given = [[parameters.get(name, 0.0) for name in one] for one in names]
+    return np.array([next((x for x in one if x > 0.0), default) for one in given])

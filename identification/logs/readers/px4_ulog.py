@@ -12,8 +12,10 @@ x, with f the parameter THR_MDL_FAC.
 """
 
 import io
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import redirect_stdout
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +34,17 @@ from ..map_fit import ways
 from ..mapped_log import recording_of
 from ..streams import Recording
 from ..table import Array
-from .px4_motors import motor_order, outputs_of_motors, slots_of_escs, with_motors, without_ranges
+from ..what_flew import check_flown
+from .px4_motors import (
+    Outputs,
+    motor_order,
+    outputs_of,
+    shares_of_motors,
+    slots_of_escs,
+    what_flew,
+    with_motors,
+    without_ranges,
+)
 from .ulog_counting import counting
 
 Fields = Mapping[str, NDArray[Any]]
@@ -40,12 +52,13 @@ Fields = Mapping[str, NDArray[Any]]
 BEGINS = (b"ULog\x01\x12\x35",)
 
 WHAT = "a PX4 log (ULog)"
-_FILTER = "vehicle_local_position"
+_FILTER, _STATUS = "vehicle_local_position", "vehicle_status"
 _SENSORS = (  # field of an inertial sensor, and that of what it gained over a time
     ("gyro_rad", "delta_angle"),
     ("accelerometer_m_s2", "delta_velocity"),
 )
 _MICROSECOND = 1e-6  # s
+_HEADER, _MESSAGE = 16, 3  # bytes, of a file and of a message
 
 
 def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -> FlightLog:
@@ -60,35 +73,48 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
         InputError: pyulog is missing, the file is no ULog, or lacks four motors, or a pose and
             inertial sensors.
     """
-    return channels(path, piece=piece).log(vehicle)
+    return channels(path, vehicle, piece=piece).log(vehicle)
 
 
-def channels(path: Path, has_ranges: bool = True, piece: int | None = None) -> Recording:
+def channels(
+    path: Path,
+    vehicle: Vehicle | None = None,
+    has_ranges: bool = True,
+    piece: int | None = None,
+) -> Recording:
     """Return a ULog's channels, each at its own rate.
 
     Args:
         path: the file.
+        vehicle: whose rotors the motors are; None: one in each quadrant.
         has_ranges: pulses are 0 to 1 in the range that parameters state; False: from 1000 to 2000
             us, for what finds the thrust of idling rotors itself.
         piece: as of ``read``.
 
     Raises:
-        InputError: pyulog is missing, the file is no ULog, or lacks four motors.
+        InputError: pyulog is missing, the file is no ULog or no quadrotor's, or lacks four motors.
     """
     topics, stated, is_damaged = read_ulog(path)
+    flown = what_flew(stated, topics.pop(_STATUS, []))
+    check_flown(path, flown)
     parameters = stated if has_ranges else without_ranges(stated)
-    order, order_note = motor_order(path, stated)
-    log_map = with_motors(recording_map("px4"), order, parameters)
+    outputs, count = outputs_of(path, topics.get("actuator_outputs", []), parameters)
+    flown = replace(flown, running=count, outputs=outputs.words)
+    order, order_note = motor_order(path, stated, vehicle)
+    log_map = with_motors(recording_map("px4"), order, parameters, outputs)
     notes = [*log_map.notes, order_note]
     if is_damaged:
-        notes.append("the file is damaged; what could be read of it was used")
+        notes.append("the file is damaged or was cut; what could be read of it was used")
+    batteries = topics.get("battery_status", [])
+    if batteries and all(not np.any(fields.get("connected", 1)) for fields in batteries):
+        notes.append("battery_status: no battery is connected (connected = 0), so no voltage")
     recorded = [
         samples
         for topic, instances in topics.items()
         for fields in instances
-        for samples in _samples(path, topic, fields, parameters)
+        for samples in _samples(topic, fields, outputs)
     ]
-    recording = recording_of(path, recorded, log_map, "px4_ulog", notes, piece)
+    recording = recording_of(path, recorded, log_map, "px4_ulog", notes, piece, flown)
     position = recording.log_map.position
     if position is not None and position.topic == _FILTER:
         fields = topics[_FILTER][0]
@@ -112,14 +138,14 @@ def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bo
     from pyulog import ULog as Parser
 
     log_map = recording_map("px4")
-    wanted = {way.topic for name in log_map.sections for way in ways(log_map, name)}
+    wanted = {way.topic for name in log_map.sections for way in ways(log_map, name)} | {_STATUS}
     check_regular(path, WHAT, LIMITS.ulog_file)
     try:
         with open_regular(path, WHAT) as file:
             # pyulog prints its doubts; the notes say them
             with redirect_stdout(io.StringIO()):
                 parsed = counting(Parser)(file, sorted(wanted))
-            is_damaged = bool(parsed.file_corruption)
+            is_damaged = bool(parsed.file_corruption) or _is_cut(path)
     except InputError:
         raise
     except Exception as error:  # whatever a parser makes of bytes that are no ULog
@@ -140,6 +166,16 @@ def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bo
     return topics, parameters, is_damaged
 
 
+def _is_cut(path: Path) -> bool:
+    """Return whether a file ends within a message, each of which states its length."""
+    with open_regular(path, WHAT) as file:
+        size, place = file.seek(0, os.SEEK_END), _HEADER
+        while place + _MESSAGE <= size:
+            file.seek(place)
+            place += _MESSAGE + int.from_bytes(file.read(2), "little")
+    return place != size
+
+
 def _column(fields: Fields, name: str) -> Array:
     with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
         return np.asarray(fields[name], dtype=np.float64)
@@ -155,9 +191,7 @@ def _times(fields: Fields) -> Array:
     return _MICROSECOND * (sampled if plausible else published)
 
 
-def _samples(
-    path: Path, topic: str, fields: Fields, parameters: Mapping[str, float]
-) -> Iterator[Samples]:
+def _samples(topic: str, fields: Fields, outputs: Outputs) -> Iterator[Samples]:
     """Yield the columns of a topic's instance, as the map names them: none, where it is not in use;
     two groups of an inertial sensor whose gyro and accelerometer have times of their own.
     """
@@ -173,8 +207,12 @@ def _samples(
         columns = {n: np.clip(np.nan_to_num(x, nan=0.0), 0.0, 1.0) for n, x in columns.items()}
         if not any(np.any(columns.get(f"control[{i}]", 0.0) > 0.0) for i in range(4)):
             return
+    elif topic == "battery_status":
+        if "connected" in columns and "voltage_v" in columns:
+            there = columns["connected"] != 0.0
+            columns["voltage_v"] = np.where(there, columns["voltage_v"], np.nan)
     elif topic == "actuator_outputs":
-        columns = outputs_of_motors(path, columns, parameters)
+        columns = shares_of_motors(columns, outputs)
     elif topic.endswith("_odometry"):
         if not _is_in_earth_frame(fields):
             return

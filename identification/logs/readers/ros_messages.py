@@ -18,7 +18,12 @@ from ..table import Array
 from .px4_motors import slots_of_motors
 
 _NUMBERS = ["Float32", "Float64", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64"]
-ARRAYS = tuple(f"std_msgs/msg/{kind}MultiArray" for kind in _NUMBERS)
+# messages that are arrays of numbers, whatever these are, and the field that holds them
+ARRAYS = {f"std_msgs/msg/{kind}MultiArray": "data" for kind in _NUMBERS}
+ARRAYS |= {
+    "crazyswarm/msg/GenericLogData": "values",
+    "crazyflie_interfaces/msg/LogDataGeneric": "values",
+}
 PARTS = ("pose", "rotors", "command", "voltage", "imu")
 MOTORS = ("rotors", "command")  # parts
 _SECOND = 10**9  # ns
@@ -81,7 +86,7 @@ def _stated() -> dict[str, Any]:
 @cache
 def kinds(part: str) -> dict[str, Kind]:
     """Return how a part is read from messages, by their types."""
-    found = {name: Kind(("data",)) for name in ARRAYS if part in MOTORS}
+    found = {name: Kind((field,)) for name, field in ARRAYS.items() if part in MOTORS}
     for name, stated in _stated()[part].items():
         fields, order = stated["fields"], stated.get("order")
         paths = fields if isinstance(fields, str) else tuple(fields)

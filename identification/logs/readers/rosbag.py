@@ -32,7 +32,7 @@ so that nothing in a file decides what code runs; a bag whose definitions differ
 
 import os
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -49,6 +49,7 @@ from ..channels import Samples
 from ..flight_log import FlightLog
 from ..mapped_log import recording_of
 from ..table import Array
+from ..what_flew import UNSTATED, WhatFlew, running
 from .ros_messages import MOTORS, definitions, stamp
 from .topic_choice import chosen_topics
 from .topic_map import Topic, joined, topic_map
@@ -75,13 +76,15 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
     """
     settings, where = topic_map(path, option)
     times: dict[str, NDArray[np.int64]] = {}
+    flown = UNSTATED
     columns: dict[str, dict[str, Array]] = {}
     with _opened(path) as (types, messages):
         topics, doubts = chosen_topics(path, types, settings, where)
         for part, topic in list(topics.items()):
             try:
-                times[part], columns[part], said = _decoded_topic(path, topic, messages)
+                times[part], columns[part], said, count = _decoded_topic(path, topic, messages)
                 doubts += said
+                flown = flown if count is None else WhatFlew(running=count)
             except InputError as error:
                 if part in settings or part in ("pose", "rotors"):
                     raise
@@ -95,7 +98,7 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
         Samples(_NANOSECOND * (times[part] - origin).astype(float), columns[part], topic.name)
         for part, topic in topics.items()
     ]
-    found = recording_of(path, recorded, joined(topics), "rosbag", (*notes, *doubts))
+    found = recording_of(path, recorded, joined(topics), "rosbag", (*notes, *doubts), flown=flown)
     return found.log(vehicle)
 
 
@@ -213,13 +216,15 @@ def _decoded(raw: Any, kind: str, stores: list[Any], ros1: bool) -> Any:
 
 def _decoded_topic(
     path: Path, topic: Topic, messages: _Messages
-) -> tuple[NDArray[np.int64], dict[str, Array], list[str]]:
-    """Return times (N,) in ns, columns (N,) by name, and notes of a topic.
+) -> tuple[NDArray[np.int64], dict[str, Array], list[str], int | None]:
+    """Return times (N,) in ns, columns (N,) by name, and notes of a topic; and of more than four
+    commands, whose order nobody stated, how many run as motors do.
 
     Raises:
         InputError: it has no message or too many, or one that cannot be used.
     """
     recorded, stamped, values = array("q"), array("q"), array("d")
+    every: list[Array] = []
     where = f"{path}: topic {topic.name}"
     for index, (received, message) in enumerate(messages(topic.name)):
         check_count(where, index + 1, LIMITS.table_rows, "messages")
@@ -227,6 +232,8 @@ def _decoded_topic(
         stamped.append(stamp(message))
         try:
             values.extend(topic.values(message))
+            if topic.part == "command" and topic.assumed_order:
+                every.append(topic.kind.values(message))
         except ValueError as error:
             raise InputError(f"{where}, message {index + 1}: {error}") from error
     if not recorded:
@@ -236,11 +243,28 @@ def _decoded_topic(
     table = np.array(values).reshape(len(recorded), -1)
     columns = dict(zip(topic.columns, table.T, strict=True))
     received_at, sampled_at = np.array(recorded), np.array(stamped)
+    count = _running(every, topic)
     doubt = ""
     if not np.any(sampled_at):
         doubt = "no time stamps"
     elif np.max(np.abs(sampled_at - received_at)) > _SAME_CLOCK:
         doubt = "its time stamps are of another clock than the bag's"
     if doubt:
-        return received_at, columns, [f"{topic.name}: {doubt}; the times of recording were taken"]
-    return sampled_at, columns, []
+        return (
+            received_at,
+            columns,
+            [f"{topic.name}: {doubt}; the times of recording were taken"],
+            count,
+        )
+    return sampled_at, columns, [], count
+
+
+def _running(every: Sequence[Array], topic: Topic) -> int | None:
+    """Return how many of the elements of commands (K,) run as motors do; None where there are no
+    more than four, or not the same in each message.
+    """
+    if len({len(values) for values in every}) != 1 or len(every[0]) <= 4:
+        return None
+    motors = [element - 1 for element in topic.elements]
+    others = [i for i in range(len(every[0])) if i not in motors]
+    return len(running(np.array(every)[:, [*motors, *others]], *topic.kind.range))

@@ -188,7 +188,7 @@ def flight_logs(draw):
         quaternion=pose[:, [6, 3, 4, 5]],
         valid=valid,
         rotor_speeds=draw(arrays(float, (count, 4), elements=st.floats(0, 3e3))),
-        voltage=draw(arrays(float, count, elements=st.floats(0.1, 20))) if optional else None,
+        voltage=draw(arrays(float, count, elements=st.floats(2.5, 20))) if optional else None,
         force=draw(arrays(float, (count, 3), elements=finite)) if optional else None,
         torque=draw(arrays(float, (count, 3), elements=finite)) if optional else None,
         accelerometer=inertial[:, 0] if read[0] else None,

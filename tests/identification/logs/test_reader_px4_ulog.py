@@ -255,7 +255,7 @@ SIX = {"CA_ROTOR_COUNT": 6}
         ({}, {}, "no motors that turn; expected esc_status .* found nothing"),
         ({"esc_status": esc(WIDE)}, {}, "no pose, and no accel.* vehicle_local_position, with"),
         (MOCAP, {}, "no motors that turn; expected esc_status .* found vehicle_mocap_odometry"),
-        (FLIGHT, SIX, "CA_ROTOR_COUNT is 6; expected a quadrotor's 4"),
+        (FLIGHT, SIX, "CA_ROTOR_COUNT says a vehicle with 6 rotors; expected a quadrotor"),
         (FLIGHT, {"CA_ROTOR_COUNT": 4, "CA_ROTOR0_PX": 0.1}, "expected one in each quadrant"),
         (MOCAP | {"esc_status": esc(WIDE + 60)}, {}, "do not overlap; expected both over the same"),
         (MOCAP | {"esc_status": esc(T[:1])}, {}, r"esc_status: 1 message\(s\); expected at least"),

@@ -238,6 +238,29 @@ def test_messages_of_mavros(write, kind):
     assert any("/vrpn/drone/pose" in n and "chosen by its name before" in n for n in log.notes)
 
 
+def test_six_motors_of_mavros_are_refused(write):
+    share = np.array([*SHARE[THEIRS], *SHARE[:2]])
+
+    def fields(t):
+        pulses = 1000.0 + 1000.0 * share * growth(t)
+        return {"header": stamp(t), "channels": np.round(pulses).astype(np.uint16)}
+
+    topics = {"/pose": pose(), "/out": ("mavros_msgs/msg/RCOut", WIDE, fields)}
+    with pytest.raises(InputError, match="6 outputs run as motors do"):
+        read_log(write(topics))
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [("bag", "crazyswarm/msg/GenericLogData"), ("mcap", "crazyflie_interfaces/msg/LogDataGeneric")],
+)
+def test_numbers_that_a_crazyflie_logs_are_motors_where_the_map_says_so(write, kind, name):
+    logged = (name, WIDE, lambda t: {"header": stamp(t), "values": OURS * growth(t)})
+    said = "rotors: {topic: /cf1/motors, unit: rad/s}"
+    log = read_log(write({"/pose": pose(), "/cf1/motors": logged}, kind, said))
+    np.testing.assert_allclose(log.rotor_speeds[0], OURS, rtol=1e-6)
+
+
 def test_actuators_of_gazebo_and_a_named_order(write):
     path = write({"/pose": pose(), "/motors": actuators()})
     log = read_log(path)

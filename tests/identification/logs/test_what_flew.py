@@ -1,0 +1,226 @@
+"""Logs of vehicles that are no quadrotor, of a plus, and of outputs that are no pulses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.support.dataflash_writer import dataflash, imu, parm
+from tests.support.sd_card_writer import sd_card
+from tests.support.ulog_writer import sensor_combined, stamps, ulog_bytes
+from windwrench.dynamics import InputError, load_vehicle
+from windwrench.identification.logs.reading import read_log
+from windwrench.identification.logs.what_flew import order_by_places, running
+from windwrench.identification.report.log_check import check_log
+
+T = 1.0 + 0.02 * np.arange(300)
+WAVES = np.sin(3.0 * T)[:, None] + 0.3 * np.sin(np.multiply.outer(T, np.arange(5.0, 13.0)))
+SHARES = 0.4 + 0.05 * WAVES  # (300, 8) of motors that answer one flight
+SERVOS = 0.5 + 0.2 * np.sin(np.multiply.outer(T, np.arange(5.0, 9.0)))  # that do not
+ARDRONE = load_vehicle("ardrone2")
+ARM = 0.18
+ENDS = [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]]
+PLUS = replace(ARDRONE, rotor_positions=ARM * np.array(ENDS))
+
+
+@pytest.fixture
+def px4(tmp_path):
+    def write(outputs, connected=1, **parameters):
+        sent = np.zeros((len(T), 16))
+        sent[:, : outputs.shape[1]] = outputs
+        battery = {
+            "uint64_t timestamp": stamps(T),
+            "float voltage_v": np.full(len(T), 15.8 if connected else 0.05),
+            "bool connected": np.full(len(T), bool(connected)),
+        }
+        topics = {
+            "actuator_outputs": {"uint64_t timestamp": stamps(T), "float output": sent},
+            "sensor_combined": sensor_combined(T),
+            "battery_status": battery,
+        }
+        path = tmp_path / "flight.ulg"
+        path.write_bytes(ulog_bytes(topics, parameters))
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        ({"MAV_TYPE": 13}, "MAV_TYPE = 13 says a hexarotor with 6 rotors"),
+        ({"MAV_TYPE": 22}, "MAV_TYPE = 22 says a VTOL plane"),
+        ({"MAV_TYPE": 1}, "MAV_TYPE = 1 says a fixed-wing plane"),
+        ({"CA_AIRFRAME": 2, "CA_ROTOR_COUNT": 4}, "CA_AIRFRAME = 2 says a VTOL plane"),
+        ({"CA_ROTOR_COUNT": 8}, "CA_ROTOR_COUNT says a vehicle with 8 rotors"),
+        ({"SYS_AUTOSTART": 13000}, "SYS_AUTOSTART = 13000 says a VTOL plane"),
+        ({"MAV_TYPE": 2, "SYS_AUTOSTART": 5001}, "a quad plus, put the rotors"),
+    ],
+)
+def test_px4_says_what_flew(px4, parameters, said):
+    with pytest.raises(InputError, match=said):
+        read_log(px4(1000.0 + 1000.0 * SHARES[:, :4], **parameters))
+
+
+def test_outputs_that_run_say_it_where_nothing_else_does(px4):
+    six = 1000.0 + 1000.0 * SHARES[:, :6]
+    with pytest.raises(InputError, match="6 outputs run as motors do"):
+        read_log(px4(six))
+    gimbal = np.column_stack([six[:, :4], 1000.0 + 1000.0 * SERVOS])
+    assert read_log(px4(gimbal)).flown.running == 4
+    assert len(read_log(px4(six, MAV_TYPE=2)).t) == len(T)  # the log's word counts
+
+
+@pytest.mark.parametrize(
+    ("scale", "parameters", "words"),
+    [
+        ((0.0, 1999.0), {"DSHOT_CONFIG": 600}, "DShot, 0 to 1999, as parameters state"),
+        ((0.0, 1999.0), {"PWM_MAIN_TIM0": -3}, "DShot, 0 to 1999, as parameters state"),
+        ((0.0, 8191.0), {}, "UAVCAN, 0 to 8191, since no pulses are like that"),
+        ((0.0, 1.0), {}, "shares of 1"),
+        ((1000.0, 1000.0), {}, "1000 to 2000 us"),
+        ((0.0, 8191.0), {f"UAVCAN_EC_FUNC{i + 1}": 101 + i for i in range(4)}, "as parameters"),
+    ],
+)
+def test_outputs_of_each_protocol_are_the_same_commands(px4, scale, parameters, words):
+    low, span = scale
+    log = read_log(px4(low + span * SHARES[:, :4], MAV_TYPE=2, **parameters))
+    np.testing.assert_allclose(log.command, SHARES[:, [2, 1, 3, 0]], atol=1e-3)
+    assert words in log.flown.outputs
+    assert any(words in note for note in log.notes)
+
+
+def test_a_battery_that_is_not_connected_has_no_voltage(px4):
+    outputs = 1000.0 + 1000.0 * SHARES[:, :4]
+    assert read_log(px4(outputs, MAV_TYPE=2)).voltage[0] == pytest.approx(15.8)
+    log = read_log(px4(outputs, connected=0, MAV_TYPE=2))
+    assert log.voltage is None
+    assert any("no battery is connected" in note for note in log.notes)
+
+
+def test_a_file_that_ends_within_a_message_says_so(px4):
+    path = px4(1000.0 + 1000.0 * SHARES[:, :4], MAV_TYPE=2)
+    assert not any("was cut" in note for note in read_log(path).notes)
+    data = path.read_bytes()
+    path.write_bytes(data[:-3])
+    assert any("was cut" in note for note in read_log(path).notes)
+
+
+def test_a_check_shows_what_flew(px4):
+    found = check_log(px4(1000.0 + 1000.0 * SHARES[:, :4], MAV_TYPE=2))
+    assert found.as_dict()["flown"]["airframe"] == "a quadrotor"
+    assert ("airframe", "quadrotor", "parameter MAV_TYPE = 2") in found.log.flown.rows()
+
+
+@pytest.fixture
+def ardupilot(tmp_path):
+    def write(texts=(), columns="C", count=4, **parameters):
+        frames = {"FRAME_CLASS": None, "FRAME_TYPE": None}
+        pulses = {f"{columns}{i + 1}": 1000.0 + 1000.0 * SHARES[:, i] for i in range(count)}
+        rows = {"TimeUS": np.round(1e6 * T), **pulses}
+        messages = [parm(**frames | parameters), imu(T), ("RCOU", "Q" + "H" * count, rows)]
+        for text in texts:
+            padded = text.encode().ljust(16, b"\0")
+            messages.append(("MSG", "QN", {"TimeUS": [1.0], "Message": [padded]}))
+        path = tmp_path / "00000001.BIN"
+        path.write_bytes(dataflash(messages))
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"texts": ["Frame: HEXA"], "FRAME": 1.0}, "'Frame: HEXA' says a hexarotor with 6"),
+        ({"texts": ["ArduPlane V4.1"]}, "says a fixed-wing plane"),
+        ({"texts": ["ArduSub V4.1.0"]}, "says a submarine"),
+        ({"texts": ["APMrover2 V3"]}, "says a ground rover"),
+        ({"FRAME_CLASS": 2.0}, "FRAME_CLASS = 2 says a hexarotor"),
+        ({"FRAME_CONFIG": 1.0}, "FRAME_CONFIG says a submarine"),
+        ({"FRAME": 1.0, "count": 6}, "6 outputs run as motors do"),
+        ({f"SERVO{i}_FUNCTION": 32.0 + i for i in range(1, 7)}, "with 6 rotors"),
+        ({"FRAME": 0.0}, "parameter FRAME is 0, a plus"),
+    ],
+)
+def test_ardupilot_says_what_flew(ardupilot, given, said):
+    servos = {f"SERVO{i}_FUNCTION": None for i in range(1, 15)}
+    with pytest.raises(InputError, match=said):
+        read_log(ardupilot(**servos | given))
+
+
+def test_a_plus_is_read_for_a_vehicle_that_is_one(ardupilot):
+    servos = {f"SERVO{i}_FUNCTION": None for i in range(1, 15)}
+    path = ardupilot(**servos, FRAME=0.0, MOT_PWM_MIN=1000.0, MOT_PWM_MAX=2000.0)
+    log = read_log(path, vehicle=PLUS)
+    # motors 1 right, 2 left, 3 front, 4 rear; the vehicle's rotors front, left, rear, right
+    np.testing.assert_allclose(log.command, SHARES[:, [2, 1, 3, 0]], atol=1e-3)
+
+
+def test_pulses_of_old_copters_have_other_names(ardupilot):
+    servos = {f"SERVO{i}_FUNCTION": None for i in range(1, 15)}
+    given = {"FRAME": 1.0, "MOT_PWM_MIN": 1000.0, "MOT_PWM_MAX": 2000.0}
+    new, old = (read_log(ardupilot(columns=c, **servos, **given)).command for c in ("C", "Ch"))
+    assert np.array_equal(new, old)
+
+
+def test_rotors_are_found_by_their_directions():
+    x = [(0.2, -0.2), (-0.2, 0.2), (0.2, 0.2), (-0.2, -0.2)]
+    assert order_by_places(x) == (3, 2, 4, 1)
+    plus = [(0.0, -1.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 0.0)]
+    assert order_by_places(plus) is None
+    assert order_by_places(plus, ARDRONE) is None
+    assert order_by_places(plus, PLUS) == (3, 2, 4, 1)
+    assert order_by_places([(1.0, 1.0)] * 4) is None
+
+
+def test_servos_do_not_run_as_motors_do():
+    assert running(SHARES, 0.0, 1.0) == list(range(8))
+    assert running(np.column_stack([SHARES[:, :4], SERVOS]), 0.0, 1.0) == [0, 1, 2, 3]
+    still = np.column_stack([SHARES[:, :4], np.full(len(T), 0.4), np.full(len(T), np.nan)])
+    assert running(still, 0.0, 1.0) == [0, 1, 2, 3]
+
+
+def test_a_decoded_blackbox_of_six_motors_and_of_ten_times_the_volts(tmp_path):
+    names = ["time (us)", "vbatLatest (V)", *(f"gyroADC[{i}]" for i in range(3))]
+    names += [*(f"accSmooth[{i}]" for i in range(3)), *(f"motor[{i}]" for i in range(6))]
+    still = np.zeros((len(T), 3)), np.tile([0.0, 0.0, 2048.0], (len(T), 1))
+    rows = np.column_stack([1e6 * T, np.full(len(T), 227.0), *still, 48 + 2000 * SHARES[:, :6]])
+    path = tmp_path / "log.csv"
+
+    def write(count):
+        kept = len(names) - 6 + count
+        text = "\n".join(",".join(f"{x:.6g}" for x in row[:kept]) for row in rows)
+        path.write_text(",".join(names[:kept]) + "\n" + text + "\n")
+
+    write(6)
+    with pytest.raises(InputError, match=r"motor\[5\] says a vehicle with 6 rotors"):
+        read_log(path)
+    write(4)
+    log = read_log(path)
+    assert log.voltage[0] == pytest.approx(22.7)
+    assert any("taken as a tenth" in note for note in log.notes)
+
+
+def test_voltages_of_no_battery_are_left_out(tmp_path):
+    columns = {"t": T, "omega1": 400 + T, "omega2": 400 + T, "omega3": 400 + T, "omega4": 400 + T}
+    columns |= {"px": T, "py": T, "pz": T, "qw": 1 + 0 * T, "qx": 0 * T, "qy": 0 * T, "qz": 0 * T}
+    columns["vbat"] = np.where(np.arange(len(T)) == 50, 227.0, 11.1)
+    path = tmp_path / "log.csv"
+    table = np.column_stack([*columns.values()])
+    np.savetxt(path, table, "%.9g", ",", header=",".join(columns), comments="")
+    log = read_log(path)
+    np.testing.assert_allclose(log.voltage, 11.1)
+    assert any("1 of 300 voltages, 227 to 227 V, are none of a" in note for note in log.notes)
+
+
+def test_a_log_of_motor_requests_alone_serves_to_compare(tmp_path):
+    """As CrazyPAD's SD-card logs: no pitch, no gyro, no accelerometer."""
+    motors = {f"motor.m{i + 1}(H)": (65535 * SHARES[:, i]).astype(int) for i in range(4)}
+    place = {f"stateEstimate.{axis}(f)": np.sin(T) for axis in "xyz"}
+    path = tmp_path / "log00"
+    path.write_bytes(sd_card({"fixedFrequency": (T, motors | place)}))
+    log = read_log(path)
+    assert not log.has_pose
+    np.testing.assert_allclose(log.command, SHARES[:, [3, 2, 1, 0]], atol=1e-4)
+    assert any("how the rotors share the work, and nothing else" in note for note in log.notes)
