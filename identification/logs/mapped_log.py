@@ -17,6 +17,7 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from .channels import Samples, in_kit_axes, in_kit_units, quaternions
+from .column_parts import further_rotors, rotors_said
 from .commanded_speeds import flown_vehicle
 from .flight_log import NORM_TOLERANCE, FlightLog, vehicle_of_columns
 from .log_map import Attitude, Battery, Columns, Commands, LogMap, Position, Rotors, constant
@@ -51,6 +52,9 @@ def map_table(
         log_map = replace(log_map, vehicle=vehicle_of_columns(table))
     vehicle = flown_vehicle(vehicle, log_map.vehicle)
     log_map = fitted(table, log_map, vehicle, reader)
+    for motors in filter(None, (log_map.rotors, log_map.commands)):
+        if further := further_rotors(motors.columns, table):
+            raise InputError(f"{table.path}: {rotors_said(motors.columns, further)}")
     columns = table.read(wanted_columns(log_map))
     if log_map.is_own and rows_apart(Samples(np.arange(float(table.rows)), columns), log_map):
         log_map = replace(log_map, rows="mixed")

@@ -374,4 +374,9 @@ def _plain_lines(layout: TextLayout, lines: Sequence[str], width: int) -> Sequen
         return []
     gap, filled = mark + mark, f"{mark}nan{mark}"
     # two passes, because neighbours share a separator
-    return [f"{mark}{line}{mark}".replace(gap, filled).replace(gap, filled)[1:-1] for line in lines]
+    return [
+        f"{mark}{line}{mark}".replace(gap, filled).replace(gap, filled)[1:-1]
+        if gap in line or line[:1] == mark or line[-1:] == mark
+        else line
+        for line in lines
+    ]
