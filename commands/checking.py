@@ -37,7 +37,7 @@ def check(
             found = check_log(log, reader, model, map)
     except UnreadLogError as error:
         if write_map is None:
-            console.print(error.map_text, soft_wrap=True, markup=False, highlight=False)
+            console.print(error.map_text, soft_wrap=True, highlight=False)
             where = "stands above; --write-map map.yaml writes it"
         else:
             write_text(error.map_text, write_map)
@@ -86,7 +86,7 @@ def check(
             ],
         )
         if write_map is None:
-            console.print(found.map_text, soft_wrap=True, markup=False, highlight=False)
+            console.print(found.map_text, soft_wrap=True, highlight=False)
     for text in flight.notes:
         if not text.startswith("warning"):
             console.print(text)

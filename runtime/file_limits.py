@@ -2,8 +2,8 @@
 text may take any time.
 
 With these limits no file takes more than about 1 GB of memory or 10 s before it is refused; files
-that pass may take longer. Everything is counted while it is unpacked; only of a
-Parquet file's columns are the sizes believed that its footer states.
+that pass may take longer. Everything is counted while it is unpacked; of a Parquet file's columns
+the sizes are believed that its footer states.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ class FileLimits:
             log is copied about twice.
         gzip_members: packed parts of one ``.gz`` file; those of parallel packers hold 64 kB or
             more.
-        parquet_footer: bytes of what describes a Parquet file.
+        parquet_footer: items of a list, or bytes of a text, in what describes a Parquet file.
         yaml_text: bytes of a YAML file, the settings of a vehicle or of a training.
         yaml_values: values in it, with every alias written out.
         yaml_depth: of values within values.
@@ -49,7 +49,7 @@ class FileLimits:
     table_rows: int = 4_000_000
     table_numbers: int = 2**25
     gzip_members: int = 100_000
-    parquet_footer: int = 2**24
+    parquet_footer: int = 2**20
     yaml_text: int = 200_000
     yaml_values: int = 20_000
     yaml_depth: int = 60

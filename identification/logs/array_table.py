@@ -3,6 +3,7 @@ is ``struct.field``, a column of a matrix ``name[0]``, ``name[1]`` ...
 """
 
 import io
+import math
 import zlib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,7 +19,23 @@ from ...runtime.file_limits import LIMITS, check_count
 from ...runtime.regular_files import read_bytes
 from .table import WHAT, Array, Table
 
-_HEAD, _PACKED = 128, 15  # bytes of a MATLAB file's header, and kind of a packed element
+# of a MATLAB file (its manual "MAT-File Format"): bytes of its header; kinds of elements, an array
+# and a packed one; classes of arrays; and types of numbers
+_HEAD, _MATRIX, _PACKED = 128, 14, 15
+_STRUCT, _NUMBERS = 2, range(6, 16)
+_TYPES = {
+    1: "i1",
+    2: "u1",
+    3: "i2",
+    4: "u2",
+    5: "i4",
+    6: "u4",
+    7: "f4",
+    9: "f8",
+    12: "i8",
+    13: "u8",
+}
+_Order = Literal["big", "little"]
 _SHOWN = 10  # arrays that a note lists
 
 
@@ -82,33 +99,74 @@ def _arrays(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _matlab(path: Path, data: bytes) -> dict[str, Any]:
-    """Return the variables of a MATLAB file.
+    """Return the numbers and structs of a MATLAB file of version 5 to 7; texts, cells and objects
+    are None. scipy's reader takes the same files, but ends the program at a spoiled one.
 
     Raises:
         InputError: it is of version 7.3 and h5py is not installed, or unpacks to too much.
+        ValueError: it is no such file, or is cut.
     """
     if data.startswith(b"MATLAB 7.3"):
         return _hdf5(path, data)
-    from scipy.io import loadmat
-
-    loaded: dict[str, Any] = loadmat(io.BytesIO(_unpacked(path, data)), simplify_cells=True)
-    return loaded
-
-
-def _unpacked(path: Path, data: bytes) -> bytes:
-    """Return a MATLAB file whose elements are not packed; what they unpack to is counted."""
-    order: Literal["big", "little"] = "big" if data[126:128] == b"MI" else "little"
-    out, at, left = [data[:_HEAD]], _HEAD, LIMITS.table_text
-    while at + 8 <= len(data):
-        kind, size = (int.from_bytes(data[at + k : at + k + 4], order) for k in (0, 4))
-        element = data[at : at + 8 + size]
+    if data[126:128] not in (b"IM", b"MI"):
+        raise ValueError("no MATLAB file of version 5 to 7")
+    order: _Order = "big" if data[126:128] == b"MI" else "little"
+    found, left = {}, LIMITS.table_text
+    for kind, inside in _elements(memoryview(data)[_HEAD:], order):
+        element: Any = inside
         if kind == _PACKED:
-            element = zlib.decompressobj().decompress(element[8:], left + 1)
-        left -= len(element)
-        check_count(path, LIMITS.table_text - left, LIMITS.table_text, "bytes unpacked")
-        out.append(element)
-        at += 8 + size
-    return b"".join(out)
+            machine = zlib.decompressobj()
+            unpacked = machine.decompress(inside, left + 1)
+            left -= len(unpacked)
+            check_count(path, LIMITS.table_text - left, LIMITS.table_text, "bytes unpacked")
+            ((kind, element),) = _elements(memoryview(unpacked), order)
+        if kind == _MATRIX:
+            name, value = _matrix(element, order)
+            found[name] = value
+    return found
+
+
+def _elements(data: memoryview, order: _Order) -> Iterator[tuple[int, memoryview]]:
+    """Yield the kinds and contents of elements that follow one another, each at a multiple of 8
+    bytes behind another that is not packed.
+
+    Raises:
+        ValueError: the last one is cut.
+    """
+    at = 0
+    while at < len(data):
+        kind, size = (int.from_bytes(data[at + k : at + k + 4], order) for k in (0, 4))
+        begin = at + 8
+        if kind >> 16:  # a small one: size and kind in one word
+            kind, size, begin = kind & 0xFFFF, kind >> 16, at + 4
+        if begin + size > len(data):
+            raise ValueError("it is cut")
+        yield kind, data[begin : begin + size]
+        at = begin + size
+        at += 0 if kind == _PACKED else -at % 8
+
+
+def _matrix(data: memoryview, order: _Order) -> tuple[str, Any]:
+    """Return the name and the value of an array.
+
+    Raises:
+        ValueError: it is none.
+    """
+    (_, flags), (_, shape), (_, name), *rest = _elements(data, order)
+    mark = "<" if order == "little" else ">"
+    lengths = np.frombuffer(shape, f"{mark}i4").tolist()
+    kind = int.from_bytes(flags[:4], order) & 0xFF
+    value: Any = None
+    if kind in _NUMBERS and rest:
+        values = np.frombuffer(rest[0][1], mark + _TYPES[rest[0][0]])
+        value = values.reshape(lengths, order="F")
+    elif kind == _STRUCT and math.prod(lengths) == 1:
+        (_, width), (_, names), *fields = rest
+        step = int.from_bytes(width, order)
+        starts = range(0, len(names), step)
+        keys = [bytes(names[i : i + step]).partition(b"\0")[0].decode("latin-1") for i in starts]
+        value = {key: _matrix(one, order)[1] for key, (_, one) in zip(keys, fields, strict=True)}
+    return bytes(name).decode("latin-1"), value
 
 
 def _hdf5(path: Path, data: bytes) -> dict[str, Any]:

@@ -93,17 +93,19 @@ def _bare(text: str) -> str:
 
 
 def groups_of(names: Iterable[Name], endings: Sequence[str]) -> list[Group]:
-    """Return the groups of columns whose names differ in one of ``endings`` alone, at the end or at
-    the beginning, in the order of the endings.
+    """Return the groups of columns whose names differ in one of ``endings`` alone, at the end, at
+    the beginning, or as a word or a word's number between others, in the order of the endings.
     """
     found: dict[tuple[str, bool], dict[str, Name]] = {}
     names = list(names)
     bases = {name.base for name in names}
+    before = "(?<!\\d)" if endings[0].isdigit() else "_"
     for name in names:
         for ending in endings:
             for key, behind in (
                 (name.base.removesuffix(ending), True),
                 (name.base.removeprefix(ending), False),
+                (re.sub(rf"{before}{ending}_(?=.)", "_", name.base, count=1), True),
             ):
                 if key == name.base or key == "_" or (not behind and key[:1] not in ("_", "")):
                     continue

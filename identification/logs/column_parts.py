@@ -61,9 +61,7 @@ class Candidate:
 
 def correlation(x: Array, y: Array) -> float:
     """Return the correlation of two series (n,); 0 where one is constant."""
-    x, y = x - x.mean(), y - y.mean()
-    size = float(np.sqrt((x @ x) * (y @ y)))
-    return float(x @ y) / size if size > 0.0 else 0.0
+    return float(np.nan_to_num(np.corrcoef(x, y)[0, 1]))
 
 
 class Numbers:
@@ -286,12 +284,14 @@ def find_parts(names: Sequence[Name], numbers: Numbers) -> dict[str, list[Candid
 def _candidates(part: str, names: Sequence[Name], numbers: Numbers) -> Iterator[Candidate]:
     """Yield the candidates of a part, with a score by their names and numbers."""
     named = {column for way in _TRIPLES for g in groups_of(names, way) for column in g.columns}
+    fours = (group for ending in _FOURS for group in groups_of(names, ending))
+    commanded = part == "motors" and any(_is_named(group, part) for group in fours)
     for number, way in enumerate(words()["parts"][part]):
         for kind in ("endings", "numbered"):
             for endings in way.get(kind, ()):
                 for group in groups_of(names, endings):
                     i = _place_of(group.key, way["words"])
-                    if i is None and _is_named(group, part):
+                    if i is None and (commanded or _is_named(group, part)):
                         continue
                     named |= set(group.columns)
                     if i is None:
@@ -300,8 +300,7 @@ def _candidates(part: str, names: Sequence[Name], numbers: Numbers) -> Iterator[
                     by_name = PARTS.numbers - 0.3 * i - 0.5 * number
                     yield from _judged(part, group, by_name, "by the columns' names", numbers)
     width = 4 if part in ("attitude", "motors") else 3
-    fours = (group for ending in _FOURS for group in groups_of(names, ending))
-    if part == "commands" or (part == "motors" and any(_is_named(group, part) for group in fours)):
+    if part == "commands" or commanded:
         return
     loose = [name for name in names if name.column not in named and numbers.varies(name.column)]
     for group in side_by_side(loose, width):

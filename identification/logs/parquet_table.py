@@ -4,7 +4,6 @@
 A dictionary of one text may stand for any number of its copies, so columns must be numbers.
 """
 
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ import numpy as np
 from ...runtime.errors import InputError
 from ...runtime.extras import need
 from ...runtime.file_limits import LIMITS, check_count
-from ...runtime.regular_files import check_regular, open_regular
+from ...runtime.regular_files import check_regular
 from .table import WHAT, Array, Table
 
 _BUFFER = 2**20  # bytes of a column that are read at a time
@@ -31,9 +30,13 @@ def open_parquet(path: Path) -> Table:
     from pyarrow import parquet
 
     check_regular(path, WHAT, LIMITS.table_text)
-    _check_footer(path)
     try:
-        file = parquet.ParquetFile(path, buffer_size=_BUFFER)
+        file = parquet.ParquetFile(
+            path,
+            buffer_size=_BUFFER,
+            thrift_string_size_limit=LIMITS.parquet_footer,
+            thrift_container_size_limit=LIMITS.parquet_footer,
+        )
         rows = int(file.metadata.num_rows)
         columns: dict[str, Any] = {}  # by name: an array of its own, or the file's field
         header: list[str] = []
@@ -138,20 +141,6 @@ def write_parquet(columns: Mapping[str, Array], path: Path, temporary: Path) -> 
 
     arrays = {name: pyarrow.array(column, from_pandas=True) for name, column in columns.items()}
     parquet.write_table(pyarrow.table(arrays), temporary)
-
-
-def _check_footer(path: Path) -> None:
-    """Raise InputError where what describes the file is too long; a library turns it into many
-    times its size.
-    """
-    with open_regular(path, WHAT) as file:
-        file.seek(max(0, os.fstat(file.fileno()).st_size - 8))
-        end = file.read(8)
-    length = int.from_bytes(end[:4], "little")
-    if end[4:] == b"PAR1" and length > LIMITS.parquet_footer:
-        raise InputError(
-            f"{path}: its footer has {length} bytes; expected at most {LIMITS.parquet_footer}"
-        )
 
 
 def _check_size(path: Path, file: Any, root: str) -> None:

@@ -248,7 +248,7 @@ def test_a_column_that_would_unpack_to_too_much_is_refused_by_the_footer(tmp_pat
             )
             np.testing.assert_array_equal(read_log(path).t, columns["t"])
     monkeypatch.setattr(parquet_table, "LIMITS", replace(LIMITS, table_numbers=10_000))
-    with pytest.raises(InputError, match="more than 10000 numbers in column px"):
+    with pytest.raises(InputError, match="more than 10000 numbers in column"):
         read_log(path)
 
 

@@ -1,5 +1,6 @@
 """Arrays, structs and lists as columns of one table: MATLAB, NumPy, Parquet and text."""
 
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -85,6 +86,20 @@ def test_a_matlab_file_that_cannot_be_read_says_what_to_do(
     (tmp_path / "a.mat").write_bytes(data)
     with pytest.raises(InputError, match=expected):
         open_table(tmp_path / "a.mat")
+
+
+def test_a_spoiled_matlab_file_is_refused_or_read(tmp_path: Path) -> None:
+    """scipy's own reader ends the program at some of these."""
+    from scipy.io import savemat
+
+    savemat(tmp_path / "whole.mat", {"t": T, "log": {"p": PLACE, "about": ["x", "yy"]}})
+    good, rng = (tmp_path / "whole.mat").read_bytes(), np.random.default_rng(0)
+    for _ in range(200):
+        data = np.frombuffer(good, np.uint8).copy()
+        data[rng.integers(0, 700, 3)] = rng.integers(0, 256, 3)
+        (tmp_path / "a.mat").write_bytes(data[: rng.integers(1, 2 * len(data))].tobytes())
+        with suppress(InputError):
+            assert open_table(tmp_path / "a.mat").rows > 1
 
 
 def test_a_packed_matlab_file_is_counted_while_it_is_unpacked(

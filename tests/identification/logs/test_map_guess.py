@@ -102,6 +102,8 @@ _VICON = "/vicon/drone/transform"
             + [f"/fmu/out/sensor_combined/gyro_rad.{i:02d}" for i in range(3)]
             + [f"/fmu/out/esc_status/rotor_speed.{i:02d}" for i in range(4)]
         ),
+        "time_s uav_x_place uav_y_place uav_z_place uav_w_turn uav_x_turn uav_y_turn uav_z_turn "
+        f"{_SENSORS} rotor1_rate rotor2_rate rotor3_rate rotor4_rate",
         "c%",  # names that say nothing: the numbers do
     ],
 )
