@@ -127,6 +127,16 @@ def groups_of(names: Iterable[Name], endings: Sequence[str]) -> list[Group]:
     return [group for group in out if not re.search(words()["not_measured"], group.key)]
 
 
+def named_alone(names: Sequence[Name], part: str) -> list[Name]:
+    """Return the names that speak for a part of one column, the likeliest first: the time, or the
+    battery's voltage.
+    """
+    known = words()[part]
+    whole = [name for word in known for name in names if name.base == word]
+    tails = [word if len(word) > 3 else f"_{word}" for word in known]
+    return [*whole, *(name for tail in tails for name in names if name.base.endswith(tail))]
+
+
 def side_by_side(names: Sequence[Name], width: int) -> list[Group]:
     """Return the groups of ``width`` columns that stand beside one another."""
     wanted = re.compile(words()["not_measured"])

@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from .column_names import Group, Name, groups_of, side_by_side, words
+from .column_names import Group, Name, groups_of, named_alone, side_by_side, words
 from .log_map import ACCELERATION_UNITS, RATE_UNITS
 from .magnitudes import MAGNITUDES, within
 from .table import Array, Table
@@ -248,6 +248,20 @@ class Numbers:
         if len(x) < PARTS.fewest or correlation(x, y) < 0.85:
             return np.nan
         return float(np.std(y) / np.std(x))
+
+
+def named_columns(names: Sequence[Name]) -> set[str]:
+    """Return the columns whose names speak for a part."""
+    groups = [
+        group
+        for ways in words()["parts"].values()
+        for way in ways
+        for endings in (*way.get("endings", ()), *way.get("numbered", ()))
+        for group in groups_of(names, endings)
+        if _is_named(group, "")
+    ]
+    alone = [name.column for part in ("time", "battery") for name in named_alone(names, part)]
+    return {*alone, *(column for group in groups for column in group.columns)}
 
 
 def find_parts(names: Sequence[Name], numbers: Numbers) -> dict[str, list[Candidate]]:

@@ -21,9 +21,18 @@ import yaml
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
+from ...runtime.file_limits import LIMITS
 from .channels import BODY_TURNS
-from .column_names import Group, Name, take_apart, words
-from .column_parts import PARTS, Candidate, Numbers, find_parts, further_rotors, rotors_said
+from .column_names import Group, Name, named_alone, take_apart, words
+from .column_parts import (
+    PARTS,
+    Candidate,
+    Numbers,
+    find_parts,
+    further_rotors,
+    named_columns,
+    rotors_said,
+)
 from .evidence import EVIDENCE, Evidence, Ranking, likelihood
 from .excerpt import LONGEST
 from .inertial import gyro_shares
@@ -159,6 +168,9 @@ def _numbers_of(table: Table, names: Sequence[Name]) -> dict[str, Array]:
     """Return the columns (rows,) that hold numbers, but for those in which text turns up later."""
     once = [n.column for n in names if table.header.count(n.column) == 1]
     wanted = [column for column in once if not table.numeric or column in table.numeric]
+    if len(wanted) * table.rows > LIMITS.table_numbers // 2:  # those whose names say something
+        named = named_columns(names)
+        wanted = [column for column in wanted if column in named]
     while wanted:
         try:
             return table.read(wanted)
@@ -173,14 +185,7 @@ def _numbers_of(table: Table, names: Sequence[Name]) -> dict[str, Array]:
 def _time_column(names: Sequence[Name], data: Mapping[str, Array]) -> Name | None:
     """Return the column of the time: by its name, else the first that increases throughout."""
     there = [name for name in names if name.column in data]
-    named = [name for word in words()["time"] for name in there if name.base == word]
-    named += [
-        name
-        for name in there
-        if name.base.startswith("time") or name.base.endswith(("time", "timestamp"))
-    ]
-    named += [name for name in there if name.base.rpartition("_")[2] in words()["time"]]
-    for name in named:
+    for name in named_alone(there, "time"):
         values = data[name.column]
         steps = np.diff(values[np.isfinite(values)])
         if np.any(steps > 0.0) and np.mean(steps >= 0.0) > 0.9:
@@ -210,10 +215,8 @@ class _Guessing:
         rest = [name for name in names if name is not self.clock]
         self.ranked = find_parts(rest, self.numbers)
         self.parts = {p: c[0].group for p, c in self.ranked.items() if c and c[0].score > 0.0}
-        for word in words()["battery"]:
-            for name in rest:
-                if f"_{name.base}".endswith(f"_{word}") and "battery" not in self.parts:
-                    self.parts["battery"] = Group((name.column,), name.base, name.unit)
+        if volts := named_alone(rest, "battery"):
+            self.parts["battery"] = Group((volts[0].column,), volts[0].base, volts[0].unit)
         if not {"position", "attitude"} <= set(self.parts):
             self.parts = {k: v for k, v in self.parts.items() if k not in ("position", "attitude")}
         self.parts = {p: g for p, g in self.parts.items() if set(g.columns) <= set(data)}
@@ -235,14 +238,11 @@ class _Guessing:
 
     def say_rivals(self, part: str, ranked: Sequence[Candidate]) -> None:
         """Keep that other columns may be a part, where they do."""
-        first = ranked[0]
-        rivals = [c for c in ranked[1:] if c.score > max(0.0, first.score - PARTS.certain)]
-        if rivals or not first.why.startswith("by the"):
-            columns = first.group.columns
-            why = f"taken: {columns[0]} ... ({first.why})"
-            if rivals:
-                why = f"{len(rivals) + 1} groups of columns look like it; {why}"
-            self.say(part, "order" if len(columns) == 4 else "columns", False, why)
+        least = max(0.0, ranked[0].score - PARTS.certain)
+        likely = [candidate for candidate in ranked if candidate.score > least]
+        if len(likely) > 1 or not self.by_name[part]:
+            field = "order" if len(ranked[0].group.columns) == 4 else "columns"
+            self.say(part, field, False, "; or ".join(map(str, likely[: PARTS.shown])))
 
     def missing(self) -> list[Missing]:
         """Return what the map lacks for a flight log."""
@@ -258,7 +258,10 @@ class _Guessing:
         has = {part for part in ("position", "accelerometer", "gyro") if part in self.sections}
         imu = "accelerometer", "gyro"
         if "position" not in has and not has.issuperset(imu):
-            poses = {p for p in ("position", "attitude") if self.is_likely(p)}
+            likely = {
+                part for part, ranked in self.ranked.items() if ranked and ranked[0].score > 0
+            }
+            poses = likely & {"position", "attitude"}
             # what is nearest to be whole: half a pose, half an IMU, else a pose
             wanted = ("position", "attitude") if poses or not has else imu
             for part in wanted:
@@ -281,10 +284,6 @@ class _Guessing:
             why = "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
             lack("motors", "rotors", 4, why)
         return out
-
-    def is_likely(self, part: str) -> bool:
-        """Return whether some columns are likely to be a part."""
-        return bool(self.ranked[part]) and self.ranked[part][0].score > 0.0
 
     def say(self, section: str, name: str, certain: bool, why: str) -> None:
         """Keep why a field is what it is."""

@@ -1,6 +1,7 @@
 """Maps that are guessed: right, or marked as a guess, never silently wrong."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ import yaml
 
 from tests.support.random_tables import fields_of, flight, random_table, save
 from windwrench.dynamics import load_vehicle
+from windwrench.identification.logs import map_guess
+from windwrench.identification.logs import table as table_module
 from windwrench.identification.logs.column_names import Group
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.log_map import parse_map
@@ -144,6 +147,18 @@ def test_what_is_missing_is_left_open_beside_what_is_known(
     assert "?" in str(written[field.split(".")[0]])
     assert f"# choose {field}: " in map_yaml(found)
     assert written["position"]["columns"] == ["x", "y", "z"]
+
+
+def test_of_a_huge_table_columns_are_read_whose_names_say_something(
+    tmp_path: Path, flown: FlightLog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    columns = columns_of(flown, f"t x y z {_QUATERNION} {_SENSORS} rpm1 rpm2 rpm3 rpm4")
+    columns |= {f"blob{name}": columns["vx"] for name in "abcdefgh"}
+    path = table_of(columns, tmp_path / "a.csv")
+    most = 25 * len(flown.t)
+    for module in (map_guess, table_module):
+        monkeypatch.setattr(module, "LIMITS", replace(module.LIMITS, table_numbers=most))
+    assert not guessed(path).missing
 
 
 def test_more_than_four_rotors_that_move_are_refused(tmp_path: Path, flown: FlightLog) -> None:
