@@ -63,7 +63,7 @@ from .magnitudes import (
     voltage_unit,
     within,
 )
-from .readings import DECLARED, ROTORS, rotations, table_readings
+from .readings import DECLARED, OTHER, ROTORS, rotations, table_readings
 from .rotor_orders import ORDERS, Order, order_names, order_words
 from .table import Array, Table
 
@@ -351,15 +351,19 @@ class _Guessing:
         readings = table_readings(
             orders if is_quaternion else (),
             units,
-            lengths=(place.unit,) if place.unit in LENGTH_UNITS else ("m", "cm", "mm"),
+            lengths=(place.unit,) if place.unit == "ft" else ("m", "cm", "mm"),
             hint="ned" if re.search("ned|down|d$", "".join(place.columns).lower()) else "",
         )
+        if place.unit in LENGTH_UNITS:
+            readings = [
+                replace(r, unlikely=r.unlikely + OTHER * (r.length != place.unit)) for r in readings
+            ]
         motors = self.values.get("motors", self.values.get("commands"))
         thrusts = np.ones((len(self.t), 4)) if motors is None else np.square(motors)
         evidence = Evidence(self.t, thrusts, self.values["position"], attitude)
         self.ranking = Ranking.of(evidence, readings, torques=False)
         best = self.ranking.best
-        self.unit("position", place.unit, LENGTH_UNITS, lambda: self.by_motion("length"))
+        length = self.unit("position", place.unit, LENGTH_UNITS, lambda: self.by_motion("length"))
         told = [("world", "", "world"), ("body", "", "body"), ("attitude", "sense", "sense")]
         made = Attitude(group.columns, order=best.order, sense=best.sense)
         if not is_quaternion:
@@ -375,7 +379,7 @@ class _Guessing:
             self.say("attitude", "order", True, "by the columns' names")
         for section, name, prop in told:
             self.take(section, name, self.by_motion(prop))
-        position = Columns(place.columns, best.length)
+        position = Columns(place.columns, length)
         self.sections |= {"world": best.world, "body": best.body}
         self.sections |= {"position": position, "attitude": made}
 

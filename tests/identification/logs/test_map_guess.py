@@ -196,12 +196,16 @@ def test_units_are_told_by_physics_not_by_names(tmp_path: Path, flown: FlightLog
     assert unit_of("m%", 1900.0 / most) == "rad/s?"  # of the size of pulses, but no offset
     assert unit_of("pwm_%", np.round(255.0) / most) == "counts?"
     assert unit_of("rpm%", 1.0, vehicle="ardrone2") == "rad/s?"
-    for name in ("ax", "ay", "az"):
-        columns[f"{name} [m/s2]"] = columns.pop(name) / 9.80665
+    for name in "xyz":
+        columns[f"a{name} [m/s2]"] = columns.pop(f"a{name}") / 9.80665
+        columns[f"{name} [mm]"] = columns.pop(name)
     found = guessed(table_of(columns | speeds, tmp_path / "g.csv"))
     assert found.log_map.accelerometer is not None
     assert found.log_map.accelerometer.unit == "g"
-    assert any("though the columns' names say m/s2" in reason.why for reason in found.doubts)
+    assert found.log_map.position is not None
+    assert found.log_map.position.unit == "m"
+    for unit in ("m/s2", "mm"):
+        assert any(f"though the columns' names say {unit}" in r.why for r in found.doubts)
 
 
 @pytest.mark.parametrize(
