@@ -39,6 +39,8 @@ class PartSettings:
     alike: float = 1.6  # ratio of medians of four rotors
     is_rate: float = 0.9  # the same, of a rate that a column states
     felt: float = 0.5  # correlation of rotors with the specific force
+    left: float = 0.5  # share of a further rotor's variance that the four leave, at most
+    rotor_sizes: tuple[float, float] = (0.5, 2.0)  # of its median by theirs
     shown: int = 4  # candidates that a map lists
 
 
@@ -368,25 +370,26 @@ def _judged(
 
 
 def further_rotors(columns: Sequence[str], table: Table) -> list[str]:
-    """Return the columns that go on with the numbers of four motors' columns, and move as they do:
-    those of a vehicle of more rotors.
+    """Return the columns that go on with the numbers of four motors' columns, and turn as they do:
+    those of a vehicle of more rotors. An output that is not a motor's by name may be a servo's, and
+    counts where it is a sum of the four: all are mixed of thrust, roll, pitch and yaw.
 
     Raises:
         InputError: the table cannot be read.
     """
-    beside = numbered_alike(columns, table.numeric or table.header)
-    data = table.read([*columns, *beside])
-    four = np.column_stack([data[name] for name in columns])
-    there = np.isfinite(four).all(axis=1)
-    if not beside or not there.any():
-        return []
-    low, high = (float(np.quantile(four[there], q)) for q in (0.01, 0.99))
-    edge, out = 0.5 * (high - low), []
-    for name in beside:
-        values = data[name][there]
-        values = values[np.isfinite(values)]
-        turns = len(values) > 1 and np.ptp(values) > 0.0
-        if turns and low - edge <= float(np.median(values)) <= high + edge:
+    out = []
+    for name in numbered_alike(columns, table.numeric or table.header):
+        data = table.read([*columns, name])
+        rows = np.column_stack(list(data.values()))
+        rows = rows[np.isfinite(rows).all(axis=1)]
+        if len(rows) < PARTS.fewest or np.ptp(rows[:, 4]) == 0.0:
+            continue
+        size = abs(float(np.median(rows[:, 4]) / max(np.median(np.abs(rows[:, :4])), 1e-12)))
+        moves = rows - rows.mean(axis=0)
+        left = np.linalg.lstsq(moves[:, :4], moves[:, 4])[1]
+        share = float(left[0] / np.sum(moves[:, 4] ** 2)) if len(left) else 0.0
+        is_motor = re.search(words()["motor_words"], name.lower())
+        if (is_motor or share < PARTS.left) and within(size, PARTS.rotor_sizes):
             out.append(name)
     return out
 

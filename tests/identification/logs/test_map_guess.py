@@ -171,6 +171,9 @@ def test_more_than_four_rotors_that_move_are_refused(tmp_path: Path, flown: Flig
     assert expected in guessed(path).lacks
     with pytest.raises(InputError, match=re.escape(expected)):
         map_table(open_table(path), good)
+    servo = 450.0 + 50.0 * np.sin(0.7 * flown.t)  # of a gimbal, on an output beside
+    idle = {"w5": servo, "w6": 0.0 * servo}
+    assert not guessed(table_of(columns | idle, tmp_path / "servo.csv")).missing
     columns |= {"w5": 0.0 * flown.t, "w6": 0.0 * flown.t}  # of an autopilot that has outputs left
     assert not guessed(table_of(columns, tmp_path / "idle.csv")).missing
 
