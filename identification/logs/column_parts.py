@@ -107,6 +107,8 @@ class Numbers:
     def between(self, t: Array, columns: Sequence[str]) -> Array:
         """Return values (n, k) at times (n,), of lines between the rows."""
         times, values = self.rows(columns)
+        if not len(times):
+            return np.full((len(t), len(columns)), np.nan)
         return np.column_stack([np.interp(t, times, x) for x in values.T])
 
     def varies(self, column: str) -> bool:
@@ -272,8 +274,9 @@ def find_parts(names: Sequence[Name], numbers: Numbers) -> dict[str, list[Candid
 
     Args:
         names: of the columns, but the time's.
-        numbers: of columns; those without are judged by their names.
+        numbers: of columns; those without are no part's.
     """
+    names = [name for name in names if name.column in numbers.data]
     found: dict[str, list[Candidate]] = {}
     taken: set[str] = set()
     for part in ("attitude", "accelerometer", "gyro", "position", "motors", "commands"):
@@ -345,7 +348,7 @@ def _judged(
     they contradict it.
     """
     columns = group.columns
-    if not set(columns) <= set(numbers.data) or not len(numbers.rows(columns)[0]):
+    if not len(numbers.rows(columns)[0]):
         yield Candidate(group, score, why)
         return
     strengths: dict[str, float] = {}
