@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..runtime.errors import InputError
+from ..runtime.errors import InputError, UnreadLogError
 from ..runtime.page_files import write_text
 from .terminal import console, note, results_folder, say, show_table, working
 
@@ -23,7 +23,8 @@ def check(
     out: Path = Path("results/check"),
 ) -> dict[str, Any]:
     """Say what a flight log holds. How it was read and why; its channels, rates, gaps and doubts.
-    For a table of unknown columns a map is guessed; write a picture of the channels.
+    For a table of unknown columns a map is guessed, with ? where you must choose; write a picture
+    of the channels.
 
     Example: windwrench check theirs.csv --vehicle my_drone.yaml --write-map map.yaml
     """
@@ -32,8 +33,20 @@ def check(
     from ..identification.report.log_check import check_log
 
     model = None if vehicle is None else load_vehicle(vehicle)
-    with working("reading"):
-        found = check_log(log, reader, model, map, piece)
+    try:
+        with working("reading"):
+            found = check_log(log, reader, model, map, piece)
+    except UnreadLogError as error:
+        if write_map is None:
+            console.print(error.map_text, soft_wrap=True, highlight=False)
+            where = "stands above; --write-map map.yaml writes it"
+        else:
+            write_text(error.map_text, write_map)
+            where = f"is {write_map}"
+        name = write_map or "map.yaml"
+        raise InputError(
+            f"{error}. The map so far {where}: edit it, then windwrench check {log} --map {name}"
+        ) from error
     if write_map is not None and not found.map_text:
         raise InputError(
             f"--write-map {write_map}: {log} is read by {found.read_by} and needs no map"
@@ -76,7 +89,7 @@ def check(
             ],
         )
         if write_map is None:
-            console.print(found.map_text, soft_wrap=True)
+            console.print(found.map_text, soft_wrap=True, highlight=False)
     for text in flight.notes:
         if not text.startswith("warning"):
             console.print(text)

@@ -12,6 +12,14 @@ class InputError(ValueError):
     """A file, option, action or measurement of the user's that the kit cannot use."""
 
 
+class UnreadLogError(InputError):
+    """A log that cannot be read yet, and the map that was made for it so far."""
+
+    def __init__(self, message: str, map_text: str) -> None:
+        super().__init__(message)
+        self.map_text = map_text
+
+
 def unknown_name(what: str, name: str, known: Iterable[str], where: str = "") -> InputError:
     """Return the error for a name that is not among the known ones, with the nearest of them as a
     suggestion.

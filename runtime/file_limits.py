@@ -2,7 +2,8 @@
 text may take any time.
 
 With these limits no file takes more than about 1 GB of memory or 10 s before it is refused; files
-that pass may take longer. Everything is counted while it is unpacked, never believed from a header.
+that pass may take longer. Everything is counted while it is unpacked; of a Parquet file's columns
+the sizes are believed that its footer states.
 """
 
 from dataclasses import dataclass
@@ -23,9 +24,7 @@ class FileLimits:
             log is copied about twice.
         gzip_members: packed parts of one ``.gz`` file; those of parallel packers hold 64 kB or
             more.
-        parquet_page: of one page of a column; writers make pages of 1 MB.
-        parquet_pages: of all columns that are read.
-        parquet_footer: bytes of what describes a Parquet file.
+        parquet_footer: items of a list, or bytes of a text, in what describes a Parquet file.
         yaml_text: bytes of a YAML file, the settings of a vehicle or of a training.
         yaml_values: values in it, with every alias written out.
         yaml_depth: of values within values.
@@ -50,9 +49,7 @@ class FileLimits:
     table_rows: int = 4_000_000
     table_numbers: int = 2**25
     gzip_members: int = 100_000
-    parquet_page: int = 2**26
-    parquet_pages: int = 100_000
-    parquet_footer: int = 2**24
+    parquet_footer: int = 2**20
     yaml_text: int = 200_000
     yaml_values: int = 20_000
     yaml_depth: int = 60

@@ -16,8 +16,24 @@ from windwrench.runtime.errors import InputError
 
 from .runner import start
 
-ENDINGS = (".ulg", ".bin", ".bbl", ".bfl", ".bag", ".mcap", ".db3", ".csv", ".csv.gz", ".parquet")
-ENDINGS += (".mat", ".npz", ".txt")
+ENDINGS = tuple(
+    f".{kind}"
+    for kind in [
+        "ulg",
+        "bin",
+        "bbl",
+        "bfl",
+        "bag",
+        "mcap",
+        "db3",
+        "csv",
+        "csv.gz",
+        "parquet",
+        "mat",
+        "npz",
+        "txt",
+    ]
+)
 SHOWN = 160  # letters of a reason
 
 

@@ -58,7 +58,12 @@ class Group:
     columns: tuple[str, ...]
     key: str  # what their names share
     unit: str = ""
-    numbered: bool = False  # by numbers, not by axes
+    endings: tuple[str, ...] = ()  # of the names: axes or numbers, where these are known
+
+    @property
+    def numbered(self) -> bool:
+        """Whether the names say no axes."""
+        return not self.endings or self.endings[0].isdigit()
 
 
 def take_apart(header: Sequence[str], units: Sequence[str] = ()) -> list[Name]:
@@ -73,6 +78,7 @@ def take_apart(header: Sequence[str], units: Sequence[str] = ()) -> list[Name]:
         if not unit and i < len(units):
             unit = _units().get(_bare(units[i]), "")
         base = re.sub(r"[^0-9a-zA-Z]+", "_", text).strip("_").lower()
+        base = re.sub(r"(?<!\d)0+(\d)$", r"\1", base)  # q.00 is q.0
         out.append(Name(column, base or column.lower(), unit))
     return out
 
@@ -86,43 +92,56 @@ def _bare(text: str) -> str:
     return text.strip(" []()").lower()
 
 
-def groups_of(names: Iterable[Name], endings: Sequence[str], numbered: bool = False) -> list[Group]:
-    """Return the groups of columns whose names differ in one of ``endings`` alone, at the end or at
-    the beginning, in the order of the endings.
+def groups_of(names: Iterable[Name], endings: Sequence[str]) -> list[Group]:
+    """Return the groups of columns whose names differ in one of ``endings`` alone, at the end, at
+    the beginning, or as a word or a word's number between others, in the order of the endings.
     """
     found: dict[tuple[str, bool], dict[str, Name]] = {}
+    names = list(names)
+    bases = {name.base for name in names}
+    before = "(?<!\\d)" if endings[0].isdigit() else "_"
     for name in names:
         for ending in endings:
             for key, behind in (
                 (name.base.removesuffix(ending), True),
                 (name.base.removeprefix(ending), False),
+                (re.sub(rf"{before}{ending}_(?=.)", "_", name.base, count=1), True),
             ):
                 if key == name.base or key == "_" or (not behind and key[:1] not in ("_", "")):
                     continue
-                if key[-1:].isdigit() and behind and numbered:
+                if key[-1:].isdigit() and behind and endings[0].isdigit():
                     continue
                 found.setdefault((key.strip("_"), behind), {}).setdefault(ending, name)
     out = []
     for (key, _), members in found.items():
+        more = "3" if endings[-1] == "2" else "0" if endings[0] == "1" else ""
+        if more and {key + more, f"{key}_{more}"} & bases:
+            continue  # three of four, or four of five
         if len(members) == len(endings):
             named = [members[ending] for ending in endings]
             units = {name.unit for name in named}
             unit = units.pop() if len(units) == 1 else ""
-            group = Group(tuple(name.column for name in named), key, unit, numbered)
+            group = Group(tuple(name.column for name in named), key, unit, tuple(endings))
             if group not in out:
                 out.append(group)
     return [group for group in out if not re.search(words()["not_measured"], group.key)]
 
 
-def best_group(groups: Iterable[Group], keys: Sequence[str]) -> tuple[Group | None, int]:
-    """Return the group whose key fits the first of ``keys`` (regular expressions of a whole key)
-    that any fits, and how many fit at all.
+def named_alone(names: Sequence[Name], part: str) -> list[Name]:
+    """Return the names that speak for a part of one column, the likeliest first: the time, or the
+    battery's voltage.
     """
-    groups = list(groups)
-    fitting = [
-        (i, group) for group in groups for i, key in enumerate(keys) if re.fullmatch(key, group.key)
+    known = words()[part]
+    whole = [name for word in known for name in names if name.base == word]
+    tails = [word if len(word) > 3 else f"_{word}" for word in known]
+    return [*whole, *(name for tail in tails for name in names if name.base.endswith(tail))]
+
+
+def side_by_side(names: Sequence[Name], width: int) -> list[Group]:
+    """Return the groups of ``width`` columns that stand beside one another."""
+    wanted = re.compile(words()["not_measured"])
+    measured = [name for name in names if not wanted.search(name.base)]
+    return [
+        Group(tuple(name.column for name in measured[i : i + width]), "")
+        for i in range(len(measured) - width + 1)
     ]
-    if not fitting:
-        return None, 0
-    best = min(fitting, key=lambda item: item[0])
-    return best[1], len({group.columns for _, group in fitting})

@@ -29,7 +29,7 @@ from .flight_log import FlightLog
 from .flight_phases import usual_thrust
 from .log_map import LENGTH_UNITS
 from .readings import DECLARED, Reading, as_written, log_readings
-from .table import Array, Rows
+from .table import Array, Mask, Rows
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,7 @@ class EvidenceSettings:
     # moments of the air are larger than what turns the body; above, noise of the pose is
     turn_hz: tuple[float, float, float] = (1.0, 4.0, 3.0)
     rate_hz: float = 20.0  # of the samples compared
+    most: int = 2000  # of them; of longer flights every second one, or third ...
     period: float = 0.005  # s, the shortest of the clock of the filters
     edge: float = 0.3  # s at either end of a piece, where filters start
     gap: float = 0.1  # s (or 3.5 periods) without a sample, which end a piece
@@ -191,12 +192,14 @@ class Evidence:
             return []
         step = float(np.median(np.diff(self._t[rows])))
         period = max(step, EVIDENCE.period)
+        count = len(rows) * step * EVIDENCE.rate_hz
+        every = np.ceil(count / EVIDENCE.most) / (EVIDENCE.rate_hz * period)
         pieces, totals = [], []
         for part in unbroken(self._t, rows, max(EVIDENCE.gap, 3.5 * step)):
             begin, end = self._t[part[0]], self._t[part[-1]]
             if end - begin > EVIDENCE.shortest and len(part) > 8:
                 t = np.arange(begin, end, period)
-                edge, every = round(EVIDENCE.edge / period), 1.0 / (EVIDENCE.rate_hz * period)
+                edge = round(EVIDENCE.edge / period)
                 compared = np.arange(edge, len(t) - edge, max(1, round(every)))
                 piece = _Piece(part, t, period, compared)
                 total = piece.slow(piece.even(self._t, self._thrusts)) @ self._k
@@ -263,15 +266,22 @@ class Evidence:
     def _each(self, values: list[Array]) -> Iterator[tuple[Array, _Piece]]:
         return zip(values, self._pieces, strict=True)
 
-    def _pushes(self, delay: float) -> Array:
-        """Return the first thrusts (n, 9) of ``_driving`` at the samples compared less a delay; NaN
-        outside their piece.
+    def _pushes(self, delay: float) -> tuple[Mask, Array, Array]:
+        """Return which samples compared (n,) less a delay lie within their piece, the first thrusts
+        (m, 9) of ``_driving`` there less their means, and their covariances (9, 9).
         """
         out = []
         for x, p in self._each(self._driving):
-            at = p.t[p.compared] - delay
-            out.append(np.column_stack([np.interp(at, p.t, c, np.nan, np.nan) for c in x[:, :9].T]))
-        return np.concatenate(out)
+            at = p.compared - delay / p.period
+            row = np.clip(np.floor(at).astype(int), 0, len(x) - 2)
+            part = (at - row)[:, None]
+            between = x[row, :9] * (1.0 - part) + x[row + 1, :9] * part
+            out.append(np.where(((at >= 0.0) & (at <= len(x) - 1))[:, None], between, np.nan))
+        thrusts = np.concatenate(out)
+        there: Mask = np.isfinite(thrusts[:, 0])
+        thrusts = thrusts[there]
+        thrusts -= thrusts.mean(axis=0) if len(thrusts) else 0.0
+        return there, thrusts, thrusts.T @ thrusts / max(len(thrusts) - 1, 1)
 
     def _moving(self, *attitude: Any) -> tuple[Array, Array]:
         """Return what moves the body by one way to turn columns into rotations: specific thrust
@@ -343,11 +353,13 @@ class Evidence:
         """Return the covariances (13, 13) of the thrusts at a delay (s) and the motion; of thrusts
         that fit nothing where too little of the flight is left.
         """
-        columns = np.column_stack([self._delayed(delay), self._moved(*moves)[2]])
-        there = np.isfinite(columns[:, 0])
-        if there.sum() < EVIDENCE.fewest:
+        there, thrusts, own = self._delayed(delay)
+        if len(thrusts) < EVIDENCE.fewest:
             return np.eye(13)
-        return np.asarray(np.cov(columns[there].T))
+        motion = self._moved(*moves)[2][there]
+        motion -= motion.mean(axis=0)
+        both = motion.T @ np.column_stack([thrusts, motion]) / (len(thrusts) - 1)
+        return np.block([[own, both[:, :9].T], [both]])
 
     def fit(self, reading: Reading, torques: bool = True) -> Fit:
         """Return how well a reading explains the flight; without torques, by forces alone."""

@@ -46,6 +46,7 @@ columns the log has, with numbers in them.
 """
 
 import math
+import re
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
@@ -70,6 +71,7 @@ from .rotor_orders import ORDERS, Order, rotor_order
 
 MAPS = Path(__file__).parent / "maps"  # those that ship with the kit
 OWN_MAP = "windwrench"  # of this kit's own columns
+UNKNOWN = "?"  # what a guessed map leaves to a person to choose
 
 WORLDS = {"enu": "enu", "nwu": "enu", "flu": "enu", "ned": "ned", "frd": "ned", "y_up": "y_up"}
 BODIES = {"flu": "flu", "frd": "frd"}
@@ -360,7 +362,24 @@ def load_map(name: str | Path) -> LogMap:
         return _shipped_map(str(name))
     if path.suffix.lower() not in (".yaml", ".yml") and not path.exists():
         raise unknown_name("map", str(name), [*map_names(), "the path of a YAML file"])
-    return parse_map(read_yaml(path, "a map file"), str(path), str(path))
+    found = read_yaml(path, "a map file")
+    _check_chosen(found, path)
+    return parse_map(found, str(path), str(path))
+
+
+def _check_chosen(found: Any, path: Path) -> None:
+    """Raise InputError where a map leaves a field open; the message has the candidates that stand
+    in a comment beside it.
+    """
+    for section, part in found.items() if isinstance(found, Mapping) else ():
+        for name, value in part.items() if isinstance(part, Mapping) else ():
+            if UNKNOWN in (value if isinstance(value, list) else [value]):
+                text = path.read_text(encoding="utf-8-sig")
+                noted = re.search(rf"^# choose {section}\.{name}: (.*)$", text, re.MULTILINE)
+                raise InputError(
+                    f"{path}: {section}.{name} is still {UNKNOWN}; expected "
+                    f"{noted[1] if noted else 'columns of the table'}"
+                )
 
 
 def recording_map(name: str) -> LogMap:

@@ -1,11 +1,12 @@
-"""A map for a table that brings none: guessed from the columns' names, the size of their numbers,
-and the physics that every flight obeys. Each field says whether it is certain, and why.
+"""A map for a table that brings none: guessed from the physics that every flight obeys, the size
+of the numbers, and the columns' names. Each field says whether it is certain, and why; what cannot
+be guessed is ``?``, beside its candidates.
 
-A unit in a name is taken at its word. What names do not say, the flight does: the specific force
-points along the thrust axis, so a horizontal acceleration is gravity times the tilt, which tells
-the quaternion's order and sense, frames, degrees and millimetres; rotors turn the body towards the
-side that they push up, which tells their order. A flight that hardly moves tells neither, and then
-the field is a guess.
+``column_parts`` says which columns are which part. The specific force points along the thrust axis,
+so a horizontal acceleration is gravity times the tilt, which tells the quaternion's order and
+sense, frames, degrees and millimetres; rotors turn the body towards the side that they push up,
+which tells their order. A flight that hardly moves tells neither, and then the field is a guess. A
+unit in a name is taken unless the numbers contradict it.
 """
 
 import re
@@ -20,8 +21,18 @@ import yaml
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
+from ...runtime.file_limits import LIMITS
 from .channels import BODY_TURNS
-from .column_names import Group, Name, best_group, groups_of, take_apart, words
+from .column_names import Group, Name, named_alone, take_apart, words
+from .column_parts import (
+    PARTS,
+    Candidate,
+    Numbers,
+    find_parts,
+    further_rotors,
+    named_columns,
+    rotors_said,
+)
 from .evidence import EVIDENCE, Evidence, Ranking, likelihood
 from .excerpt import LONGEST
 from .inertial import gyro_shares
@@ -33,6 +44,7 @@ from .log_map import (
     RATE_UNITS,
     ROTOR_UNITS,
     TIME_UNITS,
+    UNKNOWN,
     VOLTAGE_UNITS,
     Attitude,
     Battery,
@@ -51,7 +63,7 @@ from .magnitudes import (
     voltage_unit,
     within,
 )
-from .readings import DECLARED, ROTORS, rotations, table_readings
+from .readings import DECLARED, OTHER, ROTORS, rotations, table_readings
 from .rotor_orders import ORDERS, Order, order_names, order_words
 from .table import Array, Table
 
@@ -65,11 +77,21 @@ class GuessSettings:
     counts: float = 20_000.0  # median above which rpm may also be a command of 16 bits
     fast_gyro: float = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
     slow_gyro: float = 6.0  # below which 99.5 % of a flight's angular velocities lie in rad/s
+    rates: tuple[float, float] = (0.5, 20_000.0)  # Hz of rows, beyond which no name is believed
+    # power by which the specific force grows: of rotor speeds, and from which on of pulses
+    squares: tuple[float, float] = (1.5, 2.5)
+    offset: float = 2.8
 
 
 GUESS = GuessSettings()
 _Choice = tuple[str, bool, str]  # what is taken, whether it is certain, and why
 _G = ACCELERATION_UNITS["g"]
+_EXAMPLES = {
+    "position": "x, y, z",
+    "attitude": "qw, qx, qy, qz or roll, pitch, yaw",
+    "accelerometer": "ax, ay, az",
+    "gyro": "gx, gy, gz",
+}
 
 
 @dataclass(frozen=True)
@@ -83,12 +105,29 @@ class Reason:
 
 
 @dataclass(frozen=True)
+class Missing:
+    """Columns that a person must choose: a section and its field are ``?`` in the map."""
+
+    section: str
+    field: str
+    count: int  # of columns
+    why: str
+    candidates: tuple[str, ...] = ()  # the likeliest first
+
+
+@dataclass(frozen=True)
 class Guess:
     """A map that was guessed."""
 
     log_map: LogMap
     reasons: tuple[Reason, ...]
     unused: tuple[str, ...] = ()  # columns
+    missing: tuple[Missing, ...] = ()  # without which the log cannot be read
+
+    @property
+    def lacks(self) -> str:
+        """What is missing, in one line; nothing where the map is whole."""
+        return "; ".join(f"{m.section}.{m.field}: {m.why}" for m in self.missing)
 
     @property
     def doubts(self) -> tuple[Reason, ...]:
@@ -105,13 +144,11 @@ def guess_map(table: Table, vehicle: Vehicle | None = None, name: str = "guess")
         name: of the map.
 
     Raises:
-        InputError: no columns look like a time, a pose or an IMU, and motors; the message says
-            which are missing.
+        InputError: the table cannot be read.
     """
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # columns that hold nothing, or the absurd
         found = _Guessing(table, take_apart(table.header, table.units), vehicle)
-        found.time()
         if "position" in found.parts:
             found.pose()
         found.accelerometer()
@@ -119,71 +156,45 @@ def guess_map(table: Table, vehicle: Vehicle | None = None, name: str = "guess")
         found.motors("motors")
         found.motors("commands")
         found.battery()
-    unused = tuple(column for column in table.header if column not in found.data)
-    return Guess(LogMap(**found.sections, name=name), tuple(found.reasons), unused)
+    missing = tuple(found.missing())
+    parts = [part for part in found.sections.values() if isinstance(part, Columns)]
+    used = {found.clock and found.clock.column, *(c for part in parts for c in part.columns)}
+    unused = tuple(column for column in table.header if column not in used)
+    found.sections.setdefault("time", TimeColumn(UNKNOWN))
+    return Guess(LogMap(**found.sections, name=name), tuple(found.reasons), unused, missing)
 
 
-def _time_column(table: Table, names: list[Name]) -> Name:
-    named = [name for word in words()["time"] for name in names if name.base == word]
-    named += [
-        name
-        for name in names
-        if name.base.startswith("time") or name.base.endswith(("time", "timestamp"))
-    ]
-    if named:
-        return named[0]
-    first = names[0]
-    try:
-        values = table.read([first.column])[first.column]
-    except InputError:
-        values = np.zeros(2)
-    if len(values) > 2 and np.all(np.diff(values) > 0.0):
-        return first
-    raise InputError(
-        f"{table.path}: no column looks like a time; expected one such as t, time or timestamp, "
-        f"found {', '.join(table.header[:20])}"
-    )
+def _numbers_of(table: Table, names: Sequence[Name]) -> dict[str, Array]:
+    """Return the columns (rows,) that hold numbers, but for those in which text turns up later."""
+    once = [n.column for n in names if table.header.count(n.column) == 1]
+    wanted = [column for column in once if not table.numeric or column in table.numeric]
+    if len(wanted) * table.rows > LIMITS.table_numbers // 2:  # those whose names say something
+        named = named_columns(names)
+        wanted = [column for column in wanted if column in named]
+    while wanted:
+        try:
+            return table.read(wanted)
+        except InputError as error:
+            spoiled = [c for c in wanted if str(error).startswith(f"{table.path}: column {c}, ")]
+            if not spoiled:
+                raise
+            wanted = [column for column in wanted if column not in spoiled]
+    return {}
 
 
-def _groups(names: list[Name]) -> tuple[dict[str, Group], dict[str, int]]:
-    """Return the columns of each part, by their names, and how many groups look like each."""
-    parts: dict[str, Group] = {}
-    rivals: dict[str, int] = {}
-    taken: set[str] = set()
-    for part, ways in words()["parts"].items():
-        for way in ways:
-            groups = [
-                group
-                for kind in ("endings", "numbered")
-                for endings in way.get(kind, ())
-                for group in groups_of(names, endings, kind == "numbered")
-                if not taken & set(group.columns)
-            ]
-            best, count = best_group(groups, way["words"])
-            if best is not None and part not in parts:
-                parts[part], rivals[part] = best, count
-                taken |= set(best.columns)
-    for word in words()["battery"]:
-        for name in names:
-            if f"_{name.base}".endswith(f"_{word}") and "battery" not in parts:
-                parts["battery"] = Group((name.column,), name.base, name.unit)
-    return parts, rivals
-
-
-def _check_enough(table: Table, parts: Mapping[str, Group]) -> None:
-    missing = []
-    if "position" not in parts and not ("accelerometer" in parts and "gyro" in parts):
-        missing.append(
-            "a pose (such as x, y, z, qw, qx, qy, qz or roll, pitch, yaw) or an IMU (such as ax, "
-            "ay, az, gx, gy, gz)"
-        )
-    if "motors" not in parts and "commands" not in parts:
-        missing.append("four motors (such as rpm1 to rpm4, motor[0] to motor[3])")
-    if missing:
-        raise InputError(
-            f"{table.path}: no columns look like {' or like '.join(missing)}; found "
-            f"{', '.join(table.header[:40])}. Write a map by hand"
-        )
+def _time_column(names: Sequence[Name], data: Mapping[str, Array]) -> Name | None:
+    """Return the column of the time: by its name, else the first that increases throughout."""
+    there = [name for name in names if name.column in data]
+    for name in named_alone(there, "time"):
+        values = data[name.column]
+        steps = np.diff(values[np.isfinite(values)])
+        if np.any(steps > 0.0) and np.mean(steps >= 0.0) > 0.9:
+            return name
+    for name in there:
+        values = data[name.column]
+        if len(values) > 2 and np.all(np.diff(values) > 0.0):
+            return name
+    return None
 
 
 class _Guessing:
@@ -191,29 +202,93 @@ class _Guessing:
 
     def __init__(self, table: Table, names: list[Name], vehicle: Vehicle | None) -> None:
         self.table, self.vehicle = table, vehicle
-        self.clock = _time_column(table, names)
-        self.parts, rivals = _groups([n for n in names if n.column != self.clock.column])
-        if not {"position", "attitude"} <= set(self.parts):
-            self.parts = {k: v for k, v in self.parts.items() if k not in ("position", "attitude")}
-        _check_enough(table, self.parts)
-        wanted = [self.clock.column, *(c for g in self.parts.values() for c in g.columns)]
-        self.data = table.read(list(dict.fromkeys(wanted)))
-        self.values = {
-            part: np.column_stack([self.data[name] for name in group.columns])
-            for part, group in self.parts.items()
-        }
         self.sections: dict[str, Any] = {}
         self.reasons: list[Reason] = []
         self.ranking: Ranking | None = None  # of the pose
+        self.by_name: dict[str, bool] = {}  # whether the names of a part's columns speak for it
+        data = _numbers_of(table, names)
+        self.clock = _time_column(names, data)
+        self.t = np.asarray(0.01 * np.arange(table.rows), dtype=np.float64)
+        if self.clock is not None:
+            self.t = self.time(self.clock, data)
+        self.numbers = Numbers(self.t, data)
+        rest = [name for name in names if name is not self.clock]
+        self.ranked = find_parts(rest, self.numbers)
+        self.parts = {p: c[0].group for p, c in self.ranked.items() if c and c[0].score > 0.0}
+        if volts := named_alone(rest, "battery"):
+            self.parts["battery"] = Group((volts[0].column,), volts[0].base, volts[0].unit)
+        if not {"position", "attitude"} <= set(self.parts):
+            self.parts = {k: v for k, v in self.parts.items() if k not in ("position", "attitude")}
+        self.parts = {p: g for p, g in self.parts.items() if set(g.columns) <= set(data)}
+        self.further = {
+            part: further
+            for part in ("motors", "commands")
+            if part in self.parts and (further := further_rotors(self.parts[part].columns, table))
+        }
+        self.by_name = {
+            p: self.ranked[p][0].why.startswith("by") for p in self.parts if p in self.ranked
+        }
+        self.values = {
+            part: np.column_stack([data[name] for name in group.columns])
+            for part, group in self.parts.items()
+        }
         for part in ("position", "attitude", "accelerometer", "gyro"):
-            if part in self.parts and rivals[part] > 1:
-                columns = self.parts[part].columns
-                field = "order" if len(columns) == 4 else "columns"
-                why = f"{rivals[part]} groups of columns look like it; taken: {columns[0]} ..."
-                self.say(part, field, False, why)
+            if part in self.parts:
+                self.say_rivals(part, self.ranked[part])
+
+    def say_rivals(self, part: str, ranked: Sequence[Candidate]) -> None:
+        """Keep that other columns may be a part, where they do."""
+        least = max(0.0, ranked[0].score - PARTS.certain)
+        likely = [candidate for candidate in ranked if candidate.score > least]
+        if len(likely) > 1 or not self.by_name[part]:
+            field = "order" if len(ranked[0].group.columns) == 4 else "columns"
+            self.say(part, field, False, "; or ".join(map(str, likely[: PARTS.shown])))
+
+    def missing(self) -> list[Missing]:
+        """Return what the map lacks for a flight log."""
+        out = []
+
+        def lack(part: str, section: str, count: int, why: str, field: str = "columns") -> None:
+            found = self.ranked.get(part, [])[: PARTS.shown]
+            out.append(Missing(section, field, count, why, tuple(map(str, found))))
+
+        if self.clock is None:
+            why = "no column looks like a time; expected one such as t, time or timestamp"
+            lack("time", "time", 1, why, "column")
+        has = {part for part in ("position", "accelerometer", "gyro") if part in self.sections}
+        imu = "accelerometer", "gyro"
+        if "position" not in has and not has.issuperset(imu):
+            likely = {
+                part for part, ranked in self.ranked.items() if ranked and ranked[0].score > 0
+            }
+            poses = likely & {"position", "attitude"}
+            # what is nearest to be whole: half a pose, half an IMU, else a pose
+            wanted = ("position", "attitude") if poses or not has else imu
+            for part in wanted:
+                if part not in has and part not in poses:
+                    why = f"no columns look like one (such as {_EXAMPLES[part]})"
+                    lack(part, part, 4 if part == "attitude" else 3, why)
+            for part in poses:
+                group, why = self.ranked[part][0].group, self.ranked[part][0].why
+                self.say(part, "columns", False, why)
+                if part == "position":
+                    self.sections[part] = Columns(group.columns, group.unit or "m")
+                else:
+                    euler = "zyx" if len(group.columns) == 3 else ""
+                    unit = (group.unit or "rad") if euler else ""
+                    self.sections[part] = Attitude(group.columns, unit, euler=euler)
+        for part in self.further:
+            why = rotors_said(self.parts[part].columns, self.further[part])
+            lack(part, "rotors", 4, why)
+        if "rotors" not in self.sections and "commands" not in self.sections and not self.further:
+            why = "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
+            lack("motors", "rotors", 4, why)
+        return out
 
     def say(self, section: str, name: str, certain: bool, why: str) -> None:
         """Keep why a field is what it is."""
+        part = "motors" if section in ("rotors", "commands") else section
+        certain = certain and self.by_name.get(part, True)
         self.reasons.append(Reason(section, name, certain, why))
 
     def take(self, section: str, name: str, choice: _Choice) -> str:
@@ -225,28 +300,33 @@ class _Guessing:
     def unit(
         self, section: str, named: str, known: Container[str], guess: Callable[[], _Choice]
     ) -> str:
-        """Return a section's unit: as its columns' names say, or as guessed."""
-        choice = (named, True, "by the columns' names") if named in known else guess()
+        """Return a section's unit: as its columns' names say unless their numbers are certain to be
+        in another, else as guessed.
+        """
+        choice = guess()
+        if named in known and (choice[0] == named or not choice[1]):
+            choice = named, True, "by the columns' names"
+        elif named in known:
+            choice = choice[0], False, f"{choice[2]}, though the columns' names say {named}"
         return self.take(section, "unit", choice)
 
-    def time(self) -> None:
-        """Find the unit of the time, and the middle of a long flight."""
-        column = self.clock.column
-        raw = self.data[column]
+    def time(self, clock: Name, data: Mapping[str, Array]) -> Array:
+        """Find the unit of the time; return times (N,) in s of the middle of a long flight, NaN
+        elsewhere.
+        """
+        raw = data[clock.column]
         steps = np.diff(raw[np.isfinite(raw)])
-        steps = steps[steps > 0.0]
-        if not steps.size:
-            raise InputError(
-                f"{self.table.path}: column {column}: no increasing times; expected a time"
-            )
-        step = float(np.median(steps))
+        step = float(np.median(steps[steps > 0.0]))
         guessed, sure = time_unit(step)
         rate = f"{1.0 / max(step * TIME_UNITS[guessed], 1e-300):.4g} rows a second"
-        unit = self.unit("time", self.clock.unit, TIME_UNITS, lambda: (guessed, sure, rate))
-        self.t = (raw - raw[np.isfinite(raw)][0]) * TIME_UNITS[unit]
-        middle = 0.5 * (np.nanmin(self.t) + np.nanmax(self.t))
-        self.t[~(np.abs(self.t - middle) <= 0.5 * LONGEST)] = np.nan
-        self.sections["time"] = TimeColumn(column, unit)
+        if clock.unit in TIME_UNITS:  # an unusual rate is no reason to doubt a name
+            sure &= not within(1.0 / max(step * TIME_UNITS[clock.unit], 1e-300), GUESS.rates)
+        unit = self.unit("time", clock.unit, TIME_UNITS, lambda: (guessed, sure, rate))
+        t = np.asarray((raw - raw[np.isfinite(raw)][0]) * TIME_UNITS[unit])
+        middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
+        t[~(np.abs(t - middle) <= 0.5 * LONGEST)] = np.nan
+        self.sections["time"] = TimeColumn(clock.column, unit)
+        return t
 
     def by_motion(self, prop: str) -> _Choice:
         """Return what the motion says of a property of a pose's reading."""
@@ -263,28 +343,33 @@ class _Guessing:
         place, group = self.parts["position"], self.parts["attitude"]
         attitude, is_quaternion = self.values["attitude"], len(group.columns) == 4
         units: tuple[str, ...] = ("deg", "rad")
-        if group.unit in units:
-            units = (group.unit,)
-        elif np.nanmax(np.abs(attitude[:, :2]), initial=0.0) > np.pi:
+        if np.nanmax(np.abs(attitude[:, :2]), initial=0.0) > np.pi:
             units = ("deg",)
+        elif group.unit in units:
+            units = (group.unit,)
         orders = ("wxyz", "xyzw") if group.numbered else ("wxyz",)
         readings = table_readings(
             orders if is_quaternion else (),
             units,
-            lengths=(place.unit,) if place.unit in LENGTH_UNITS else ("m", "cm", "mm"),
-            hint="ned" if re.search("ned|down", "".join(place.columns).lower()) else "",
+            lengths=(place.unit,) if place.unit == "ft" else ("m", "cm", "mm"),
+            hint="ned" if re.search("ned|down|d$", "".join(place.columns).lower()) else "",
         )
-        thrusts = np.square(self.values["motors" if "motors" in self.parts else "commands"])
+        if place.unit in LENGTH_UNITS:
+            readings = [
+                replace(r, unlikely=r.unlikely + OTHER * (r.length != place.unit)) for r in readings
+            ]
+        motors = self.values.get("motors", self.values.get("commands"))
+        thrusts = np.ones((len(self.t), 4)) if motors is None else np.square(motors)
         evidence = Evidence(self.t, thrusts, self.values["position"], attitude)
         self.ranking = Ranking.of(evidence, readings, torques=False)
         best = self.ranking.best
-        self.unit("position", place.unit, LENGTH_UNITS, lambda: self.by_motion("length"))
+        length = self.unit("position", place.unit, LENGTH_UNITS, lambda: self.by_motion("length"))
         told = [("world", "", "world"), ("body", "", "body"), ("attitude", "sense", "sense")]
         made = Attitude(group.columns, order=best.order, sense=best.sense)
         if not is_quaternion:
             signs = (1, best.pitch_sign, 1) if best.pitch_sign < 0 else ()
             made = replace(made, unit=best.unit, euler=best.euler, signs=signs)
-            beyond = best.unit, True, "angles beyond pi"
+            beyond = best.unit, best.unit != group.unit, "angles beyond pi"
             guessed = self.by_motion("unit") if len(units) > 1 else beyond
             self.unit("attitude", group.unit, ANGLE_UNITS, lambda: guessed)
             told += [("attitude", "euler", "euler"), ("attitude", "signs", "pitch_sign")]
@@ -294,7 +379,7 @@ class _Guessing:
             self.say("attitude", "order", True, "by the columns' names")
         for section, name, prop in told:
             self.take(section, name, self.by_motion(prop))
-        position = Columns(place.columns, best.length)
+        position = Columns(place.columns, length)
         self.sections |= {"world": best.world, "body": best.body}
         self.sections |= {"position": position, "attitude": made}
 
@@ -319,7 +404,10 @@ class _Guessing:
         likely = [u for u, one in units.items() if within(size * one / _G, MAGNITUDES.gravity)]
         why, scale = f"its median size is {size:.4g}", 1.0
         if group.unit in units or likely:
+            likely = likely or [group.unit]
             unit = self.unit("accelerometer", group.unit, units, lambda: (likely[0], True, why))
+            if unit == group.unit and not within(size * units[unit] / _G, MAGNITUDES.doubtful):
+                self.say("accelerometer", "unit", False, f"{unit}: {why}, which is not gravity's")
         else:
             scale = float(f"{_G / max(size, 1e-12):.6g}")
             why += ", which is taken for the 9.81 m/s2 of a hover"
@@ -344,14 +432,15 @@ class _Guessing:
             unit = "deg/s" if high > GUESS.slow_gyro else "rad/s"
             guessed = unit, high > GUESS.fast_gyro, f"its fast values are {high:.3g}"
         else:
-            units = (group.unit,) if group.unit in ("rad/s", "deg/s") else ("rad/s", "deg/s")
-            axes, guessed = self.gyro_by_pose(values, units)
+            axes, guessed = self.gyro_by_pose(values, ("rad/s", "deg/s"), group.unit)
             self.take("gyro", "body", (axes, *guessed[1:]))
         unit = self.unit("gyro", group.unit, RATE_UNITS, lambda: guessed)
         self.sections["gyro"] = Sensor(group.columns, unit, body=axes)
 
-    def gyro_by_pose(self, values: Array, units: Sequence[str]) -> tuple[str, _Choice]:
-        """Return a gyro's body axes and unit, whether they are sure, and why."""
+    def gyro_by_pose(self, values: Array, units: Sequence[str], named: str) -> tuple[str, _Choice]:
+        """Return a gyro's body axes and unit, whether they are sure, and why. A unit that is named
+        is kept where another one fits hardly better.
+        """
         assert self.ranking is not None
         good, rotation = rotations(self.values["attitude"], self.ranking.best)
         times = self.t[good]
@@ -361,6 +450,10 @@ class _Guessing:
         shares = gyro_shares(self.t, values, times[seen], rotation[seen], turns)
         if shares is None:
             return ways[0][1], (ways[0][0], False, "the log is too short")
+        if named in units:
+            kept = [k for k, (unit, _) in enumerate(ways) if unit == named]
+            if min(shares[k] for k in kept) <= EVIDENCE.good or min(shares) > EVIDENCE.good:
+                ways, shares = [ways[k] for k in kept], [shares[k] for k in kept]
         first, second = np.argsort(shares)[:2]
         lead = likelihood([shares[first]] * 3) - likelihood([shares[second]] * 3)
         sure = shares[first] <= EVIDENCE.good and lead >= EVIDENCE.certain and self.turning_known
@@ -372,8 +465,9 @@ class _Guessing:
         if part not in self.parts:
             return
         group, values = self.parts[part], self.values[part]
-        kind, unit, sure, why = motor_unit(group, values, self.vehicle)
-        if kind in self.sections:
+        power = self.numbers.elasticity(values)
+        kind, unit, sure, why = motor_unit(group, values, self.vehicle, power)
+        if kind in self.sections or part in self.further:
             return
         self.take(kind, "unit", (unit, sure, why))
         order, sure, why = self.order(group, values)
@@ -384,7 +478,9 @@ class _Guessing:
             pairs = 7 if unit == "eRPM" else 1
             self.sections[kind] = Rotors(group.columns, unit, order=order, pole_pairs=pairs)
             return
-        limits = COMMAND_UNITS[unit] or (0.0, 65535.0)
+        high = float(np.nanmax(values, initial=0.0))
+        counts = next((float(2**bits - 1) for bits in (8, 10, 11, 12) if high < 2**bits), 65535.0)
+        limits = COMMAND_UNITS[unit] or (0.0, counts)
         if unit in ("us", "counts", "dshot"):
             self.say(kind, "range", False, f"{limits[0]:g} to {limits[1]:g}, the usual one")
         self.sections[kind] = Commands(group.columns, unit, order=order, range=limits)
@@ -436,18 +532,23 @@ class _Guessing:
         self.sections["battery"] = Battery(group.columns, unit)
 
 
-def motor_unit(group: Group, values: Array, vehicle: Vehicle | None) -> tuple[str, str, bool, str]:
+def motor_unit(
+    group: Group, values: Array, vehicle: Vehicle | None, power: float = np.nan
+) -> tuple[str, str, bool, str]:
     """Return whether columns are rotors or commands, their unit, if that is certain, and why: by
-    the first rule that holds.
+    the first rule that holds. ``power`` is that by which the specific force grows with them; NaN:
+    unknown.
     """
-    names = " ".join(group.columns).lower()
+    # of a path such as /fmu/out/esc_status/rotor_speed.00 the last word
+    names = " ".join(re.sub(r"^.*/(?=.*[a-z])", "", name.lower()) for name in group.columns)
     turning = np.abs(values[np.isfinite(values) & (values != 0.0)])
     if not turning.size:
         return "commands", "normalised", False, "all are zero"
     low, middle, high = (float(x) for x in np.quantile(turning, [0.01, 0.5, 1.0]))
     named = group.unit or next((unit for unit in ("eRPM", "rpm") if unit.lower() in names), "")
     commanded = any(word in names for word in words()["command_words"])
-    speeds = any(word in names for word in ("omega", "speed", "rotor"))
+    speeds = any(word in names for word in ("omega", "speed", "rotor", "rpm"))
+    speeds |= within(power, GUESS.squares) and not commanded
     pulses = low >= 850.0 and high <= 2250.0
     carrying: list[str] = []
     if vehicle is not None and not commanded:
@@ -457,16 +558,22 @@ def motor_unit(group: Group, values: Array, vehicle: Vehicle | None) -> tuple[st
     doubt = "pulses in us" if pulses else "percents" if high <= 100.0 else ""
     doubt = "" if speeds else doubt
     by_names, between = "by the columns' names", f"values from {low:.4g} to {high:.4g}"
+    if not np.isnan(power):
+        between += f", and the specific force grows with their power of {power:.2g}"
     up_to = f"values up to {high:.6g}"
     carries = f"in it the rotors carry the weight of {vehicle.name if vehicle else ''}"
     carries += f", though they may be {doubt}" if doubt else ""
+    # by the vehicle's weight a name may be wrong, but poles of eRPM are unknown
+    lifts = len(carrying) == 1 and named in ROTOR_UNITS and named not in ("eRPM", *carrying)
     rules = (
+        (lifts, "rotors", "".join(carrying), False, f"{carries}, not in {named} as names say"),
         (named in ROTOR_UNITS, "rotors", named, True, by_names),
         (high <= 1.0, "commands", "normalised", "omega" not in names, up_to),
         (named in ("us", "percent"), "commands", named, True, by_names),
         (commanded and pulses, "commands", "us", True, between),
         (commanded and high <= 100.0, "commands", "percent", False, up_to),
-        (commanded and middle > 4000.0 and high <= 65535.0, "commands", "counts", False, up_to),
+        (commanded and high <= 65535.0, "commands", "counts", False, up_to),
+        (pulses and power >= GUESS.offset, "commands", "us", True, between),
         (len(carrying) == 1, "rotors", "".join(carrying), not doubt, carries),
         (
             not commanded and middle > GUESS.counts and high <= 65535.5,
@@ -478,24 +585,35 @@ def motor_unit(group: Group, values: Array, vehicle: Vehicle | None) -> tuple[st
             *("rotors", "rpm", True),
             f"the median is {middle:.5g}, too fast for rad/s",
         ),
-        (pulses and "omega" not in names, "commands", "us", False, between),
+        (pulses and not speeds, "commands", "us", False, between),
     )
     otherwise = f"the median is {middle:.4g}; it might be rpm or Hz"
     return next((rule[1:] for rule in rules if rule[0]), ("rotors", "rad/s", False, otherwise))
 
 
 def map_yaml(guess: Guess) -> str:
-    """Return a guessed map as a YAML file; comments say what is certain and what is a guess."""
+    """Return a guessed map as a YAML file; comments say what is certain, what is a guess, and among
+    which columns to choose where it says ``?``.
+    """
     m = guess.log_map
     sections: dict[str, Any] = {"vehicle": m.vehicle} if m.vehicle else {}
-    sections |= {"time": {"column": m.time.column, "unit": m.time.unit}}
+    if m.time.column:
+        sections["time"] = {"column": m.time.column, "unit": m.time.unit}
     sections |= {"world": m.world, "body": m.body}
     sections |= {name: _fields(part) for name, part in m.sections.items()}
     lines = ["# A map of this table's columns. What is marked GUESS: check it."]
+    if guess.missing:
+        lines.append(f"# {UNKNOWN}: choose, and write it here. Still missing: {guess.lacks}")
+    for lack in guess.missing:
+        several = lack.field == "columns"
+        sections[lack.section] = {lack.field: [UNKNOWN] * lack.count if several else UNKNOWN}
     for name, value in sections.items():
         for r in (r for r in guess.reasons if r.section == name):
             mark = "certain" if r.certain else "GUESS"
             lines.append(f"# {mark}: {f'{r.field}: ' if r.field else ''}{r.why}")
+        for lack in (lack for lack in guess.missing if lack.section == name):
+            listed = "; ".join(lack.candidates) or "columns of the table"
+            lines.append(f"# choose {name}.{lack.field}: {listed}")
         flow = False if isinstance(value, str) else None
         text = yaml.safe_dump(
             {name: value}, default_flow_style=flow, sort_keys=False, width=1000, allow_unicode=True
@@ -511,7 +629,7 @@ def _fields(part: Columns) -> dict[str, Any]:
     fields = {
         name: list(value) if isinstance(value, tuple) else value
         for name, value in vars(part).items()
-        if value not in ("", (), None, False, 1)
+        if value not in ("", (), None, False, 1, (0.0, 1.0))
     }
     if isinstance(part, Battery):
         fields = {"column": fields.pop("columns")[0], **fields}

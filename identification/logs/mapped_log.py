@@ -1,10 +1,11 @@
 """From columns of any names and a map of what they mean to a flight log: of a table, whose channels
 share its rows, and of a recording, whose groups of channels have a clock each.
 
-Each section of the map becomes a stream (``streams``). Rows of a table that hold neither a pose nor
-an inertial sensor's sample are left out, unless most rows have a pose, which the others then lost;
-a map of whole rows keeps them all. An attitude that is logged in other rows than the position is
-interpolated to the position's.
+Each section of the map becomes a stream (``streams``). Where channels stand in rows of their own,
+the pose's rows are the log's, and the others are interpolated to them. Else rows of a table that
+hold neither a pose nor an inertial sensor's sample are left out, unless most rows have a pose,
+which the others then lost; a map of whole rows keeps them all. An attitude that is logged in other
+rows than the position is interpolated to the position's.
 """
 
 from collections.abc import Sequence
@@ -17,6 +18,7 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from .channels import Samples, in_kit_axes, in_kit_units, quaternions
 from .clocks import on_one_clock
+from .column_parts import further_rotors, rotors_said
 from .commanded_speeds import flown_vehicle
 from .flight_log import NORM_TOLERANCE, FlightLog, vehicle_of_columns
 from .log_map import Attitude, Battery, Columns, Commands, LogMap, Position, Rotors, constant
@@ -24,7 +26,7 @@ from .map_fit import NO_QUATERNION, chosen, fitted, wanted_columns, ways
 from .rotor_orders import order_names, order_words
 from .streams import Recording, Stream, readable, slerp
 from .table import Mask, Table
-from .table_rows import LONGEST_STEPS, check_rows, has_several_rates, rows_of
+from .table_rows import LONGEST_STEPS, check_rows, rows_apart, rows_of
 from .what_flew import UNSTATED, WhatFlew, check_flown
 
 _IMU = ("accelerometer", "gyro")
@@ -52,8 +54,11 @@ def map_table(
         log_map = replace(log_map, vehicle=vehicle_of_columns(table))
     vehicle = flown_vehicle(vehicle, log_map.vehicle)
     log_map = fitted(table, log_map, vehicle, reader)
+    for motors in filter(None, (log_map.rotors, log_map.commands)):
+        if further := further_rotors(motors.columns, table):
+            raise InputError(f"{table.path}: {rotors_said(motors.columns, further)}")
     columns = table.read(wanted_columns(log_map))
-    if log_map.is_own and has_several_rates(columns, log_map):
+    if log_map.is_own and rows_apart(Samples(np.arange(float(table.rows)), columns), log_map):
         log_map = replace(log_map, rows="mixed")
     notes = [*table.notes, *log_map.notes, *([log_map.time.note] if log_map.time.note else [])]
     if not log_map.is_own or log_map.rows == "mixed":
@@ -110,7 +115,7 @@ def recording_of(
         if name == "attitude":
             continue
         if name in _IMU:
-            samples = samples.cut(_kept_rows(samples, log_map))
+            samples = samples.cut(_kept_rows(samples, log_map, part))
         values = in_kit_units(log_map, name, part, samples.values(part))
         streams[name] = stream = Stream(part.label, samples.t, values)
         if isinstance(part, Rotors) and not log_map.is_own:
@@ -165,7 +170,7 @@ def _pose(
     """
     place, turn, notes = log_map.position, log_map.attitude, []
     assert place is not None
-    keep = _kept_rows(samples, log_map)
+    keep = _kept_rows(samples, log_map, place)
     t = samples.t[keep]
     position = in_kit_units(log_map, "position", place, samples.values(place)[keep])
     placed: Mask = np.asarray(np.isfinite(position).all(axis=1))
@@ -235,19 +240,27 @@ def _attitude(path: Path, log_map: LogMap, part: Attitude, samples: Samples) -> 
     return replace(raw, values=in_kit_axes(log_map, part, raw.values))
 
 
-def _kept_rows(samples: Samples, log_map: LogMap) -> Mask:
-    """Return which rows (N,) of a group are the log's: those with a position or an inertial
-    sensor's sample; all, where most have a position, which the others lost.
+def _kept_rows(samples: Samples, log_map: LogMap, part: Columns) -> Mask:
+    """Return which rows (N,) of a group are those of a section's stream: its own, where channels
+    stand in rows of their own; else those with a position or an inertial sensor's sample; all,
+    where most have a position, which the others lost.
     """
-    keep: Mask = np.zeros(len(samples.t), bool)
+    everything: Mask = np.ones(len(samples.t), bool)
+    if log_map.rows in ("whole", "messages"):
+        return everything
+    if samples.table is not None and rows_apart(samples, log_map):
+        return np.asarray(np.isfinite(samples.values(part)).all(axis=1))
     if (place := log_map.position) is not None and samples.has(place):
-        keep = np.asarray(np.isfinite(samples.values(place)).all(axis=1))
-    if log_map.rows in ("whole", "messages") or np.mean(keep) > 0.5:
-        return np.ones(len(keep), bool)
-    for part in (log_map.accelerometer, log_map.gyro):
-        if part is not None and samples.has(part):
-            keep |= np.isfinite(samples.values(part)).all(axis=1)
-    return keep
+        placed = np.isfinite(samples.values(place)).all(axis=1)
+        if np.mean(placed) > 0.5:
+            return everything
+    inertial = (log_map.position, log_map.accelerometer, log_map.gyro)
+    there = [
+        np.isfinite(samples.values(one)).all(axis=1)
+        for one in inertial
+        if one is not None and samples.has(one)
+    ]
+    return np.asarray(np.any(there, axis=0))
 
 
 def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream) -> list[str]:

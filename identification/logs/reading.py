@@ -98,9 +98,18 @@ def missing_columns(table: Table) -> list[str]:
     return [name for name in needed if name not in there]
 
 
-def is_known_table(table: Table) -> bool:
-    """Return whether a table's columns are the kit's own, or those of a reader."""
-    return not missing_columns(table) or reader_by_columns(table.path, table.header) is not None
+def unknown_table(path: Path) -> Table | None:
+    """Return the table in a file whose columns are neither the kit's own nor those of a reader;
+    None for any other file.
+
+    Raises:
+        InputError: it is a table by its name, and none that can be read.
+    """
+    if not is_table(path) or reader_by_content(path) is not None:
+        return None
+    table = open_table(path)
+    known = not missing_columns(table) or reader_by_columns(path, table.header) is not None
+    return None if known else table
 
 
 def _read(

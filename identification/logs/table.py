@@ -2,7 +2,7 @@
 
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +18,12 @@ Rows = NDArray[np.intp]
 WHAT = "a flight log"  # for errors
 SUFFIXES = (".csv", ".csv.gz", ".parquet")  # of tables that the kit writes
 TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".log")  # of text tables, packed or not
+ARRAY_SUFFIXES = (".mat", ".npz")
 
 
 @dataclass(frozen=True)
 class Table:
-    """A file of named columns, of which only those asked for are turned into numbers.
+    """A file of named columns, of which those asked for are turned into numbers, once.
 
     Raises:
         InputError: it has no rows, or more than ``FileLimits.table_rows``.
@@ -37,6 +38,8 @@ class Table:
     blank_before: tuple[int, ...] = ()  # a row for each blank line before it, in their order
     units: tuple[str, ...] = ()  # of a line of units behind the header
     notes: tuple[str, ...] = ()  # how it is laid out, and what was left out
+    numeric: tuple[str, ...] = ()  # columns that hold numbers, as far as was looked; empty: all
+    _columns: dict[str, Array] = field(default_factory=dict, repr=False)  # those turned so far
 
     def __post_init__(self) -> None:
         check_count(self.path, self.rows, LIMITS.table_rows, "rows")
@@ -46,7 +49,7 @@ class Table:
             )
 
     def read(self, names: Sequence[str]) -> dict[str, Array]:
-        """Return columns (rows,) by their names; empty fields are NaN.
+        """Return columns (rows,) by their names, read-only; empty fields are NaN.
 
         Raises:
             InputError: a field is no number; a name stands in the header more than once; the
@@ -57,10 +60,15 @@ class Table:
                 raise InputError(
                     f"{self.path}: column {name} stands there more than once; expected it once"
                 )
-        check_count(self.path, self.rows * len(names), LIMITS.table_numbers, "numbers")
-        columns = np.empty((len(names), self.rows))
-        self.fill(self, [self.header.index(name) for name in names], columns)
-        return dict(zip(names, columns, strict=True))
+        new = [name for name in dict.fromkeys(names) if name not in self._columns]
+        numbers = self.rows * (len(self._columns) + len(new))
+        check_count(self.path, numbers, LIMITS.table_numbers, "numbers")
+        columns = np.empty((len(new), self.rows))
+        if new:
+            self.fill(self, [self.header.index(name) for name in new], columns)
+        columns.flags.writeable = False
+        self._columns.update(zip(new, columns, strict=True))
+        return {name: self._columns[name] for name in names}
 
     def row(self, index: int) -> str:
         """Return how to find a row (counted from 0) in the file: rows and lines count from 1."""
@@ -87,7 +95,7 @@ def file_kind(path: Path) -> str:
 def stem(path: Path) -> str:
     """Return a table's name without its ending."""
     name = path.name
-    for ending in (".gz", ".parquet", *TEXT_SUFFIXES):
+    for ending in (".gz", ".parquet", *ARRAY_SUFFIXES, *TEXT_SUFFIXES):
         if name.lower().endswith(ending):
             name = name[: -len(ending)]
     return name

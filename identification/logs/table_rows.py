@@ -22,6 +22,7 @@ _LONGEST_GAP = 0.06
 LONGEST_STEPS = 3.5
 _FINITE = "a finite number"
 _DENSE = 0.5  # share of the rows from which on a channel counts as one of every row
+_FEWEST = 10  # samples of a channel that tell in which rows it stands
 
 
 def rows_of(
@@ -159,18 +160,28 @@ def _last_of(column: Array, first: Rows) -> Array:
     return np.where(last >= 0, column[last], np.nan)
 
 
-def has_several_rates(columns: Mapping[str, Array], log_map: LogMap) -> bool:
-    """Return whether positions or attitudes are slower than the table, and not in the same rows:
-    where a pose is lost, both are.
+def rows_apart(samples: Samples, log_map: LogMap) -> bool:
+    """Return whether channels stand in rows of their own: another one is in rows without a position
+    (or without a gyro's sample, in a log of no pose) far more often than rows lack one. Where a
+    pose is lost, the others are in all rows alike.
     """
-    if log_map.position is None or log_map.attitude is None:
+    there = {
+        name: np.asarray(np.isfinite(samples.values(part)).all(axis=1))
+        for name, part in log_map.sections.items()
+        if samples.has(part)
+    }
+    base = next((name for name in ("position", "gyro") if name in there), "")
+    if not base:
         return False
-    placed, turned = (
-        np.isfinite([columns[name] for name in part.named]).all(axis=0)
-        for part in (log_map.position, log_map.attitude)
+    placed = there.pop(base)
+    turned = there.get("attitude", placed)
+    if 0.0 < min(placed.mean(), turned.mean()) < _DENSE and np.any(placed != turned):
+        return True
+    return any(
+        x.sum() >= _FEWEST and x[~placed].sum() > (1.0 - 0.5 * placed.mean()) * x.sum()
+        for x in there.values()
+        if placed.any()
     )
-    share = min(placed.mean(), turned.mean())
-    return bool(0.0 < share < _DENSE and np.any(placed != turned))
 
 
 def check_rows(samples: Samples, log_map: LogMap) -> list[str]:

@@ -1,5 +1,5 @@
-"""Tables of numbers in text and Parquet files: read with errors that say where, written whole or
-not at all.
+"""Tables of numbers in text, Parquet, MATLAB and NumPy files: read with errors that say where,
+written whole or not at all.
 """
 
 import gzip
@@ -8,15 +8,18 @@ from pathlib import Path
 
 from ...runtime.errors import InputError
 from ...runtime.whole_files import replaced
+from .array_table import open_arrays
 from .parquet_table import open_parquet, write_parquet
-from .table import SUFFIXES, TEXT_SUFFIXES, Array, Table, file_kind
+from .table import ARRAY_SUFFIXES, SUFFIXES, TEXT_SUFFIXES, Array, Table, file_kind
 from .text_table import open_text
 
 
 def is_table(path: Path) -> bool:
-    """Return whether a file's name is that of a table: Parquet, or a text, packed or not."""
+    """Return whether a file's name is that of a table: of arrays, or a text, packed or not."""
     name = path.name.lower()
-    return name.endswith(".parquet") or name.removesuffix(".gz").endswith(TEXT_SUFFIXES)
+    return name.endswith((".parquet", *ARRAY_SUFFIXES)) or name.removesuffix(".gz").endswith(
+        TEXT_SUFFIXES
+    )
 
 
 def open_table(path: Path) -> Table:
@@ -29,9 +32,12 @@ def open_table(path: Path) -> Table:
     if not is_table(path):
         raise InputError(
             f"{path}: unknown kind of file; expected a table whose name ends in "
-            f"{', '.join(dict.fromkeys((*TEXT_SUFFIXES, *SUFFIXES)))}"
+            f"{', '.join(dict.fromkeys((*TEXT_SUFFIXES, *SUFFIXES, *ARRAY_SUFFIXES)))}"
         )
-    return open_parquet(path) if path.name.lower().endswith(".parquet") else open_text(path)
+    name = path.name.lower()
+    if name.endswith(ARRAY_SUFFIXES):
+        return open_arrays(path)
+    return open_parquet(path) if name.endswith(".parquet") else open_text(path)
 
 
 def write_table(columns: Mapping[str, Array], path: Path) -> None:

@@ -1,5 +1,5 @@
 """Tables of numbers in texts, packed or not, of any layout: separator, decimal comma, lines before
-the header, a line of units behind it.
+the header, a line of units behind it, lists in fields, whose items are columns ``name[0]`` ...
 
 The layout is found in the first lines. Each separator and each way to write decimals is tried. The
 right one makes the most numbers of a line, in the longest run of lines that have as many fields as
@@ -15,7 +15,7 @@ import re
 import zlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import BinaryIO, cast
@@ -40,6 +40,11 @@ _LOOKED_AT = 2**18  # characters in which the layout is found
 _LINES = 600  # of them; what Betaflight's decoder writes before the header has 150
 _BETWEEN = 5  # lines between header and first row, at most
 _FEWEST = 2  # columns of a table
+_LIST = re.compile(  # between separators: numbers in brackets, or nothing
+    r'(?:(?<=[,;\t|])|^) {0,9}"?([\[(](?: {0,9}(?:[-+.]?\d|nan)[-+.,; \w]*)?[\])])"?'
+    r" {0,9}(?=[,;\t|]|$)",
+    re.IGNORECASE,
+)
 _COMMENT = re.compile(r"^\s*(#|%|//)[#%/ ]*")
 # decimal commas to points; a point beside them may stand for thousands, and is no number's
 _POINTS = str.maketrans(",.", ".?")
@@ -49,12 +54,26 @@ _DECIMAL_COMMA = (
 )
 
 
+def _items(field: str) -> list[str]:
+    """Return the items of a list as people write it, between commas, semicolons or spaces."""
+    return re.sub(r"[\[\](),;]", " ", field).split()
+
+
 @dataclass(frozen=True)
 class TextLayout:
     """How the lines of a text table are written."""
 
     separator: str = ","  # " ": any white space
     decimal: str = "."  # or ","
+    lists: tuple[tuple[int, int], ...] = ()  # fields (from 0) that hold lists, and their lengths
+
+    def opened(self, line: str) -> str:
+        """Return a line with the items of its lists as fields; as many empty ones of none."""
+        fields = self.fields(_LIST.sub(r'"\1"', line))
+        for i, count in self.lists:
+            if i < len(fields):
+                fields[i] = self.separator.join(_items(fields[i]) or [""] * count)
+        return self.separator.join(fields)
 
     def fields(self, line: str) -> list[str]:
         """Return the fields of a line, without the space around them; none where its quotation
@@ -104,9 +123,11 @@ def open_text(path: Path) -> Table:
     Raises:
         InputError: unreadable, no text, no table, or more than ``FileLimits`` allows.
     """
-    head = _first_lines(path)
+    written = _first_lines(path)
+    head = [_LIST.sub("0", line) for line in written]
     layout, first = _layout(path, head)
     header, first = _header(path, head, layout, first)
+    layout = replace(layout, lists=_lists(layout, written[first:]))
     between = [] if header is None else [line for line in head[header + 1 : first] if line.strip()]
     said = [f"fields separated by {_SEPARATORS[layout.separator]}"]
     if layout.decimal == ",":
@@ -120,6 +141,8 @@ def open_text(path: Path) -> Table:
         said.append(f"{header} line(s) before the header")
     if between:
         said.append(f"{len(between)} line(s) between header and rows")
+    for i, count in reversed(layout.lists):
+        names[i : i + 1] = [f"{names[i]}[{k}]" for k in range(count)]
     notes = [] if said == ["fields separated by comma"] else [f"layout: {', '.join(said)}"]
 
     rows, last, blank = 0, "", []
@@ -128,7 +151,7 @@ def open_text(path: Path) -> Table:
             blank.append(rows)
         else:
             rows, last = rows + 1, line
-    if rows > 1 and len(layout.fields(last)) < len(names):
+    if rows > 1 and len(layout.fields(layout.opened(last))) < len(names):
         rows -= 1
         notes.append("the last line was cut off, and left out")
 
@@ -136,6 +159,8 @@ def open_text(path: Path) -> Table:
         lines: Iterator[str] = islice(_lines(path), first, None)
         if blank:
             lines = (line for line in lines if not layout.is_blank(line))
+        if layout.lists:
+            lines = map(layout.opened, lines)
         kept, done = islice(lines, rows), 0
         while block := list(islice(kept, _BLOCK)):
             columns[:, done : done + len(block)] = _numbers(table, layout, block, done, where).T
@@ -143,8 +168,26 @@ def open_text(path: Path) -> Table:
         if done != rows:
             raise InputError(f"{path}: changed while it was read; expected a whole file")
 
-    units = tuple(layout.fields(between[0])) if len(between) == 1 else ()
-    return Table(path, tuple(names), rows, fill, first + 1, tuple(blank), units, tuple(notes))
+    units = tuple(layout.fields(between[0])) if len(between) == 1 and not layout.lists else ()
+    seen = [layout.fields(layout.opened(line)) for line in written[first:] if line.strip()]
+    seen = [fields for fields in seen if len(fields) >= len(names)]
+    numeric = tuple(
+        name
+        for i, name in enumerate(names)
+        if all(layout.number(fields[i]) is not None for fields in seen)
+    )
+    lines = first + 1, tuple(blank)
+    return Table(path, tuple(names), rows, fill, *lines, units, tuple(notes), numeric)
+
+
+def _lists(layout: TextLayout, lines: Sequence[str]) -> tuple[tuple[int, int], ...]:
+    """Return which fields (from 0) of rows hold lists, and how long the first that has items is."""
+    found: dict[int, int] = {}
+    for line in lines if layout.separator != " " else ():
+        for i, field in enumerate(layout.fields(_LIST.sub(r'"\1"', line))):
+            if field[:1] in ("[", "("):
+                found[i] = found.get(i) or len(_items(field))
+    return tuple(sorted((i, count) for i, count in found.items() if count))
 
 
 def _latin(error: UnicodeError) -> tuple[str, int]:
@@ -331,4 +374,9 @@ def _plain_lines(layout: TextLayout, lines: Sequence[str], width: int) -> Sequen
         return []
     gap, filled = mark + mark, f"{mark}nan{mark}"
     # two passes, because neighbours share a separator
-    return [f"{mark}{line}{mark}".replace(gap, filled).replace(gap, filled)[1:-1] for line in lines]
+    return [
+        f"{mark}{line}{mark}".replace(gap, filled).replace(gap, filled)[1:-1]
+        if gap in line or line[:1] == mark or line[-1:] == mark
+        else line
+        for line in lines
+    ]

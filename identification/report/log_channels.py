@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ...runtime.page_files import write_png
+from ...runtime.whole_files import replaced
 from ..logs.flight_log import FlightLog
 
 Array = NDArray[np.float64]
@@ -101,5 +101,6 @@ def plot_channels(name: str, channels: list[Channel], path: Path) -> Path:
         if len(channel.series) > 1:
             panel.legend(loc="upper right", fontsize=7, ncols=len(channel.series))
     panels[-1].set_xlabel("time (s)")
-    write_png(figure, path)
+    with replaced(path) as partial:  # no page shows it, so that its colours need not be few
+        figure.savefig(partial, format="png", dpi=90)
     return path

@@ -12,14 +12,14 @@ import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...dynamics.vehicle_file import load_vehicle, preset_names
-from ...runtime.errors import InputError
+from ...runtime.errors import InputError, UnreadLogError
 from ..logs.flight_log import FlightLog
 from ..logs.log_map import MAPS, map_names
 from ..logs.map_guess import Guess, guess_map, map_yaml
 from ..logs.mapped_log import map_table
-from ..logs.reading import finished, is_known_table, read_log
+from ..logs.reading import finished, read_log, unknown_table
 from ..logs.screening import screen_log
-from ..logs.tables import is_table, open_table
+from ..logs.table import Table
 from ..motion.noise_spectrum import noise_spectra
 from .log_channels import Channel, log_channels
 
@@ -83,7 +83,8 @@ def check_log(
         piece: as of ``read_log``.
 
     Raises:
-        InputError: it cannot be read, and no map can be guessed.
+        InputError: it cannot be read.
+        UnreadLogError: it cannot be read yet, by the map that was guessed, which the error has.
     """
     guess, text = None, ""
     with warnings.catch_warnings():
@@ -91,15 +92,12 @@ def check_log(
         if log_map is not None:
             log = read_log(path, reader, vehicle, log_map, piece)
             read_by, text = f"the map {log_map}", _map_text(log_map)
+        elif reader is None and (table := unknown_table(path)) is not None:
+            log, guess = _guessed(table, vehicle)
+            read_by, text = "a map that was guessed", map_yaml(guess)
         else:
-            try:
-                log = read_log(path, reader, vehicle, piece=piece)
-                read_by, text = _read_by(path, log)
-            except InputError as error:
-                if reader is not None or not is_table(path):
-                    raise
-                log, guess = _guessed(path, vehicle, error)
-                read_by, text = "a map that was guessed", map_yaml(guess)
+            log = read_log(path, reader, vehicle, piece=piece)
+            read_by, text = _read_by(path, log)
     if vehicle is None and log.vehicle in preset_names():
         vehicle = load_vehicle(log.vehicle)
     doubts = [
@@ -123,16 +121,18 @@ def _read_by(path: Path, log: FlightLog) -> tuple[str, str]:
     return "this kit's own format", ""
 
 
-def _guessed(path: Path, vehicle: Vehicle | None, error: InputError) -> tuple[FlightLog, Guess]:
-    table = open_table(path)
-    if is_known_table(table):
-        raise error  # it is known what the columns mean: the fault is in what they hold
+def _guessed(table: Table, vehicle: Vehicle | None) -> tuple[FlightLog, Guess]:
     guess = guess_map(table, vehicle)
     if vehicle is not None:
         guess = replace(guess, log_map=replace(guess.log_map, vehicle=vehicle.name))
-    with np.errstate(over="ignore", invalid="ignore"):
-        log = map_table(table, guess.log_map, vehicle)
-    return finished(log, vehicle), guess
+    if guess.missing:
+        raise UnreadLogError(f"{table.path}: {guess.lacks}", map_yaml(guess))
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            log = map_table(table, guess.log_map, vehicle)
+        return finished(log, vehicle), guess
+    except InputError as refused:
+        raise UnreadLogError(str(refused), map_yaml(guess)) from refused
 
 
 def _doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:

@@ -9,6 +9,7 @@ import pytest
 from tests.support.random_tables import Written, flight, random_table, save
 from windwrench.cli import app
 from windwrench.identification.logs.reading import read_log
+from windwrench.runtime.errors import InputError
 
 
 @pytest.fixture(scope="module")
@@ -73,3 +74,37 @@ def test_positions_without_an_attitude_are_a_channel_and_an_imu_is_checked(
     channels: dict[str, dict[str, float]] = found["channels"]  # type: ignore[assignment]
     assert channels["position"]["rate_hz"] == pytest.approx(5.0)
     assert any("ax, ay, az look like g" in text for text in found["doubts"])  # type: ignore[attr-defined]
+
+
+def test_a_map_with_something_missing_is_written_and_finished_by_hand(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Four columns that do not move: nothing shows that they are rotors, or in which unit."""
+    log, path, map_file = flight("ardrone2", "excite", 1, 12.0), tmp_path / "a.csv", tmp_path / "m"
+    columns = [log.t, *log.position.T, *log.quaternion.T, *np.full((4, len(log.t)), 380.0)]
+    names = "time,x,y,z,qw,qx,qy,qz,aft_1,aft_2,aft_3,aft_4"
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=names, comments="")
+    chosen = ["check", path, "--out", tmp_path, "--write-map", map_file]
+    with pytest.raises(
+        InputError, match=r"rotors\.columns: no columns look like four motors.*edit"
+    ):
+        run(capsys, *chosen)
+    text = map_file.read_text()
+    assert "columns: ['?', '?', '?', '?']" in text
+    with pytest.raises(InputError, match=r"rotors\.columns is still \?; expected \[aft_1, aft_2, "):
+        run(capsys, "check", path, "--map", map_file, "--out", tmp_path)
+    map_file.write_text(text.replace("'?', '?', '?', '?'", "aft_1, aft_2, aft_3, aft_4"))
+    found = run(capsys, "check", path, "--map", map_file, "--out", tmp_path)
+    assert found["samples"] == len(log.t)
+
+
+def test_the_map_that_is_printed_names_its_columns(
+    tmp_path: Path, written: Written, capsys: pytest.CaptureFixture[str]
+) -> None:
+    app(
+        ["check", str(save(written, tmp_path / "theirs.csv")), "--out", str(tmp_path)],
+        standalone_mode=False,
+    )
+    assert written.log_map.position is not None
+    first = written.log_map.position.columns[0]
+    assert first in capsys.readouterr().out.split("columns:")[1]

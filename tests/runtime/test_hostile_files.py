@@ -233,7 +233,7 @@ def test_other_files_are_regular_too(tmp_path):
         read_json(tmp_path / "large.json", "a card")
 
 
-def test_a_page_that_would_unpack_to_too_much_is_refused_by_its_header(tmp_path, monkeypatch):
+def test_a_column_that_would_unpack_to_too_much_is_refused_by_the_footer(tmp_path, monkeypatch):
     pyarrow = pytest.importorskip("pyarrow", reason="pip install 'windwrench[parquet]'")
     from pyarrow import parquet
 
@@ -247,8 +247,8 @@ def test_a_page_that_would_unpack_to_too_much_is_refused_by_its_header(tmp_path,
                 pyarrow.table(columns), path, compression=packing, use_dictionary=dictionary
             )
             np.testing.assert_array_equal(read_log(path).t, columns["t"])
-    monkeypatch.setattr(parquet_table, "LIMITS", replace(LIMITS, parquet_page=10_000))
-    with pytest.raises(InputError, match=r"column t, page 1: \d+ values in \d+ bytes; expected"):
+    monkeypatch.setattr(parquet_table, "LIMITS", replace(LIMITS, table_numbers=10_000))
+    with pytest.raises(InputError, match="more than 10000 numbers in column"):
         read_log(path)
 
 

@@ -138,8 +138,10 @@ def _table(name):
     said = {}
     for way, model in (("alone", None), ("vehicle", _vehicle(vehicle, path))):
         try:
-            table = open_table(path)
-            found = _fields(guess_map(table, model))
+            guess = guess_map(open_table(path), model)
+            if guess.missing:
+                raise InputError(guess.lacks)
+            found = _fields(guess)
         except InputError as error:
             said[way] = {"error": _plain(str(error), path.parent)}
         else:

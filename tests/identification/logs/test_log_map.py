@@ -173,6 +173,45 @@ def test_a_table_of_several_rates_has_the_rows_of_its_pose(tmp_path: Path) -> No
     )
 
 
+@pytest.mark.parametrize("own", [False, True])
+@pytest.mark.parametrize(
+    "steps",  # s between samples of pose, rotors and IMU
+    [(0.01, 0.02, 0.0), (0.01, 0.016, 0.0), (0.01, 0.005, 0.0), (0.01, 0.02, 0.005)],
+)
+def test_channels_in_rows_of_their_own_meet_at_the_poses_times(
+    tmp_path: Path, own: bool, steps: tuple[float, float, float]
+) -> None:
+    """As PlotJuggler and exports of bags write them, whatever the pattern of the rates."""
+    kinds = {
+        "px py pz qw qx qy qz": (0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0),
+        "omega1 omega2 omega3 omega4": (400.0,) * 4,
+        "ax ay az gx gy gz": (0.0, 0.0, 9.81, 0.0, 0.0, 0.0),
+    }
+    begins = (0.0, 0.0 if steps[1] == 0.016 else 0.003, 0.0007)
+    rows: dict[float, dict[str, float]] = {}
+    for (names, values), step, begin in zip(kinds.items(), steps, begins, strict=True):
+        for t in np.arange(begin, 2.0, step) if step else ():
+            row = rows.setdefault(round(float(t), 6), {})
+            row |= dict(zip(names.split(), values, strict=True)) | (
+                {"pz": t} if "pz" in names else {}
+            )
+    header = [
+        name for names, step in zip(kinds, steps, strict=True) if step for name in names.split()
+    ]
+    lines = [",".join(map(str, [t, *(rows[t].get(n, "") for n in header)])) for t in sorted(rows)]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([",".join(["t", *header]), *lines]))
+    found = load_map("windwrench")
+    log = (
+        read_log(path)
+        if own
+        else map_table(open_table(path), replace(found, name="m", rows="mixed"))
+    )
+    np.testing.assert_allclose(np.diff(log.t), 0.01)
+    assert log.valid.all()
+    assert len(log.t) >= 195
+
+
 def test_rows_of_one_time_are_one_row(tmp_path: Path) -> None:
     t = [f"{0.01 * (k // 2):.2f}" for k in range(80)]
     pose = {

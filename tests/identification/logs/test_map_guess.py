@@ -1,5 +1,7 @@
 """Maps that are guessed: right, or marked as a guess, never silently wrong."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +10,13 @@ import yaml
 
 from tests.support.random_tables import fields_of, flight, random_table, save
 from windwrench.dynamics import load_vehicle
+from windwrench.identification.logs import map_guess
+from windwrench.identification.logs import table as table_module
 from windwrench.identification.logs.column_names import Group
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.log_map import parse_map
 from windwrench.identification.logs.map_guess import Guess, guess_map, map_yaml, motor_unit
+from windwrench.identification.logs.mapped_log import map_table
 from windwrench.identification.logs.tables import open_table
 from windwrench.runtime.errors import InputError
 
@@ -51,11 +56,158 @@ def test_pose_and_motors_in_rows_of_their_own_are_read(tmp_path: Path, flown: Fl
     assert not guessed(path).doubts
 
 
-def test_a_table_without_a_time_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "a.csv"
-    path.write_text("a,b\n0,1\n0,2\n0,2\n")
-    with pytest.raises(InputError, match="no column looks like a time"):
-        guessed(path)
+def columns_of(log: FlightLog, names: str, is_ned: bool = False) -> dict[str, np.ndarray]:
+    """Return a flight's columns under names of time, position, quaternion, velocity, accelerometer,
+    gyro and rotors (rad/s), in this order; a name such as ``c%`` is that of all, by their numbers.
+    """
+    assert log.accelerometer is not None
+    assert log.gyro is not None
+    down = np.array([1.0, -1.0, -1.0]) if is_ned else np.ones(3)
+    turned = log.quaternion * (np.array([1.0, 1.0, -1.0, -1.0]) if is_ned else 1.0)
+    velocity = np.gradient(log.position, log.t, axis=0)
+    parts = [log.t[:, None], log.position * down, turned, velocity * down]
+    parts += [log.accelerometer * down, log.gyro * down, log.rotor_speeds]
+    values = np.hstack(parts)
+    listed = names.split() if "%" not in names else [names.replace("%", str(i)) for i in range(21)]
+    return dict(zip(listed, values.T, strict=True))
+
+
+def table_of(columns: dict[str, np.ndarray], path: Path) -> Path:
+    """Write columns as CSV."""
+    rows = np.column_stack(list(columns.values()))
+    np.savetxt(path, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.9g")
+    return path
+
+
+_QUATERNION, _SENSORS = "qw qx qy qz", "vx vy vz ax ay az gx gy gz"
+_PX4 = "/fmu/out/vehicle_odometry"
+_VICON = "/vicon/drone/transform"
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        f"t n e d {_QUATERNION} {_SENSORS} w1 w2 w3 w4",
+        f"t pos_n pos_e pos_d {_QUATERNION} {_SENSORS} w1 w2 w3 w4",
+        f"t x_ned y_ned z_ned {_QUATERNION} {_SENSORS} motor_0 motor_1 motor_2 motor_3",
+        f"t px py pz {_QUATERNION} vx vy vz ax ay az angular_velocities_0 angular_velocities_1 "
+        "angular_velocities_2 w1 w2 w3 w4",
+        " ".join(
+            ["__time", *(f"{_VICON}/translation/{a}" for a in "xyz")]
+            + [f"{_VICON}/rotation/{a}" for a in "wxyz"]
+            + [_SENSORS, *(f"/motors/angular_velocities_{i}" for i in range(4))]
+        ),
+        " ".join(
+            ["__time", *(f"{_PX4}/position.{i:02d}" for i in range(3))]
+            + [f"{_PX4}/q.{i:02d}" for i in range(4)]
+            + [f"{_PX4}/velocity.{i:02d}" for i in range(3)]
+            + [f"/fmu/out/sensor_combined/accelerometer_m_s2.{i:02d}" for i in range(3)]
+            + [f"/fmu/out/sensor_combined/gyro_rad.{i:02d}" for i in range(3)]
+            + [f"/fmu/out/esc_status/rotor_speed.{i:02d}" for i in range(4)]
+        ),
+        "time_s uav_x_place uav_y_place uav_z_place uav_w_turn uav_x_turn uav_y_turn uav_z_turn "
+        f"{_SENSORS} rotor1_rate rotor2_rate rotor3_rate rotor4_rate",
+        "c%",  # names that say nothing: the numbers do
+    ],
+)
+def test_parts_are_found_by_what_their_numbers_obey(
+    tmp_path: Path, flown: FlightLog, names: str
+) -> None:
+    columns = columns_of(flown, names, is_ned=True)
+    listed, found = list(columns), guessed(table_of(columns, tmp_path / "a.csv"), "ardrone2")
+    log_map = found.log_map
+    assert not found.missing
+    assert (log_map.world, log_map.body) == ("ned", "frd")
+    parts = {"position": 1, "attitude": 4, "accelerometer": 11, "gyro": 14, "rotors": 17}
+    for name, first in parts.items():
+        part = log_map.sections[name]
+        assert list(part.columns) == listed[first : first + len(part.columns)]
+    assert log_map.rotors is not None
+    assert log_map.rotors.unit == "rad/s"
+
+
+@pytest.mark.parametrize(
+    ("dropped", "field"),
+    [("t", "time.column"), ("qw", "attitude.columns"), ("w1", "rotors.columns")],
+)
+@pytest.mark.parametrize("is_there", [False, True])  # without a number in it
+def test_what_is_missing_is_left_open_beside_what_is_known(
+    tmp_path: Path, flown: FlightLog, dropped: str, field: str, is_there: bool
+) -> None:
+    columns = columns_of(flown, f"t x y z {_QUATERNION} {_SENSORS} w1 w2 w3 w4")
+    for name in [name for name in columns if name.startswith(("a", "g", "v"))]:
+        del columns[name]
+    columns[dropped] = np.full(len(flown.t), np.nan)
+    if not is_there:
+        del columns[dropped]
+    found = guessed(table_of(columns, tmp_path / "a.csv"))
+    assert [f"{m.section}.{m.field}" for m in found.missing] == [field]
+    written = yaml.safe_load(map_yaml(found))
+    assert "?" in str(written[field.split(".")[0]])
+    assert f"# choose {field}: " in map_yaml(found)
+    assert written["position"]["columns"] == ["x", "y", "z"]
+
+
+def test_of_a_huge_table_columns_are_read_whose_names_say_something(
+    tmp_path: Path, flown: FlightLog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    columns = columns_of(flown, f"t x y z {_QUATERNION} {_SENSORS} rpm1 rpm2 rpm3 rpm4")
+    columns |= {f"blob{name}": columns["vx"] for name in "abcdefgh"}
+    path = table_of(columns, tmp_path / "a.csv")
+    most = 25 * len(flown.t)
+    for module in (map_guess, table_module):
+        monkeypatch.setattr(module, "LIMITS", replace(module.LIMITS, table_numbers=most))
+    assert not guessed(path).missing
+
+
+def test_more_than_four_rotors_that_move_are_refused(tmp_path: Path, flown: FlightLog) -> None:
+    columns = columns_of(flown, f"t x y z {_QUATERNION} {_SENSORS} w1 w2 w3 w4")
+    rng = np.random.default_rng(0)
+    good = guessed(table_of(columns, tmp_path / "quad.csv")).log_map
+    columns |= {"w5": columns["w1"] + rng.standard_normal(len(flown.t)), "w6": columns["w2"]}
+    path = table_of(columns, tmp_path / "hexa.csv")
+    expected = "6 rotors turn (w1, w2, w3, w4, w5, w6); expected the four of a quadrotor"
+    assert expected in guessed(path).lacks
+    with pytest.raises(InputError, match=re.escape(expected)):
+        map_table(open_table(path), good)
+    servo = 450.0 + 50.0 * np.sin(0.7 * flown.t)  # of a gimbal, on an output beside
+    idle = {"w5": servo, "w6": 0.0 * servo}
+    assert not guessed(table_of(columns | idle, tmp_path / "servo.csv")).missing
+    columns |= {"w5": 0.0 * flown.t, "w6": 0.0 * flown.t}  # of an autopilot that has outputs left
+    assert not guessed(table_of(columns, tmp_path / "idle.csv")).missing
+
+
+def test_units_are_told_by_physics_not_by_names(tmp_path: Path, flown: FlightLog) -> None:
+    """Speeds lift with their square, pulses stand on an offset, and no name is believed that the
+    numbers contradict.
+    """
+    columns = columns_of(flown, f"t x y z {_QUATERNION} {_SENSORS} m1 m2 m3 m4")
+    speeds = {name: columns.pop(name) for name in ("m1", "m2", "m3", "m4")}
+    most = max(float(x.max()) for x in speeds.values())
+
+    def unit_of(names: str, scale: float, offset: float = 0.0, vehicle: str = "") -> str:
+        values = [offset + scale * x for x in speeds.values()]
+        made = columns | {names.replace("%", str(i + 1)): x for i, x in enumerate(values)}
+        found = guessed(table_of(made, tmp_path / "a.csv"), vehicle)
+        part = found.log_map.rotors or found.log_map.commands
+        assert part is not None
+        sure = all(r.field != "unit" or r.section == "gyro" for r in found.doubts)
+        return f"{part.unit}{'' if sure else '?'}"
+
+    assert unit_of("m%", 800.0 / most, 1000.0) == "us"
+    assert unit_of("m%", 1900.0 / most) == "rad/s?"  # of the size of pulses, but no offset
+    assert unit_of("pwm_%", np.round(255.0) / most) == "counts?"
+    assert unit_of("rpm%", 1.0, vehicle="ardrone2") == "rad/s?"
+    for name in "xyz":
+        columns[f"a{name} [m/s2]"] = columns.pop(f"a{name}") / 9.80665
+        columns[f"{name} [mm]"] = columns.pop(name)
+    found = guessed(table_of(columns | speeds, tmp_path / "g.csv"))
+    assert found.log_map.accelerometer is not None
+    assert found.log_map.accelerometer.unit == "g"
+    assert found.log_map.position is not None
+    assert found.log_map.position.unit == "m"
+    for unit in ("m/s2", "mm"):
+        assert any(f"though the columns' names say {unit}" in r.why for r in found.doubts)
 
 
 @pytest.mark.parametrize(
@@ -70,7 +222,7 @@ def test_percents_are_not_silently_taken_for_turns_a_second(
     hover = np.sqrt(vehicle.weight / vehicle.k.sum()) / (2.0 * np.pi)
     values = np.full((100, 4), hover)
     values[0] = highest
-    group = Group(tuple(f"{name}{i}" for i in range(1, 5)), name, numbered=True)
+    group = Group(tuple(f"{name}{i}" for i in range(1, 5)), name)
     kind, unit, sure, why = motor_unit(group, values, vehicle)
     if expected is None:
         assert not sure
