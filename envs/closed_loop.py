@@ -19,7 +19,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -35,6 +35,7 @@ from ..controllers.flight import (
 from ..controllers.model_inverse import foresee, through_the_rotors
 from ..dynamics.effects import compile_effects
 from ..dynamics.mean_jet import COUNT_R, COUNT_X
+from ..dynamics.model import lay_addresses, without_addresses
 from ..dynamics.motion import Array
 from ..dynamics.rotation import quaternion_of_yaw, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
@@ -344,11 +345,10 @@ class ClosedLoop:
     ) -> None:
         if estimator not in ESTIMATORS:
             raise unknown_name("estimator", estimator, ESTIMATORS)
-        plant, self._body = plant_record(
-            declared if true is None else true, settings or PlantSettings()
-        )
+        self.true = declared if true is None else true
+        plant, self._body = plant_record(self.true, settings or PlantSettings())
         self.model, self.data = load_world(self._body, load, drawn)
-        self.load = load
+        self.load, self.own_stages = load, tuple(stages)
         self.record = np.zeros(1, dtype=LOOP)
         loop = self.record[0]
         loop["plant"] = plant[0]
@@ -363,7 +363,22 @@ class ClosedLoop:
         self.accelerometer = accelerometer
         self.noise_size = NOISE + (0 if accelerometer is None else ACCELEROMETER_NOISE)
         self.ukf = ESTIMATORS[estimator](declared, tuning, TICK)
-        loop["step"], loop["filter"] = self.ukf.step_address, self.ukf.record[0]
+        loop["filter"] = self.ukf.record[0]
+        self.winds, self.reference = Sum(), np.zeros((0, REFERENCE_SIZE))
+        self.noise, self.row = np.zeros((1, self.noise_size)), 0  # normals of the run, and its tick
+        self.fan_path = self._fan_at_rest = np.array([[0.0, float(loop["fan"]["height"])]])
+        self._settled = 0  # ticks before the episode
+        self._carried = tuple(self.__dict__)  # by a copy, which lays the rest over it
+        self._bind()
+
+    def _bind(self) -> None:
+        """Lay what Python reads and writes over the record and MuJoCo's data, and find compiled
+        code.
+        """
+        loop = self.record[0]
+        loop["step"] = self.ukf.step_address
+        lay_addresses(loop["plant"], self.true)
+        lay_addresses(loop["filter"], self.ukf.vehicle)
         self.state: Array = loop["filter"]["x"]
         self.covariance: Array = loop["filter"]["P"]
         self.setpoint: Array = loop["flight"]["setpoint"]
@@ -380,15 +395,10 @@ class ClosedLoop:
         self.thrust: Array = loop["thrust"]
         self.points: Array = loop["points"]
         self.attitude_of_points: Array = loop["rotation"]
-        self.winds = Sum()
-        self.noise, self.row = np.zeros((1, self.noise_size)), 0  # normals of the run, and its tick
-        self.fan_path = self._fan_at_rest = np.array([[0.0, float(loop["fan"]["height"])]])
         self._ticks: np.ndarray = self.record["ticks"]
-        self._settled = 0  # ticks before the episode
-        self.stages = self._pipeline(stages)
-        self._look_at_world(np.zeros((0, REFERENCE_SIZE)))
+        self.stages = self._pipeline(self.own_stages)
+        self._look_at_world()
         given = self.record, self.world, self.fan_path, self.noise
-        self._own_stages = bool(stages)
         self._move = _C_FUNCTION(partial(mujoco.mj_step, self.model, self.data, SUBSTEPS))
         self._move_address = int(ctypes.cast(self._move, ctypes.c_void_p).value or 0)
         self._run_ticks = specialised(run_ticks, *given, 0)
@@ -407,13 +417,13 @@ class ClosedLoop:
             stages[name] = run
         return stages
 
-    def _look_at_world(self, reference: Array) -> None:
+    def _look_at_world(self) -> None:
         """Take the arrays of MuJoCo's data, which a reset of it may move."""
         self._qpos: Array = self.data.qpos
         self._qvel: Array = self.data.qvel
         xfrc: Array = self.data.xfrc_applied[self.model.body("vehicle").id]
         self.world = World(
-            self.jet_table, self._qpos[:7], self._qvel[:6], xfrc, reference, self.winds.calls
+            self.jet_table, self._qpos[:7], self._qvel[:6], xfrc, self.reference, self.winds.calls
         )
 
     @property
@@ -503,8 +513,8 @@ class ClosedLoop:
                     f"got shape {rows.shape}"
                 )
         mujoco.mj_resetData(self.model, self.data)
-        self.winds = blowing
-        self._look_at_world(rows)
+        self.winds, self.reference = blowing, rows
+        self._look_at_world()
         loop = self.record[0]
         loop["winds"] = len(blowing.winds)
         self.action[:] = 0.0
@@ -570,7 +580,7 @@ class ClosedLoop:
             )
         self.noise, self.fan_path = noise, path
         with Untimed():
-            if not (self._own_stages or self.winds.own):
+            if not (self.own_stages or self.winds.own):
                 self._run_ticks(self.record, self.world, path, noise, self._move_address)
                 return
             for k in range(count):
@@ -597,18 +607,19 @@ class ClosedLoop:
         """
         return bool(self.data.time < (self._settled + self.ticks - 0.5) * TICK)
 
-    def __reduce__(self) -> NoReturn:
-        """Refuse to be copied or pickled: the loop's arrays are views of its record and of MuJoCo's
-        data, and those of a copy would not be.
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy starts from: no views, and no addresses of this process."""
+        record = self.record.copy()
+        record["step"] = 0
+        for part in ("plant", "filter"):
+            record[part] = without_addresses(record[part])
+        return {name: getattr(self, name) for name in (*self._carried, "_carried")} | {
+            "record": record
+        }
 
-        Raises:
-            InputError: always.
-        """
-        raise InputError(
-            "a flight cannot be copied or pickled; make another environment, reset it with the "
-            "same seed and fly "
-            "the same actions: it arrives at the same state"
-        )
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._bind()
 
     def healthy(self) -> bool:
         """Whether it still flies: every number of plant and filter finite, and nothing faster than

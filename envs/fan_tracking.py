@@ -184,6 +184,9 @@ class FanTrackingEnv(FanTask):
         self.view = View(observe, self.normalize)
         bound = self.view.bound()
         self.observation_space = gym.spaces.Box(-bound, bound, bound.shape, np.float32)
+        self._compile()
+
+    def _compile(self) -> None:
         frame = np.empty(OBSERVATION_SIZE, dtype=np.float32)
         self._see = specialised(see, np.empty(20), 0.0, frame)
 

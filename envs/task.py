@@ -118,9 +118,24 @@ class Task(gym.Env[Frame, Frame], ABC):
         self.viewer: Any = None
         self._loop: ClosedLoop | None = None
         self._in_flight = False
-        self._generator: np.random.Generator | None = None
+        self._generator: np.random.Generator | None = None  # that the normals are drawn from
         self.command: Array = np.zeros(self.action_size)  # the last one, in SI units
         self.foresight = 0  # decisions to come that ``info`` tells of, for the oracle
+
+    # what a copy makes anew: windows, and what holds compiled code
+    _made_anew: ClassVar = ("viewer", "_generator", "_generators", "_draw_normals", "_see")
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy in the middle of an episode starts from."""
+        return {name: v for name, v in self.__dict__.items() if name not in self._made_anew}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.viewer = self._generator = None
+        self._compile()
+
+    def _compile(self) -> None:
+        """Find the compiled code of the task's own."""
 
     def _observe(self, limits: Array, scales: Sequence[float]) -> None:
         """Set the observation's space, of numbers within ``limits`` that ``normalize`` divides by

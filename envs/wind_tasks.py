@@ -161,10 +161,13 @@ class WindHoverEnv(Task):
         self.winds = None if winds is None else Sum(*winds, where=f"{self.name}: winds").winds
         self.model_in_loop, self.gains = bool(model_in_loop), gains
         self._observe(_LIMITS, OBSERVATION_SCALES)
-        frame, three = np.empty(WIND_OBSERVATION_SIZE, dtype=np.float32), np.empty(3)
-        self._see = specialised(see, np.empty(20), np.empty(10), three, three, three, frame)
         self.reference_name = ""
         self.blowing: Sequence[Wind] = []
+        self._compile()
+
+    def _compile(self) -> None:
+        frame, three = np.empty(WIND_OBSERVATION_SIZE, dtype=np.float32), np.empty(3)
+        self._see = specialised(see, np.empty(20), np.empty(10), three, three, three, frame)
 
     def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> ClosedLoop:
         """Return the closed loop of a true vehicle, with an accelerometer."""
