@@ -47,6 +47,7 @@ from ..runtime.addresses import call_at, call_step
 from ..runtime.compiled import Record, compiled, specialised
 from ..runtime.errors import InputError, unknown_name
 from .fan import FAN, STATIONS, Fan, fan_record, jet_table
+from .observing import Motion
 from .plant import (
     NOISE,
     PLANT,
@@ -145,6 +146,14 @@ class Stage:
 
 
 @compiled
+def place_stations(pose: Array, R: Array, s: Array, points: Array) -> None:
+    """Write the places (3, STATIONS) m, world, of stations ``s`` of a vehicle at a pose (7,)."""
+    for i in range(STATIONS):
+        for a in range(3):
+            points[a, i] = pose[a] + R[a, 0] * s[i, 0] + R[a, 1] * s[i, 1] + R[a, 2] * s[i, 2]
+
+
+@compiled
 def _blow(record: Record, world: World, path: Array, noise: Array, k: int) -> None:
     """Write the winds at the vehicle's stations into ``fan.air``, every second tick."""
     loop, qpos = record[0], world.qpos
@@ -152,10 +161,8 @@ def _blow(record: Record, world: World, path: Array, noise: Array, k: int) -> No
         return
     R, s, points, air = loop.rotation, loop.fan.stations, loop.points, loop.air
     quaternion_to_matrix(qpos[3:7], R)
-    for i in range(STATIONS):
-        for a in range(3):
-            air[a, i] = 0.0
-            points[a, i] = qpos[a] + R[a, 0] * s[i, 0] + R[a, 1] * s[i, 1] + R[a, 2] * s[i, 2]
+    place_stations(qpos, R, s, points)
+    air[:] = 0.0
     loop.time[0] = max(loop.ticks, 0) * TICK
     add_winds(world.winds, loop.time, points, air)
     for i in range(STATIONS):
@@ -219,33 +226,33 @@ def _actuate(record: Record, world: World, path: Array, noise: Array, k: int) ->
         xfrc,
     )
     if noise.shape[1] > NOISE:
-        _accelerate(loop, xfrc, noise, k)
+        if k == 0:
+            for j in range(3):
+                loop.specific[j] = loop.thrust[j] = 0.0
+        accelerate(loop, xfrc, noise[k])
+        if k == len(noise) - 1:
+            for j in range(3):
+                loop.specific[j] /= len(noise)
+                loop.thrust[j] /= len(noise)
 
 
 @compiled
-def _accelerate(loop: Record, xfrc: Array, noise: Array, k: int) -> None:
+def accelerate(loop: Record, xfrc: Array, noise: Array) -> None:
     """Add what an accelerometer in the centre of mass measures, turned into the world by the
     estimated attitude, and what the rotors make by the declared model.
     """
     plant, body = loop.plant, loop.flight.body
     R, E = plant.rotation, loop.flight.rotation
-    if k == 0:
-        for j in range(3):
-            loop.specific[j] = loop.thrust[j] = 0.0
     thrust = 0.0
     for i in range(4):
         thrust += body.k[i] * plant.z[i] * plant.z[i]
     for j in range(3):
-        felt = loop.accelerometer_bias[j] + loop.accelerometer_sigma * noise[k, NOISE + j]
+        felt = loop.accelerometer_bias[j] + loop.accelerometer_sigma * noise[NOISE + j]
         for i in range(3):
             felt += R[i, j] * xfrc[i] / plant.body.mass
         for i in range(3):
             loop.specific[i] += E[i, j] * felt
         loop.thrust[j] += E[j, 2] * thrust / body.mass
-    if k == len(noise) - 1:
-        for j in range(3):
-            loop.specific[j] /= len(noise)
-            loop.thrust[j] /= len(noise)
 
 
 @compiled
@@ -263,6 +270,16 @@ def run_ticks(record: Record, world: World, path: Array, noise: Array, move: int
         _actuate(record, world, path, noise, k)
         call_at(move, 0)
         record[0].ticks += 1
+
+
+@compiled
+def write_motion(record: Record, world: World, motion: Motion, n: int) -> None:
+    """Write where a loop stands into row ``n``."""
+    loop = record[0]
+    motion.position[n, :, 0], motion.velocity[n, :, 0] = world.qpos, world.qvel
+    motion.wrench[n, :, 0], motion.state[n, :, 0] = loop.plant.external, loop.filter.x
+    motion.specific[n, :, 0], motion.thrust[n, :, 0] = loop.specific, loop.thrust
+    motion.air[n, :, :, 0] = loop.fan.air
 
 
 @compiled
@@ -361,7 +378,12 @@ class ClosedLoop:
             loop["fan"]["blown"] = 1  # drag, in still air too
             self.jet_table = np.stack(jet_table(fan.radius, fan.hub_radius))
         self.accelerometer = accelerometer
-        self.noise_size = NOISE + (0 if accelerometer is None else ACCELEROMETER_NOISE)
+        self.noise_size = NOISE
+        if accelerometer is not None:
+            self.noise_size, loop["accelerometer_sigma"] = (
+                NOISE + ACCELEROMETER_NOISE,
+                accelerometer[0],
+            )
         self.ukf = ESTIMATORS[estimator](declared, tuning, TICK)
         loop["filter"] = self.ukf.record[0]
         self.winds, self.reference = Sum(), np.zeros((0, REFERENCE_SIZE))
@@ -519,8 +541,7 @@ class ClosedLoop:
         loop["winds"] = len(blowing.winds)
         self.action[:] = 0.0
         if self.accelerometer is not None:
-            loop["accelerometer_sigma"], sigma = self.accelerometer
-            loop["accelerometer_bias"] = sigma * rng.standard_normal(3)
+            loop["accelerometer_bias"] = self.accelerometer[1] * rng.standard_normal(3)
         loop["ticks"], self._settled = -settle, settle
         reset_plant(loop["plant"], self._body)
         self._qpos[:3], self._qpos[3:7] = position, quaternion_of_yaw(yaw)
@@ -580,7 +601,7 @@ class ClosedLoop:
             )
         self.noise, self.fan_path = noise, path
         with Untimed():
-            if not (self.own_stages or self.winds.own):
+            if not self.has_own_parts:
                 self._run_ticks(self.record, self.world, path, noise, self._move_address)
                 return
             for k in range(count):
@@ -599,6 +620,11 @@ class ClosedLoop:
         """Let MuJoCo integrate the rigid body over the tick."""
         mujoco.mj_step(self.model, self.data, SUBSTEPS)
         self._ticks += 1
+
+    @property
+    def has_own_parts(self) -> bool:
+        """Whether a user's own stages or winds fly, which are called from Python."""
+        return bool(self.own_stages or self.winds.own)
 
     @property
     def was_reset(self) -> bool:
