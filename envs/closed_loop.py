@@ -55,6 +55,7 @@ from .plant import (
     TICK,
     PlantSettings,
     actuate,
+    delay,
     load_world,
     plant_record,
     reset_plant,
@@ -250,8 +251,11 @@ def accelerate(loop: Record, xfrc: Array, noise: Array) -> None:
         felt = loop.accelerometer_bias[j] + loop.accelerometer_sigma * noise[NOISE + j]
         for i in range(3):
             felt += R[i, j] * xfrc[i] / plant.body.mass
+        plant.scratch[j] = felt
+    delay(plant.past_felt, plant.imu_late, plant.scratch, plant.late)
+    for j in range(3):
         for i in range(3):
-            loop.specific[i] += E[i, j] * felt
+            loop.specific[i] += E[i, j] * plant.late[j]
         loop.thrust[j] += E[j, 2] * thrust / body.mass
 
 
@@ -545,6 +549,7 @@ class ClosedLoop:
         loop["ticks"], self._settled = -settle, settle
         reset_plant(loop["plant"], self._body)
         self._qpos[:3], self._qpos[3:7] = position, quaternion_of_yaw(yaw)
+        loop["plant"]["past_poses"] = self._qpos[:7]
         self.setpoint[:] = 0.0
         self.setpoint[:3], self.setpoint[9] = position, yaw
         reset_flight(loop["flight"])

@@ -28,6 +28,7 @@ from .fan import Fan
 from .normals import draw_normals, generator_list
 from .observing import Episodes, Motion, View
 from .plant import TICK, PlantSettings
+from .scenarios import Drawn
 
 Frame = NDArray[np.float32]
 
@@ -73,7 +74,7 @@ class Task(gym.Env[Frame, Frame], ABC):
         vehicle: what filter and flight loop know: preset, YAML path or ``Vehicle``.
         effects: of the true vehicle, which nobody declared.
         truth: the true vehicle, before ``effects``; default: as declared.
-        settings: of the plant: motor lag, unmodelled disturbance, dropouts.
+        settings: of the plant: motor lag, unmodelled disturbance, delays, losses.
         estimator: ``"ukf"``, or ``"constant-gain"``: the filter's converged gain, which is faster.
         normalize: whether observations, and actions in m/s2, are divided by fixed scales.
         width: of a picture, in pixels.
@@ -145,6 +146,7 @@ class Task(gym.Env[Frame, Frame], ABC):
         self.action_space = gym.spaces.Box(-largest, largest, (self.action_size,), np.float32)
         self.viewer: Any = None
         self._loop: ClosedLoop | None = None
+        self.drawn: dict[str, float] = {}  # of an episode, where the scenario varies
         self._in_flight = False
         self._generator: np.random.Generator | None = None  # that the normals are drawn from
         self.command: Array = np.zeros(self.action_size)  # the last one, in SI units
@@ -224,7 +226,10 @@ class Task(gym.Env[Frame, Frame], ABC):
             replace(vehicle, mocap=mocap, effects=(*vehicle.effects, *self.effects)),
             UKFTuning.for_vehicle(declared, TICK, scenario.rise_time),
             fan,
-            self.settings or PlantSettings.for_vehicle(self.truth),
+            replace(
+                self.settings or PlantSettings.for_vehicle(self.truth),
+                **{n: v for n, v in self.drawn.items() if n in Drawn.__dataclass_fields__},
+            ),
             drawn=self.render_mode is not None,
             estimator=self.estimator,
             stages=self.stages,
@@ -234,7 +239,7 @@ class Task(gym.Env[Frame, Frame], ABC):
     def draw_loop(self) -> None:
         """Make the closed loop of an episode, drawn where the scenario varies."""
         fan = self.fan
-        self.drawn: dict[str, float] = {}
+        self.drawn = {}
         if not self.scenario.varied:
             if self._loop is None:
                 self._loop = self.make_loop(self.truth, fan)

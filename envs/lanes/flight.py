@@ -40,6 +40,7 @@ from ..plant import (
     TICK,
     add_up,
     blow,
+    delay,
     disturb,
     follow,
     log_speeds,
@@ -82,6 +83,16 @@ _PLANT = LaneRecord(
         "q",
         "rho",
         "scratch",
+        "dropout",
+        "dropout_kept",
+        "lost",
+        "actuator_late",
+        "pose_late",
+        "imu_late",
+        "past_commands",
+        "past_poses",
+        "past_felt",
+        "late",
     ),
     (
         "motor_keep",
@@ -91,7 +102,6 @@ _PLANT = LaneRecord(
         "disturbance_force",
         "disturbance_torque",
         "disturbance_keep",
-        "dropout",
         "effect_wrench",
         "applied",
     ),
@@ -170,7 +180,8 @@ def tick_lanes(
     """
     loop, f = _loop_at(address), in_hand(work)
     plant, flight, fan, qpos, qvel = loop.plant, loop.flight, loop.fan, loop.qpos, loop.qvel
-    measure(plant, qpos, loop.noise)
+    delay(plant.past_poses, plant.pose_late, qpos, plant.late)
+    measure(plant, plant.late, loop.noise)
     lose_pose(plant, loop.noise)
     for i in range(11):
         f.z[i] = plant.z[i]
