@@ -89,6 +89,10 @@ $(VENV)-lowest/.lowest: pyproject.toml .ci/lowest.py
 	$(@D)/bin/pip install --quiet --disable-pip-version-check -c $(@D)/lowest.txt -e '.[test]'
 	touch $@
 
+# one line on each log of FOLDER: read, or refused and why
+foreign: $(VENV)/.tested
+	$(BIN)/python -m windwrench.studies.foreign_logs $(FOLDER)
+
 clean:
 	rm -rf $(VENV) $(VENV)-* build dist results site *.egg-info
 	find . -name '*.nb[ic]' -delete

@@ -34,6 +34,9 @@ _OWN_ROW = (
     MAX_EFFECTS + MAX_SENSING
 )  # the model's: whether it has delivered rotor speeds yet, and those
 
+# fields that hold addresses of compiled effects
+_ADDRESSES = ("wrench_models", "wrench_hooks", "rotor_models", "sensing_models")
+
 MODEL_FIELDS: list[tuple[object, ...]] = [
     ("body", BODY),
     ("constants", "f8", (VEHICLE_SIZE,)),
@@ -80,17 +83,32 @@ def load_model(record: np.void, vehicle: Vehicle) -> Vehicle:
     assert max(bundle.rotor_memory, bundle.sensing_memory) <= MEMORY
     record["body"] = body_record(bundle.vehicle)[0]
     record["constants"] = bundle.constants
-    for kind, models, coefficients in (
-        ("wrench", bundle.wrench_models, bundle.wrench_coefficients),
-        ("rotor", bundle.rotor_models, bundle.rotor_coefficients),
-        ("sensing", bundle.sensing_models, bundle.sensing_coefficients),
+    for kind, coefficients in (
+        ("wrench", bundle.wrench_coefficients),
+        ("rotor", bundle.rotor_coefficients),
+        ("sensing", bundle.sensing_coefficients),
     ):
-        record[f"{kind}_count"] = len(models)
-        record[f"{kind}_models"][: len(models)] = models
-        record[f"{kind}_coefficients"][: len(models)] = coefficients
-    record["wrench_hooks"][: len(bundle.wrench_hooks)] = bundle.wrench_hooks
+        record[f"{kind}_count"] = len(coefficients)
+        record[f"{kind}_coefficients"][: len(coefficients)] = coefficients
+    lay_addresses(record, vehicle)
     record["hooked"] = int(np.any(bundle.wrench_hooks != 0))
     return bundle.vehicle
+
+
+def lay_addresses(record: np.void, vehicle: Vehicle) -> None:
+    """Write where this process has the compiled effects of a vehicle into the model's fields."""
+    bundle = compile_effects(vehicle)
+    for name in _ADDRESSES:
+        addresses = getattr(bundle, name)
+        record[name][: len(addresses)] = addresses
+
+
+def without_addresses(record: np.ndarray) -> np.ndarray:
+    """Return a copy of a record (1,) with a model's fields that another process may read."""
+    copy = record.copy()
+    for name in _ADDRESSES:
+        copy[name] = 0
+    return copy
 
 
 def reset_model(record: np.void) -> None:

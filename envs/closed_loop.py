@@ -19,7 +19,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -35,6 +35,7 @@ from ..controllers.flight import (
 from ..controllers.model_inverse import foresee, through_the_rotors
 from ..dynamics.effects import compile_effects
 from ..dynamics.mean_jet import COUNT_R, COUNT_X
+from ..dynamics.model import lay_addresses, without_addresses
 from ..dynamics.motion import Array
 from ..dynamics.rotation import quaternion_of_yaw, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
@@ -46,6 +47,7 @@ from ..runtime.addresses import call_at, call_step
 from ..runtime.compiled import Record, compiled, specialised
 from ..runtime.errors import InputError, unknown_name
 from .fan import FAN, STATIONS, Fan, fan_record, jet_table
+from .observing import Motion
 from .plant import (
     NOISE,
     PLANT,
@@ -53,6 +55,7 @@ from .plant import (
     TICK,
     PlantSettings,
     actuate,
+    delay,
     load_world,
     plant_record,
     reset_plant,
@@ -144,6 +147,14 @@ class Stage:
 
 
 @compiled
+def place_stations(pose: Array, R: Array, s: Array, points: Array) -> None:
+    """Write the places (3, STATIONS) m, world, of stations ``s`` of a vehicle at a pose (7,)."""
+    for i in range(STATIONS):
+        for a in range(3):
+            points[a, i] = pose[a] + R[a, 0] * s[i, 0] + R[a, 1] * s[i, 1] + R[a, 2] * s[i, 2]
+
+
+@compiled
 def _blow(record: Record, world: World, path: Array, noise: Array, k: int) -> None:
     """Write the winds at the vehicle's stations into ``fan.air``, every second tick."""
     loop, qpos = record[0], world.qpos
@@ -151,10 +162,8 @@ def _blow(record: Record, world: World, path: Array, noise: Array, k: int) -> No
         return
     R, s, points, air = loop.rotation, loop.fan.stations, loop.points, loop.air
     quaternion_to_matrix(qpos[3:7], R)
-    for i in range(STATIONS):
-        for a in range(3):
-            air[a, i] = 0.0
-            points[a, i] = qpos[a] + R[a, 0] * s[i, 0] + R[a, 1] * s[i, 1] + R[a, 2] * s[i, 2]
+    place_stations(qpos, R, s, points)
+    air[:] = 0.0
     loop.time[0] = max(loop.ticks, 0) * TICK
     add_winds(world.winds, loop.time, points, air)
     for i in range(STATIONS):
@@ -218,33 +227,36 @@ def _actuate(record: Record, world: World, path: Array, noise: Array, k: int) ->
         xfrc,
     )
     if noise.shape[1] > NOISE:
-        _accelerate(loop, xfrc, noise, k)
+        if k == 0:
+            for j in range(3):
+                loop.specific[j] = loop.thrust[j] = 0.0
+        accelerate(loop, xfrc, noise[k])
+        if k == len(noise) - 1:
+            for j in range(3):
+                loop.specific[j] /= len(noise)
+                loop.thrust[j] /= len(noise)
 
 
 @compiled
-def _accelerate(loop: Record, xfrc: Array, noise: Array, k: int) -> None:
+def accelerate(loop: Record, xfrc: Array, noise: Array) -> None:
     """Add what an accelerometer in the centre of mass measures, turned into the world by the
     estimated attitude, and what the rotors make by the declared model.
     """
     plant, body = loop.plant, loop.flight.body
     R, E = plant.rotation, loop.flight.rotation
-    if k == 0:
-        for j in range(3):
-            loop.specific[j] = loop.thrust[j] = 0.0
     thrust = 0.0
     for i in range(4):
         thrust += body.k[i] * plant.z[i] * plant.z[i]
     for j in range(3):
-        felt = loop.accelerometer_bias[j] + loop.accelerometer_sigma * noise[k, NOISE + j]
+        felt = loop.accelerometer_bias[j] + loop.accelerometer_sigma * noise[NOISE + j]
         for i in range(3):
             felt += R[i, j] * xfrc[i] / plant.body.mass
+        plant.scratch[j] = felt
+    delay(plant.past_felt, plant.imu_late, plant.scratch, plant.late)
+    for j in range(3):
         for i in range(3):
-            loop.specific[i] += E[i, j] * felt
+            loop.specific[i] += E[i, j] * plant.late[j]
         loop.thrust[j] += E[j, 2] * thrust / body.mass
-    if k == len(noise) - 1:
-        for j in range(3):
-            loop.specific[j] /= len(noise)
-            loop.thrust[j] /= len(noise)
 
 
 @compiled
@@ -262,6 +274,16 @@ def run_ticks(record: Record, world: World, path: Array, noise: Array, move: int
         _actuate(record, world, path, noise, k)
         call_at(move, 0)
         record[0].ticks += 1
+
+
+@compiled
+def write_motion(record: Record, world: World, motion: Motion, n: int) -> None:
+    """Write where a loop stands into row ``n``."""
+    loop = record[0]
+    motion.position[n, :, 0], motion.velocity[n, :, 0] = world.qpos, world.qvel
+    motion.wrench[n, :, 0], motion.state[n, :, 0] = loop.plant.external, loop.filter.x
+    motion.specific[n, :, 0], motion.thrust[n, :, 0] = loop.specific, loop.thrust
+    motion.air[n, :, :, 0] = loop.fan.air
 
 
 @compiled
@@ -344,11 +366,10 @@ class ClosedLoop:
     ) -> None:
         if estimator not in ESTIMATORS:
             raise unknown_name("estimator", estimator, ESTIMATORS)
-        plant, self._body = plant_record(
-            declared if true is None else true, settings or PlantSettings()
-        )
+        self.true = declared if true is None else true
+        plant, self._body = plant_record(self.true, settings or PlantSettings())
         self.model, self.data = load_world(self._body, load, drawn)
-        self.load = load
+        self.load, self.own_stages = load, tuple(stages)
         self.record = np.zeros(1, dtype=LOOP)
         loop = self.record[0]
         loop["plant"] = plant[0]
@@ -361,9 +382,29 @@ class ClosedLoop:
             loop["fan"]["blown"] = 1  # drag, in still air too
             self.jet_table = np.stack(jet_table(fan.radius, fan.hub_radius))
         self.accelerometer = accelerometer
-        self.noise_size = NOISE + (0 if accelerometer is None else ACCELEROMETER_NOISE)
+        self.noise_size = NOISE
+        if accelerometer is not None:
+            self.noise_size, loop["accelerometer_sigma"] = (
+                NOISE + ACCELEROMETER_NOISE,
+                accelerometer[0],
+            )
         self.ukf = ESTIMATORS[estimator](declared, tuning, TICK)
-        loop["step"], loop["filter"] = self.ukf.step_address, self.ukf.record[0]
+        loop["filter"] = self.ukf.record[0]
+        self.winds, self.reference = Sum(), np.zeros((0, REFERENCE_SIZE))
+        self.noise, self.row = np.zeros((1, self.noise_size)), 0  # normals of the run, and its tick
+        self.fan_path = self._fan_at_rest = np.array([[0.0, float(loop["fan"]["height"])]])
+        self._settled = 0  # ticks before the episode
+        self._carried = tuple(self.__dict__)  # by a copy, which lays the rest over it
+        self._bind()
+
+    def _bind(self) -> None:
+        """Lay what Python reads and writes over the record and MuJoCo's data, and find compiled
+        code.
+        """
+        loop = self.record[0]
+        loop["step"] = self.ukf.step_address
+        lay_addresses(loop["plant"], self.true)
+        lay_addresses(loop["filter"], self.ukf.vehicle)
         self.state: Array = loop["filter"]["x"]
         self.covariance: Array = loop["filter"]["P"]
         self.setpoint: Array = loop["flight"]["setpoint"]
@@ -380,15 +421,10 @@ class ClosedLoop:
         self.thrust: Array = loop["thrust"]
         self.points: Array = loop["points"]
         self.attitude_of_points: Array = loop["rotation"]
-        self.winds = Sum()
-        self.noise, self.row = np.zeros((1, self.noise_size)), 0  # normals of the run, and its tick
-        self.fan_path = self._fan_at_rest = np.array([[0.0, float(loop["fan"]["height"])]])
         self._ticks: np.ndarray = self.record["ticks"]
-        self._settled = 0  # ticks before the episode
-        self.stages = self._pipeline(stages)
-        self._look_at_world(np.zeros((0, REFERENCE_SIZE)))
+        self.stages = self._pipeline(self.own_stages)
+        self._look_at_world()
         given = self.record, self.world, self.fan_path, self.noise
-        self._own_stages = bool(stages)
         self._move = _C_FUNCTION(partial(mujoco.mj_step, self.model, self.data, SUBSTEPS))
         self._move_address = int(ctypes.cast(self._move, ctypes.c_void_p).value or 0)
         self._run_ticks = specialised(run_ticks, *given, 0)
@@ -407,13 +443,13 @@ class ClosedLoop:
             stages[name] = run
         return stages
 
-    def _look_at_world(self, reference: Array) -> None:
+    def _look_at_world(self) -> None:
         """Take the arrays of MuJoCo's data, which a reset of it may move."""
         self._qpos: Array = self.data.qpos
         self._qvel: Array = self.data.qvel
         xfrc: Array = self.data.xfrc_applied[self.model.body("vehicle").id]
         self.world = World(
-            self.jet_table, self._qpos[:7], self._qvel[:6], xfrc, reference, self.winds.calls
+            self.jet_table, self._qpos[:7], self._qvel[:6], xfrc, self.reference, self.winds.calls
         )
 
     @property
@@ -503,17 +539,17 @@ class ClosedLoop:
                     f"got shape {rows.shape}"
                 )
         mujoco.mj_resetData(self.model, self.data)
-        self.winds = blowing
-        self._look_at_world(rows)
+        self.winds, self.reference = blowing, rows
+        self._look_at_world()
         loop = self.record[0]
         loop["winds"] = len(blowing.winds)
         self.action[:] = 0.0
         if self.accelerometer is not None:
-            loop["accelerometer_sigma"], sigma = self.accelerometer
-            loop["accelerometer_bias"] = sigma * rng.standard_normal(3)
+            loop["accelerometer_bias"] = self.accelerometer[1] * rng.standard_normal(3)
         loop["ticks"], self._settled = -settle, settle
         reset_plant(loop["plant"], self._body)
         self._qpos[:3], self._qpos[3:7] = position, quaternion_of_yaw(yaw)
+        loop["plant"]["past_poses"] = self._qpos[:7]
         self.setpoint[:] = 0.0
         self.setpoint[:3], self.setpoint[9] = position, yaw
         reset_flight(loop["flight"])
@@ -570,7 +606,7 @@ class ClosedLoop:
             )
         self.noise, self.fan_path = noise, path
         with Untimed():
-            if not (self._own_stages or self.winds.own):
+            if not self.has_own_parts:
                 self._run_ticks(self.record, self.world, path, noise, self._move_address)
                 return
             for k in range(count):
@@ -591,24 +627,30 @@ class ClosedLoop:
         self._ticks += 1
 
     @property
+    def has_own_parts(self) -> bool:
+        """Whether a user's own stages or winds fly, which are called from Python."""
+        return bool(self.own_stages or self.winds.own)
+
+    @property
     def was_reset(self) -> bool:
         """Whether MuJoCo reset the vehicle on its own: it does so, silently in code, where a state
         is not finite. Its time then is zero.
         """
         return bool(self.data.time < (self._settled + self.ticks - 0.5) * TICK)
 
-    def __reduce__(self) -> NoReturn:
-        """Refuse to be copied or pickled: the loop's arrays are views of its record and of MuJoCo's
-        data, and those of a copy would not be.
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy starts from: no views, and no addresses of this process."""
+        record = self.record.copy()
+        record["step"] = 0
+        for part in ("plant", "filter"):
+            record[part] = without_addresses(record[part])
+        return {name: getattr(self, name) for name in (*self._carried, "_carried")} | {
+            "record": record
+        }
 
-        Raises:
-            InputError: always.
-        """
-        raise InputError(
-            "a flight cannot be copied or pickled; make another environment, reset it with the "
-            "same seed and fly "
-            "the same actions: it arrives at the same state"
-        )
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._bind()
 
     def healthy(self) -> bool:
         """Whether it still flies: every number of plant and filter finite, and nothing faster than

@@ -5,18 +5,24 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 
-from ..controllers.observation import OBSERVATION_SIZE
 from ..dynamics.motion import Array
-from ..runtime.compiled import compiled, specialised
+from ..runtime.compiled import compiled, compiled_without_gil
 from ..runtime.errors import InputError
 from .fan import Fan
-from .observing import LIMITS, View
+from .observing import LIMITS, SCALES, Episodes, Motion, View
 from .plant import TICK
 from .scenarios import SCENARIOS, draw_fan_path
-from .task import EPISODE_SECONDS, LOST_OFFSET, SETTLE_TICKS, Frame, Task, keep_within
+from .task import (
+    COMMON_VALUES,
+    EPISODE_SECONDS,
+    LOST_OFFSET,
+    Frame,
+    Task,
+    is_flying,
+    keep_within,
+)
 
 DECISION_TICKS = 16  # 12.5 Hz
 DISTANCE = 2.3  # m, from the fan
@@ -56,12 +62,11 @@ class FanTask(Task):
     def __init__(self, *shared: Any, fan: Fan, **named: Any) -> None:
         super().__init__(*shared, **named)
         self.fan = replace(fan, turbulence=self.scenario.turbulence)
-        self.fan_motion = ""
 
-    def _start(self, path: Array, distance: float, settle: int, offset: Array) -> None:
+    def _start(self, path: Array, settle: int, offset: Array) -> None:
         """Hover ``offset`` (2,) m beside the fan's axis for ``settle`` ticks."""
-        self.path, self.distance = path, distance
-        start = np.array([distance, *(path[0] + offset)])
+        self.path, self.distance = path, self.drawn.get("distance", DISTANCE)
+        start = np.array([self.distance, *(path[0] + offset)])
         self.loop.reset(self.np_random, start, math.pi, fan_path=path[:1], settle=settle)
 
     def _truth(self) -> dict[str, Any]:
@@ -80,6 +85,34 @@ class FanTask(Task):
         loop = self.loop
         loop.setpoint[4 : 4 + self.action_size] = self.command
         loop.run(noise, self.path[min(loop.ticks, len(self.path) - 1) :])
+
+
+@compiled_without_gil
+def look_along_y(
+    which: np.ndarray, episodes: Episodes, motion: Motion, frames: Frame, values: np.ndarray
+) -> None:
+    """Write what ``FanTrackingEnv`` sees and tells of the episodes ``which``."""
+    lanes = motion.state.shape[2]
+    for n in np.flatnonzero(which):
+        b, lane = n // lanes, n % lanes
+        p, v = motion.position[b, :, lane], motion.velocity[b, :, lane]
+        state, path, value = motion.state[b, :, lane].copy(), episodes.paths[n], values[n]
+        see(state, episodes.commands[n, 0], frames[n])
+        k = min(episodes.ticks[n], len(path) - 1)
+        value.time, value.fan_y = episodes.ticks[n] * TICK, path[max(k - 1, 0), 0]
+        value.fan_velocity = (path[k, 0] - value.fan_y) / TICK
+        value.y, value.offset = p[1], p[1] - value.fan_y
+        value.force[:], value.torque[:] = motion.wrench[b, :3, lane], motion.wrench[b, 3:, lane]
+        value.reward_tracking, value.reward_change = reward_terms(
+            value.offset, episodes.changes[n, 0]
+        )
+        # written such that a number that is not finite counts as lost
+        value.lost = episodes.broken[n] or not (
+            is_flying(state, p, v)
+            and abs(value.offset) <= LOST_OFFSET
+            and abs(p[0] - episodes.distance[n]) <= AWAY
+            and abs(p[2] - path[0, 1]) <= AWAY
+        )
 
 
 class FanTrackingEnv(FanTask):
@@ -171,6 +204,13 @@ class FanTrackingEnv(FanTask):
     name = "FanTracking"
     action_size = 1
 
+    look = look_along_y
+    values = np.dtype(
+        [*COMMON_VALUES, *[(name, "f8") for name in ("fan_y", "fan_velocity", "y", "offset")]],
+        align=True,
+    )
+    limits, scales = LIMITS, SCALES
+
     def __init__(
         self,
         *shared: Any,
@@ -180,24 +220,15 @@ class FanTrackingEnv(FanTask):
         **named: Any,
     ) -> None:
         super().__init__(*shared, fan=fan or Fan(), **named)
+        self._see_by(View(observe, self.normalize))
         self.fan_path = fan_path
-        self.view = View(observe, self.normalize)
-        bound = self.view.bound()
-        self.observation_space = gym.spaces.Box(-bound, bound, bound.shape, np.float32)
-        frame = np.empty(OBSERVATION_SIZE, dtype=np.float32)
-        self._see = specialised(see, np.empty(20), 0.0, frame)
-
-    def _begin(self) -> None:
-        self.hover(SETTLE_TICKS)
-        self.view.restart(self.loop.state)
 
     def hover(self, settle: int = 0) -> None:
         """Draw an episode and let the vehicle hover at its start for ``settle`` ticks."""
         rng, scenario = self.np_random, self.scenario
-        distance = self._draw_loop(self.fan).get("distance", DISTANCE)
-        self.fan_motion, _, fan_y = draw_fan_path(scenario, rng, FAN_TIMES)
+        self.drawn_label, _, fan_y = draw_fan_path(scenario, rng, FAN_TIMES)
         if self.fan_path is not None:
-            self.fan_motion = "given"
+            self.drawn_label = "given"
             fan_y = np.asarray(self.fan_path(FAN_TIMES), dtype=np.float64)
             if fan_y.shape != FAN_TIMES.shape or not np.all(np.isfinite(fan_y)):
                 n = FAN_TIMES.size
@@ -206,40 +237,7 @@ class FanTrackingEnv(FanTask):
                 )
         offset = float(rng.uniform(*scenario.offset) * rng.choice([-1.0, 1.0]))
         path = np.column_stack([fan_y, np.full(len(fan_y), self.fan.height)])
-        self._start(path, distance, settle, np.array([offset, 0.0]))
-
-    def _get_obs(self) -> Frame:
-        loop, frame = self.loop, np.empty(OBSERVATION_SIZE, dtype=np.float32)
-        self._see(loop.state, self.command.item(), frame)
-        return frame if self.view.is_plain else self.view.of(frame, loop.state, loop.ticks)
-
-    def _get_info(self) -> dict[str, Any]:
-        loop, path = self.loop, self.path
-        k = min(loop.ticks, len(path) - 1)
-        fan_y = float(path[max(k - 1, 0), 0])
-        x, y, z = loop.position.tolist()
-        # written such that a number that is not finite counts as lost
-        flying = (
-            self.is_flying()
-            and abs(y - fan_y) <= LOST_OFFSET
-            and abs(x - self.distance) <= AWAY
-            and abs(z - self.fan.height) <= AWAY
-        )
-        return {
-            "fan_y": fan_y,
-            "fan_velocity": (float(path[k, 0]) - fan_y) / TICK if k > 0 else 0.0,
-            "y": y,
-            "offset": y - fan_y,
-            "force": loop.external[:3].copy(),
-            "torque": loop.external[3:].copy(),
-            "time": loop.time,
-            "lost": not flying,
-            "fan_motion": self.fan_motion,
-        }
-
-    def _get_reward(self, info: dict[str, Any], change: Array) -> dict[str, float]:
-        tracking, steady = reward_terms(info["offset"], float(change[0]))
-        return {"reward_tracking": tracking, "reward_change": steady}
+        self._start(path, settle, np.array([offset, 0.0]))
 
 
 TRUTH = frozenset({"force", "torque"})  # what every environment's ``info`` holds

@@ -5,19 +5,54 @@ from typing import Any
 
 import numpy as np
 
-from ..dynamics.motion import Array
 from ..dynamics.vehicle import Vehicle
+from ..runtime.compiled import compiled_without_gil
 from .fan import Fan
-from .fan_tracking import AWAY, CHANGE_COST, DISTANCE, FAN_TIMES, TRACKING_WIDTH, FanTask
+from .fan_tracking import AWAY, CHANGE_COST, FAN_TIMES, TRACKING_WIDTH, FanTask
+from .observing import Episodes, Motion
 from .plant import TICK
 from .scenarios import draw_fan_path
-from .task import LOST_OFFSET, SETTLE_TICKS, Frame, keep_within
+from .task import COMMON_VALUES, LOST_OFFSET, Frame, is_flying, keep_within
 
 FAN_HEIGHT = 1.5  # m, of the fan's axis at the start
 CAGE = 0.6  # rad, of the cage's stations above and below the rotors' plane
 _VERTICAL = 0.5  # of the scenario's speeds and travels that the fan moves up and down with
 _LIMITS = np.array([10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 5.0, 5.0, 1.0, 1.0])
 SCALES_2D = (0.5, 0.5, 0.5, 0.03, 0.03, 0.03, 0.5, 0.5, 1.0, 1.0)
+
+
+@compiled_without_gil
+def look_across(
+    which: np.ndarray, episodes: Episodes, motion: Motion, frames: Frame, values: np.ndarray
+) -> None:
+    """Write what ``FanTracking2DEnv`` sees and tells of the episodes ``which``."""
+    lanes = motion.state.shape[2]
+    for n in np.flatnonzero(which):
+        b, lane = n // lanes, n % lanes
+        p, v = motion.position[b, :, lane], motion.velocity[b, :, lane]
+        x, path, value = motion.state[b, :, lane].copy(), episodes.paths[n], values[n]
+        frame, change = frames[n], 0.0
+        for i in range(3):
+            frame[i], frame[3 + i] = x[16 + i], x[13 + i]
+        k = min(episodes.ticks[n], len(path) - 1)
+        for i in range(2):
+            frame[6 + i], frame[8 + i] = x[8 + i], episodes.commands[n, i]
+            value.fan[i], value.position[i] = path[max(k - 1, 0), i], p[1 + i]
+            value.fan_velocity[i] = (path[k, i] - value.fan[i]) / TICK
+            change += episodes.changes[n, i] ** 2
+        keep_within(frame, _LIMITS)
+        value.time = episodes.ticks[n] * TICK
+        value.error = math.hypot(p[1] - value.fan[0], p[2] - value.fan[1])
+        value.force[:], value.torque[:] = motion.wrench[b, :3, lane], motion.wrench[b, 3:, lane]
+        value.reward_tracking = 1.0 / (1.0 + (value.error / TRACKING_WIDTH) ** 2)
+        value.reward_change = -CHANGE_COST * change
+        # written such that a number that is not finite counts as lost
+        value.lost = episodes.broken[n] or not (
+            is_flying(x, p, v)
+            and value.error <= LOST_OFFSET
+            and abs(p[0] - episodes.distance[n]) <= AWAY
+            and p[2] > 0.0
+        )
 
 
 class FanTracking2DEnv(FanTask):
@@ -98,10 +133,20 @@ class FanTracking2DEnv(FanTask):
     name = "FanTracking2D"
     action_size = 2
 
+    look = look_across
+    values = np.dtype(
+        [
+            *COMMON_VALUES,
+            *[(name, "f8", (2,)) for name in ("fan", "fan_velocity", "position")],
+            ("error", "f8"),
+        ],
+        align=True,
+    )
+    limits, scales = tuple(_LIMITS), SCALES_2D
+
     def __init__(self, *shared: Any, fan: Fan | None = None, **named: Any) -> None:
         fan = fan or Fan(height=FAN_HEIGHT, hull_elevation=CAGE)
         super().__init__(*shared, fan=fan, **named)
-        self._observe(_LIMITS, SCALES_2D)
 
     def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> Any:
         """Return the closed loop; its accelerometer, which nobody reads, uses three more normals of
@@ -109,49 +154,13 @@ class FanTracking2DEnv(FanTask):
         """
         return super().make_loop(vehicle, fan, accelerometer=(0.0, 0.0), **given)
 
-    def _begin(self) -> None:
+    def hover(self, settle: int = 0) -> None:
+        """Draw an episode and let the vehicle hover at its start for ``settle`` ticks."""
         rng, scenario = self.np_random, self.scenario
-        distance = self._draw_loop(self.fan).get("distance", DISTANCE)
         sideways, _, y = draw_fan_path(scenario, rng, FAN_TIMES)
         upwards, _, z = draw_fan_path(scenario, rng, FAN_TIMES)
-        self.fan_motion = f"{sideways} and {upwards}"
+        self.drawn_label = f"{sideways} and {upwards}"
         path = np.column_stack([y, self.fan.height + _VERTICAL * z])
         offset, side = float(rng.uniform(*scenario.offset)), float(rng.uniform(-math.pi, math.pi))
         beside = offset * np.array([math.cos(side), 0.5 * math.sin(side)])
-        self._start(path, distance, SETTLE_TICKS, beside)
-
-    def _get_obs(self) -> Frame:
-        x = self.loop.state
-        frame = np.concatenate([x[16:19], x[13:16], x[8:10], self.command]).astype(np.float32)
-        keep_within(frame, _LIMITS)
-        return frame / self._scales
-
-    def _get_info(self) -> dict[str, Any]:
-        loop, path = self.loop, self.path
-        k = min(loop.ticks, len(path) - 1)
-        fan = path[max(k - 1, 0)]
-        x, y, z = loop.position.tolist()
-        offset = math.hypot(y - fan[0], z - fan[1])
-        flying = (
-            self.is_flying()
-            and offset <= LOST_OFFSET
-            and abs(x - self.distance) <= AWAY
-            and z > 0.0
-        )
-        return {
-            "fan": fan.copy(),
-            "fan_velocity": (path[k] - fan) / TICK if k > 0 else np.zeros(2),
-            "position": np.array([y, z]),
-            "error": offset,
-            "force": loop.external[:3].copy(),
-            "torque": loop.external[3:].copy(),
-            "time": loop.time,
-            "lost": not flying,
-            "fan_motion": self.fan_motion,
-        }
-
-    def _get_reward(self, info: dict[str, Any], change: Array) -> dict[str, float]:
-        return {
-            "reward_tracking": 1.0 / (1.0 + (info["error"] / TRACKING_WIDTH) ** 2),
-            "reward_change": -CHANGE_COST * float(change @ change),
-        }
+        self._start(path, settle, beside)

@@ -1,8 +1,10 @@
-"""What an agent of the fan-tracking task sees: the whole frame, parts of it, its history, or the
-pose alone; in SI units or divided by fixed scales.
+"""What episodes side by side are, and what their agents see: the whole frame, parts of it, its
+history, or the pose alone; in SI units or divided by fixed scales.
 """
 
 import math
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +14,45 @@ from ..controllers.observation import (
     FORCE_X,
     LAST_COMMAND,
     MAX_COMMAND,
-    OBSERVATION_SIZE,
 )
 from ..controllers.observation import VELOCITY_Y as _VELOCITY_Y
 from ..runtime.errors import InputError, unknown_name
+from .fan import STATIONS
 from .plant import TICK
 
 Frame = NDArray[np.float32]
 Array = NDArray[np.float64]
+
+
+class Episodes(NamedTuple):
+    """Episodes side by side, a row each."""
+
+    ticks: NDArray[np.int64]  # (n,) since the start; below zero while the filter settles
+    paths: Array  # (n, m, 2) m, y and height of the fan's axis, a column a tick
+    references: Array  # (n, k, 10) to be flown, a column a tick; k = 0: the set point moves
+    distance: Array  # (n,) m, from the fan at the start
+    commands: Array  # (n, actions) in SI units
+    changes: Array  # (n, actions) of the commands
+    broken: NDArray[np.bool_]  # (n,) whether the physics started over on its own
+
+
+class Motion(NamedTuple):
+    """Vehicles side by side: vehicle i in row ``i // lanes`` and lane ``i % lanes``."""
+
+    position: Array  # (rows, 7, lanes) m, and quaternion
+    velocity: Array  # (rows, 6, lanes) m/s, world, and rad/s, body
+    wrench: Array  # (rows, 6, lanes) N and Nm, world, the true external one
+    state: Array  # (rows, 20, lanes) as the filter estimates it
+    specific: Array  # (rows, 3, lanes) m/s2, as of ``ClosedLoop``
+    thrust: Array  # (rows, 3, lanes) m/s2, likewise
+    air: Array  # (rows, STATIONS, 3, lanes) m/s, of the winds at the stations
+
+    @classmethod
+    def zeros(cls, rows: int) -> "Motion":
+        """Return vehicles one to a row, before they fly."""
+        sizes = (7,), (6,), (6,), (20,), (3,), (3,), (STATIONS, 3)
+        return cls(*(np.zeros((rows, *size, 1)) for size in sizes))
+
 
 FRAMES = 25  # decisions of a history, 2 s
 _TICKS = round(DECISION_PERIOD / TICK)  # of a decision
@@ -30,33 +63,37 @@ SCALES = (0.5, 0.5, 0.5, 0.03, 0.03, 0.03, 0.5, 1.0)
 # of the pose: position (m), velocity (m/s), tilt, yaw (rad), command (m/s)
 _POSE_LIMITS = (5.0, 5.0, 5.0, 5.0, 1.0, 1.0, math.pi, MAX_COMMAND)
 _POSE_SCALES = (1.0, 1.0, 1.0, 0.5, 0.1, 0.1, 0.2, 1.0)
-_KEPT = {
-    "wrench": tuple(range(OBSERVATION_SIZE)),
-    "wrench-without-fx": tuple(i for i in range(OBSERVATION_SIZE) if i != FORCE_X),
-    "history": tuple(range(OBSERVATION_SIZE)),
-}
-OBSERVE = (*_KEPT, "pose")
+OBSERVE = ("wrench", "wrench-without-fx", "history", "pose")
 
 
 class View:
-    """From the frame (8,) of the environment to what its agent sees.
+    """From the frame (n,) of the environment to what its agent sees.
 
     Args:
-        observe: one of ``OBSERVE``.
+        observe: one of ``OBSERVE``; other than ``"wrench"`` of FanTracking alone.
         normalize: whether each number is divided by its scale.
+        limits: largest size (n,) of the frame's numbers.
+        scales: sizes (n,) that become 1.
 
     Raises:
         InputError: an unknown view, or ``normalize`` is no boolean.
     """
 
-    def __init__(self, observe: str = "wrench", normalize: bool = False) -> None:
+    def __init__(
+        self,
+        observe: str = "wrench",
+        normalize: bool = False,
+        limits: Sequence[float] = LIMITS,
+        scales: Sequence[float] = SCALES,
+    ) -> None:
         if observe not in OBSERVE:
             raise unknown_name("view", str(observe), OBSERVE, "FanTracking: observe")
         if not isinstance(normalize, bool | np.bool_):
             raise InputError(f"FanTracking: normalize must be True or False, got {normalize!r}")
         self.observe, self.normalize = observe, bool(normalize)
-        limits, scales = (_POSE_LIMITS, _POSE_SCALES) if observe == "pose" else (LIMITS, SCALES)
-        kept = list(_KEPT.get(observe, range(len(limits))))
+        if observe == "pose":
+            limits, scales = _POSE_LIMITS, _POSE_SCALES
+        kept = [i for i in range(len(limits)) if observe != "wrench-without-fx" or i != FORCE_X]
         self._kept = kept
         self._limits = np.array(limits, dtype=np.float32)[kept]
         self._scales = (
@@ -89,7 +126,7 @@ class View:
         self._seen, self._start = -1, state[:3].copy()
 
     def of_frames(self, frames: Frame) -> Frame:
-        """Return what is seen of frames (n, 8), where a frame alone says so."""
+        """Return what is seen of frames (n, size), where a frame alone says so."""
         seen: Frame = frames[:, self._kept] / self._scales
         return seen
 
@@ -127,4 +164,4 @@ class View:
         )
 
 
-__all__ = ["FRAMES", "OBSERVE", "SCALES", "View"]
+__all__ = ["FRAMES", "OBSERVE", "SCALES", "Episodes", "Motion", "View"]

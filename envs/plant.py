@@ -39,6 +39,8 @@ SUBSTEPS = 2
 # unit normals that one tick uses: pose, disturbance, gusts, dropout
 _POSE, _DISTURBANCE, _GUSTS, _DROPOUT = 0, 6, 12, 12 + 3 * STATIONS
 NOISE = _DROPOUT + 1
+MAX_DELAY = 0.1  # s, of what is kept for later
+_KEPT = round(MAX_DELAY / TICK) + 1
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,12 @@ class PlantSettings:
     )
     disturbance_torque: float = 0.01  # Nm
     disturbance_time: float = 0.3  # s, over which it lasts
-    dropout: float = 0.0  # probability that a pose is lost
+    # s, until what was commanded, or measured, arrives: at most ``MAX_DELAY``, whole ticks
+    actuator_delay: float = 0.0  # of rotor commands, before the motors' lag
+    pose_delay: float = 0.0  # of the pose, whose rotor speeds are not late
+    imu_delay: float = 0.0  # of the accelerometer, where there is one
+    dropout: float = 0.0  # share of the poses that are lost
+    dropout_burst: float = 0.0  # s, mean length of a run of lost poses; 0: each alone
     battery_life: float = 480.0  # s, over which the voltage falls by a tenth
     sensor_noise: bool = True
 
@@ -77,7 +84,18 @@ PLANT = np.dtype(
         ("disturbance_force", "f8"),
         ("disturbance_torque", "f8"),
         ("disturbance_keep", "f8"),
-        ("dropout", "f8"),  # a unit normal below it loses the pose
+        # a unit normal below it loses the pose: after one that came, and after one that was lost
+        ("dropout", "f8"),
+        ("dropout_kept", "f8"),
+        ("lost", "f8", (1,)),  # 1: the last pose was lost
+        ("actuator_late", "f8"),  # ticks
+        ("pose_late", "f8"),
+        ("imu_late", "f8"),
+        # of the last ticks, the newest first: rad/s; m and quaternion; m/s2, body
+        ("past_commands", "f8", (_KEPT, 4)),
+        ("past_poses", "f8", (_KEPT, 7)),
+        ("past_felt", "f8", (_KEPT, 3)),
+        ("late", "f8", (7,)),  # what arrives now of one of them
         ("voltage_ref", "f8"),
         ("battery_life", "f8"),
         ("battery", "f8"),  # V now; 0: not modelled
@@ -120,7 +138,31 @@ def plant_record(vehicle: Vehicle, settings: PlantSettings) -> tuple[np.ndarray,
         settings.disturbance_torque,
     )
     p["disturbance_keep"] = math.exp(-TICK / settings.disturbance_time)
-    p["dropout"] = _normal_quantile(settings.dropout)
+    for name in ("actuator", "pose", "imu"):
+        delay = getattr(settings, f"{name}_delay")
+        if not 0.0 <= delay <= MAX_DELAY:
+            raise InputError(
+                f"PlantSettings: {name}_delay must be 0 to {MAX_DELAY} s, got {delay!r}"
+            )
+        p[f"{name}_late"] = round(delay / TICK)
+    share, leaves = settings.dropout, 1.0 - settings.dropout
+    if not 0.0 <= share <= 1.0:
+        raise InputError(f"PlantSettings: dropout must be 0 to 1, got {share!r}")
+    if settings.dropout_burst != 0.0 and 0.0 < share < 1.0:
+        shortest = TICK * max(1.0, share / leaves)
+        if not settings.dropout_burst >= shortest:
+            raise InputError(
+                f"PlantSettings: dropout_burst must be 0, or at least {shortest:.4g} s where a "
+                f"share of {share:g} is lost, got {settings.dropout_burst!r}"
+            )
+        # Gilbert, Bell System Technical Journal 39 (1960): a chain of two states
+        share, leaves = (
+            TICK / settings.dropout_burst * share / leaves,
+            TICK / settings.dropout_burst,
+        )
+    p["dropout"], p["dropout_kept"] = _normal_quantile(share), _normal_quantile(1.0 - leaves)
+    if settings.dropout_burst == 0.0:
+        p["dropout_kept"] = p["dropout"]
     p["voltage_ref"], p["battery_life"] = vehicle.voltage_ref, settings.battery_life
     return record, amended
 
@@ -136,8 +178,9 @@ def reset_plant(p: np.void, vehicle: Vehicle) -> None:
     effects applied.
     """
     reset_model(p)
-    for name in ("disturbance", "external", "jet", "applied"):
+    for name in ("disturbance", "external", "jet", "applied", "lost"):
         p[name] = 0.0
+    p["past_commands"], p["past_felt"] = vehicle.hover_rate, [0.0, 0.0, vehicle.gravity]
     p["speeds"] = vehicle.hover_rate
     p["battery"] = 1.05 * vehicle.voltage_ref
     p["z"][:4] = p["speeds"]
@@ -208,6 +251,19 @@ def load_world(
 
 
 @compiled
+def delay(past: Array, ticks: float, now: Array, late: Array) -> None:
+    """Write what ``now`` (n,) was ``ticks`` ago into ``late``; ``past`` (_KEPT, n) is kept."""
+    late_in_any = any_of(ticks > 0.0)
+    for i in range(past.shape[1]):
+        late[i] = now[i]
+        if late_in_any:
+            for j in range(past.shape[0] - 1, 0, -1):
+                past[j, i] = past[j - 1, i]
+                late[i] = choose(ticks == float(j), past[j, i], late[i])
+            past[0, i] = now[i]
+
+
+@compiled
 def sense(p: Record, qpos: Array, noise: Array) -> int:
     """Write the sample that motion capture takes now into ``p.z``; return its parts (3, or 0 where
     it is lost).
@@ -217,11 +273,13 @@ def sense(p: Record, qpos: Array, noise: Array) -> int:
     The attitude comes with a non-negative scalar part, as from a real system, so that a vehicle
     that faces -x sees the sign of its quaternion flip several times a second.
     """
+    delay(p.past_poses, p.pose_late, qpos, p.late)
     for i in range(7):
-        p.sample[4 + i] = qpos[i]
+        p.sample[4 + i] = p.late[i]
     rewrite_sample(p, 0.0, 3, 1.0)
     measure(p, p.sample[4:11], noise)
-    return 0 if noise[_DROPOUT] < p.dropout else 3
+    note_loss(p, noise)
+    return 0 if p.lost[0] > 0.0 else 3
 
 
 @compiled
@@ -239,18 +297,26 @@ def measure(p: Record, pose: Array, noise: Array) -> None:
 
 
 @compiled
+def note_loss(p: Record, noise: Array) -> None:
+    """Write into ``p.lost`` whether this pose is lost; losses come in runs."""
+    bound = choose(p.lost[0] > 0.0, p.dropout_kept, p.dropout)
+    p.lost[0] = choose(noise[_DROPOUT] < bound, 1.0, 0.0)
+
+
+@compiled
 def lose_pose(p: Record, noise: Array) -> None:
     """Write NaN for the pose in ``p.z`` where it is lost: what ``sense`` returns, as numbers."""
-    lost = noise[_DROPOUT] < p.dropout
+    note_loss(p, noise)
     for i in range(4, 11):
-        p.z[i] = choose(lost, math.nan, p.z[i])
+        p.z[i] = choose(p.lost[0] > 0.0, math.nan, p.z[i])
 
 
 @compiled
 def follow(p: Record, command: Array) -> None:
     """Let the motors follow their commands (4,) rad/s for one tick."""
+    delay(p.past_commands, p.actuator_late, command, p.late)
     for i in range(4):
-        p.speeds[i] = command[i] + p.motor_keep * (p.speeds[i] - command[i])
+        p.speeds[i] = p.late[i] + p.motor_keep * (p.speeds[i] - p.late[i])
         p.speeds[i] = min(max(p.speeds[i], 0.0), p.omega_max)
 
 

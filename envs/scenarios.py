@@ -11,13 +11,22 @@ from ..runtime.errors import unknown_name
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True, kw_only=True)
 class Drawn:
-    """What is drawn anew each episode: a data class of ranges (low, high)."""
+    """What is drawn anew each episode: ranges (low, high). Those that are stated here replace what
+    ``PlantSettings`` say, in their units; None: as these say.
+    """
+
+    actuator_delay: tuple[float, float] | None = None
+    pose_delay: tuple[float, float] | None = None
+    imu_delay: tuple[float, float] | None = None
+    dropout: tuple[float, float] | None = None
+    dropout_burst: tuple[float, float] | None = None
 
     def draw(self, rng: np.random.Generator) -> dict[str, float]:
         """Return one value of each field by its name, uniform, in the order of the fields."""
         ranges = vars(self)
-        return {name: float(rng.uniform(*ranges[name])) for name in ranges}
+        return {name: float(rng.uniform(*r)) for name, r in ranges.items() if r is not None}
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,12 @@
 """What the tasks share: one environment around one flight loop.
 
-A task states its spaces, its scenarios and its decision as data, and writes ``_begin`` (draw an
-episode and hover), ``_get_obs``, ``_get_info`` and ``_get_reward``.
+A task states its spaces, its scenarios and its decision as data, and writes ``hover`` (draw an
+episode and hover at its start) and ``look``, compiled: what is seen, told and rewarded.
 """
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -22,14 +22,27 @@ from ..dynamics.vehicle_file import load_vehicle
 from ..estimator.tuning import UKFTuning
 from ..runtime.compiled import compiled, specialised
 from ..runtime.errors import InputError, unknown_name
-from .closed_loop import ESTIMATORS, ClosedLoop, Stage
+from .closed_loop import ESTIMATORS, REFERENCE_SIZE, ClosedLoop, Stage, is_healthy, write_motion
 from .display import modes_shown, need_display
 from .fan import Fan
 from .normals import draw_normals, generator_list
+from .observing import Episodes, Motion, View
 from .plant import TICK, PlantSettings
+from .scenarios import Drawn
 
 Frame = NDArray[np.float32]
 
+# entries of ``info`` that all tasks have
+COMMON_VALUES: list[tuple[Any, ...]] = [
+    ("reward_tracking", "f8"),
+    ("reward_change", "f8"),
+    ("force", "f8", (3,)),
+    ("torque", "f8", (3,)),
+    ("time", "f8"),
+    ("lost", "?"),
+]
+_ONE = np.ones(1, dtype=np.bool_)
+_NO_REFERENCE = np.zeros((0, REFERENCE_SIZE))
 EPISODE_SECONDS = 20.0
 SETTLE_TICKS = 300  # the filter settles before an episode starts
 LOST_OFFSET = 2.5  # m, of the vehicle from where it should be
@@ -45,6 +58,13 @@ def keep_within(frame: Frame, limits: Array) -> None:
         frame[i] = min(max(seen, -limits[i]), limits[i]) if math.isfinite(seen) else 0.0
 
 
+@compiled
+def is_flying(state: Array, position: Array, velocity: Array) -> bool:
+    """Return whether a vehicle still flies: finite, no faster than one can be, and upright."""
+    tilted = position[4] * position[4] + position[5] * position[5]
+    return is_healthy(state, velocity) and 1.0 - 2.0 * tilted >= UPRIGHT
+
+
 class Task(gym.Env[Frame, Frame], ABC):
     """A quadrotor in closed loop, whose agent commands the flight loop.
 
@@ -54,7 +74,7 @@ class Task(gym.Env[Frame, Frame], ABC):
         vehicle: what filter and flight loop know: preset, YAML path or ``Vehicle``.
         effects: of the true vehicle, which nobody declared.
         truth: the true vehicle, before ``effects``; default: as declared.
-        settings: of the plant: motor lag, unmodelled disturbance, dropouts.
+        settings: of the plant: motor lag, unmodelled disturbance, delays, losses.
         estimator: ``"ukf"``, or ``"constant-gain"``: the filter's converged gain, which is faster.
         normalize: whether observations, and actions in m/s2, are divided by fixed scales.
         width: of a picture, in pixels.
@@ -72,6 +92,15 @@ class Task(gym.Env[Frame, Frame], ABC):
     action_size: ClassVar[int]
     largest_action: ClassVar[float] = 1.0
     action_unit: ClassVar[str] = "m/s"
+    label: ClassVar[str] = "fan_motion"  # entry of ``info`` that names what was drawn
+    accelerates: ClassVar[bool] = False  # whether a command is an acceleration, not a velocity
+    draws: ClassVar[int] = 1  # of an episode, until the vehicle is not lost in it at once
+    # writes frames (n, size) and a table (n,) of ``values`` for the episodes that are named
+    look: ClassVar[Callable[..., None]]
+    fan: Fan
+    values: ClassVar[np.dtype]  # of the entries of ``info`` beside ``label``
+    limits: ClassVar[Sequence[float]]  # of the frame's numbers
+    scales: ClassVar[Sequence[float]]  # that ``normalize`` divides them by
 
     def __init__(
         self,
@@ -113,22 +142,66 @@ class Task(gym.Env[Frame, Frame], ABC):
         self.render_mode, self.width, self.height = render_mode, width, height
         self.metadata = {**self.metadata, "render_modes": modes_shown(self.metadata)}
         largest = self.largest_action if self.action_unit == "m/s" or not normalize else 1.0
-        self._action_scale = self.largest_action / largest
+        self.action_scale = self.largest_action / largest
         self.action_space = gym.spaces.Box(-largest, largest, (self.action_size,), np.float32)
         self.viewer: Any = None
         self._loop: ClosedLoop | None = None
+        self.drawn: dict[str, float] = {}  # of an episode, where the scenario varies
         self._in_flight = False
-        self._generator: np.random.Generator | None = None
+        self._generator: np.random.Generator | None = None  # that the normals are drawn from
         self.command: Array = np.zeros(self.action_size)  # the last one, in SI units
         self.foresight = 0  # decisions to come that ``info`` tells of, for the oracle
+        self._see_by(View("wrench", self.normalize, self.limits, self.scales))
+        # of an episode: the fan's path (m, 2) m, its distance in m, what is flown, and its name
+        self.path, self.distance = np.zeros((1, 2)), 0.0
+        self.reference: Array = _NO_REFERENCE
+        self.drawn_label = ""
+        self._motion = Motion.zeros(1)
+        self._frames = np.zeros((1, len(self.limits)), dtype=np.float32)
+        self._table = np.zeros(1, dtype=self.values)
+        self._lay_episode()
+        self._compile()
 
-    def _observe(self, limits: Array, scales: Sequence[float]) -> None:
-        """Set the observation's space, of numbers within ``limits`` that ``normalize`` divides by
-        ``scales``.
-        """
-        self._scales = np.array(scales if self.normalize else np.ones(len(scales)), np.float32)
-        bound = limits.astype(np.float32) / self._scales
+    # what a copy makes anew: windows, and what holds compiled code
+    _made_anew: ClassVar = ("viewer", "_generator", "_generators", "_draw_normals", "_look")
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy in the middle of an episode starts from."""
+        return {name: v for name, v in self.__dict__.items() if name not in self._made_anew}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.viewer = self._generator = None
+        self._compile()
+
+    def _compile(self) -> None:
+        seen = self._episodes, self._motion, self._frames, self._table
+        self._look = specialised(type(self).look, _ONE, *seen)
+
+    def _see_by(self, view: View) -> None:
+        """Let the agent see by a view."""
+        self.view, bound = view, view.bound()
         self.observation_space = gym.spaces.Box(-bound, bound, bound.shape, np.float32)
+
+    def _lay_episode(self) -> None:
+        """Let what is looked at be the episode that was drawn."""
+        commands, changes = np.zeros((2, 1, self.action_size))
+        self._episodes = Episodes(
+            np.zeros(1, dtype=np.int64),
+            self.path[np.newaxis],
+            self.reference[np.newaxis],
+            np.array([self.distance]),
+            commands,
+            changes,
+            np.zeros(1, dtype=np.bool_),
+        )
+
+    def _look_around(self) -> None:
+        """Write frame and values of now."""
+        loop, episodes = self.loop, self._episodes
+        write_motion(loop.record, loop.world, self._motion, 0)
+        episodes.ticks[0], episodes.broken[0] = loop.ticks, loop.was_reset
+        self._look(_ONE, episodes, self._motion, self._frames, self._table)
 
     @property
     def loop(self) -> ClosedLoop:
@@ -153,20 +226,25 @@ class Task(gym.Env[Frame, Frame], ABC):
             replace(vehicle, mocap=mocap, effects=(*vehicle.effects, *self.effects)),
             UKFTuning.for_vehicle(declared, TICK, scenario.rise_time),
             fan,
-            self.settings or PlantSettings.for_vehicle(self.truth),
+            replace(
+                self.settings or PlantSettings.for_vehicle(self.truth),
+                **{n: v for n, v in self.drawn.items() if n in Drawn.__dataclass_fields__},
+            ),
             drawn=self.render_mode is not None,
             estimator=self.estimator,
             stages=self.stages,
             **given,
         )
 
-    def _draw_loop(self, fan: Fan) -> dict[str, float]:
-        """Make the closed loop of an episode; return what was drawn where the scenario varies."""
+    def draw_loop(self) -> None:
+        """Make the closed loop of an episode, drawn where the scenario varies."""
+        fan = self.fan
+        self.drawn = {}
         if not self.scenario.varied:
             if self._loop is None:
                 self._loop = self.make_loop(self.truth, fan)
-            return {}
-        drawn: dict[str, float] = self.scenario.variation.draw(self.np_random)
+            return
+        drawn = self.drawn = self.scenario.variation.draw(self.np_random)
         fan = replace(
             fan,
             speed=fan.speed * drawn.get("fan_speed", 1.0),
@@ -179,23 +257,56 @@ class Task(gym.Env[Frame, Frame], ABC):
             inertia=self.truth.inertia * drawn["inertia"],
         )
         self._loop = self.make_loop(vehicle, fan)
-        return drawn
+
+    def take_loop(self, loop: ClosedLoop, drawn: dict[str, float]) -> None:
+        """Go on with the closed loop of an episode, and what was drawn for it."""
+        self._loop, self.drawn = loop, drawn
+
+    def _begin(self) -> None:
+        """Draw an episode, hover at its start, and let the filter settle; draw anew where the winds
+        carry the vehicle off before the episode is the agent's.
+        """
+        self.draw_loop()
+        for _ in range(self.draws):
+            self.hover(SETTLE_TICKS)
+            self._lay_episode()
+            self._look_around()
+            if not self._table["lost"][0]:
+                return
+        self.refuse_draws()
+
+    def refuse_draws(self) -> None:
+        """Refuse winds in which the vehicle was lost at the start of each of ``draws`` episodes."""
+        if self.draws > 1:
+            raise InputError(
+                f"{self.name}: the vehicle is lost before the episode begins in {self.draws} draws "
+                f"of these winds; expected winds that its flight loop can hold for 1.5 s"
+            )
 
     @abstractmethod
-    def _begin(self) -> None:
-        """Draw an episode, hover at its start, and let the filter settle."""
+    def hover(self, settle: int = 0) -> None:
+        """Draw an episode and let the vehicle hover at its start for ``settle`` ticks."""
 
     @abstractmethod
     def _fly(self, noise: Array) -> None:
         """Fly a decision at ``command`` with unit normals, a row a tick."""
 
-    @abstractmethod
     def _get_obs(self) -> Frame:
         """Return what the agent sees now."""
+        frame = self._frames[0]
+        if self.view.is_plain:
+            return frame.copy()
+        return self.view.of(frame, self.loop.state, self.loop.ticks)
 
-    @abstractmethod
     def _get_info(self) -> dict[str, Any]:
-        """Return the truth that the agent does not see, and whether the vehicle is lost."""
+        """Return the terms of the reward, the truth that the agent does not see, and whether the
+        vehicle is lost.
+        """
+        found = {}
+        for name in self.values.names or ():
+            value = self._table[name][0]
+            found[name] = value.copy() if value.ndim else value.item()
+        return found | {self.label: self.drawn_label}
 
     def _truth(self) -> dict[str, Any]:
         """Return what the oracle knows beyond ``info``: the true motion and the integral of the
@@ -219,10 +330,6 @@ class Task(gym.Env[Frame, Frame], ABC):
         info = self._get_info()
         return info | self._truth() if self.foresight else info
 
-    @abstractmethod
-    def _get_reward(self, info: dict[str, Any], change: Array) -> dict[str, float]:
-        """Return the terms of the reward; ``change`` is that of the command."""
-
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Frame, dict[str, Any]]:
@@ -241,11 +348,12 @@ class Task(gym.Env[Frame, Frame], ABC):
         self._begin()
         self._in_flight = True
         self.command = np.zeros(self.action_size)
+        self.view.restart(self.loop.state)
         if self.render_mode == "human":
             self.render()
-        # whether the vehicle is lost is decided by steps
-        info = {"reward_tracking": 0.0, "reward_change": 0.0, **self._told(), "lost": False}
-        return self._get_obs(), info
+        # rewards, and whether the vehicle is lost, are decided by steps
+        first = {"reward_tracking": 0.0, "reward_change": 0.0, "lost": False}
+        return self._get_obs(), self._told() | first
 
     def step(self, action: Frame) -> tuple[Frame, float, bool, bool, dict[str, Any]]:
         """Fly a decision with an action as ``action_space`` has it; one out of range is clipped.
@@ -256,23 +364,28 @@ class Task(gym.Env[Frame, Frame], ABC):
         given = np.asarray(action, dtype=np.float64)
         numbers = given.ravel().tolist()
         if given.shape != (self.action_size,) or not math.isfinite(sum(numbers)):
-            unit = "units of the largest" if self._action_scale != 1.0 else self.action_unit
             raise InputError(
-                f"{self.name}: action must be {_NUMBERS[self.action_size]} in {unit}, shape "
-                f"({self.action_size},), got {action!r}"
+                f"{self.name}: action must be {_NUMBERS[self.action_size]} in "
+                f"{self.unit_of_actions}, shape ({self.action_size},), got {action!r}"
             )
         if not self._in_flight:
             raise InputError(f"{self.name}: call reset before step")
         last, largest = self.command, self.largest_action
-        wanted = [self._action_scale * number for number in numbers]
+        wanted = [self.action_scale * number for number in numbers]
         self.command = np.array([min(max(value, -largest), largest) for value in wanted])
+        self._episodes.commands[0], self._episodes.changes[0] = self.command, self.command - last
         self.fly()
+        self._look_around()
         if self.render_mode == "human":
             self.render()
         info = self._told()
-        terms = self._get_reward(info, self.command - last)
-        reward = sum(terms.values())
-        return self._get_obs(), reward, info["lost"], False, {**terms, **info}
+        reward = info["reward_tracking"] + info["reward_change"]
+        return self._get_obs(), reward, info["lost"], False, info
+
+    @property
+    def unit_of_actions(self) -> str:
+        """Unit of an action as ``action_space`` has it."""
+        return "units of the largest" if self.action_scale != 1.0 else self.action_unit
 
     def fly(self) -> None:
         """Fly a decision at ``command``, with the normals of ``np_random.standard_normal``."""
@@ -283,12 +396,6 @@ class Task(gym.Env[Frame, Frame], ABC):
             self._draw_normals = specialised(draw_normals, self._generators, 0, self._normals)
         self._draw_normals(self._generators, 0, self._normals)
         self._fly(self._normals)
-
-    def is_flying(self) -> bool:
-        """Whether the vehicle still flies: finite, no faster than a vehicle can be, and upright."""
-        loop = self.loop
-        _, x, y, _ = loop.quaternion.tolist()
-        return loop.healthy() and 1.0 - 2.0 * (x * x + y * y) >= UPRIGHT
 
     def _make_viewer(self) -> Any:
         from .drawing import Viewer

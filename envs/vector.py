@@ -1,7 +1,8 @@
-"""Many fan-tracking environments in one process: one compiled call flies a decision of all of
-them, and one writes what came of it.
+"""Many environments of a task in one process: one compiled call flies a decision of all of them,
+and one writes what came of it.
 """
 
+import copy
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
@@ -12,43 +13,22 @@ from gymnasium.vector import AutoresetMode
 from numba import typed, typeof
 from numpy.typing import NDArray
 
-from ..controllers.observation import OBSERVATION_SIZE
 from ..dynamics.motion import Array
 from ..runtime.compiled import compiled_without_gil, specialised
 from ..runtime.errors import InputError, unknown_name
-from .closed_loop import is_healthy, run_ticks
-from .fan_tracking import (
-    AWAY,
-    DECISION_TICKS,
-    FAN_TIMES,
-    FanTrackingEnv,
-    reward_terms,
-    see,
-)
+from .closed_loop import REFERENCE_SIZE, run_ticks, write_motion
+from .fan_tracking import FanTrackingEnv
 from .normals import draw_normals, generator_list
-from .observing import View
-from .plant import NOISE, TICK
-from .task import LOST_OFFSET, UPRIGHT, Frame
+from .observing import Episodes, Motion
+from .plant import TICK
+from .task import EPISODE_SECONDS, Frame, Task
 from .untimed import Untimed
 
 Flags = NDArray[np.bool_]
 Infos = dict[str, Any]
 
-# entries of ``infos``, beside ``fan_motion``
-VALUES = np.dtype(
-    [
-        *[(name, "f8") for name in ("reward_tracking", "reward_change")],
-        *[(name, "f8") for name in ("fan_y", "fan_velocity", "y", "offset")],
-        ("force", "f8", (3,)),
-        ("torque", "f8", (3,)),
-        ("time", "f8"),
-        ("lost", "?"),
-    ],
-    align=True,
-)
 
-
-class FanTrackingVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
+class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
     """``num_envs`` environments side by side, each bit for bit the single one with its seed.
 
     ``reset(seed=s)`` seeds them with s, s + 1, ...; a list gives each its own. An environment whose
@@ -60,34 +40,39 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
 
     Args:
         num_envs: how many.
-        max_episode_steps: decisions after which an episode is truncated.
+        max_episode_steps: decisions after which an episode is truncated; default: those of 20 s.
         threads: over which the environments are spread; the results do not depend on it. MuJoCo
             gains little by threads: its step is called through Python.
         autoreset_mode: ``NEXT_STEP`` or ``SAME_STEP``, of ``gymnasium.vector.AutoresetMode`` or its
             value as text.
-        **kwargs: of ``FanTrackingEnv``.
+        task: whose environments they are.
+        **kwargs: of ``task``.
 
     Raises:
-        InputError: ``num_envs`` or ``threads`` is not positive, another mode, or what
-            ``FanTrackingEnv`` refuses.
+        InputError: ``num_envs`` or ``threads`` is not positive, another mode, or what ``task``
+            refuses.
     """
 
     def __init__(
         self,
         num_envs: int = 1,
-        max_episode_steps: int = 250,
+        max_episode_steps: int | None = None,
         threads: int = 1,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        task: type[Task] = FanTrackingEnv,
         **kwargs: Any,
     ) -> None:
+        if max_episode_steps is None:
+            max_episode_steps = round(EPISODE_SECONDS / (TICK * task.decision_ticks))
         for name, value in (
             ("num_envs", num_envs),
             ("max_episode_steps", max_episode_steps),
             ("threads", threads),
         ):
             if value < 1:
-                raise InputError(f"FanTracking: {name} must be at least 1, got {value}")
-        self.autoreset_mode = _mode(autoreset_mode)
+                raise InputError(f"{task.name}: {name} must be at least 1, got {value}")
+        self.task, self.autoreset_mode = task, _mode(autoreset_mode, task.name)
+        self._given = num_envs, max_episode_steps, threads, autoreset_mode, task, kwargs
         self.num_envs, self.max_episode_steps = num_envs, max_episode_steps
         self.threads = min(threads, num_envs)
         self.envs = self._make_envs(kwargs)
@@ -99,28 +84,48 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         self.action_space = gym.vector.utils.batch_space(first.action_space, num_envs)
         self.observation_space = gym.vector.utils.batch_space(first.observation_space, num_envs)
         self._decisions = np.zeros(num_envs, dtype=np.int64)  # of the episode in hand
-        self._ticks = np.zeros(num_envs, dtype=np.int64)  # likewise
         self._begun = np.zeros(num_envs, dtype=np.bool_)
         self._over = np.zeros(num_envs, dtype=np.bool_)  # episodes that ended at the last step
-        self._broken = np.zeros(num_envs, dtype=np.bool_)  # MuJoCo started over on its own
         # each environment's own; one that was not reset yet has another's
         self._generators = generator_list([np.random.default_rng(0)] * num_envs)
-        self._paths = np.zeros((num_envs, FAN_TIMES.size))  # m, the fan's y, a column a tick
-        self._distance = np.zeros(num_envs)  # m, from the fan at the start
-        self._commands, self._changes = np.zeros(num_envs), np.zeros(num_envs)  # m/s
-        view = first.view
-        self._views = [View(view.observe, view.normalize) for _ in range(num_envs)]
+        self._episodes = Episodes(
+            np.zeros(num_envs, dtype=np.int64),
+            np.zeros((num_envs, 1, 2)),
+            np.zeros((num_envs, 0, REFERENCE_SIZE)),
+            np.zeros(num_envs),
+            np.zeros((num_envs, task.action_size)),
+            np.zeros((num_envs, task.action_size)),
+            np.zeros(num_envs, dtype=np.bool_),
+        )
+        self._views = [copy.deepcopy(first.view) for _ in range(num_envs)]
         self._frames = np.zeros(self.observation_space.shape or (), dtype=np.float32)
         self._whole = self._frames  # frames before a view is taken of them
-        if not view.is_plain:
-            self._whole = np.zeros((num_envs, OBSERVATION_SIZE), dtype=np.float32)
-        self._table = np.zeros(num_envs, dtype=VALUES)
-        self._values = {name: self._table[name] for name in VALUES.names or ()}
-        self._values["fan_motion"] = np.zeros(num_envs, dtype=object)
+        if not first.view.is_plain:
+            self._whole = np.zeros((num_envs, len(task.limits)), dtype=np.float32)
+        self._table = np.zeros(num_envs, dtype=task.values)
+        self._labels = np.zeros(num_envs, dtype=object)
         self._all = np.ones(num_envs, dtype=np.bool_)
         self._pool: ThreadPoolExecutor | None = None
         self._compiled: dict[Any, Callable[..., None]] = {}
         self._motion = self._make_memory()
+
+    @property
+    def _values(self) -> Infos:
+        """Entries of ``infos``, as views."""
+        values: Infos = {name: self._table[name] for name in self.task.values.names or ()}
+        return values | {self.task.label: self._labels}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy starts from: arguments, arrays, generators and environments."""
+        kept = ("_decisions", "_begun", "_over", "_episodes", "_views", "_frames", "_whole")
+        names = *kept, "_table", "_labels", "envs", "_np_random", "_np_random_seed"
+        state = {name: getattr(self, name) for name in names}
+        return state | {"_given": self._given, "_generators": list(self._generators)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        count, steps, threads, mode, task, kwargs = state["_given"]
+        type(self).__init__(self, count, steps, threads, mode, task, **kwargs)
+        self._restore(state)
 
     def reset(
         self,
@@ -135,7 +140,9 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
             InputError: a list of seeds, or a mask, of another length, or another option.
         """
         if unknown := [name for name in options or {} if name != "reset_mask"]:
-            raise unknown_name("option", str(unknown[0]), ("reset_mask",), "FanTracking: reset")
+            raise unknown_name(
+                "option", str(unknown[0]), ("reset_mask",), f"{self.task.name}: reset"
+            )
         seeds = (
             [None if seed is None else seed + i for i in range(self.num_envs)]
             if seed is None or isinstance(seed, int | np.integer)
@@ -144,29 +151,32 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         mask = np.asarray((options or {}).get("reset_mask", self._all))
         if len(seeds) != self.num_envs or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
             raise InputError(
-                f"FanTracking: reset: expected {self.num_envs} seeds, and booleans in reset_mask; "
-                f"got {len(seeds)} and {mask!r}"
+                f"{self.task.name}: reset: expected {self.num_envs} seeds, and booleans in "
+                f"reset_mask; got {len(seeds)} and {mask!r}"
             )
         self._start(mask, seeds)
         self._over[mask] = False
         return self._frames.copy(), self._infos()
 
     def step(self, actions: Frame) -> tuple[Frame, NDArray[np.float64], Flags, Flags, Infos]:
-        """Fly 80 ms in every environment with commanded velocities (num_envs, 1) m/s along y.
+        """Fly a decision in every environment with actions (num_envs, n) as ``action_space`` has
+        them.
 
         Raises:
             InputError: another shape, or a number that is not finite; nothing has flown then.
         """
-        commands = np.asarray(actions, dtype=np.float64)
-        if commands.shape != (self.num_envs, 1) or not np.all(np.isfinite(commands)):
+        task, env = self.task, self.envs[0]
+        wanted, shape = np.asarray(actions, dtype=np.float64), self._episodes.commands.shape
+        if wanted.shape != shape or not np.all(np.isfinite(wanted)):
             raise InputError(
-                f"FanTracking: actions must be finite numbers in m/s, shape ({self.num_envs}, 1), "
-                f"got {commands!r}"
+                f"{task.name}: actions must be finite numbers in {env.unit_of_actions}, shape "
+                f"{shape}, got {wanted!r}"
             )
         if not self._begun.all():
-            raise InputError("FanTracking: call reset before step")
-        flying, limit = ~self._over, self.envs[0].largest_action
-        self._call(take_commands, flying, commands, limit, self._commands, self._changes)
+            raise InputError(f"{task.name}: call reset before step")
+        flying = ~self._over
+        given = env.action_scale, task.largest_action, self._episodes
+        self._call(take_commands, flying, wanted, *given)
         self._fly(flying)
         self._look(flying)
         self._decisions += 1
@@ -190,93 +200,115 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         """Start an episode in all environments that ``which`` (num_envs,) names."""
         started = np.flatnonzero(which).tolist()
         self._begun[which] = False
-        for numbers in (self._decisions, self._ticks, self._commands, self._changes, self._broken):
+        _, _, _, _, *moves = self._episodes
+        for numbers in (self._decisions, self._episodes.ticks, *moves):
             numbers[which] = 0
         self._hover(started, seeds or [None] * self.num_envs)
         for i in started:
             self._views[i].restart(self._state(i))
         self._look(which)
         for name in ("reward_tracking", "reward_change", "lost"):  # decided by steps
-            self._values[name][which] = 0
+            self._table[name][which] = 0
         self._begun[which] = True
 
-    def _make_envs(self, kwargs: dict[str, Any]) -> list[FanTrackingEnv]:
+    def _make_envs(self, kwargs: dict[str, Any]) -> list[Task]:
         """Return the environments."""
-        return [FanTrackingEnv(**kwargs) for _ in range(self.num_envs)]
+        return [self.task(**kwargs) for _ in range(self.num_envs)]
 
-    def _make_memory(self) -> tuple[Array, Array, Array, Array]:
-        """Make what ``_fly`` works on.
-
-        Returns position and quaternion (7,), velocities (6,), true external wrench (6,) and
-        estimated state (20,) of all environments, which ``_fly`` writes: arrays (n, size, lanes),
-        environment i in row ``i // lanes`` and lane ``i % lanes``.
-        """
+    def _make_memory(self) -> Motion:
+        """Make what ``_fly`` works on; return the motion of all, which ``_fly`` writes."""
         # an environment that was not reset yet has the first one's flight
         first = self.envs[0]
         flight = first.make_loop(first.truth, first.fan).flight
         self._flights = typed.List.empty_list(typeof(flight))
         for _ in range(self.num_envs):
             self._flights.append(flight)
-        position, velocity, wrench, state = (
-            np.zeros((self.num_envs, size, 1)) for size in (7, 6, 6, 20)
-        )
-        return position, velocity, wrench, state
+        return Motion.zeros(self.num_envs)
+
+    def _restore(self, state: dict[str, Any]) -> None:
+        """Go on from the state of another."""
+        for name in ("_decisions", "_begun", "_over", "_frames", "_whole", "_table", "_labels"):
+            getattr(self, name)[...] = state[name]
+        for name in ("_episodes", "_views", "_np_random", "_np_random_seed"):
+            setattr(self, name, state[name])
+        self._generators = generator_list(state["_generators"])
+        self._take_envs(state)
+
+    def _take_envs(self, state: dict[str, Any]) -> None:
+        """Take the environments of another, whose generators are those of ``_generators``."""
+        self.envs = state["envs"]
+        for i in np.flatnonzero(self._begun).tolist():
+            env = self.envs[i]
+            self._generators[i], self._flights[i] = env.np_random, env.loop.flight
+        self._move(self._begun, 0)
+
+    def _draw(self, i: int, env: Task) -> None:
+        """Write down the episode that an environment has drawn."""
+        given, labels = self._episodes, self._labels
+        if given.paths.shape[1] != len(env.path) or given.references.shape[1] != len(env.reference):
+            self._episodes = given = given._replace(
+                paths=np.zeros((self.num_envs, *env.path.shape)),
+                references=np.zeros((self.num_envs, *env.reference.shape)),
+            )
+        given.paths[i], given.references[i] = env.path, env.reference
+        given.distance[i], labels[i] = env.distance, env.drawn_label
 
     def _hover(self, which: list[int], seeds: Sequence[int | None]) -> None:
         """Draw an episode of some environments, and let their vehicles hover at its start."""
 
         def hover(n: int) -> None:
             i = which[n]
-            env = self.envs[i]
-            env.reset(seed=seeds[i])
-            self._generators[i], self._flights[i] = env.np_random, env.loop.flight
-            self._distance[i], self._paths[i] = env.distance, env.path[:, 0]
-            self._values["fan_motion"][i] = env.fan_motion
+            self.envs[i].reset(seed=seeds[i])
 
         self._spread(hover, len(which))
+        for i in which:
+            env = self.envs[i]
+            self._generators[i], self._flights[i] = env.np_random, env.loop.flight
+            self._draw(i, env)
         self._move(np.isin(np.arange(self.num_envs), which), 0)
 
     def _fly(self, which: Flags) -> None:
-        """Fly a decision in some environments at ``_commands``."""
-        own_stages, flying = bool(self.envs[0].stages), np.flatnonzero(which).tolist()
-        for i in flying if own_stages else ():
-            self.envs[i].command[0] = self._commands[i]
-            self.envs[i].fly()
-            self._ticks[i] += DECISION_TICKS
-        self._move(which, 0 if own_stages else DECISION_TICKS)
+        """Fly a decision in some environments at their commands."""
+        flying, ticks, episodes = np.flatnonzero(which).tolist(), 0, self._episodes
+        if any(self.envs[i].loop.has_own_parts for i in flying):
+            for i in flying:
+                self.envs[i].command[:] = episodes.commands[i]
+                self.envs[i].fly()
+                episodes.ticks[i] += self.task.decision_ticks
+        else:
+            ticks = self.task.decision_ticks
+        self._move(which, ticks)
         for i in flying:
-            self._broken[i] = self.envs[i].loop.was_reset
+            episodes.broken[i] = self.envs[i].loop.was_reset
 
     def _move(self, which: Flags, ticks: int) -> None:
         """Run some ticks of the kit's own stages, and write ``_motion``."""
         parts = 1 if self.threads == 1 else self.num_envs
-        given = self._flights, self._generators, which, self._commands, self._paths
-        height = self.envs[0].fan.height
+        noise_size = self.envs[0].loop.noise_size
+        given = self._flights, self._generators, which, self._episodes, ticks, noise_size
 
         def move(part: int) -> None:
             first, last = part * self.num_envs // parts, (part + 1) * self.num_envs // parts
-            self._call(fly_loops, first, last, *given, height, self._ticks, ticks, *self._motion)
+            self._call(fly_loops, first, last, *given, self.task.accelerates, self._motion)
 
         with Untimed():
             self._spread(move, parts)
 
     def _state(self, i: int) -> Array:
         """Return the estimated state (20,) of an environment."""
-        states = self._motion[3]
+        states = self._motion.state
         state: Array = states[i // states.shape[2], :, i % states.shape[2]]
         return state
 
     def _look(self, which: Flags) -> None:
-        """Write frames and values of some environments, as ``FanTrackingEnv`` has them."""
-        env, frames = self.envs[0], self._whole
-        moves = self._commands, self._changes, self._broken
-        episodes = which, self._ticks, self._paths, self._distance, env.fan.height
-        self._call(look, *episodes, *moves, *self._motion, frames, self._table)
+        """Write frames and values of some environments, as their task has them."""
+        env, frames, ticks = self.envs[0], self._whole, self._episodes.ticks
+        self._call(self.task.look, which, self._episodes, self._motion, frames, self._table)
         if env.view.is_of_a_frame and not env.view.is_plain:
             self._frames[which] = env.view.of_frames(frames[which])
         elif not env.view.is_plain:
             for i in np.flatnonzero(which).tolist():
-                self._frames[i] = self._views[i].of(frames[i], self._state(i), int(self._ticks[i]))
+                self._frames[i] = self._views[i].of(frames[i], self._state(i), int(ticks[i]))
         if self.render_mode == "human":
             self.render()
 
@@ -340,27 +372,27 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
             env.close()
 
 
-def _mode(given: AutoresetMode | str) -> AutoresetMode:
+def _mode(given: AutoresetMode | str, task: str) -> AutoresetMode:
     known = (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP)
     for mode in known:
         if given is mode or given in (mode.value, mode.name):
             return mode
     raise InputError(
-        f"FanTracking: autoreset_mode must be {' or '.join(m.name for m in known)} of "
+        f"{task}: autoreset_mode must be {' or '.join(m.name for m in known)} of "
         f"gymnasium.vector.AutoresetMode, got {given!r}"
     )
 
 
 @compiled_without_gil
 def take_commands(
-    which: Flags, wanted: Array, limit: float, commands: Array, changes: Array
+    which: Flags, wanted: Array, scale: float, limit: float, episodes: Episodes
 ) -> None:
-    """Write the commands (n,) m/s of the environments ``which``, within ``limit``, and their
-    changes.
-    """
+    """Write the commands of the environments ``which``, within ``limit``, and their changes."""
     for n in np.flatnonzero(which):
-        value = min(max(wanted[n, 0], -limit), limit)
-        changes[n], commands[n] = value - commands[n], value
+        for i in range(wanted.shape[1]):
+            value = min(max(scale * wanted[n, i], -limit), limit)
+            episodes.changes[n, i] = value - episodes.commands[n, i]
+            episodes.commands[n, i] = value
 
 
 @compiled_without_gil
@@ -370,15 +402,11 @@ def fly_loops(
     flights: Any,
     generators: Any,
     which: Flags,
-    commands: Array,
-    paths: Array,
-    height: float,
-    ticks: np.ndarray,
+    episodes: Episodes,
     count: int,
-    position: Array,
-    velocity: Array,
-    wrench: Array,
-    state: Array,
+    noise_size: int,
+    accelerates: bool,
+    motion: Motion,
 ) -> None:
     """Fly ``count`` ticks of those environments from ``begin`` to ``end - 1`` that fly.
 
@@ -388,66 +416,27 @@ def fly_loops(
         flights: (n,) of ``ClosedLoop.flight``; a typed list.
         generators: (n,) that the noise is drawn from; a typed list.
         which: (n,) booleans, whether they fly.
-        commands: (n,) m/s, along y.
-        paths: (n, m) m, the fan's y, a column a tick.
-        height: m, of the fan's axis.
-        ticks: (n,) since the start of the episode; written.
+        episodes: whose ticks are written.
         count: of ticks.
-        position: (n, 7, 1) m and quaternion; written, as are the next three.
-        velocity: (n, 6, 1) m/s, world, and rad/s, body.
-        wrench: (n, 6, 1) N and Nm, the true external one.
-        state: (n, 20, 1) as the filter estimates it.
+        noise_size: unit normals of a tick.
+        accelerates: whether the commands are accelerations, or velocities along y and z.
+        motion: written.
     """
-    path, last = np.full((count, 2), height), paths.shape[1] - 1
+    commands, ticks = episodes.commands, episodes.ticks
     for n in range(begin, end):
         if not which[n]:
             continue
         record, world, move = flights[n]
-        loop, noise = record[0], np.empty((count, NOISE))
-        loop.flight.setpoint[4] = commands[n]
-        for k in range(count):
-            path[k, 0] = paths[n, min(ticks[n] + k, last)]
+        loop, noise, path = record[0], np.empty((count, noise_size)), episodes.paths[n]
+        for i in range(commands.shape[1]):
+            if accelerates:
+                loop.action[i] = commands[n, i]
+            else:
+                loop.flight.setpoint[4 + i] = commands[n, i]
         draw_normals(generators, n, noise)
-        run_ticks(record, world, path, noise, move)
+        run_ticks(record, world, path[min(ticks[n], len(path) - 1) :], noise, move)
         ticks[n] += count
-        position[n, :, 0], velocity[n, :, 0] = world.qpos, world.qvel
-        wrench[n, :, 0], state[n, :, 0] = loop.plant.external, loop.filter.x
+        write_motion(record, world, motion, n)
 
 
-@compiled_without_gil
-def look(
-    which: Flags,
-    ticks: np.ndarray,
-    paths: Array,
-    distance: Array,
-    height: float,
-    commands: Array,
-    changes: Array,
-    broken: Flags,
-    position: Array,
-    velocity: Array,
-    wrench: Array,
-    states: Array,
-    frames: Frame,
-    values: np.ndarray,
-) -> None:
-    """Write frames and the truth of the environments ``which`` as ``FanTrackingEnv`` has them."""
-    lanes = states.shape[2]
-    for n in np.flatnonzero(which):
-        b, lane = n // lanes, n % lanes
-        p, v, state = position[b, :, lane], velocity[b, :, lane], states[b, :, lane].copy()
-        see(state, commands[n], frames[n])
-        k, value = min(ticks[n], paths.shape[1] - 1), values[n]
-        value.time, value.fan_y = ticks[n] * TICK, paths[n, max(k - 1, 0)]
-        value.fan_velocity = (paths[n, k] - value.fan_y) / TICK
-        value.y, value.offset = p[1], p[1] - value.fan_y
-        value.force[:], value.torque[:] = wrench[b, :3, lane], wrench[b, 3:, lane]
-        value.reward_tracking, value.reward_change = reward_terms(value.offset, changes[n])
-        # written such that a number that is not finite counts as lost
-        value.lost = broken[n] or not (
-            is_healthy(state, v)
-            and 1.0 - 2.0 * (p[4] * p[4] + p[5] * p[5]) >= UPRIGHT
-            and abs(value.offset) <= LOST_OFFSET
-            and abs(p[0] - distance[n]) <= AWAY
-            and abs(p[2] - height) <= AWAY
-        )
+FanTrackingVectorEnv = TaskVectorEnv  # its name where it flew FanTracking alone

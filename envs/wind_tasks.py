@@ -11,18 +11,25 @@ from ..controllers.wind_observation import (
     MAX_ACCELERATION,
     OBSERVATION_LIMITS,
     OBSERVATION_SCALES,
-    WIND_OBSERVATION_SIZE,
     WIND_PERIOD,
 )
 from ..dynamics.motion import Array
 from ..dynamics.rotation import quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
-from ..runtime.compiled import compiled, specialised
-from ..runtime.errors import InputError
+from ..runtime.compiled import compiled, compiled_without_gil
 from .closed_loop import ClosedLoop
-from .fan import Fan, jet_wrench
+from .fan import STATIONS, Fan, jet_wrench
+from .observing import Episodes, Motion
 from .plant import TICK
-from .task import EPISODE_SECONDS, LOST_OFFSET, SETTLE_TICKS, Frame, Task, keep_within
+from .task import (
+    COMMON_VALUES,
+    EPISODE_SECONDS,
+    LOST_OFFSET,
+    Frame,
+    Task,
+    is_flying,
+    keep_within,
+)
 from .wind import Sum, Wind
 from .wind_scenarios import HEIGHT, START, WIND_SCENARIOS, draw_reference, draw_winds
 
@@ -30,16 +37,9 @@ WIND_DECISION_TICKS = 8  # 25 Hz
 WIND_DECISIONS = round(EPISODE_SECONDS / TICK / WIND_DECISION_TICKS)
 TRACKING_WIDTH = 0.1  # m, error at which the tracking reward is a half
 CHANGE_COST = 0.002  # per (m/s2)^2 of change of the action
-_DRAWS = 20  # of an episode's winds, until the vehicle is not lost in them at once
 # m/s2, standard deviation of the accelerometer's noise a tick, and of its bias
 ACCELEROMETER = (0.15, 0.05)
 _LIMITS = np.array(OBSERVATION_LIMITS)
-
-
-def _square(vector: Array) -> float:
-    """Return the squared length of a vector (3,)."""
-    x, y, z = vector.tolist()
-    return float(x * x + y * y + z * z)
 
 
 @compiled
@@ -53,6 +53,40 @@ def see(
         frame[12 + i], frame[15 + i] = x[16 + i], x[13 + i]  # force, torque
         frame[18 + i], frame[21 + i], frame[24 + i] = specific[i], thrust[i], action[i]
     keep_within(frame, _LIMITS)
+
+
+@compiled_without_gil
+def look_at_reference(
+    which: np.ndarray, episodes: Episodes, motion: Motion, frames: Frame, values: np.ndarray
+) -> None:
+    """Write what ``WindHoverEnv`` sees and tells of the episodes ``which``."""
+    lanes = motion.state.shape[2]
+    for n in np.flatnonzero(which):
+        b, lane = n // lanes, n % lanes
+        p, v = motion.position[b, :, lane], motion.velocity[b, :, lane]
+        state, value = motion.state[b, :, lane].copy(), values[n]
+        rows = episodes.references[n]
+        reference = rows[min(max(episodes.ticks[n], 0), len(rows) - 1)]
+        specific, thrust = motion.specific[b, :, lane].copy(), motion.thrust[b, :, lane].copy()
+        see(state, reference, specific, thrust, episodes.commands[n], frames[n])
+        square, change = 0.0, 0.0
+        for i in range(3):
+            value.position[i], value.reference[i] = p[i], reference[i]
+            value.force[i] = motion.wrench[b, i, lane]
+            value.torque[i] = motion.wrench[b, 3 + i, lane]
+            wind = 0.0
+            for station in range(STATIONS):
+                wind += motion.air[b, station, i, lane]
+            value.wind[i] = wind / STATIONS
+            square += (p[i] - reference[i]) * (p[i] - reference[i])
+            change += episodes.changes[n, i] * episodes.changes[n, i]
+        value.time, value.error = episodes.ticks[n] * TICK, math.sqrt(square)
+        value.reward_tracking = 1.0 / (1.0 + square / (TRACKING_WIDTH * TRACKING_WIDTH))
+        value.reward_change = -CHANGE_COST * change
+        # written such that a number that is not finite counts as lost
+        value.lost = episodes.broken[n] or not (
+            is_flying(state, p, v) and p[2] > 0.0 and value.error <= LOST_OFFSET
+        )
 
 
 class WindHoverEnv(Task):
@@ -149,6 +183,19 @@ class WindHoverEnv(Task):
     largest_action = MAX_ACCELERATION
     action_unit = "m/s2"
 
+    label = "trajectory"
+    accelerates, draws = True, 20
+    look = look_at_reference
+    values = np.dtype(
+        [
+            *COMMON_VALUES,
+            ("error", "f8"),
+            *[(name, "f8", (3,)) for name in ("position", "reference", "wind")],
+        ],
+        align=True,
+    )
+    limits, scales = OBSERVATION_LIMITS, OBSERVATION_SCALES
+
     def __init__(
         self,
         *shared: Any,
@@ -160,10 +207,7 @@ class WindHoverEnv(Task):
         super().__init__(*shared, **named)
         self.winds = None if winds is None else Sum(*winds, where=f"{self.name}: winds").winds
         self.model_in_loop, self.gains = bool(model_in_loop), gains
-        self._observe(_LIMITS, OBSERVATION_SCALES)
-        frame, three = np.empty(WIND_OBSERVATION_SIZE, dtype=np.float32), np.empty(3)
-        self._see = specialised(see, np.empty(20), np.empty(10), three, three, three, frame)
-        self.reference_name = ""
+        self.fan = Fan(speed=0.0, height=HEIGHT)
         self.blowing: Sequence[Wind] = []
 
     def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> ClosedLoop:
@@ -177,62 +221,20 @@ class WindHoverEnv(Task):
             **given,
         )
 
-    def _begin(self) -> None:
-        """Draw winds and reference, anew where the winds carry the vehicle off before the episode
-        is the agent's.
-        """
-        self._draw_loop(Fan(speed=0.0, height=HEIGHT))
+    def hover(self, settle: int = 0) -> None:
+        """Draw winds and reference, and let the vehicle hover at its start for ``settle`` ticks."""
         rng = self.np_random
-        for _ in range(_DRAWS):
-            drawn = draw_winds(self.scenario, rng, EPISODE_SECONDS)
-            self.blowing = drawn if self.winds is None else self.winds
-            self.reference_name, self._reference = draw_reference(
-                rng, math.pi, EPISODE_SECONDS, self.moving
-            )
-            self.loop.reset(rng, START, math.pi, self.blowing, self._reference, settle=SETTLE_TICKS)
-            if not self._get_info()["lost"]:
-                return
-        raise InputError(
-            f"{self.name}: the vehicle is lost before the episode begins in {_DRAWS} draws of "
-            f"these winds; expected winds that its flight loop can hold for 1.5 s"
+        drawn = draw_winds(self.scenario, rng, EPISODE_SECONDS)
+        self.blowing = drawn if self.winds is None else self.winds
+        self.drawn_label, self.reference = draw_reference(
+            rng, math.pi, EPISODE_SECONDS, self.moving
         )
+        self.path = np.array([[0.0, HEIGHT]])
+        self.loop.reset(rng, START, math.pi, self.blowing, self.reference, settle=settle)
 
     def _fly(self, noise: Array) -> None:
         self.loop.action[:] = self.command
         self.loop.run(noise)
-
-    def _row(self) -> Array:
-        """Return the reference (10,) now."""
-        row: Array = self._reference[min(max(self.loop.ticks, 0), len(self._reference) - 1)]
-        return row
-
-    def _get_obs(self) -> Frame:
-        loop, frame = self.loop, np.empty(WIND_OBSERVATION_SIZE, dtype=np.float32)
-        self._see(loop.state, self._row(), loop.specific, loop.thrust, loop.action, frame)
-        return frame / self._scales if self.normalize else frame
-
-    def _get_info(self) -> dict[str, Any]:
-        loop, reference, position = self.loop, self._row()[:3], self.loop.position.copy()
-        error = math.sqrt(_square(position - reference))
-        flying = self.is_flying() and position.item(2) > 0.0 and error <= LOST_OFFSET
-        return {
-            "error": error,
-            "position": position,
-            "reference": reference.copy(),
-            "force": loop.external[:3].copy(),
-            "torque": loop.external[3:].copy(),
-            "wind": loop.wind,
-            "time": loop.time,
-            "lost": not flying,
-            "trajectory": self.reference_name,
-        }
-
-    def _get_reward(self, info: dict[str, Any], change: Array) -> dict[str, float]:
-        square = _square(info["position"] - info["reference"])
-        return {
-            "reward_tracking": 1.0 / (1.0 + square / (TRACKING_WIDTH * TRACKING_WIDTH)),
-            "reward_change": -CHANGE_COST * _square(change),
-        }
 
     def _truth(self) -> dict[str, Any]:
         """Return beside ``Task._truth`` the actuators' disturbance (6,) N and Nm, world, and the
@@ -258,7 +260,7 @@ class WindHoverEnv(Task):
         return WindViewer(self.render_mode or "", self.width, self.height)
 
     def _scenery(self) -> Any:
-        return self.blowing, self._row()[:3], self.loop.time
+        return self.blowing, self._table["reference"][0], self.loop.time
 
 
 class WindTrajectoryEnv(WindHoverEnv):

@@ -23,7 +23,7 @@ import numpy as np
 from numba import carray
 from numpy.typing import ArrayLike, NDArray
 
-from ..dynamics.model import reset_model
+from ..dynamics.model import lay_addresses, reset_model, without_addresses
 from ..dynamics.rotation import attitude_error, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
 from ..runtime.addresses import address_of
@@ -464,10 +464,11 @@ class WrenchUKF:
             name: value
             for name, value in self.__dict__.items()
             if name not in ("_sample", "_now", "_refused", "_call")
-        }
+        } | {"record": without_addresses(self.record)}
 
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
+        lay_addresses(self.record[0], self.vehicle)
         self._bind()
 
     def __copy__(self) -> Self:

@@ -89,17 +89,17 @@ def _stepping(env: Any, period: float, steps: int) -> Callable[[], float]:
 
 def together(count: int, threads: int = 1) -> Callable[[], float]:
     """Return a run of ``count`` environments that step together."""
-    from ..envs.vector import FanTrackingVectorEnv
+    from ..envs.vector import TaskVectorEnv
 
-    envs = FanTrackingVectorEnv(count, max_episode_steps=10**9, threads=threads, scenario="static")
+    envs = TaskVectorEnv(count, max_episode_steps=10**9, threads=threads, scenario="static")
     return _all_stepping(envs, max(2, _TOGETHER // count))
 
 
 def in_lanes(count: int, threads: int = 1) -> Callable[[], float]:
     """Return a run of ``count`` environments in the lanes of a vector unit."""
-    from ..envs.lanes.vector import FanTrackingLanes
+    from ..envs.lanes.vector import TaskLanes
 
-    envs = FanTrackingLanes(count, 10**9, threads, scenario="static")
+    envs = TaskLanes(count, 10**9, threads, scenario="static")
     return _all_stepping(envs, max(2, _IN_LANES // count))
 
 

@@ -16,24 +16,8 @@ from windwrench.runtime.errors import InputError
 
 from .runner import start
 
-ENDINGS = tuple(
-    f".{kind}"
-    for kind in [
-        "ulg",
-        "bin",
-        "bbl",
-        "bfl",
-        "bag",
-        "mcap",
-        "db3",
-        "csv",
-        "csv.gz",
-        "parquet",
-        "mat",
-        "npz",
-        "txt",
-    ]
-)
+_KINDS = "ulg", "bin", "bbl", "bfl", "bag", "mcap", "db3", "csv", "csv.gz", "parquet", "mat", "npz"
+ENDINGS = tuple(f".{kind}" for kind in _KINDS)
 SHOWN = 160  # letters of a reason
 
 

@@ -9,9 +9,9 @@ from gymnasium.wrappers import TimeLimit
 from numpy.typing import NDArray
 
 from ..envs.fan_tracking import TRUTH, FanTrackingEnv, scenario_env
-from ..envs.lanes.vector import FanTrackingLanes
+from ..envs.lanes.vector import TaskLanes
 from ..envs.scenarios import SCENARIOS
-from ..envs.vector import FanTrackingVectorEnv
+from ..envs.vector import TaskVectorEnv
 from ..evaluation.episodes import DECISIONS
 from ..runtime.errors import InputError, unknown_name
 
@@ -169,9 +169,9 @@ def make_training_envs(
                 f"training: {LANES} flies one scenario, with repeat 1 and features of the filter's "
                 f"estimate, got {name!r}"
             )
-        return FanTrackingLanes(count, DECISIONS, scenario=name)
+        return TaskLanes(count, DECISIONS, scenario=name)
     if plain:
-        return FanTrackingVectorEnv(count, DECISIONS, scenario=name, estimator=estimator)
+        return TaskVectorEnv(count, DECISIONS, scenario=name, estimator=estimator)
 
     def make() -> gym.Env[Frame, Frame]:
         env = make_training_env(name, estimator, sources)

@@ -5,7 +5,7 @@ MuJoCo is not called here. What it does with a free rigid body, one semi-implici
 ``fly_freely``, whose equations of motion are those of the filter's prediction.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,8 +23,16 @@ from ...estimator.ukf_lanes import (
 from ...runtime.addresses import call_at
 from ...runtime.compiled import Record, compiled, compiled_without_gil
 from ...runtime.vector_lanes import WIDTH, LaneRecord
-from ..closed_loop import ClosedLoop
-from ..fan import FAN
+from ..closed_loop import (
+    ACCELEROMETER_NOISE,
+    LOOP,
+    WIND_EVERY,
+    ClosedLoop,
+    accelerate,
+    place_stations,
+)
+from ..fan import FAN, STATIONS
+from ..observing import Episodes, Motion
 from ..plant import (
     NOISE,
     PLANT,
@@ -32,13 +40,17 @@ from ..plant import (
     TICK,
     add_up,
     blow,
+    delay,
     disturb,
     follow,
     log_speeds,
     lose_pose,
     measure,
 )
+from ..wind.field import Calls, add_winds
 
+# fields of a closed loop's own record that differ from lane to lane
+_OWN = ("action", "specific", "thrust", "accelerometer_bias")
 # a block of loops, as one of them would have it
 _LOOP = np.dtype(
     [
@@ -49,8 +61,10 @@ _LOOP = np.dtype(
         ("qvel", "f8", (6,)),
         ("xfrc", "f8", (6,)),
         ("acceleration", "f8", (6,)),
-        ("noise", "f8", (NOISE,)),  # unit normals of the tick in hand
+        ("noise", "f8", (NOISE + ACCELEROMETER_NOISE,)),  # unit normals of the tick in hand
         ("none", "f8", (6,)),
+        *[(name, LOOP[name]) for name in _OWN],
+        ("accelerometer_sigma", "f8"),
     ]
 )
 # the true body is each vehicle's own, the declared one that of all
@@ -69,6 +83,16 @@ _PLANT = LaneRecord(
         "q",
         "rho",
         "scratch",
+        "dropout",
+        "dropout_kept",
+        "lost",
+        "actuator_late",
+        "pose_late",
+        "imu_late",
+        "past_commands",
+        "past_poses",
+        "past_felt",
+        "late",
     ),
     (
         "motor_keep",
@@ -78,7 +102,6 @@ _PLANT = LaneRecord(
         "disturbance_force",
         "disturbance_torque",
         "disturbance_keep",
-        "dropout",
         "effect_wrench",
         "applied",
     ),
@@ -91,16 +114,31 @@ _FLIGHT = LaneRecord(
 )
 _FAN = LaneRecord(
     FAN,
-    ("speed", "rotor_drag", "hull_area", "gusts", "y"),
-    ("height", "turbulence", "keep", "mixing", "stations", "blown", "air"),
+    ("speed", "rotor_drag", "hull_area", "gusts", "y", "height", "air"),
+    ("turbulence", "keep", "mixing", "stations", "blown"),
 )
 LOOPS = LaneRecord(
     _LOOP,
-    ("qpos", "qvel", "xfrc", "acceleration", "noise"),
-    ("none",),
+    ("qpos", "qvel", "xfrc", "acceleration", "noise", *_OWN),
+    ("none", "accelerometer_sigma"),
     {"plant": _PLANT, "flight": _FLIGHT, "fan": _FAN},
 )
 _loop_at = LOOPS.at
+
+
+class Drawn(NamedTuple):
+    """Fields of the blocks' records that ``fly_blocks`` reads and writes, (blocks, ..., WIDTH)."""
+
+    noise: Array
+    fan_y: Array
+    fan_height: Array
+    setpoint: Array
+    action: Array
+    specific: Array
+    thrust: Array
+    air: Array
+    qpos: Array
+    stations: Array  # (blocks, STATIONS, 3)
 
 
 @compiled
@@ -131,22 +169,30 @@ def fly_freely(loop: Record, dt: float) -> None:
 
 
 @compiled
-def tick_lanes(address: int, work: int, step: int, axial: Array, radial: Array) -> None:
-    """Do what ``closed_loop.tick`` does, and then MuJoCo, with the loops whose record lies at
-    ``address``.
+def tick_lanes(
+    address: int, work: int, step: int, axial: Array, radial: Array, accelerates: bool, feels: bool
+) -> None:
+    """Do what ``closed_loop.run_ticks`` does in a tick but for its winds, and then MuJoCo, with the
+    loops whose record lies at ``address``.
 
     Their filters are in hand in the record at ``work``, and ``step`` is the address of those's
     step.
     """
     loop, f = _loop_at(address), in_hand(work)
     plant, flight, fan, qpos, qvel = loop.plant, loop.flight, loop.fan, loop.qpos, loop.qvel
-    measure(plant, qpos, loop.noise)
+    delay(plant.past_poses, plant.pose_late, qpos, plant.late)
+    measure(plant, plant.late, loop.noise)
     lose_pose(plant, loop.noise)
     for i in range(11):
         f.z[i] = plant.z[i]
     call_at(step, work)
-    move_setpoint(flight, f.x, TICK)
+    if not accelerates:
+        move_setpoint(flight, f.x, TICK)
+    for i in range(3):
+        flight.setpoint[6 + i] += loop.action[i]
     fly(flight, f.x, TICK)
+    for i in range(3):
+        flight.setpoint[6 + i] -= loop.action[i]
     follow(plant, flight.command)
     log_speeds(plant, plant.speeds)
     rotor_wrench(plant.body, plant.speeds, plant.rotor_wrench)
@@ -154,8 +200,27 @@ def tick_lanes(address: int, work: int, step: int, axial: Array, radial: Array) 
     blow(plant, fan, axial, radial, qpos, qvel, loop.noise)
     disturb(plant, loop.noise)
     add_up(plant, loop.xfrc)
+    if feels:
+        accelerate(loop, loop.xfrc, loop.noise)
     for _ in range(SUBSTEPS):
         fly_freely(loop, TICK / SUBSTEPS)
+
+
+@compiled
+def blow_at(
+    calls: Calls,
+    time: Array,
+    pose: Array,
+    stations: Array,
+    rotation: Array,
+    points: Array,
+    air: Array,
+) -> None:
+    """Write the winds at the stations of a vehicle at a pose (7,) into ``air`` (3, STATIONS)."""
+    quaternion_to_matrix(pose[3:7], rotation)
+    place_stations(pose, rotation, stations, points)
+    air[:] = 0.0
+    add_winds(calls, time, points, air)
 
 
 @compiled_without_gil
@@ -167,15 +232,15 @@ def fly_blocks(
     work: int,
     step: int,
     jet: Array,
-    noise: Array,
-    fan_y: Array,
-    setpoint: Array,
+    drawn: Drawn,
     generators: Any,
-    flying: np.ndarray,
-    commands: Array,
-    paths: Array,
-    first: np.ndarray,
+    slots: np.ndarray,
+    episodes: Episodes,
+    calls: np.ndarray,
+    winds: np.ndarray,
     ticks: int,
+    noise_size: int,
+    accelerates: bool,
 ) -> None:
     """Fly blocks ``begin`` to ``end - 1`` of loops side by side.
 
@@ -187,36 +252,62 @@ def fly_blocks(
         work: address of a record for a block of filters in hand, this thread's own.
         step: address of the step of a block of filters.
         jet: (2, COUNT_X, COUNT_R) of the jet's table.
-        noise: (blocks, NOISE, WIDTH) of the records.
-        fan_y: (blocks, WIDTH) likewise.
-        setpoint: (blocks, 11, WIDTH) likewise.
-        generators: (n,) of the loops; a typed list.
-        flying: (n,) booleans; a loop that does not fly draws nothing.
-        commands: (n,) m/s, along y.
-        paths: (n, m) m, the fan's y.
-        first: (n,) columns of ``paths`` at the first tick; of a loop that flies, then the next.
+        drawn: what this writes into the records.
+        generators: (n,) of the environments; a typed list.
+        slots: (lanes,) the environment in each lane; -1: none flies there, and none draws.
+        episodes: of the environments; ticks are written.
+        calls: (n, winds, 2) of the environments' winds.
+        winds: (n,) how many they are.
         ticks: of ``TICK`` s.
+        noise_size: unit normals of a tick.
+        accelerates: whether commands are accelerations beside a reference, or velocities.
     """
-    last = paths.shape[1] - 1
+    pose, rotation, time = np.empty(7), np.empty((3, 3)), np.empty(1)
+    points, air = np.empty((3, STATIONS)), np.empty((3, STATIONS))
+    first, feels = episodes.ticks, noise_size > NOISE
     for b in range(begin, end):
-        members = range(WIDTH * b, min(WIDTH * (b + 1), len(flying)))
-        if not flying[members.start : members.stop].any():
+        members = slots[WIDTH * b : WIDTH * (b + 1)]
+        if not np.any(members >= 0):
             continue
         loop, block = loops[0] + b * loops[1], kept[0] + b * kept[1]
         take_up(block, work)
-        for n in members:
-            setpoint[b, 4, n - members.start] = commands[n]
+        drawn.specific[b], drawn.thrust[b] = 0.0, 0.0
+        for lane in range(WIDTH):
+            n = members[lane]
+            for i in range(episodes.commands.shape[1] if n >= 0 else 0):
+                if accelerates:
+                    drawn.action[b, i, lane] = episodes.commands[n, i]
+                else:
+                    drawn.setpoint[b, 4 + i, lane] = episodes.commands[n, i]
         for k in range(ticks):
-            for n in members:
-                if flying[n]:
-                    lane = n - members.start
-                    fan_y[b, lane] = paths[n, min(first[n] + k, last)]
-                    generator = generators[n]
-                    for i in range(NOISE):
-                        noise[b, i, lane] = generator.standard_normal()
-            tick_lanes(loop, work, step, jet[0], jet[1])
+            for lane in range(WIDTH):
+                n = members[lane]
+                if n < 0:
+                    continue
+                now = max(first[n] + k, 0)
+                row = min(now, episodes.paths.shape[1] - 1)
+                drawn.fan_y[b, lane] = episodes.paths[n, row, 0]
+                drawn.fan_height[b, lane] = episodes.paths[n, row, 1]
+                if accelerates:
+                    row = min(now, episodes.references.shape[1] - 1)
+                    for i in range(episodes.references.shape[2]):
+                        drawn.setpoint[b, i, lane] = episodes.references[n, row, i]
+                if winds[n] > 0 and (first[n] + k) % WIND_EVERY == 0:
+                    time[0] = now * TICK
+                    pose[:] = drawn.qpos[b, :, lane]
+                    blow_at(
+                        calls[n, : winds[n]], time, pose, drawn.stations[b], rotation, points, air
+                    )
+                    drawn.air[b, :, :, lane] = air.T
+                generator = generators[n]
+                for i in range(noise_size):
+                    drawn.noise[b, i, lane] = generator.standard_normal()
+            tick_lanes(loop, work, step, jet[0], jet[1], accelerates, feels)
         for n in members:
-            first[n] += ticks if flying[n] else 0
+            if n >= 0:
+                first[n] += ticks
+        drawn.specific[b] /= ticks
+        drawn.thrust[b] /= ticks
         put_down(block, work)
 
 
@@ -236,12 +327,29 @@ class Blocks:
         self.addresses = tuple(
             (int(records.ctypes.data), records.itemsize) for records in (self.loops, self.filters)
         )
-        # of all blocks, (blocks, n, WIDTH): position and quaternion, velocities, external wrench,
-        # estimated states
         loops = self.loops
-        external = loops["plant"]["external"]
-        self.motion = loops["qpos"], loops["qvel"], external, self.filters["x"]
-        self.drawn = loops["noise"], loops["fan"]["y"], loops["flight"]["setpoint"]
+        specific, thrust, fan = loops["specific"], loops["thrust"], loops["fan"]
+        self.motion = Motion(
+            loops["qpos"],
+            loops["qvel"],
+            loops["plant"]["external"],
+            self.filters["x"],
+            specific,
+            thrust,
+            fan["air"],
+        )
+        self.drawn = Drawn(
+            loops["noise"],
+            fan["y"],
+            fan["height"],
+            loops["flight"]["setpoint"],
+            loops["action"],
+            specific,
+            thrust,
+            fan["air"],
+            loops["qpos"],
+            fan["stations"],
+        )
 
     def __len__(self) -> int:
         """Return how many blocks there are."""
@@ -273,8 +381,9 @@ def _single(loop: ClosedLoop) -> dict[str, Any]:
         "qvel": qvel[:6],
         "xfrc": np.zeros(6),
         "acceleration": np.zeros(6),
-        "noise": np.zeros(NOISE),
+        "noise": np.zeros(NOISE + ACCELEROMETER_NOISE),
         "none": np.zeros(6),
+        **{name: record[name] for name in (*_OWN, "accelerometer_sigma")},
     }
 
 

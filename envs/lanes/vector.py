@@ -1,7 +1,8 @@
-"""Many fan-tracking environments in the lanes of a vector unit."""
+"""Many environments of a task in the lanes of a vector unit."""
 
 from collections import deque
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,43 +14,47 @@ from ...runtime.compiled import compiled
 from ...runtime.errors import InputError, unknown_name
 from ...runtime.vector_lanes import WIDTH
 from ..closed_loop import ClosedLoop
-from ..fan_tracking import DECISION_TICKS, FanTrackingEnv
-from ..normals import generator_list
-from ..task import SETTLE_TICKS
-from ..vector import FanTrackingVectorEnv, Flags
+from ..fan_tracking import FanTrackingEnv
+from ..fan_tracking_2d import FanTracking2DEnv
+from ..observing import Motion
+from ..task import SETTLE_TICKS, Task
+from ..vector import Flags, TaskVectorEnv
+from ..wind.field import Sum
+from ..wind_tasks import WindHoverEnv, WindTrajectoryEnv
 from .flight import Blocks, fly_blocks
 
 _LARGEST = 1e10  # of a number that MuJoCo goes on with
 
 
-class FanTrackingLanes(FanTrackingVectorEnv):
-    """``FanTrackingVectorEnv`` without MuJoCo: plant, filter and flight loop side by side, an
-    environment in each lane of a vector unit.
+class TaskLanes(TaskVectorEnv):
+    """``TaskVectorEnv`` without MuJoCo: plant, filter and flight loop side by side, an environment
+    in each lane of a vector unit.
 
     An episode is that of the MuJoCo environment with its seed, to rounding: the same draws of the
     same generators, the same equations in the same order, and MuJoCo's integrator written out for
     the one free body there is. It is the same bit for bit for any ``num_envs`` and ``threads``.
-    Observation, reward, ``infos`` and autoreset modes are those of ``FanTrackingVectorEnv``.
+    Observation, reward, ``infos`` and autoreset modes are those of ``TaskVectorEnv``.
 
-    All scenarios fly, with any ``vehicle``, ``truth``, ``fan``, ``settings``, ``fan_path`` and
-    view. What does not, and is refused: effects other than those of the rigid body (mass, inertia,
-    com_offset), declared or not; ``estimator="constant-gain"``; ``render_mode``; ``stages``.
+    All scenarios fly, with any ``vehicle``, ``truth``, ``fan``, ``settings``, ``fan_path``,
+    ``gains``, view and compiled ``winds``. What does not, and is refused: effects other than those
+    of the rigid body (mass, inertia, com_offset), declared or not; ``estimator="constant-gain"``;
+    ``render_mode``; ``stages`` and winds of one's own.
 
     Args:
         num_envs: how many.
-        *args: as of ``FanTrackingVectorEnv``.
+        *args: as of ``TaskVectorEnv``.
         **kwargs: likewise.
 
     Raises:
-        InputError: what does not fly in lanes, or what ``FanTrackingVectorEnv`` refuses.
+        InputError: what does not fly in lanes, or what ``TaskVectorEnv`` refuses.
     """
 
-    def _make_envs(self, kwargs: dict[str, Any]) -> list[FanTrackingEnv]:
+    def _make_envs(self, kwargs: dict[str, Any]) -> list[Task]:
         """Return one environment: it says what all are, and never flies."""
-        return [FanTrackingEnv(**kwargs)]
+        return [self.task(**kwargs)]
 
-    def _make_memory(self) -> tuple[Array, Array, Array, Array]:
-        """Make what ``_fly`` works on; return motion, wrench and estimates."""
+    def _make_memory(self) -> Motion:
+        """Make what ``_fly`` works on; return the motion of all."""
         env = self.envs[0]
         self._like = env.make_loop(env.truth, env.fan)
         _refuse(env, self._like)
@@ -58,11 +63,41 @@ class FanTrackingLanes(FanTrackingVectorEnv):
         self._settling = Blocks(0, self._like)
         self._works: deque[np.ndarray] = deque()
         self._seeded = np.zeros(self.num_envs, dtype=np.bool_)
+        self._blowing: list[Sum] = [Sum()] * self.num_envs  # what ``_calls`` has the addresses of
+        self._lay_calls()
         return self._flying.motion
 
-    def _fly_blocks(self, blocks: Blocks, count: int, *given: Any) -> None:
-        """Fly blocks; each thread has a record of its own for the filters in hand."""
+    def _lay_calls(self) -> None:
+        """Write down where the winds of all environments are: (n, winds, 2), and how many."""
+        most = max(len(winds.calls) for winds in self._blowing)
+        self._calls = np.zeros((self.num_envs, most, 2), dtype=np.int64)
+        self._winds = np.array([len(winds.calls) for winds in self._blowing])
+        for i, winds in enumerate(self._blowing):
+            self._calls[i, : len(winds.calls)] = winds.calls
+
+    def __getstate__(self) -> dict[str, Any]:
+        return (
+            super().__getstate__()
+            | {name: getattr(self, name) for name in ("_seeded", "_blowing")}
+            | {"_flying": (self._flying.loops, self._flying.filters)}
+        )
+
+    def _take_envs(self, state: dict[str, Any]) -> None:
+        self.envs, self._seeded, self._blowing = (
+            state["envs"],
+            state["_seeded"],
+            state["_blowing"],
+        )
+        self._flying.loops[...], self._flying.filters[...] = state["_flying"]
+        self._lay_calls()
+
+    def _fly_blocks(self, blocks: Blocks, slots: np.ndarray, ticks: int) -> None:
+        """Fly blocks in which ``slots`` (lanes,) say whose vehicle is in a lane; -1: nobody's. Each
+        thread has a record of its own for the filters in hand.
+        """
+        count = len(slots) // WIDTH
         parts = 1 if self.threads == 1 else count
+        given = self._generators, slots, self._episodes, self._calls, self._winds, ticks
 
         def fly(part: int) -> None:
             try:
@@ -72,49 +107,59 @@ class FanTrackingLanes(FanTrackingVectorEnv):
             try:
                 first, last = part * count // parts, (part + 1) * count // parts
                 memory = *blocks.addresses, work.ctypes.data, self._step, self._like.jet_table
-                self._call(fly_blocks, first, last, *memory, *blocks.drawn, *given)
+                kind = self._like.noise_size, self.task.accelerates
+                self._call(fly_blocks, first, last, *memory, blocks.drawn, *given, *kind)
             finally:
                 self._works.append(work)
 
         self._spread(fly, parts)
 
     def _fly(self, which: Flags) -> None:
-        blocks = self._flying
-        given = self._generators, which, self._commands, self._paths, self._ticks, DECISION_TICKS
-        self._fly_blocks(blocks, len(blocks), *given)
-        self._call(start_over, which, *self._motion[:2], self._broken)
+        slots = np.full(len(self._flying) * WIDTH, -1)
+        slots[: self.num_envs][which] = np.flatnonzero(which)
+        self._fly_blocks(self._flying, slots, self.task.decision_ticks)
+        self._call(start_over, which, *self._motion[:2], self._episodes.broken)
 
     def _hover(self, which: list[int], seeds: Sequence[int | None]) -> None:
-        places = _places(which)
+        env, vehicles = self.envs[0], {}
+        for i, seed in ((i, seeds[i]) for i in which):
+            if not self._seeded[i] or seed is not None:
+                self._generators[i], self._seeded[i] = np_random(seed)[0], True
+            env.np_random = self._generators[i]
+            env.draw_loop()
+            vehicles[i] = env.loop, env.drawn
+        for _ in range(env.draws):
+            self._settle(which, vehicles)
+            drawn = np.isin(np.arange(self.num_envs), which)
+            self._call(start_over, drawn, *self._motion[:2], self._episodes.broken)
+            self._call(
+                self.task.look, drawn, self._episodes, self._motion, self._whole, self._table
+            )
+            which = np.flatnonzero(drawn & self._table["lost"]).tolist()
+            if not which:
+                return
+        env.refuse_draws()
+
+    def _settle(self, which: list[int], vehicles: dict[int, Any]) -> None:
+        """Draw episodes for drawn vehicles, and let these hover at the start."""
+        env, places = self.envs[0], _places(which)
         count = 1 + max((block for block, _ in places.values()), default=-1)
         if count > len(self._settling):
             self._settling = Blocks(count, self._like)
-        settling, size = self._settling, count * WIDTH
-        generators = generator_list([np.random.default_rng(0)] * size)
-        flying, still = np.zeros(size, dtype=np.bool_), np.zeros((size, 1))
+        settling, slots = self._settling, np.full(count * WIDTH, -1)
         for i, (block, lane) in places.items():
-            n = WIDTH * block + lane
-            generators[n] = self._draw(i, seeds[i], block, lane)
-            flying[n], still[n] = True, self._paths[i, 0]
-        given = generators, flying, np.zeros(size), still, np.zeros(size, np.int64), SETTLE_TICKS
-        self._fly_blocks(settling, count, *given)
+            env.np_random = self._generators[i]
+            env.take_loop(*vehicles[i])
+            env.hover()
+            self._draw(i, env)
+            self._blowing[i] = env.loop.winds
+            settling.put(block, slice(lane, lane + 1), env.loop)
+            slots[WIDTH * block + lane], self._episodes.ticks[i] = i, -SETTLE_TICKS
+            self._episodes.commands[i] = 0.0
+        self._lay_calls()
+        self._fly_blocks(settling, slots, SETTLE_TICKS)
         for i, (block, lane) in places.items():
             self._flying.take(i // WIDTH, lane, settling, block)
-
-    def _draw(self, i: int, seed: int | None, block: int, lane: int) -> np.random.Generator:
-        """Draw an episode and put its vehicle at the start, in a lane of the blocks that settle;
-        return the generator.
-        """
-        env = self.envs[0]
-        if not self._seeded[i] or seed is not None:
-            self._generators[i], self._seeded[i] = np_random(seed)[0], True
-        generator: np.random.Generator = self._generators[i]
-        env.np_random = generator
-        env.hover()
-        self._distance[i], self._paths[i] = env.distance, env.path[:, 0]
-        self._settling.put(block, slice(lane, lane + 1), env.loop)
-        self._values["fan_motion"][i] = env.fan_motion
-        return generator
 
 
 @compiled
@@ -141,7 +186,7 @@ def _places(which: list[int]) -> dict[int, tuple[int, int]]:
     return places
 
 
-def _refuse(env: FanTrackingEnv, loop: ClosedLoop) -> None:
+def _refuse(env: Task, loop: ClosedLoop) -> None:
     """Refuse what does not fly in lanes."""
     record = loop.record[0]
     called = any(
@@ -154,34 +199,38 @@ def _refuse(env: FanTrackingEnv, loop: ClosedLoop) -> None:
         (env.estimator != "ukf", f"flies the full filter 'ukf', got estimator={env.estimator!r}"),
         (called, "flies no effects but mass, inertia and com_offset, and the vehicle has others"),
         (env.stages, "runs no stages of your own"),
+        (Sum(*(getattr(env, "winds", None) or ())).own, "has no winds of your own"),
     ):
         if wrong:
-            raise InputError(f"FanTracking: plant='lanes' {what}; plant='mujoco' does it")
+            raise InputError(f"{env.name}: plant='lanes' {what}; plant='mujoco' does it")
 
 
-PLANTS: dict[str, type[FanTrackingVectorEnv]] = {
-    "mujoco": FanTrackingVectorEnv,
-    "lanes": FanTrackingLanes,
-}
+PLANTS: dict[str, type[TaskVectorEnv]] = {"mujoco": TaskVectorEnv, "lanes": TaskLanes}
 
 
-def make_fan_tracking_vector(
-    num_envs: int = 1, plant: str = "mujoco", **kwargs: Any
-) -> FanTrackingVectorEnv:
-    """Return ``num_envs`` fan-tracking environments side by side.
+def make_vector(
+    task: type[Task], num_envs: int = 1, plant: str = "mujoco", **kwargs: Any
+) -> TaskVectorEnv:
+    """Return ``num_envs`` environments of a task side by side.
 
     Args:
+        task: the class of its environment.
         num_envs: how many.
-        plant: ``"mujoco"``, the reference (``FanTrackingVectorEnv``), or ``"lanes"``, the same
-            flight in the lanes of a vector unit (``FanTrackingLanes``): several times as fast.
+        plant: ``"mujoco"``, the reference (``TaskVectorEnv``), or ``"lanes"``, the same flight in
+            the lanes of a vector unit (``TaskLanes``): several times as fast.
         **kwargs: of the class.
 
     Raises:
         InputError: an unknown plant, or what the class refuses.
     """
     if plant not in PLANTS:
-        raise unknown_name("plant", str(plant), PLANTS, "FanTracking: plant")
-    return PLANTS[plant](num_envs, **kwargs)
+        raise unknown_name("plant", str(plant), PLANTS, f"{task.name}: plant")
+    return PLANTS[plant](num_envs, task=task, **kwargs)
 
 
-__all__ = ["PLANTS", "FanTrackingLanes", "make_fan_tracking_vector"]
+make_fan_tracking_vector = partial(make_vector, FanTrackingEnv)
+make_fan_tracking_2d_vector = partial(make_vector, FanTracking2DEnv)
+make_wind_hover_vector = partial(make_vector, WindHoverEnv)
+make_wind_trajectory_vector = partial(make_vector, WindTrajectoryEnv)
+
+__all__ = ["PLANTS", "TaskLanes", "make_vector"]

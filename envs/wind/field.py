@@ -57,9 +57,8 @@ class CompiledWind:
 
     Args:
         function: the formula, a plain function of ``SIGNATURE``, compiled at its first use.
-        parameters: (1,) of a structured type, which states the fields and their units. A table is
-            held as the address of its first number.
-        tables: these tables; they live as long as the wind.
+        parameters: (1,) of a structured type, which states the fields and their units.
+        tables: arrays, by the fields that hold the address of their first number.
 
     Attributes:
         calls: as ``add_winds`` takes them.
@@ -69,10 +68,24 @@ class CompiledWind:
         self,
         function: Callable[..., None],
         parameters: np.ndarray,
-        tables: tuple[np.ndarray, ...] = (),
+        tables: dict[str, np.ndarray] | None = None,
     ) -> None:
-        self._kept = parameters, tables
+        self._formula = function, parameters, tables or {}
+        self._bind()
+
+    def _bind(self) -> None:
+        """Write down where this process has the formula, its parameters and its tables."""
+        function, parameters, tables = self._formula
+        for name, table in tables.items():
+            parameters[name] = table.ctypes.data
         self.calls = np.array([[address_of(function, SIGNATURE), parameters.ctypes.data]])
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "calls"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._bind()
 
     def velocity(self, points: ArrayLike, time: float) -> Array:
         """Return the air's velocity (n, 3) m/s, world, at points (n, 3) m of the world and a time
@@ -89,17 +102,6 @@ class CompiledWind:
     def __add__(self, other: Wind) -> "Sum":
         return Sum(self, other)
 
-    def __reduce__(self) -> Any:
-        """Refuse to be copied or pickled: compiled code cannot be.
-
-        Raises:
-            InputError: always.
-        """
-        raise InputError(
-            f"a wind ({type(self).__name__}) cannot be copied or pickled; make it anew from the "
-            f"same arguments and seed: it is the same"
-        )
-
 
 class Sum(CompiledWind):
     """The sum of winds: those of this room, and behind them ``own``, the user's own.
@@ -112,8 +114,11 @@ class Sum(CompiledWind):
         for wind in winds:
             check_wind(wind, where)
         self.winds = [part for wind in winds for part in winds_of(wind)]
-        calls = [wind.calls for wind in self.winds if isinstance(wind, CompiledWind)]
         self.own = [wind for wind in self.winds if not isinstance(wind, CompiledWind)]
+        self._bind()
+
+    def _bind(self) -> None:
+        calls = [wind.calls for wind in self.winds if isinstance(wind, CompiledWind)]
         self.calls = np.concatenate([np.zeros((0, 2), dtype=np.int64), *calls])
 
     def velocity(self, points: ArrayLike, time: float) -> Array:

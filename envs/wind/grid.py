@@ -99,8 +99,8 @@ class GridWind(CompiledWind):
         widths = [
             (axis[-1] - axis[0]) / (len(axis) - 1) if len(axis) > 1 else 1.0 for axis in self.axes
         ]
-        parameters = np.array([(first, widths, self.wind.ctypes.data, shape[:4])], dtype=GRID)
-        super().__init__(_grid, parameters, (self.wind,))
+        parameters = np.array([(first, widths, 0, shape[:4])], dtype=GRID)
+        super().__init__(_grid, parameters, {"field": self.wind})
 
 
 def on_grid(

@@ -118,13 +118,11 @@ class _Jets(CompiledWind):
         parameters = np.zeros(1, dtype=JETS)
         w = parameters[0]
         tables = (*jet_table(radius, hub_radius), self.places, self.speeds, table)
-        for name, array in zip(JETS.names or (), tables, strict=False):
-            w[name] = array.ctypes.data
         w["place_steps"], (w["steps"], w["jets"]) = len(self.places), self.speeds.shape
         # gusts travel with the shear layer's eddies, at half the speed of the jet
         w["waves"], w["axes"] = len(table), self.axes
         w["advection"] = 0.5 * float(self.speeds.max()) * self.axes[0]
-        super().__init__(_jets, parameters, tables)
+        super().__init__(_jets, parameters, dict(zip(JETS.names or (), tables, strict=False)))
 
 
 class FanWall(_Jets):

@@ -211,8 +211,8 @@ class Turbulence(CompiledWind):
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         table[:, :3], table[:, 4:] = table[:, :3] @ turn.T, table[:, 4:] @ turn.T
         table = np.ascontiguousarray(table)
-        parameters = np.array([(table.ctypes.data, len(table), carried)], dtype=TURBULENCE)
-        super().__init__(_turbulence, parameters, (table,))
+        parameters = np.array([(0, len(table), carried)], dtype=TURBULENCE)
+        super().__init__(_turbulence, parameters, {"waves": table})
 
 
 def _three(value: ArrayLike, name: str, at_least_zero: bool) -> NDArray[np.float64]:

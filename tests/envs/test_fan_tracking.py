@@ -1,7 +1,5 @@
 """The fan-tracking environment: its interface, its repeatability, how it starts and ends."""
 
-import copy
-import pickle
 import subprocess
 import sys
 import warnings
@@ -134,17 +132,6 @@ def test_a_generator_that_is_put_in_is_drawn_from():
     assert not np.array_equal(env.loop.state, twin.loop.state)
     other.standard_normal((16, NOISE))
     assert env.np_random.uniform() == other.uniform()
-
-
-@pytest.mark.parametrize("copied", [copy.deepcopy, pickle.dumps])
-def test_a_flight_in_progress_is_not_copied(copied):
-    env = FanTrackingEnv("static")
-    copy.deepcopy(env).reset(
-        seed=0
-    )  # before its first flight there is nothing that could be shared
-    env.reset(seed=0)
-    with pytest.raises(InputError, match="cannot be copied or pickled"):
-        copied(env)
 
 
 VEHICLE = load_vehicle("ardrone2")

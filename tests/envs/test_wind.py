@@ -1,7 +1,6 @@
 """Winds: spectra against theory, formulas, files, and the same field in other simulators."""
 
 import math
-import pickle
 
 import numpy as np
 import pytest
@@ -248,7 +247,6 @@ def test_what_is_no_file_of_winds_is_named(tmp_path):
         (lambda: GridWind(([0], [0], [0], [0]), np.zeros((1, 1, 1, 1, 2))), "must have the shape"),
         (lambda: Uniform((1, 0, 0)).velocity([1.0, 2.0], 0.0), r"shape \(n, 3\)"),
         (lambda: Uniform((1, 0, 0)).velocity([[1.0, 2.0, 3.0]], np.nan), "time"),
-        (lambda: pickle.dumps(Uniform((1, 0, 0))), "cannot be copied"),
     ],
 )
 def test_what_cannot_be_is_named_in_one_line(make, words):

@@ -9,7 +9,7 @@ import pytest
 
 from windwrench.dynamics import load_vehicle
 from windwrench.envs import FanTrackingEnv
-from windwrench.envs.vector import FanTrackingVectorEnv
+from windwrench.envs.vector import TaskVectorEnv
 from windwrench.estimator import ConstantGainFilter, WrenchUKF, WrenchUKFBatch
 
 VEHICLE = load_vehicle("ardrone2")
@@ -75,7 +75,7 @@ def test_a_leak_is_seen():
         (lambda: stepped(ConstantGainFilter(VEHICLE)), 4000),
         (lambda: stepped(WrenchUKFBatch(VEHICLE, 11), 11, 50), 4000),
         (lambda: episode(FanTrackingEnv("base")), 20_000),
-        (lambda: episode(FanTrackingVectorEnv(3, threads=2, scenario="base")), 20_000),
+        (lambda: episode(TaskVectorEnv(3, threads=2, scenario="base")), 20_000),
     ],
     ids=["filter", "constant gain", "batch", "environment", "environments"],
 )

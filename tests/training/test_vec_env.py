@@ -7,7 +7,7 @@ import pytest
 
 from windwrench.controllers.features import Features, History
 from windwrench.envs.fan_tracking import FanTrackingEnv
-from windwrench.envs.vector import FanTrackingVectorEnv
+from windwrench.envs.vector import TaskVectorEnv
 from windwrench.training.training_envs import MixedFanTracking, make_training_envs
 
 pytest.importorskip(
@@ -23,7 +23,7 @@ def seed_of(environment, episode):
 
 
 def make(count, limit, scenario="static"):
-    return FeatureVecEnv(FanTrackingVectorEnv(count, limit, scenario=scenario), FEATURES, seed_of)
+    return FeatureVecEnv(TaskVectorEnv(count, limit, scenario=scenario), FEATURES, seed_of)
 
 
 def away(seed):
@@ -100,7 +100,7 @@ def test_rewards_are_weighted_terms():
         [env.step(np.array([[c]]))[1][0] for c in commands], rewards, rtol=1e-6
     )
     squared = FeatureVecEnv(
-        FanTrackingVectorEnv(1, 50, scenario="static"),
+        TaskVectorEnv(1, 50, scenario="static"),
         FEATURES,
         seed_of,
         {"tracking": 0.0, "change": 0.0, "squared": 1.0},
