@@ -29,7 +29,7 @@ from windwrench.identification.comparison.change import NOWHERE, Change
 from windwrench.identification.comparison.change import compare as compare_sets
 from windwrench.identification.comparison.fault_channels import read_channels
 from windwrench.identification.comparison.fault_detection import find_fault
-from windwrench.identification.comparison.trim import trim_of_log
+from windwrench.identification.comparison.trim import Trim, carrying, trim_of, trim_of_log
 from windwrench.identification.comparison.words import fault_data
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.findings import Diagnosis
@@ -278,6 +278,26 @@ def crazypad(folder: Path) -> list[dict[str, Any]]:
         path.name: trim_of_log(read_log(path, "crazypad"), vehicle)
         for path in sorted(folder.glob("*.csv.gz"))
     }
+    return _each_compared(trims)
+
+
+def crazypad_cards(folder: Path) -> list[dict[str, Any]]:
+    """Compare every flight of vehicle E8 in CrazyPAD's ``data/motor_data`` with all other normal
+    ones; tape on a propeller is left out, of which nobody knows what it should do.
+    """
+    trims = {}
+    for path in sorted(folder.glob("*/E8_log*")):
+        if not path.parent.name.startswith("tape"):
+            log = read_log(path, "crazyflie_sd")
+            assert log.command is not None
+            steady = carrying(log.t, log.command.sum(axis=1))
+            name = f"{path.parent.name}__{path.name}"
+            trims[name] = trim_of(name, log.t, log.command, steady, log.voltage)
+    return _each_compared(trims)
+
+
+def _each_compared(trims: Mapping[str, Trim]) -> list[dict[str, Any]]:
+    """Return the answer on each flight, against all other normal ones of the same vehicle."""
     rows = []
     for name, trim in trims.items():
         which = name.split("__")[1].split("_")[0]
@@ -534,6 +554,10 @@ def study(
             "motor_faults/."
         ),
     ] = Path("../shared/data"),
+    pad: Annotated[
+        Path | None,
+        typer.Option(help="Folder data/motor_data of CrazyPAD; without it, as they were kept."),
+    ] = None,
     wall: Annotated[
         Path | None,
         typer.Option(help="Folder data/experiment of Neural-Fly; without it, as they were kept."),
@@ -551,6 +575,9 @@ def study(
         "slung_payload": slung_payload(data / "crazyswarm2_payload" / "csv"),
         "fan_wall": fan_wall(wall) if wall else kept("real-flights/real_flights.json")["fan_wall"],
         "crazypad": crazypad(data / "crazypad"),
+        "crazypad_cards": crazypad_cards(pad)
+        if pad
+        else kept("real-flights/real_flights.json")["crazypad_cards"],
         "motor_faults": motor_faults(data / "motor_faults"),
     }
     write_json(result, folder / "real_flights.json", allow_nan=True)

@@ -83,6 +83,7 @@ _PARAMETERS = {  # that no multirotor has
     "ARSPD_FBW_MIN": "a fixed-wing plane",
     "AIRSPEED_MIN": "a fixed-wing plane",
     "CRUISE_THROTTLE": "a ground rover",
+    "CRUISE_SPEED": "a ground rover",
 }
 _FRAME_WORDS = {  # in a MSG such as "Frame: HEXA" or "Frame: QUAD/X"
     "QUAD": QUADROTOR,
@@ -199,13 +200,13 @@ def _what_flew(parameters: Parameters, messages: Messages | None) -> WhatFlew:
             for word, airframe in _FRAME_WORDS.items():
                 if found[1].startswith(word):
                     return WhatFlew(airframe, said)
+    for name, airframe in _PARAMETERS.items():
+        if name in parameters:
+            return WhatFlew(airframe, f"parameter {name}")
     if "FRAME_CLASS" in parameters:
         number = int(parameters["FRAME_CLASS"])
         by = f"parameter FRAME_CLASS = {number}"
         return WhatFlew(_CLASSES.get(number, "an unknown frame"), by)
-    for name, airframe in _PARAMETERS.items():
-        if name in parameters:
-            return WhatFlew(airframe, f"parameter {name}")
     functions = {int(parameters.get(f"SERVO{i}_FUNCTION", 0)) for i in range(1, _CHANNELS + 1)}
     motors = len(functions & {*range(_MOTOR1, _MOTOR1 + 8)})
     return WhatFlew("", "SERVOn_FUNCTION", motors) if motors else UNSTATED
