@@ -221,15 +221,13 @@ class Task(gym.Env[Frame, Frame], ABC):
         scenario = self.scenario
         mocap = Mocap(1.0 / TICK, scenario.sigma_position, scenario.sigma_attitude)
         declared = replace(self.vehicle, mocap=mocap)
+        late: dict[str, Any] = {n: self.drawn[n] for n in vars(Drawn()) if n in self.drawn}
         return ClosedLoop(
             declared,
             replace(vehicle, mocap=mocap, effects=(*vehicle.effects, *self.effects)),
             UKFTuning.for_vehicle(declared, TICK, scenario.rise_time),
             fan,
-            replace(
-                self.settings or PlantSettings.for_vehicle(self.truth),
-                **{n: v for n, v in self.drawn.items() if n in Drawn.__dataclass_fields__},
-            ),
+            replace(self.settings or PlantSettings.for_vehicle(self.truth), **late),
             drawn=self.render_mode is not None,
             estimator=self.estimator,
             stages=self.stages,
@@ -293,9 +291,9 @@ class Task(gym.Env[Frame, Frame], ABC):
 
     def _get_obs(self) -> Frame:
         """Return what the agent sees now."""
-        frame = self._frames[0]
+        frame: Frame = self._frames[0]
         if self.view.is_plain:
-            return frame.copy()
+            return np.array(frame)
         return self.view.of(frame, self.loop.state, self.loop.ticks)
 
     def _get_info(self) -> dict[str, Any]:
