@@ -295,7 +295,7 @@ class Task(gym.Env[Frame, Frame], ABC):
         """Return what the agent sees now."""
         frame: Frame = self._frames[0]
         if self.view.is_plain:
-            return frame.copy()
+            return np.array(frame)
         return self.view.of(frame, self.loop.state, self.loop.ticks)
 
     def _get_info(self) -> dict[str, Any]:
