@@ -53,7 +53,12 @@ def called_back(text, new):
     """Return the text of a report with the names as they were."""
     for old, name in new.items():
         text = re.sub(rf"\b{name}\b", old, text)
-    return json.loads(text)
+    return without_plain_names(json.loads(text))
+
+
+def without_plain_names(data):
+    """Return a report without its headline: plain names are those that a library's files state."""
+    return {key: value for key, value in data.items() if key != "headline"}
 
 
 @pytest.mark.parametrize(
@@ -65,7 +70,7 @@ def called_back(text, new):
 )
 def test_a_library_under_other_names_explains_the_same(name):
     log = flight(name)
-    own = json.loads(report(log))
+    own = without_plain_names(json.loads(report(log)))
     assert own["effects"]
     order = {effect: i for i, effect in enumerate(names())}
     with renamed(lambda effect: f"law{order[effect]:02d}") as new:
