@@ -28,7 +28,8 @@ _LARGEST_SHARE = 1.5  # an output beyond is no share, but of the protocol's rang
 _DSHOT = (0.0, 1999.0)
 _UAVCAN = (0.0, 8191.0)
 _DSHOT_TIMERS = range(-5, -1)  # of PWM_MAIN_TIMn: DShot150 to DShot1200
-_PULSES = (700.0, 2500.0)  # us: no servo or speed controller is sent others while motors turn
+_LEAST_PULSE = 700.0  # us: no speed controller is sent a shorter one, disarmed or not
+_ABOVE_PULSES = 1.1  # of the longest pulse, which no pulse reaches
 _PLUS = ((0.0, -1.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 0.0))  # motors 1 to 4, x forward, y left
 # CA_AIRFRAME, and thousands of SYS_AUTOSTART, that are no multirotor of four
 _AIRFRAMES = {1: MAV_TYPES[1], 2: MAV_TYPES[22], 3: MAV_TYPES[21], 4: MAV_TYPES[20]}
@@ -230,20 +231,22 @@ def _range(
     """
     most = float(np.nanmax(motors)) if np.isfinite(motors).any() else 0.0
     turning = motors[motors > 0.5 * most]  # not what stops them
-    usual = float(np.median(turning)) if turning.size else _PULSES[0]
+    usual = float(np.median(turning)) if turning.size else _LEAST_PULSE
+    lows, highs = (
+        _ends(parameters, bank, slots, end, default)
+        for end, default in (("MIN", 1000.0), ("MAX", 2000.0))
+    )
+    # a bus for sensors alone leaves the motors to pulses, which stay long when they stand still
+    has_bus = parameters.get("UAVCAN_ENABLE", 0.0) >= 3.0 and bool(np.any(motors < _LEAST_PULSE))
     timers = [parameters.get(f"PWM_{bank}_TIM{i}", 0.0) for i in range(_OUTPUTS)]
     is_dshot = parameters.get("DSHOT_CONFIG", 0.0) > 0.0 or any(x in _DSHOT_TIMERS for x in timers)
     if 0.0 < most <= _LARGEST_SHARE:
         return Outputs(slots, np.zeros(4), np.ones(4), "shares of 1")
-    if bank == "UAVCAN" or usual > _PULSES[1]:
-        protocol, (low, high), stated = "UAVCAN", _UAVCAN, bank == "UAVCAN"
-    elif is_dshot or usual < _PULSES[0]:
+    if bank == "UAVCAN" or has_bus or most > _ABOVE_PULSES * highs.max():
+        protocol, (low, high), stated = "UAVCAN", _UAVCAN, bank == "UAVCAN" or has_bus
+    elif is_dshot or usual < _LEAST_PULSE:
         protocol, (low, high), stated = "DShot", _DSHOT, is_dshot
     else:
-        lows, highs = (
-            _ends(parameters, bank, slots, end, default)
-            for end, default in (("MIN", 1000.0), ("MAX", 2000.0))
-        )
         if not np.all(highs > lows):
             raise InputError(
                 f"{path}: the PWM_{bank}_MIN and MAX parameters of the motors' outputs are "
