@@ -24,10 +24,9 @@ from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS
 from .channels import BODY_TURNS
 from .column_names import Group, Name, named_alone, take_apart, words
+from .column_numbers import PARTS, Numbers
 from .column_parts import (
-    PARTS,
     Candidate,
-    Numbers,
     find_parts,
     further_rotors,
     named_columns,
