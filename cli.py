@@ -25,6 +25,7 @@ from .commands.output import prepare_output
 from .commands.paper import reproduce
 from .commands.running import as_command, command_name
 from .commands.terminal import errors
+from .commands.warming import warm
 from .runtime.errors import InputError, unknown_name
 from .runtime.interrupts import INTERRUPTED, forget, noted
 from .runtime.printable import printable
@@ -38,7 +39,7 @@ class _Commands(TyperGroup):
         name = args[0] if args else ""
         if name and not name.startswith("-") and name not in self.commands:
             if not is_path(name):
-                raise unknown_name("command", name, set(self.commands) - {"look"})
+                raise unknown_name("command", name, set(self.commands) - {"look", "warm"})
             args = ["look", *args]
         return super().resolve_command(ctx, args)
 
@@ -98,7 +99,8 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
     reproduce,
     train,
 )
-app.command("look", hidden=True)(as_command(look))
+for command in (look, warm):
+    app.command(command_name(command), hidden=True)(as_command(command))
 for command in _COMMANDS:
     kind = LogsAgainstLogs if command is compare else None
     app.command(command_name(command), cls=kind)(as_command(command))
