@@ -18,18 +18,14 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from windwrench.runtime.page_files import write_text
 from windwrench.runtime.provenance import made_by
-from windwrench.studies.kept_results import DOCS, ROOT, kept
+from windwrench.studies.kept_results import DOCS, ROOT
 from windwrench.studies.quotes import read_quotes, unknown_numbers, wrong_quotes
 from windwrench.studies.scoring import area_under_curve, share, table
 
-__all__ = ["DOCS", "PAGES", "ROOT", "kept", "write_page"]
-
 # the module of each page, whose function ``page`` returns what the template shows
 PAGES: Mapping[str, str] = {
-    "diagnosis-trials": "trials.page",
-    "probabilities": "probabilities.calibration",
-    "real-flights": "measured_flights",
     "tasks": "tasks",
+    "trust": "trust",
 }
 _MODULE = re.compile(r"`((?:[a-z_]+/)+[a-z_0-9]+\.py)`")
 
@@ -61,19 +57,6 @@ def render(name: str, shown: Mapping[str, Any]) -> str:
         shown: what the template shows, by name.
     """
     return _templates().get_template(f"{name}.md").render(shown)
-
-
-def write_page(name: str, shown: Mapping[str, Any], path: Path | None = None) -> Path:
-    """Write a page; return its path.
-
-    Args:
-        name: one of ``PAGES``.
-        shown: what the template shows, by name.
-        path: default: the page below ``docs/``.
-    """
-    page = path or DOCS / f"{name}.md"
-    write_text(render(name, shown), page)
-    return page
 
 
 def page_of_results(name: str) -> str:

@@ -13,13 +13,9 @@ MOST_OF_A_FILE = 50_000  # bytes, of what should have been compressed
 PICTURES = {".png", ".gif", ".jpg", ".webp", ".mp4", ".svg"}
 PAGES_OF_COMMANDS = (  # a line that says how the page was made, once or once a section
     "reproduction.md",
-    "close-loop.md",
-    "diagnosis-trials.md",
-    "real-flights.md",
     "leaderboard.md",
     "speed.md",
-    "measured-estimator.md",
-    "measured-logs.md",
+    "trust.md",
     "identify.md",
     "tutorials/live.md",
 )
