@@ -22,12 +22,15 @@ def page() -> dict[str, Any]:
 
 def _trials(result: Mapping[str, Any]) -> dict[str, Any]:
     judged = [j for outcome in result["trials"] for j in judge(outcome)]
+    measured = rules(judged)
+    (doubted,) = (rule.measured for rule in measured if "rightly none" in rule.subject)
     return {
         "command": f"python -m studies.trials --seed {result['seed']} --seeds {result['seeds']}",
         "version": result["version"],
         "commit": result["commit"],
         "flights": len(result["trials"]),
         "diagnoses": len(judged),
-        "rules": rules(judged),
+        "rules": measured,
+        "doubted": doubted,
         "unseen": list(UNSEEN),
     }
