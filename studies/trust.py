@@ -14,6 +14,7 @@ from windwrench.studies.trials.judgements import judge, rules
 def page() -> dict[str, Any]:
     """Return what the page shows."""
     return {
+        "benchmark": kept("identify/nanodrone.json"),
         "flights": measured_flights.shown(),
         "probabilities": calibration.shown(),
         "trials": _trials(kept(RESULTS)),
