@@ -206,7 +206,7 @@ def fly_better(request: Request, found: Diagnosis, report: Report) -> Step:
             f"gusts and noise are the same.",
             f"Distance from the jet's axis, mean RMSE: {np.mean(before):.3f} m before, "
             f"{np.mean(after):.3f} m after; smaller on {better} of {count}.",
-            "So few flights show the way and not a rate: docs/close-loop.md has twenty for each "
+            "So few flights show the way and not a rate: docs/trust.md has twenty for each "
             "of ten effects.",
         ),
         f"windwrench fly --scenario {SCENARIO} --seed {request.seed} --vehicle "

@@ -106,7 +106,6 @@ def run(seeds: int, progress: Progress, seconds: float = _COUNTED) -> Result:
         "fig3",
         clusters=figures["clusters"],
         alone=alone,
-        most=[list(alone)[i] for i in np.argmax(list(alone.values()), axis=0)],
         calm=1e3 * spread["without actuator noise"],
         plain=1e3 * np.abs(off).max(axis=0),
         rest=1e3 * np.abs(off - offset).max(axis=0),

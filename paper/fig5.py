@@ -232,8 +232,6 @@ def _told(scores: Scores, ratios: Ratios, seeds: int) -> tuple[list[Comparison],
     return compared(
         "fig5",
         seeds=seeds,
-        labels=[label for label, _, _ in PAIRS],
-        flights=FLIGHTS,
         noises=list(NOISES),
         plants=list(PLANTS),
         words=words,

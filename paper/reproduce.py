@@ -148,19 +148,13 @@ def _csv(columns: Columns) -> str:
 
 
 def write_page(names: Sequence[str], folder: Path, page: Path) -> None:
-    """Write the page "the paper / this kit" from the experiments' JSON files in a folder.
-
-    The running times in NAME.timing.json, which an earlier version wrote, end a figure's table.
-    """
+    """Write the page "the paper / this kit" from the experiments' JSON files in a folder."""
     figures = {}
     for name in names:
         try:
             figures[name] = read_json(folder / f"{name}.json", "a figure's results")
         except InputError:
             continue
-        timing = folder / f"{name}.timing.json"
-        if timing.is_file():
-            figures[name]["comparison"] += read_json(timing, "a figure's timing")
     where = Path(os.path.relpath(folder, page.parent)).as_posix()
     text = template("page").render(figures=figures, where=where, made_by=made_by)
     write_text(text, page)

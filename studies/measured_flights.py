@@ -46,11 +46,12 @@ from windwrench.runtime.errors import InputError
 from windwrench.runtime.page_files import write_json, write_png
 from windwrench.runtime.provenance import commit
 from windwrench.studies.fan_wall import fan_wall
-from windwrench.studies.pages import DOCS, kept, write_page
+from windwrench.studies.kept_results import DOCS, kept
 from windwrench.studies.runner import start
 
 Array = NDArray[np.float64]
 
+RESULTS = "real-flights/real_flights.json"  # below docs/
 CUTOFF_HZ = 4.0
 _EDGE = 0.6  # s at either end, where filters start
 _DAY = 86400.0  # s
@@ -494,54 +495,23 @@ def unmet(fold: Mapping[str, Any]) -> list[str]:
     return [words for words, met in bounds.items() if not met]
 
 
-def _units(effect: str) -> dict[str, str]:
-    return {c.name: "" if c.unit == "1" else f" {c.unit}" for c in get(effect).coefficients}
-
-
-def coefficients(effect: Mapping[str, Any]) -> str:
-    """Return an effect's coefficients with their units, in words."""
-    units = _units(effect["name"])
-    return ", ".join(f"{k} = {v:.3g}{units[k]}" for k, v in effect["coefficients"].items())
-
-
-def ranges(folds: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return each effect that folds name: on how many, within which coefficients, and what some
-    fold cannot tell from the effect.
-    """
-    named: dict[str, list[Mapping[str, Any]]] = {}
-    for effect in (e for fold in folds for e in fold["effects"]):
-        named.setdefault(effect["name"], []).append(effect)
-    rows = []
-    for name, found in named.items():
-        units, told = _units(name), []
-        for c in found[0]["coefficients"]:
-            values = [effect["coefficients"][c] for effect in found]
-            told.append(f"{c} {min(values):.3g} to {max(values):.3g}{units[c]}")
-        others = sorted({x for effect in found for x in effect["indistinguishable_from"]})
-        row = {"name": name, "count": len(found), "coefficients": ", ".join(told)}
-        rows.append(row | {"others": others})
-    return rows
-
-
-def page() -> dict[str, Any]:
-    """Return what the page shows of the kept results."""
-    result: dict[str, Any] = kept("real-flights/real_flights.json")
-    folds = result["nanobench"]
+def shown() -> dict[str, Any]:
+    """Return the kept results, and what the page says of them beside."""
+    result: dict[str, Any] = kept(RESULTS)
+    folds = [fold | {"unmet": unmet(fold)} for fold in result["nanobench"]]
     groups = dict.fromkeys(fold["fitted_on"] for fold in folds)
     names = [effect for fold in folds for effect in fold["effects"]]
     return result | {
+        "nanobench": folds,
         "names": names,
         "tentative": [effect for effect in names if effect["tentative"]],
         "pooled": [pooled([f for f in folds if f["fitted_on"] == words]) for words in groups],
-        "truth": {"payload_g": 1000 * PAYLOAD, "cable_m": CABLE},
-        "unmet": unmet,
-        "coefficients": coefficients,
-        "ranges": ranges,
-        "drag": [
-            extreme(fold["drag_N_per_mps"][axis] for fold in folds)
-            for axis in (0, 1)
-            for extreme in (min, max)
+        "slung_payload": [
+            load
+            | {"load": next((e for e in load["effects"] if e["name"] == "slung_payload"), None)}
+            for load in result["slung_payload"]
         ],
+        "truth": {"payload_g": 1000 * PAYLOAD, "cable_m": CABLE},
         "nowhere": NOWHERE,
     }
 
@@ -562,26 +532,22 @@ def study(
         Path | None,
         typer.Option(help="Folder data/experiment of Neural-Fly; without it, as they were kept."),
     ] = None,
-    markdown: Annotated[Path | None, typer.Option(help="Markdown file of the page.")] = None,
 ) -> None:
-    """Diagnose measured flights, test each on flights left out of its fit, and write the page."""
+    """Diagnose measured flights, test each on flights left out of its fit, and keep the results."""
     code = commit()  # before the diagnoses: the code that makes them
-    folder = DOCS / "real-flights"
     result = {
         "version": __version__,
         "commit": code,
         "cutoff_hz": CUTOFF_HZ,
-        "nanobench": nanobench(data / "nanobench", folder / "nanobench.png"),
+        "nanobench": nanobench(data / "nanobench", (DOCS / RESULTS).with_name("nanobench.png")),
         "slung_payload": slung_payload(data / "crazyswarm2_payload" / "csv"),
-        "fan_wall": fan_wall(wall) if wall else kept("real-flights/real_flights.json")["fan_wall"],
+        "fan_wall": fan_wall(wall) if wall else kept(RESULTS)["fan_wall"],
         "crazypad": crazypad(data / "crazypad"),
-        "crazypad_cards": crazypad_cards(pad)
-        if pad
-        else kept("real-flights/real_flights.json")["crazypad_cards"],
+        "crazypad_cards": crazypad_cards(pad) if pad else kept(RESULTS)["crazypad_cards"],
         "motor_faults": motor_faults(data / "motor_faults"),
     }
-    write_json(result, folder / "real_flights.json", allow_nan=True)
-    print(write_page("real-flights", page(), markdown))
+    write_json(result, DOCS / RESULTS, allow_nan=True)
+    print(DOCS / RESULTS)
 
 
 if __name__ == "__main__":

@@ -431,12 +431,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 def section(result: Mapping[str, Any]) -> str:
     """Return what the page shows of a study's result, as Markdown."""
     head = "position m | velocity m/s | attitude rad | rate rad/s |\n" + "| --- " * 5 + "|"
-    lines = [f"| {len(result['flights'])} flights, sum of mean errors over 50 steps | {head}"]
-    for row in result["all"]:
-        ends = zip(row["mean"], row["low"], row["high"], strict=True)
-        cells = " | ".join(f"{mean:.3g} ({low:.3g}–{high:.3g})" for mean, low, high in ends)
-        lines.append(f"| {row['way']} | {cells} |")
-    lines += ["", f"| path held out: named coefficients of what stays | {head}"]
+    lines = [f"| path held out: named coefficients of what stays | {head}"]
     for path, rows in result["paths"].items():
         still, named = (
             next(row["mean"] for row in rows if row["way"] == w) for w in (STAYS, NAMED)

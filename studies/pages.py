@@ -8,9 +8,8 @@ import argparse
 import difflib
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache, partial
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -18,19 +17,13 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from windwrench.runtime.page_files import write_text
 from windwrench.runtime.provenance import made_by
-from windwrench.studies.kept_results import DOCS, ROOT, kept
+from windwrench.studies import tasks, trust
+from windwrench.studies.kept_results import DOCS, ROOT
 from windwrench.studies.quotes import read_quotes, unknown_numbers, wrong_quotes
-from windwrench.studies.scoring import area_under_curve, share, table
+from windwrench.studies.scoring import share
 
-__all__ = ["DOCS", "PAGES", "ROOT", "kept", "write_page"]
-
-# the module of each page, whose function ``page`` returns what the template shows
-PAGES: Mapping[str, str] = {
-    "diagnosis-trials": "trials.page",
-    "probabilities": "probabilities.calibration",
-    "real-flights": "measured_flights",
-    "tasks": "tasks",
-}
+# what the template of each page shows, of kept results
+PAGES: Mapping[str, Callable[[], Mapping[str, Any]]] = {"tasks": tasks.page, "trust": trust.page}
 _MODULE = re.compile(r"`((?:[a-z_]+/)+[a-z_0-9]+\.py)`")
 
 
@@ -44,42 +37,13 @@ def _templates() -> Environment:
         keep_trailing_newline=True,
     )
     found.filters |= {"f": format, "zip": partial(zip, strict=True)}
-    found.globals |= {
-        "area_under_curve": area_under_curve,
-        "made_by": made_by,
-        "share": share,
-        "table": table,
-    }
+    found.globals |= {"made_by": made_by, "share": share}
     return found
 
 
-def render(name: str, shown: Mapping[str, Any]) -> str:
-    """Return a page as Markdown.
-
-    Args:
-        name: of its template.
-        shown: what the template shows, by name.
-    """
-    return _templates().get_template(f"{name}.md").render(shown)
-
-
-def write_page(name: str, shown: Mapping[str, Any], path: Path | None = None) -> Path:
-    """Write a page; return its path.
-
-    Args:
-        name: one of ``PAGES``.
-        shown: what the template shows, by name.
-        path: default: the page below ``docs/``.
-    """
-    page = path or DOCS / f"{name}.md"
-    write_text(render(name, shown), page)
-    return page
-
-
 def page_of_results(name: str) -> str:
-    """Return one of ``PAGES`` as its kept results give the page."""
-    study = import_module(f"windwrench.studies.{PAGES[name]}")
-    return render(name, study.page())
+    """Return one of ``PAGES``, as Markdown, as its kept results give the page."""
+    return _templates().get_template(f"{name}.md").render(PAGES[name]())
 
 
 def differing_lines(name: str) -> list[str]:

@@ -19,7 +19,6 @@ from windwrench.runtime.workers import Lost, each
 
 Task = tuple[Any, ...]  # arguments that JSON can hold
 Jobs = Annotated[int, typer.Option(min=1, help="Number of processes.")]
-Page = Annotated[Path | None, typer.Option(help="Markdown file of the page.")]
 _MOST_SECONDS = 4 * 3600.0  # of a task
 _ROOMS = ("runtime", "dynamics", "estimator", "controllers", "identification", "envs")
 

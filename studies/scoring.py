@@ -82,8 +82,3 @@ def area_under_curve(strange: Sequence[float], known: Sequence[float]) -> str:
         return "–"
     area = float(mannwhitneyu(strange, known).statistic) / (len(strange) * len(known))
     return f"{area:.3f} ({len(strange)} against {len(known)})"
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table as Markdown."""
-    return "\n".join(f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *rows))

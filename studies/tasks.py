@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from windwrench.studies.pages import kept
+from windwrench.studies.kept_results import kept
 
 TASKS = ("WindHover", "WindTrajectory", "FanTracking2D")
 

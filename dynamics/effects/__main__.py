@@ -2,24 +2,27 @@
 ``python -m windwrench.dynamics.effects`` prints the page.
 """
 
-from . import Effect, get, model_in_words, names
+from . import Coefficient, Effect, get, model_in_words, names
+from .base import CENTRAL
 
-_HEAD = """# The effects
+_HEAD = f"""# The effects
 
-One effect, three uses: the simulator applies it, the estimator's model includes it once it is declared, and the diagnosis fits it
-to the residual of a log. Each is one file in `dynamics/effects/`, which holds its model, the equation, once. This page is made from
-those files:
+The simulator applies an effect, the estimator's model includes it once it is declared, and the diagnosis fits it to the residual of a
+log. Each is one file in `dynamics/effects/`. This page is made from those files:
 
     python -m windwrench.dynamics.effects > docs/effects.md
 
-A vehicle declares effects in its YAML file, `effects: [{name: rotor_drag, coefficients: {kdx: 1.2e-4, kdy: 1.2e-4}}]`;
+A vehicle declares effects in its YAML file, `effects: [{{name: rotor_drag, coefficients: {{kdx: 1.2e-4, kdy: 1.2e-4}}}}]`;
 `windwrench record --effect rotor_drag:kdx=1.2e-4,kdy=1.2e-4` flies one that the vehicle does not declare. Coefficients not given are
-zero. Kinds: *rotor input* changes what the rotors deliver, *wrench* adds force and torque, *body* changes the rigid
-body, *sensing* changes what the log holds. World z is up; body x points forward, y left.
+zero. World z is up; body x points forward, y left.
 
-An effect declares what it is, and a diagnosis goes by that, not by its name. It declares its *family* and the *role* in which other
-effects know it. It also declares what logs must hold to show it. What
-can be confused in given flights is computed from them: `indistinguishable_from` in a report.
+The *kind* says what an effect changes. *Rotor input*: what the rotors deliver. *Wrench*: force and torque. *Body*: the rigid
+body. *Sensing*: what the log holds. The *role* is what other effects know it by, and *needs* is what a log must hold to show it. A
+diagnosis goes by these words and not by the name. It computes from the flights which effects can be confused:
+`indistinguishable_from` in a report.
+
+Of each coefficient stand its typical sizes for vehicles of 0.45 kg and of 0.03 kg, and its range. `central` is the same in all
+effects that act rotor by rotor. {CENTRAL[:1].upper()}{CENTRAL[1:]}.
 
 """
 
@@ -28,39 +31,37 @@ def effects_page() -> str:
     """Return the page (Markdown) of all effects: model, coefficients, sizes, sources, and what
     distinguishes them.
     """
-    parts = [
-        _HEAD,
-        "| effect | kind | family | coefficients |\n| --- | --- | --- | --- |\n",
-    ]
+    families: dict[str, list[str]] = {}
     for name in names():
-        effect = get(name)
-        parts.append(
-            f"| [{name}](#{name}) | {effect.kind} | {effect.family} | "
-            f"{', '.join(c.name for c in effect.coefficients)} |\n"
-        )
+        families.setdefault(get(name).family, []).append(f"[{name}](#{name})")
+    parts = [_HEAD, "| family | effects |\n| --- | --- |\n"]
+    parts += [f"| {family} | {', '.join(links)} |\n" for family, links in sorted(families.items())]
     for name in names():
         effect = get(name)
         model = model_in_words(name).replace("``", "`")
+        parts.append(f"\n## {name}\n\n{model}\n\n")
+        parts += [_line(c) for c in effect.coefficients if c.meaning != CENTRAL]
         parts.append(
-            f"\n## {name}\n\n{model}\n\n{_declarations(effect)}\n\n"
-            "| coefficient | unit | typical, 0.45 kg | typical, 0.03 kg | range | meaning |\n"
-            "| --- | --- | --- | --- | --- | --- |\n"
+            f"\n{_declarations(effect)} Source: {effect.source}.\n\n"
+            f"Distinguished by: {effect.excitation}.\n"
         )
-        for c in effect.coefficients:
-            parts.append(
-                f"| {c.name} | {c.unit} | {c.typical[0]:g} | {c.typical[1]:g} | "
-                f"{_span(c.minimum, c.maximum)} | "
-                f"{c.meaning} |\n"
-            )
-        parts.append(f"\nSource: {effect.source}.\n\nDistinguished by: {effect.excitation}.\n")
     return "".join(parts)
+
+
+def _line(c: Coefficient) -> str:
+    """Return a coefficient as an item of a list."""
+    unit = "" if c.unit == "1" else f" {c.unit}"
+    sizes = " and ".join(dict.fromkeys(f"{size:g}" for size in c.typical))
+    return f"* `{c.name}`: {c.meaning}; typically {sizes}{unit}, {_span(c.minimum, c.maximum)}\n"
 
 
 def _declarations(effect: Effect) -> str:
     """Return what an effect declares, as one line."""
-    parts = [f"Kind: {effect.kind}", f"Family: {effect.family}"]
+    parts = [f"Kind: {effect.kind}"]
     if effect.role is not None:
         parts.append(f"Role: {effect.role}")
+    if any(c.meaning == CENTRAL for c in effect.coefficients):
+        parts.append("Has `central`")
     if effect.needs:
         parts.append(f"Needs: {', '.join(effect.needs)}")
     if effect.starting_points is not None:
@@ -71,8 +72,8 @@ def _declarations(effect: Effect) -> str:
 def _span(minimum: float, maximum: float) -> str:
     low, high = abs(minimum) != float("inf"), abs(maximum) != float("inf")
     if low and high:
-        return f"{minimum:g} to {maximum:g}"
-    return f"at least {minimum:g}" if low else f"at most {maximum:g}" if high else "any"
+        return f"from {minimum:g} to {maximum:g}"
+    return f"at least {minimum:g}" if low else f"at most {maximum:g}" if high else "any size"
 
 
 if __name__ == "__main__":

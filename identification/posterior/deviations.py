@@ -20,13 +20,6 @@ def of_two_estimates(std: float, value: float, other: float) -> float:
     return math.hypot(std, (value - other) / math.sqrt(2.0))
 
 
-def without_other_estimate(std: float, value: float, other: float) -> float:
-    """Return the deviation by its own noise of an estimate whose deviation ``of_two_estimates``
-    gave.
-    """
-    return math.sqrt(max(std**2 - 0.5 * (value - other) ** 2, 0.0))
-
-
 def with_both_estimates(
     effects: Sequence[NamedEffect], ranking: Ranking
 ) -> tuple[NamedEffect, ...]:

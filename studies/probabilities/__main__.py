@@ -1,5 +1,5 @@
-"""``python -m studies.probabilities`` flies and diagnoses flights whose truth is known, and writes
-the page of what their probabilities are worth.
+"""``python -m studies.probabilities`` flies and diagnoses flights whose truth is known, and keeps
+what ``docs/trust.md`` shows of their probabilities.
 """
 
 from pathlib import Path
@@ -9,10 +9,10 @@ import typer
 
 from windwrench.runtime.errors import unknown_name
 from windwrench.runtime.page_files import write_json
-from windwrench.studies.pages import DOCS, write_page
-from windwrench.studies.probabilities.calibration import RESULTS, page
+from windwrench.studies.kept_results import DOCS
+from windwrench.studies.probabilities.calibration import RESULTS
 from windwrench.studies.probabilities.flights import OF_TEN, WAYS_TO_LOG, recorded
-from windwrench.studies.runner import Jobs, Page, Task, run_tasks, start
+from windwrench.studies.runner import Jobs, Task, run_tasks, start
 
 _FIRST = {"first": (800_000, 3000), "later": (850_000, 5000), "other logs": (910_000, 170_000)}
 # the other simulator's flight i is this one of its catalogue, so that few flights hold many kinds
@@ -53,8 +53,8 @@ def plan_of_other_logs(flights: int, first: int, catalogue: int, simulator: str)
 
 def study(
     flights: Annotated[
-        str, typer.Option(help=f"Which are flown: {', '.join(RESULTS)}; none: those kept.")
-    ] = "none",
+        str, typer.Option(help=f"Which are flown and replace the kept ones: {', '.join(RESULTS)}.")
+    ],
     count: Annotated[int, typer.Option(min=1, help="Flights of either simulator.")] = 350,
     simulator: Annotated[
         str, typer.Option(help="File of the other simulator.")
@@ -63,25 +63,23 @@ def study(
     out: Annotated[Path, typer.Option(help="Folder of what is done.")] = Path(
         "results/probabilities"
     ),
-    markdown: Page = None,
 ) -> None:
-    """Fly, diagnose and keep flights, and write the page of all that are kept."""
-    if flights != "none":
-        if flights not in RESULTS:
-            raise unknown_name("set of flights", flights, RESULTS)
-        own, other = _FIRST[flights]
-        wanted = (
-            plan_of_other_logs(count, own, other, simulator)
-            if flights == "other logs"
-            else plan(count, count, own, other, simulator)
-        )
-        done = run_tasks(recorded, wanted, out / f"{flights}.jsonl", jobs)
-        kept = [
-            {"task": ["own" if task[0] == "own" else "other", *task[1:]], "result": result}
-            for task, result in done.items()
-        ]
-        write_json(kept, DOCS / RESULTS[flights])
-    print(write_page("probabilities", page(), markdown))
+    """Fly, diagnose and keep flights."""
+    if flights not in RESULTS:
+        raise unknown_name("set of flights", flights, RESULTS)
+    own, other = _FIRST[flights]
+    wanted = (
+        plan_of_other_logs(count, own, other, simulator)
+        if flights == "other logs"
+        else plan(count, count, own, other, simulator)
+    )
+    done = run_tasks(recorded, wanted, out / f"{flights}.jsonl", jobs)
+    kept = [
+        {"task": ["own" if task[0] == "own" else "other", *task[1:]], "result": result}
+        for task, result in done.items()
+    ]
+    write_json(kept, DOCS / RESULTS[flights])
+    print(DOCS / RESULTS[flights])
 
 
 if __name__ == "__main__":

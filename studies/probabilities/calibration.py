@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 
 from windwrench.identification.findings import Probabilities
-from windwrench.identification.posterior.deviations import without_other_estimate
 from windwrench.identification.posterior.pooling import SEARCH_ALONE, PoolingSettings
 from windwrench.identification.search_verdict import SEARCH_VERDICT
-from windwrench.studies.pages import kept
+from windwrench.studies.kept_results import kept
 from windwrench.studies.probabilities.fitting import (
     acts_unknown,
     fit,
@@ -182,9 +181,9 @@ def area(flights: Sequence[Scored]) -> str:
     return area_under_curve(strange, known)
 
 
-def errors_of_coefficients(flights: Sequence[Scored], both: bool) -> list[float]:
+def errors_of_coefficients(flights: Sequence[Scored]) -> list[float]:
     """Return errors of coefficients in stated standard deviations, of right names whose truth is
-    known; ``both``: of the two estimates, else of the search alone.
+    known.
     """
     out = []
     for x in flights:
@@ -192,29 +191,19 @@ def errors_of_coefficients(flights: Sequence[Scored], both: bool) -> list[float]
             for name, value in x.flight["truth"].get(e["name"], {}).items():
                 std = e["std"].get(name) or 0.0
                 if std > 0.0 and not acts_unknown(x.flight):
-                    own = e["coefficients"][name]
-                    other = x.flight["fitted"].get(e["name"], {}).get(name, own)
-                    if not both:
-                        std = without_other_estimate(std, own, other)
-                    out.append(abs(own - value) / std)
+                    out.append(abs(e["coefficients"][name] - value) / std)
     return out
 
 
 def summary(title: str, flights: Sequence[Scored]) -> dict[str, Any]:
     """Return what names and probabilities of flights are worth, as a row of a table."""
     claims = claims_of(flights)
-    named = [(e, x) for x in flights for e in x.flight["named"]]
-
-    def right(tentative: bool) -> str:
-        some = [(e, x) for e, x in named if e["tentative"] is tentative]
-        return share(sum(is_right(x.flight, e["name"]) for e, x in some), len(some))
-
+    sure = [(e, x) for x in flights for e in x.flight["named"] if not e["tentative"]]
     return {
         "title": title,
         "flights": len(flights),
         "unknown": sum(acts_unknown(x.flight) for x in flights),
-        "sure": right(False),
-        "tentative": right(True),
+        "sure": share(sum(is_right(x.flight, e["name"]) for e, x in sure), len(sure)),
         "error": expected_calibration_error(claims),
         "error_ci95": calibration_interval(flights),
         "error_of_perfect": error_of_perfect_calibration(claims),
@@ -249,14 +238,11 @@ def counts(flights: Sequence[Scored]) -> dict[str, str]:
         "outsiders and left-out effects, yet a name of 0.5 and more": above(strange, 0.5),
         "outsiders and left-out effects, yet a name of 0.95 and more": above(strange, 0.95),
     }
-    for both, words in ((True, ""), (False, ", by the search alone")):
-        errors = errors_of_coefficients(flights, both)
-        for level, most in ((68, 0.9945), (95, 1.96)) if errors else ():
-            count = share(sum(e < most for e in errors), len(errors))
-            out[f"coverage of {level} % intervals of coefficients{words}"] = count
-    low, middle, high = np.quantile([x.flight["cpu_s"] for x in flights], [0.05, 0.5, 0.95])
-    told = f"{middle:.1f} s ({low:.1f} to {high:.1f})"
-    return out | {"CPU time, median (5 to 95 % of flights)": told}
+    errors = errors_of_coefficients(flights)
+    for level, most in ((68, 0.9945), (95, 1.96)):
+        count = share(sum(e < most for e in errors), len(errors))
+        out[f"coverage of {level} % intervals of coefficients"] = count
+    return out
 
 
 def without_posteriors(
@@ -291,7 +277,7 @@ def weights_without_posterior(
     return {k: replace(x, evidence=0.0, other=0.0, structure=0.0) for k, x in found.items()}
 
 
-def page() -> dict[str, Any]:
+def shown() -> dict[str, Any]:
     """Return what the page shows of the kept results."""
     records, later = kept(RESULTS["first"]), kept(RESULTS["later"])
     others = kept(RESULTS["other logs"])
@@ -312,5 +298,4 @@ def page() -> dict[str, Any]:
         "rows": rows,
         "counts": {"earlier": counts(fitted), "later": counts(after)},
         "reliability": {"earlier": reliability(fitted), "later": reliability(after)},
-        "refused": share(sum("refused" in r["result"] for r in others), len(others)),
     }

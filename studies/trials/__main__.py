@@ -9,11 +9,13 @@ import typer
 from windwrench import __version__
 from windwrench.runtime.page_files import write_json
 from windwrench.runtime.provenance import commit
-from windwrench.studies.pages import DOCS, write_page
-from windwrench.studies.runner import Jobs, Page, start
+from windwrench.studies.kept_results import DOCS
+from windwrench.studies.runner import Jobs, start
 from windwrench.studies.trials.judgements import judge, rules
-from windwrench.studies.trials.page import RESULTS, page
+from windwrench.studies.trials.misses import misses
 from windwrench.studies.trials.trials import plan, run_trials, stamp
+
+RESULTS = "diagnosis-trials/trials.json.gz"  # below docs/
 
 
 def study(
@@ -29,13 +31,17 @@ def study(
         typer.Option(help="Group of flights to run, such as pair; may be repeated."),
     ] = None,
     jobs: Jobs = 1,
-    markdown: Page = None,
+    keep: Annotated[
+        bool,
+        typer.Option("--keep", help=f"Keep the results as docs/{RESULTS}, which a page shows."),
+    ] = False,
     out: Annotated[Path, typer.Option(help="Folder of outcomes.")] = Path("results/trials"),
 ) -> None:
     """Simulate flights with known effects, diagnose and score them; a repeated command resumes."""
     code = commit()  # before the flights: the code that flies
     outcomes = run_trials(plan(seeds, quick, seed, group or ()), out, jobs)
-    measured = rules(j for outcome in outcomes for j in judge(outcome))
+    judged = [j for outcome in outcomes for j in judge(outcome)]
+    measured = rules(judged)
     result: dict[str, Any] = {
         "version": __version__,
         "commit": code,
@@ -47,13 +53,13 @@ def study(
         "rules": [asdict(rule) for rule in measured],
         "trials": outcomes,
     }
-    page_file = markdown or out / "trials.md"
-    in_docs = page_file.resolve().parent == DOCS
-    write_json(result, DOCS / RESULTS if in_docs else out / "trials.json.gz", allow_nan=True)
+    file = DOCS / RESULTS if keep else out / "trials.json.gz"
+    write_json(result, file, allow_nan=True)
+    print(*misses(judged), sep="\n")
     for rule in measured:
         met = {True: "met", False: "not met", None: "-"}[rule.met]
         print(f"{met:8}{rule.subject}: {rule.measured}; target: {rule.target}")
-    print(write_page("diagnosis-trials", page(result), page_file))
+    print(file)
 
 
 if __name__ == "__main__":

@@ -23,19 +23,15 @@ from windwrench.studies.scoring import (
 )
 from windwrench.studies.trials.held_back_outsiders import UNSEEN
 
-RIGHT, RIGHT_TENTATIVE = "right", "right, tentative"
-TENTATIVE, WRONG = "tentative", "confidently wrong"
-PARTIAL, UNEXPLAINED, SILENT, FAILED = "partial", "unexplained", "silent", "failed"
-OUTCOMES: Mapping[str, str] = {
-    RIGHT: "every added effect named, no other, none tentative; with nothing added, nothing named",
-    RIGHT_TENTATIVE: "the same names, but tentative, or structure reported where there is none",
-    PARTIAL: "true names only, but not all",
-    TENTATIVE: "other names, or too many, and those marked tentative",
-    UNEXPLAINED: "nothing named, and an unexplained error reported",
-    SILENT: "nothing named, and no error reported",
-    WRONG: "a wrong name that is not marked tentative",
-    FAILED: "the diagnosis ended in an error",
-}
+# outcomes of a diagnosis; right with nothing added is nothing named
+RIGHT = "right"  # every added effect named, no other, none tentative
+RIGHT_TENTATIVE = "right, tentative"  # or structure reported where there is none
+PARTIAL = "partial"  # true names only, but not all
+TENTATIVE = "tentative"  # other names, or too many, and those marked tentative
+UNEXPLAINED = "unexplained"  # nothing named, and an unexplained error reported
+SILENT = "silent"  # nothing named, and no error reported
+WRONG = "confidently wrong"  # a wrong name that is not marked tentative
+FAILED = "failed"  # the diagnosis ended in an error
 COEFFICIENT_BAR = 0.05
 FLOOR_BAR = 1.2  # times what the sensors leave
 ROLLOUT_BARS = {"rotor_drag": 0.25, "mass": 0.25, "inflow_thrust": 0.25, "ground_effect": 0.5}
@@ -52,7 +48,7 @@ class Judgement:
         flight: trajectory and conditions, in words.
         without: effects that were taken out of the library.
         truth: effects that were added.
-        outcome: one of OUTCOMES.
+        outcome: RIGHT, or another of the words above.
         named: with a question mark where tentative, and what flights cannot tell from each.
         exact: right by the very names, not only up to what flights cannot tell.
         classes: all that is named, or that flights cannot tell from a name.

@@ -54,7 +54,7 @@ def test_the_page_shows_the_table_and_the_picture(tmp_path):
     page = (tmp_path / "page.md").read_text()
     assert "| a value (m) | about 1 | 1.00 |" in page
     assert "![A title](out/fig3.png)" in page
-    assert "[fig3.csv.gz](out/fig3.csv.gz)" in page
+    assert "[CSV](out/fig3.csv.gz)" in page
     assert made_by("windwrench reproduce fig3 --seeds 3", [commit()]) in page.splitlines()
     assert "A remark." in page
     assert "fig4" not in page

@@ -13,13 +13,9 @@ MOST_OF_A_FILE = 50_000  # bytes, of what should have been compressed
 PICTURES = {".png", ".gif", ".jpg", ".webp", ".mp4", ".svg"}
 PAGES_OF_COMMANDS = (  # a line that says how the page was made, once or once a section
     "reproduction.md",
-    "close-loop.md",
-    "diagnosis-trials.md",
-    "real-flights.md",
     "leaderboard.md",
     "speed.md",
-    "measured-estimator.md",
-    "measured-logs.md",
+    "trust.md",
     "identify.md",
     "tutorials/live.md",
 )
@@ -91,17 +87,9 @@ def test_every_picture_and_data_file_is_used(tracked):
     unused = [
         path.relative_to(ROOT).as_posix()
         for path in tracked
-        if path.suffix not in (".md", ".py") and path not in linked and not belongs(path, linked)
+        if path.suffix not in (".md", ".py") and path not in linked
     ]
     assert not unused
-
-
-def belongs(path, linked):
-    """A part of a result that its page's command keeps in a file of its own: fig5.timing.json is
-    read with fig5.json.
-    """
-    name, _, ending = path.name.partition(".")
-    return ending == "timing.json" and path.with_name(f"{name}.json") in linked
 
 
 @pytest.mark.parametrize("name", PAGES_OF_COMMANDS)

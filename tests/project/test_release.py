@@ -71,7 +71,7 @@ def test_the_papers_figures_are_those_of_the_pages():
         low, high = base[name]["rmse_ci95_m"]
         assert f"{base[name]['rmse_m']:.3f} m" in text
         assert f"({low:.3f} to {high:.3f})" in text
-    trials = (ROOT / "docs/diagnosis-trials.md").read_text(encoding="utf-8")
+    trials = (ROOT / "docs/trust.md").read_text(encoding="utf-8")
     for count in re.findall(r"\d+ of \d+", text):
         assert count in trials, count
     assert "112 of 118 coefficients" in trials

@@ -7,7 +7,7 @@ from dataclasses import asdict
 import pytest
 
 from windwrench.identification.posterior.pooling import POOLING, SEARCH_ALONE
-from windwrench.studies.pages import kept
+from windwrench.studies.kept_results import kept
 from windwrench.studies.probabilities.__main__ import plan, plan_of_other_logs
 from windwrench.studies.probabilities.calibration import (
     RESULTS,
