@@ -26,7 +26,6 @@ __all__ = ["DOCS", "PAGES", "ROOT", "kept", "write_page"]
 
 # the module of each page, whose function ``page`` returns what the template shows
 PAGES: Mapping[str, str] = {
-    "diagnosis-trials": "trials.page",
     "probabilities": "probabilities.calibration",
     "real-flights": "measured_flights",
     "tasks": "tasks",
