@@ -113,6 +113,8 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
     def _values(self) -> Infos:
         """Entries of ``infos``, as views."""
         values: Infos = {name: self._table[name] for name in self.task.values.names or ()}
+        if self.envs[0].version > 0:
+            values |= {"observation": self._whole, "command": self._episodes.commands}
         return values | {self.task.label: self._labels}
 
     def __getstate__(self) -> dict[str, Any]:

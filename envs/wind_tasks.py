@@ -171,6 +171,7 @@ class WindHoverEnv(Task):
 
     ## Version history
 
+    * v1: ``normalize=True`` by default; ``info`` has ``observation`` and ``command`` in SI units.
     * v0: initial version.
     """  # noqa: E501
 
@@ -282,6 +283,7 @@ class WindTrajectoryEnv(WindHoverEnv):
 
     ## Version history
 
+    * v1: ``normalize=True`` by default; ``info`` has ``observation`` and ``command`` in SI units.
     * v0: initial version.
     """
 

@@ -4,7 +4,7 @@
 
 ``gru`` is imitation with a memory (``imitation``): the task's oracle says of every decision what it
 would do; in ``FanTracking2D`` the simulator says where the fan is and how it moves. ``sac`` is that
-of stable-baselines3 on ``normalize=True``.
+of stable-baselines3 on the task's version 1.
 """
 
 import argparse
@@ -140,8 +140,8 @@ def sac(task: str, seed: int, steps: int) -> TaskPolicy:
     from stable_baselines3.common.monitor import Monitor
     from stable_baselines3.common.vec_env import DummyVecEnv
 
-    name = f"windwrench/{task}-v0"
-    env = DummyVecEnv([lambda: Monitor(gym.make(name, scenario=SCENARIO, normalize=True))])
+    name = f"windwrench/{task}-v1"
+    env = DummyVecEnv([lambda: Monitor(gym.make(name, scenario=SCENARIO))])
     entropy = f"learner.target_entropy={-float(env.action_space.shape[0])}"
     config = load_config("sac", [*_SAC, entropy, f"steps={steps}"])
     learner = make_learner(config, env, seed)
