@@ -168,6 +168,11 @@ class Task(gym.Env[Frame, Frame], ABC):
         self._lay_episode()
         self._compile()
 
+    @classmethod
+    def decisions(cls) -> int:
+        """Return how many decisions an episode has."""
+        return round(EPISODE_SECONDS / (TICK * cls.decision_ticks))
+
     # what a copy makes anew: windows, and what holds compiled code
     _made_anew: ClassVar = ("viewer", "_generator", "_generators", "_draw_normals", "_look")
 
