@@ -24,7 +24,7 @@ class Task:
     rival: str  # the law over which wins are counted
     flown: str  # the law that is flown where none is named
     defaults: tuple[str, ...]  # its scenarios where none is named
-    some: tuple[str, ...] = ()  # laws of a benchmark where none is named; none: all
+    selected: tuple[str, ...] = ()  # laws of a benchmark where none is named; none: all
     bounds: tuple[str, ...] = ("hover", "oracle")  # no designed laws: the ends of the scales
     # 95 % interval of one law's mean RMSE
     interval: Callable[..., tuple[float, float]] = hierarchical_bootstrap
@@ -42,7 +42,7 @@ class Task:
     @property
     def standard(self) -> tuple[str, ...]:
         """Laws of a benchmark where none is named."""
-        return self.some or tuple(self.laws)
+        return self.selected or tuple(self.laws)
 
     @property
     def decisions(self) -> int:
