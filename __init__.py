@@ -1,8 +1,11 @@
 """windwrench: a quadrotor that feels the wind.
 
-Importing the package registers its environments with Gymnasium: ``windwrench/FanTracking-v0``,
-``windwrench/FanTracking2D-v0``, ``windwrench/WindHover-v0`` and ``windwrench/WindTrajectory-v0``.
+Importing the package registers its environments with Gymnasium: ``windwrench/FanTracking``,
+``FanTracking2D``, ``WindHover`` and ``WindTrajectory``, each as ``-v0`` in SI units, for designed
+laws, and as ``-v1`` normalised, for learners.
 """
+
+import warnings
 
 from .runtime.interrupts import is_command, leaving_at_once
 
@@ -18,10 +21,14 @@ _TASKS = {  # pytest imports this file a second time, as a folder's
     "WindTrajectory": ("wind_tasks:WindTrajectoryEnv", "make_wind_trajectory_vector", 500),
 }
 for _name, (_single, _vector, _steps) in _TASKS.items():
-    if f"windwrench/{_name}-v0" not in gymnasium.registry:
-        gymnasium.register(
-            id=f"windwrench/{_name}-v0",
-            entry_point=f"windwrench.envs.{_single}",
-            vector_entry_point=f"windwrench.envs.lanes.vector:{_vector}",
-            max_episode_steps=_steps,
-        )
+    for _version in (0, 1):
+        if f"windwrench/{_name}-v{_version}" not in gymnasium.registry:
+            gymnasium.register(
+                id=f"windwrench/{_name}-v{_version}",
+                entry_point=f"windwrench.envs.{_single}",
+                vector_entry_point=f"windwrench.envs.lanes.vector:{_vector}",
+                max_episode_steps=_steps,
+                kwargs={"version": _version} if _version else {},
+            )
+# Gymnasium takes the older for outdated
+warnings.filterwarnings("ignore", r".*windwrench/\w+-v0 is out of date", DeprecationWarning)

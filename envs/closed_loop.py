@@ -147,25 +147,36 @@ class Stage:
 
 
 @compiled
-def place_stations(pose: Array, R: Array, s: Array, points: Array) -> None:
-    """Write the places (3, STATIONS) m, world, of stations ``s`` of a vehicle at a pose (7,)."""
+def blow_at(
+    calls: Calls,
+    time: Array,
+    pose: Array,
+    stations: Array,
+    rotation: Array,
+    points: Array,
+    air: Array,
+) -> None:
+    """Write the winds at the stations of a vehicle at a pose (7,) into ``air`` (3, STATIONS) m/s,
+    and the stations' places into ``points`` (3, STATIONS) m, world.
+    """
+    R, s = rotation, stations
+    quaternion_to_matrix(pose[3:7], R)
     for i in range(STATIONS):
         for a in range(3):
             points[a, i] = pose[a] + R[a, 0] * s[i, 0] + R[a, 1] * s[i, 1] + R[a, 2] * s[i, 2]
+    air[:] = 0.0
+    add_winds(calls, time, points, air)
 
 
 @compiled
 def _blow(record: Record, world: World, path: Array, noise: Array, k: int) -> None:
     """Write the winds at the vehicle's stations into ``fan.air``, every second tick."""
-    loop, qpos = record[0], world.qpos
+    loop = record[0]
     if loop.winds == 0 or loop.ticks % WIND_EVERY != 0:
         return
-    R, s, points, air = loop.rotation, loop.fan.stations, loop.points, loop.air
-    quaternion_to_matrix(qpos[3:7], R)
-    place_stations(qpos, R, s, points)
-    air[:] = 0.0
+    air, stations = loop.air, loop.fan.stations
     loop.time[0] = max(loop.ticks, 0) * TICK
-    add_winds(world.winds, loop.time, points, air)
+    blow_at(world.winds, loop.time, world.qpos, stations, loop.rotation, loop.points, air)
     for i in range(STATIONS):
         for a in range(3):
             loop.fan.air[i, a] = air[a, i]
@@ -187,6 +198,16 @@ def _estimate(record: Record, world: World, path: Array, noise: Array, k: int) -
 
 
 @compiled
+def fly_beside(flight: Record, x: Array, action: Array) -> None:
+    """Fly to the set point with an acceleration (3,) m/s2 beside the flight loop's own."""
+    for i in range(3):
+        flight.setpoint[6 + i] += action[i]
+    fly(flight, x, TICK)
+    for i in range(3):
+        flight.setpoint[6 + i] -= action[i]
+
+
+@compiled
 def _steer(record: Record, world: World, path: Array, noise: Array, k: int) -> None:
     """Write the rotor speeds that fly to the reference, or to the set point where there is none."""
     loop = record[0]
@@ -197,15 +218,11 @@ def _steer(record: Record, world: World, path: Array, noise: Array, k: int) -> N
             flight.setpoint[i] = reference[row, i]
     else:
         move_setpoint(flight, ukf.x, TICK)
-    for i in range(3):
-        flight.setpoint[6 + i] += loop.action[i]
     if loop.model_in_loop > 0:
         foresee(flight, ukf, ukf.x)
-    fly(flight, ukf.x, TICK)
+    fly_beside(flight, ukf.x, loop.action)
     if loop.model_in_loop > 0:
         through_the_rotors(flight, ukf)
-    for i in range(3):
-        flight.setpoint[6 + i] -= loop.action[i]
 
 
 @compiled

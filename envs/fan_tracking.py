@@ -158,7 +158,7 @@ class FanTrackingEnv(FanTask):
     | `"pose"`              | 8    | no wrench: position since the start x, y, z (m), velocity along y (m/s), the x and y of the body's z axis (its tilt), yaw less 180 degrees (rad), last command; all as the filter estimates them |
     | `"history"`           | 200  | the table above at the last 25 decisions (2 s), oldest first; before the start: as at the start |
 
-    With ``normalize=True`` each number is divided by a fixed scale, so that it is about 1 in flight:
+    In v1, and with ``normalize=True``, each number is divided by a fixed scale, so that it is about 1 in flight:
     force 0.5 N, torque 0.03 Nm, velocity 0.5 m/s, command 1 m/s, position 1 m, tilt 0.1, yaw 0.2 rad.
     The action needs no scale: it lies between -1 and 1 as it is.
 
@@ -198,6 +198,7 @@ class FanTrackingEnv(FanTask):
 
     ## Version history
 
+    * v1: ``normalize=True`` by default; ``info`` has ``observation`` and ``command`` in SI units.
     * v0: initial version.
     """  # noqa: E501
 

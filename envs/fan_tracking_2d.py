@@ -127,6 +127,7 @@ class FanTracking2DEnv(FanTask):
 
     ## Version history
 
+    * v1: ``normalize=True`` by default; ``info`` has ``observation`` and ``command`` in SI units.
     * v0: initial version.
     """  # noqa: E501
 

@@ -16,7 +16,7 @@ from ..controllers.observation import (
     MAX_COMMAND,
 )
 from ..controllers.observation import VELOCITY_Y as _VELOCITY_Y
-from ..runtime.errors import InputError, unknown_name
+from ..runtime.errors import unknown_name
 from .fan import STATIONS
 from .plant import TICK
 
@@ -76,7 +76,7 @@ class View:
         scales: sizes (n,) that become 1.
 
     Raises:
-        InputError: an unknown view, or ``normalize`` is no boolean.
+        InputError: an unknown view.
     """
 
     def __init__(
@@ -88,9 +88,7 @@ class View:
     ) -> None:
         if observe not in OBSERVE:
             raise unknown_name("view", str(observe), OBSERVE, "FanTracking: observe")
-        if not isinstance(normalize, bool | np.bool_):
-            raise InputError(f"FanTracking: normalize must be True or False, got {normalize!r}")
-        self.observe, self.normalize = observe, bool(normalize)
+        self.observe, self.normalize = observe, normalize
         if observe == "pose":
             limits, scales = _POSE_LIMITS, _POSE_SCALES
         kept = [i for i in range(len(limits)) if observe != "wrench-without-fx" or i != FORCE_X]

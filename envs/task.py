@@ -76,10 +76,13 @@ class Task(gym.Env[Frame, Frame], ABC):
         truth: the true vehicle, before ``effects``; default: as declared.
         settings: of the plant: motor lag, unmodelled disturbance, delays, losses.
         estimator: ``"ukf"``, or ``"constant-gain"``: the filter's converged gain, which is faster.
-        normalize: whether observations, and actions in m/s2, are divided by fixed scales.
+        normalize: whether observations, and actions in m/s2, are divided by fixed scales; default:
+            from version 1 on.
         width: of a picture, in pixels.
         height: likewise.
         stages: of a user's own, in the pipeline of a tick: ``windwrench.envs.Stage``.
+        version: of the task. From 1 on ``info`` has, in SI units, the frame ``observation`` and the
+            ``command`` that was flown.
 
     Raises:
         InputError: an argument that names what does not exist.
@@ -111,10 +114,11 @@ class Task(gym.Env[Frame, Frame], ABC):
         truth: str | Vehicle | None = None,
         settings: PlantSettings | None = None,
         estimator: str = "ukf",
-        normalize: bool = False,
+        normalize: bool | None = None,
         width: int = 640,
         height: int = 480,
         stages: Sequence[Stage] = (),
+        version: int = 0,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(
@@ -122,6 +126,8 @@ class Task(gym.Env[Frame, Frame], ABC):
             )
         if render_mode == "human":
             need_display()
+        self.version = version
+        normalize = version > 0 if normalize is None else normalize
         if not isinstance(normalize, bool | np.bool_):
             raise InputError(f"{self.name}: normalize must be True or False, got {normalize!r}")
         if estimator not in ESTIMATORS:
@@ -141,7 +147,7 @@ class Task(gym.Env[Frame, Frame], ABC):
         self.stages = tuple(stages)
         self.render_mode, self.width, self.height = render_mode, width, height
         self.metadata = {**self.metadata, "render_modes": modes_shown(self.metadata)}
-        largest = self.largest_action if self.action_unit == "m/s" or not normalize else 1.0
+        largest = 1.0 if normalize else self.largest_action
         self.action_scale = self.largest_action / largest
         self.action_space = gym.spaces.Box(-largest, largest, (self.action_size,), np.float32)
         self.viewer: Any = None
@@ -161,6 +167,11 @@ class Task(gym.Env[Frame, Frame], ABC):
         self._table = np.zeros(1, dtype=self.values)
         self._lay_episode()
         self._compile()
+
+    @classmethod
+    def decisions(cls) -> int:
+        """Return how many decisions an episode has."""
+        return round(EPISODE_SECONDS / (TICK * cls.decision_ticks))
 
     # what a copy makes anew: windows, and what holds compiled code
     _made_anew: ClassVar = ("viewer", "_generator", "_generators", "_draw_normals", "_look")
@@ -306,6 +317,9 @@ class Task(gym.Env[Frame, Frame], ABC):
         for name in self.values.names or ():
             value = self._table[name][0]
             found[name] = value.copy() if value.ndim else value.item()
+        if self.version > 0:
+            found["observation"] = self._frames[0].copy()
+            found["command"] = self._episodes.commands[0].copy()
         return found | {self.label: self.drawn_label}
 
     def _truth(self) -> dict[str, Any]:

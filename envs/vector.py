@@ -20,8 +20,7 @@ from .closed_loop import REFERENCE_SIZE, run_ticks, write_motion
 from .fan_tracking import FanTrackingEnv
 from .normals import draw_normals, generator_list
 from .observing import Episodes, Motion
-from .plant import TICK
-from .task import EPISODE_SECONDS, Frame, Task
+from .task import Frame, Task
 from .untimed import Untimed
 
 Flags = NDArray[np.bool_]
@@ -63,7 +62,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         **kwargs: Any,
     ) -> None:
         if max_episode_steps is None:
-            max_episode_steps = round(EPISODE_SECONDS / (TICK * task.decision_ticks))
+            max_episode_steps = task.decisions()
         for name, value in (
             ("num_envs", num_envs),
             ("max_episode_steps", max_episode_steps),
@@ -113,6 +112,8 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
     def _values(self) -> Infos:
         """Entries of ``infos``, as views."""
         values: Infos = {name: self._table[name] for name in self.task.values.names or ()}
+        if self.envs[0].version > 0:
+            values |= {"observation": self._whole, "command": self._episodes.commands}
         return values | {self.task.label: self._labels}
 
     def __getstate__(self) -> dict[str, Any]:

@@ -34,7 +34,6 @@ from .wind import Sum, Wind
 from .wind_scenarios import HEIGHT, START, WIND_SCENARIOS, draw_reference, draw_winds
 
 WIND_DECISION_TICKS = 8  # 25 Hz
-WIND_DECISIONS = round(EPISODE_SECONDS / TICK / WIND_DECISION_TICKS)
 TRACKING_WIDTH = 0.1  # m, error at which the tracking reward is a half
 CHANGE_COST = 0.002  # per (m/s2)^2 of change of the action
 # m/s2, standard deviation of the accelerometer's noise a tick, and of its bias
@@ -171,6 +170,7 @@ class WindHoverEnv(Task):
 
     ## Version history
 
+    * v1: ``normalize=True`` by default; ``info`` has ``observation`` and ``command`` in SI units.
     * v0: initial version.
     """  # noqa: E501
 
@@ -282,6 +282,7 @@ class WindTrajectoryEnv(WindHoverEnv):
 
     ## Version history
 
+    * v1: ``normalize=True`` by default; ``info`` has ``observation`` and ``command`` in SI units.
     * v0: initial version.
     """
 
@@ -289,4 +290,4 @@ class WindTrajectoryEnv(WindHoverEnv):
     moving = True
 
 
-__all__ = ["WIND_DECISIONS", "WIND_DECISION_TICKS", "WindHoverEnv", "WindTrajectoryEnv"]
+__all__ = ["WIND_DECISION_TICKS", "WindHoverEnv", "WindTrajectoryEnv"]

@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..envs.fan_tracking import DECISION_TICKS, EPISODE_SECONDS, LOST_OFFSET
-from ..envs.plant import TICK
+from ..envs.fan_tracking import LOST_OFFSET, FanTrackingEnv
 from .briefing import briefing_of
 
 Array = NDArray[np.float64]
-DECISIONS = round(EPISODE_SECONDS / TICK / DECISION_TICKS)  # of FanTracking
+DECISIONS = FanTrackingEnv.decisions()
 # Seeds of episodes that score controllers; those of training and validation lie below, so none is
 # shared.
 FIRST_TEST_SEED = 1_000_000

@@ -2,17 +2,15 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ..controllers.own_file import is_file_name, load_controller
 from ..controllers.registry import STANDARD_TASK, TASK_LAWS, make_controller, shipped_policies
 from ..controllers.trained_policy import TrainedPolicy, is_policy_path, load_policy
+from ..envs import task as environments
 from ..envs.fan_tracking import FanTrackingEnv, scenario_env
 from ..envs.fan_tracking_2d import FanTracking2DEnv
-from ..envs.scenarios import SCENARIOS
-from ..envs.wind_scenarios import WIND_SCENARIOS
 from ..envs.wind_tasks import WindHoverEnv, WindTrajectoryEnv
 from ..runtime.errors import InputError, unknown_name
 from .statistics import episode_bootstrap, hierarchical_bootstrap
@@ -22,67 +20,60 @@ from .statistics import episode_bootstrap, hierarchical_bootstrap
 class Task:
     """What a benchmark needs to know of a task."""
 
-    environment: Callable[..., Any]
-    scenarios: Mapping[str, Any]
-    laws: Mapping[str, Callable[..., Any]]
+    environment: type[environments.Task]
     rival: str  # the law over which wins are counted
     flown: str  # the law that is flown where none is named
-    standard: tuple[str, ...]  # laws of a benchmark where none is named
     defaults: tuple[str, ...]  # its scenarios where none is named
-    policies: Callable[[], Mapping[str, Path]]  # that come with the kit, by name
-    decisions: int = 250  # of an episode of 20 s
+    selected: tuple[str, ...] = ()  # laws of a benchmark where none is named; none: all
     bounds: tuple[str, ...] = ("hover", "oracle")  # no designed laws: the ends of the scales
     # 95 % interval of one law's mean RMSE
     interval: Callable[..., tuple[float, float]] = hierarchical_bootstrap
+
+    @property
+    def scenarios(self) -> Mapping[str, Any]:
+        """All of its worlds, by name."""
+        return self.environment.scenarios
+
+    @property
+    def laws(self) -> Mapping[str, Callable[..., Any]]:
+        """All of its designed laws, by name."""
+        return TASK_LAWS[self.environment.name]
+
+    @property
+    def standard(self) -> tuple[str, ...]:
+        """Laws of a benchmark where none is named."""
+        return self.selected or tuple(self.laws)
+
+    @property
+    def decisions(self) -> int:
+        """How many an episode has."""
+        return self.environment.decisions()
+
+    def policies(self) -> Mapping[str, Path]:
+        """Return the policies that come with the kit, by name."""
+        return shipped_policies(self.environment.name)
 
     def references(self, names: Sequence[str]) -> list[str]:
         """Return ``names`` and the laws that scores, wins and shares are relative to."""
         return list(dict.fromkeys([*names, "hover", self.rival, *self.bounds]))
 
 
-_WIND = {
-    "scenarios": WIND_SCENARIOS,
-    "rival": "pid",
-    "flown": "pid-force",
-    "defaults": ("base", "turbulent"),
-    "decisions": 500,
-}
 TASKS: dict[str, Task] = {
-    "FanTracking": Task(
-        FanTrackingEnv,
-        SCENARIOS,
-        TASK_LAWS["FanTracking"],
-        "admittance",
-        "admittance",
-        ("hover", "admittance", "ratio", "oracle"),
-        ("static", "base"),
-        shipped_policies,
-        bounds=("hover", "limit", "oracle"),
-        interval=episode_bootstrap,
-    ),
-    "FanTracking2D": Task(
-        FanTracking2DEnv,
-        SCENARIOS,
-        TASK_LAWS["FanTracking2D"],
-        "admittance",
-        "admittance",
-        tuple(TASK_LAWS["FanTracking2D"]),
-        ("static", "base", "fast"),
-        partial(shipped_policies, "FanTracking2D"),
-    ),
-    **{
-        name: Task(
-            environment=environment,
-            laws=TASK_LAWS[name],
-            standard=tuple(TASK_LAWS[name]),
-            policies=partial(shipped_policies, name),
-            **_WIND,  # type: ignore[arg-type]
-        )
-        for name, environment in (
-            ("WindHover", WindHoverEnv),
-            ("WindTrajectory", WindTrajectoryEnv),
-        )
-    },
+    task.environment.name: task
+    for task in (
+        Task(
+            FanTrackingEnv,
+            "admittance",
+            "admittance",
+            ("static", "base"),
+            ("hover", "admittance", "ratio", "oracle"),
+            ("hover", "limit", "oracle"),
+            episode_bootstrap,
+        ),
+        Task(FanTracking2DEnv, "admittance", "admittance", ("static", "base", "fast")),
+        Task(WindHoverEnv, "pid", "pid-force", ("base", "turbulent")),
+        Task(WindTrajectoryEnv, "pid", "pid-force", ("base", "turbulent")),
+    )
 }
 
 

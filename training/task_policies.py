@@ -4,7 +4,7 @@
 
 ``gru`` is imitation with a memory (``imitation``): the task's oracle says of every decision what it
 would do; in ``FanTracking2D`` the simulator says where the fan is and how it moves. ``sac`` is that
-of stable-baselines3 on ``normalize=True``.
+of stable-baselines3 on the task's version 1.
 """
 
 import argparse
@@ -19,10 +19,8 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from numpy.typing import NDArray
 
 from ..controllers import make_controller
-from ..controllers.observation import DECISION_PERIOD, MAX_COMMAND
 from ..controllers.trained_policy import TaskPolicy, save_policy
-from ..controllers.wind_observation import MAX_ACCELERATION, OBSERVATION_SCALES, WIND_PERIOD
-from ..envs.fan_tracking_2d import SCALES_2D
+from ..envs.plant import TICK
 from ..evaluation.tasks import TASKS
 from .belief_network import BeliefNetwork
 from .configuration import load_config
@@ -59,11 +57,10 @@ class TaskLesson:
     """
 
     def __init__(self, task: str) -> None:
+        kind = TASKS[task].environment
         self.of_fan, self._task = task == "FanTracking2D", task
-        self.decisions = TASKS[task].decisions
-        self.period = DECISION_PERIOD if self.of_fan else WIND_PERIOD
-        self.largest = MAX_COMMAND if self.of_fan else MAX_ACCELERATION
-        self.scale = np.array(SCALES_2D if self.of_fan else OBSERVATION_SCALES, dtype=np.float32)
+        self.decisions, self.period = kind.decisions(), TICK * kind.decision_ticks
+        self.largest, self.scale = kind.largest_action, np.array(kind.scales, dtype=np.float32)
 
     def begin(self, count: int) -> None:
         """Start ``count`` episodes."""
@@ -140,8 +137,8 @@ def sac(task: str, seed: int, steps: int) -> TaskPolicy:
     from stable_baselines3.common.monitor import Monitor
     from stable_baselines3.common.vec_env import DummyVecEnv
 
-    name = f"windwrench/{task}-v0"
-    env = DummyVecEnv([lambda: Monitor(gym.make(name, scenario=SCENARIO, normalize=True))])
+    name = f"windwrench/{task}-v1"
+    env = DummyVecEnv([lambda: Monitor(gym.make(name, scenario=SCENARIO))])
     entropy = f"learner.target_entropy={-float(env.action_space.shape[0])}"
     config = load_config("sac", [*_SAC, entropy, f"steps={steps}"])
     learner = make_learner(config, env, seed)

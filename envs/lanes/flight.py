@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...controllers.flight import FLIGHT, FlightGains, fly, move_setpoint
+from ...controllers.flight import FLIGHT, FlightGains, move_setpoint
 from ...dynamics.motion import BODY, Array, accelerations, rotor_wrench
 from ...dynamics.rotation import normalise, quaternion_to_matrix, turn_body
 from ...estimator.ukf_lanes import (
@@ -29,7 +29,8 @@ from ..closed_loop import (
     WIND_EVERY,
     ClosedLoop,
     accelerate,
-    place_stations,
+    blow_at,
+    fly_beside,
 )
 from ..fan import FAN, STATIONS
 from ..observing import Episodes, Motion
@@ -47,7 +48,6 @@ from ..plant import (
     lose_pose,
     measure,
 )
-from ..wind.field import Calls, add_winds
 
 # fields of a closed loop's own record that differ from lane to lane
 _OWN = ("action", "specific", "thrust", "accelerometer_bias")
@@ -188,11 +188,7 @@ def tick_lanes(
     call_at(step, work)
     if not accelerates:
         move_setpoint(flight, f.x, TICK)
-    for i in range(3):
-        flight.setpoint[6 + i] += loop.action[i]
-    fly(flight, f.x, TICK)
-    for i in range(3):
-        flight.setpoint[6 + i] -= loop.action[i]
+    fly_beside(flight, f.x, loop.action)
     follow(plant, flight.command)
     log_speeds(plant, plant.speeds)
     rotor_wrench(plant.body, plant.speeds, plant.rotor_wrench)
@@ -204,23 +200,6 @@ def tick_lanes(
         accelerate(loop, loop.xfrc, loop.noise)
     for _ in range(SUBSTEPS):
         fly_freely(loop, TICK / SUBSTEPS)
-
-
-@compiled
-def blow_at(
-    calls: Calls,
-    time: Array,
-    pose: Array,
-    stations: Array,
-    rotation: Array,
-    points: Array,
-    air: Array,
-) -> None:
-    """Write the winds at the stations of a vehicle at a pose (7,) into ``air`` (3, STATIONS)."""
-    quaternion_to_matrix(pose[3:7], rotation)
-    place_stations(pose, rotation, stations, points)
-    air[:] = 0.0
-    add_winds(calls, time, points, air)
 
 
 @compiled_without_gil

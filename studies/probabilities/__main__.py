@@ -12,9 +12,10 @@ from windwrench.runtime.page_files import write_json
 from windwrench.studies.kept_results import DOCS
 from windwrench.studies.probabilities.calibration import RESULTS
 from windwrench.studies.probabilities.flights import OF_TEN, WAYS_TO_LOG, recorded
-from windwrench.studies.runner import Jobs, Task, run_tasks, start
+from windwrench.studies.runner import Jobs, Task, code_stamp, run_tasks, start
 
 _FIRST = {"first": (800_000, 3000), "later": (850_000, 5000), "other logs": (910_000, 170_000)}
+_MODULES = "logged_poses", "outsiders", "practice_flights", "rotorpy_flights"
 # the other simulator's flight i is this one of its catalogue, so that few flights hold many kinds
 _STRIDE, _CATALOGUE = 7, 33
 
@@ -73,7 +74,8 @@ def study(
         if flights == "other logs"
         else plan(count, count, own, other, simulator)
     )
-    done = run_tasks(recorded, wanted, out / f"{flights}.jsonl", jobs)
+    code = code_stamp("probabilities/flights", *(f"trials/{name}" for name in _MODULES))
+    done = run_tasks(recorded, wanted, out / f"{flights}.jsonl", jobs, code)
     kept = [
         {"task": ["own" if task[0] == "own" else "other", *task[1:]], "result": result}
         for task, result in done.items()

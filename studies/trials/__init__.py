@@ -1,1 +1,1 @@
-"""Trials of the diagnosis: flights with a known cause, diagnosed and scored."""
+"""Flights with a known cause, for a diagnosis to be tried on."""

@@ -20,8 +20,7 @@ from windwrench.envs.recording import background, draw_trajectory, record_flight
 from windwrench.identification.inference.regression import typical_size
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import InputError, unknown_name
-from windwrench.studies.trials.held_back_outsiders import HELD_BACK
-from windwrench.studies.trials.outsiders import OUTSIDERS, wrench_input
+from windwrench.studies.trials.outsiders import HELD_BACK, OUTSIDERS, wrench_input
 
 Array = NDArray[np.float64]
 
@@ -71,6 +70,7 @@ _SHOWN: Mapping[str, tuple[str, ...]] = {
     "flywheel": ("excite", "fast"),
     "sloshing": ("excite", "fast"),
     "tether": ("excite", "gentle"),
+    **dict.fromkeys(HELD_BACK, ("excite", "fast")),
 }
 _TYPICAL_MASSES = (0.465, 0.027)  # kg, of the vehicles that the library's typical sizes are of
 # coefficients that say where and of what kind a thing is, not how strong
@@ -314,8 +314,8 @@ def practise(
     Args:
         vehicle: as declared; without a ceiling it gets one at 2.6 m.
         kind: one of ``KINDS``.
-        added: names of effects, or one of ``OUTSIDERS``; more is drawn from ``seed`` where a kind
-            asks for more.
+        added: names of effects, or one of ``OUTSIDERS`` or ``HELD_BACK``; more is drawn from
+            ``seed`` where a kind asks for more.
         size: one of ``SIZES``, of the effects and of the disturbance.
         trajectory: default: one in which what was added shows.
         seed: of everything random.
@@ -334,7 +334,9 @@ def practise(
         raise unknown_name("size", size, SIZES)
     vehicle = vehicle if np.isfinite(vehicle.ceiling_z) else replace(vehicle, ceiling_z=_CEILING)
     # equal seeds of different flights must not draw equal signs and sizes
-    rng = np.random.default_rng((seed, zlib.crc32("+".join((kind, *added, size)).encode())))
+    held_back = bool(added) and added[0] in HELD_BACK
+    words = (*added, size) if held_back else (kind, *added, size)
+    rng = np.random.default_rng((seed, zlib.crc32("+".join(words).encode())))
     wanted = {"nothing": 0, "effect": 1, "pair": 2, "hover": 1, "outsider": 1}[kind]
     pool = (
         tuple(OUTSIDERS)
@@ -366,6 +368,7 @@ def practise(
         imu,
         gust_time,
         seen,
+        rng if held_back else None,
     )
     name = "_".join((kind, *added, size, trajectory, str(seed)))
     return Practice(
@@ -379,57 +382,6 @@ def practise(
         turbulence,
         sensor,
         replace(log, name=name),
-        vehicle,
-    )
-
-
-def practise_held_back(
-    vehicle: Vehicle, name: str, size: str = "typical", seed: int = 0, seconds: float = 60.0
-) -> Practice:
-    """Fly one practice flight with a disturbance of ``HELD_BACK``.
-
-    Args:
-        vehicle: as declared; without a ceiling it gets one at 2.6 m.
-        name: one of ``HELD_BACK``.
-        size: one of ``SIZES``, factor on the wrench.
-        seed: of everything random.
-        seconds: length of the log.
-
-    Raises:
-        InputError: an unknown name, or a crash.
-    """
-    if name not in HELD_BACK:
-        raise unknown_name("disturbance", name, HELD_BACK)
-    if size not in SIZES:
-        raise unknown_name("size", size, SIZES)
-    vehicle = vehicle if np.isfinite(vehicle.ceiling_z) else replace(vehicle, ceiling_z=_CEILING)
-    rng = np.random.default_rng((seed, zlib.crc32(f"{name}+{size}".encode())))
-    trajectory = str(rng.choice(["excite", "fast"]))
-    turbulence, sensor = float(rng.integers(2)), float(rng.choice([0.5, 1.0, 2.0]))
-    log = fly_practice(
-        vehicle,
-        (),
-        trajectory,
-        seconds,
-        seed,
-        name,
-        turbulence,
-        sensor,
-        SIZES[size],
-        outsider_rng=rng,
-    )
-    title = f"held_back_{name}_{size}_{trajectory}_{seed}"
-    return Practice(
-        title,
-        "outsider",
-        size,
-        trajectory,
-        seed,
-        (),
-        name,
-        turbulence,
-        sensor,
-        replace(log, name=title),
         vehicle,
     )
 

@@ -20,13 +20,12 @@ from windwrench.identification.logs.flight_log import FlightLog, write_log
 from windwrench.runtime.whole_files import replaced
 
 START = "from windwrench.cli import main; main()"
-TRIALS = """
+STUDY = """
 from pathlib import Path
-from windwrench.studies.trials.trials import Trial, run_trials
+from windwrench.studies.probabilities.flights import recorded
+from windwrench.studies.runner import run_tasks
 if __name__ == "__main__":
-    trials = [Trial("nothing", (), seed=s, trajectory="gentle", seconds=12.0) for s in range(1)]
-    Path("out").mkdir(exist_ok=True)
-    run_trials(trials, Path("out"), jobs=2)
+    run_tasks(recorded, [("own", "nothing", 1)], Path("out/study.jsonl"), jobs=2)
 """
 COMMANDS = {
     "benchmark": "benchmark --controllers hover --scenarios static --episodes 6 --jobs 2 --out out",
@@ -41,7 +40,7 @@ pytestmark = pytest.mark.skipif(
 
 
 def start(folder, name, **options):
-    words = ["-c", START, *COMMANDS[name].split()] if name in COMMANDS else ["trials.py"]
+    words = ["-c", START, *COMMANDS[name].split()] if name in COMMANDS else ["study.py"]
     streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL} | options
     return subprocess.Popen([sys.executable, *words], cwd=folder, start_new_session=True, **streams)
 
@@ -100,7 +99,7 @@ def results(folder):
 def timeless(value):
     """Return a kept value without the times that the work took."""
     if isinstance(value, dict):
-        return {k: timeless(v) for k, v in value.items() if k not in ("cost", "seconds")}
+        return {k: timeless(v) for k, v in value.items() if k not in ("cost", "seconds", "cpu_s")}
     return [timeless(v) for v in value] if isinstance(value, list) else value
 
 
@@ -113,14 +112,14 @@ def flight(tmp_path_factory):
     return path.read_bytes()
 
 
-@pytest.mark.parametrize("name", [*COMMANDS, "trials"])
+@pytest.mark.parametrize("name", [*COMMANDS, "study"])
 @pytest.mark.slow
 def test_a_killed_run_leaves_nothing_half_and_can_be_run_again(tmp_path, flight, name):
     whole, cut = tmp_path / "whole", tmp_path / "cut"
     for folder in (whole, cut):
         folder.mkdir()
         (folder / "flight.csv").write_bytes(flight)
-        (folder / "trials.py").write_text(TRIALS)
+        (folder / "study.py").write_text(STUDY)
     begun = time.monotonic()
     assert start(whole, name).wait() == 0
     lasted = time.monotonic() - begun

@@ -20,7 +20,7 @@ from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.motion.sensor_noise import sensor_noise, with_noise
 from windwrench.runtime.errors import InputError
-from windwrench.studies.trials.practice_flights import fly_practice, practise, practise_held_back
+from windwrench.studies.trials.practice_flights import fly_practice, practise
 
 VEHICLE = load_vehicle("ardrone2")
 
@@ -140,14 +140,6 @@ def drawn(*arguments, **more) -> Callable[[], tuple[FlightLog, Vehicle]]:
     return flight
 
 
-def held_back(*arguments) -> Callable[[], tuple[FlightLog, Vehicle]]:
-    def flight() -> tuple[FlightLog, Vehicle]:
-        flown = practise_held_back(VEHICLE, *arguments)
-        return flown.log, flown.vehicle
-
-    return flight
-
-
 def made(name: str, trajectory: str = "excite", **coefficients: float):
     return lambda: (fly(name, trajectory, **coefficients), VEHICLE)
 
@@ -192,16 +184,25 @@ CASES = {
     ),
     # a battery's cell fails for seconds: its mean is a mass, and no effect scatters so
     "quick: what comes and goes": Case(
-        held_back("failing_cell", "small", 202), {"mass": True}, where="from one 3 s block"
+        drawn("outsider", ("failing_cell",), "small", None, 202),
+        {"mass": True},
+        where="from one 3 s block",
     ),
     # a camera on a mount of 2 Hz: slow turns are those of a larger inertia, but it swings
     "a soft mount": Case(
-        held_back("loose_gimbal", "small", 30), {"inertia": True}, where=r"mode at 2\.1 Hz"
+        drawn("outsider", ("loose_gimbal",), "small", None, 30),
+        {"inertia": True},
+        where=r"mode at 2\.1 Hz",
     ),
     # noise takes from slow turns, where a mount would add to them
     "noise that takes from slow turns": Case(
         drawn("pair", (), "typical", None, 3979625931, 60.0),
         {"inertia": False, "body_drag": False},
+    ),
+    # in hover the flight loop answers noise, once as a mass would
+    "a flight loop's answer to noise": Case(
+        drawn("hover", ("rotor_efficiency",), "typical", None, 3995502488, 60.0),
+        {"rotor_efficiency": False},
     ),
     # at one speed friction is a drag; how the flight begins says that it is none, if little more
     "friction on a circle": Case(on_a_circle(outsider="dry_friction"), among=""),

@@ -13,8 +13,7 @@ from windwrench.envs.plant import is_a_body
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass
-from windwrench.studies.trials.held_back_outsiders import HELD_BACK
-from windwrench.studies.trials.outsiders import OUTSIDERS
+from windwrench.studies.trials.outsiders import HELD_BACK, OUTSIDERS
 from windwrench.studies.trials.practice_flights import (
     SIZES,
     draw_effect,

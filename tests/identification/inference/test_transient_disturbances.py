@@ -12,7 +12,7 @@ from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.inference.regression import Flights
 from windwrench.identification.inference.transient_disturbances import transient_disturbances
 from windwrench.identification.report.words import remainder_sentence
-from windwrench.studies.trials.practice_flights import fly_practice, practise_held_back
+from windwrench.studies.trials.practice_flights import fly_practice, practise
 
 VEHICLE = load_vehicle("ardrone2")
 
@@ -21,7 +21,7 @@ def test_a_wash_that_passes_now_and_then_is_found_where_it_was():
     """A third of it, 0.05 weights for half a second, in twice the noise: as steady gusts it is next
     to nothing.
     """
-    flown = practise_held_back(VEHICLE, "passing_wash", "small", 3628941416, 60.0)
+    flown = practise(VEHICLE, "outsider", ("passing_wash",), "small", None, 3628941416)
     found = diagnose([flown.log], flown.vehicle)
     assert (found.verdict, found.remainder, found.effects) == ("unexplained", "random", ())
     (down,) = (push for push in found.pushes if push.channel == "Fz")

@@ -22,7 +22,7 @@ from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.readings import DECLARED
 from windwrench.identification.logs.screening import screen_for_estimate, screen_log
 from windwrench.identification.wrench_series import estimate_log
-from windwrench.studies.trials.practice_flights import practise_held_back
+from windwrench.studies.trials.practice_flights import practise
 
 VEHICLE = load_vehicle("ardrone2")
 CLEAN = ("excite", "gentle", "circle", "yaw")
@@ -74,7 +74,7 @@ def test_rotors_that_work_against_a_cord_turn_as_declared():
     """Slow turns against a spring of the heading need the opposite of what rotors give, as if these
     turned the other way.
     """
-    flown = practise_held_back(VEHICLE, "winding_cord", "typical", 2714764493, 60.0)
+    flown = practise(VEHICLE, "outsider", ("winding_cord",), "typical", None, 2714764493)
     assert screen_log(flown.log, flown.vehicle) == ()
 
 
