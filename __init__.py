@@ -4,12 +4,17 @@ Importing the package registers its environments with Gymnasium: ``windwrench/Fa
 ``windwrench/FanTracking2D-v0``, ``windwrench/WindHover-v0`` and ``windwrench/WindTrajectory-v0``.
 """
 
+from importlib import import_module
+from typing import Any
+
 from .runtime.interrupts import is_command, leaving_at_once
 
 with leaving_at_once(is_command()):
     import gymnasium
 
 __version__ = "1.0.0"
+# rooms that are imported when they are asked for
+__all__ = ["__version__", "controllers", "dynamics", "envs", "estimator", "identification"]
 
 _TASKS = {  # pytest imports this file a second time, as a folder's
     "FanTracking": ("fan_tracking:FanTrackingEnv", "make_fan_tracking_vector", 250),
@@ -25,3 +30,13 @@ for _name, (_single, _vector, _steps) in _TASKS.items():
             vector_entry_point=f"windwrench.envs.lanes.vector:{_vector}",
             max_episode_steps=_steps,
         )
+
+
+def __getattr__(name: str) -> Any:
+    if name in __all__:
+        return import_module(f".{name}", __name__)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

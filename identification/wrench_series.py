@@ -1,5 +1,7 @@
 """The external wrench over a flight log: the wrench filter run from its first row to its last."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
