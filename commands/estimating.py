@@ -33,18 +33,18 @@ def estimate(
     gate: float | None = None,
     tune: bool | None = None,
     tuning: Path | None = None,
-    film: bool = False,
     video: bool = False,
+    gif: bool = False,
     rrd: bool = False,
     view: bool = False,
-    begin: float = 0.0,
+    film_from: float = 0.0,
     film_seconds: float = 30.0,
     out: Path = Path("results/estimate"),
 ) -> dict[str, Any]:
     """Estimate the wrench on a logged flight. Write wrench.csv and a picture, and a film of the
     flight on request.
 
-    Example: windwrench estimate flight.csv --vehicle crazyflie --film
+    Example: windwrench estimate flight.csv --vehicle crazyflie --gif
     """
     import numpy as np
 
@@ -61,10 +61,10 @@ def estimate(
     from .tuning_file import load_tuning, save_tuning
 
     level = gate_of(gate)
-    kinds = film_kinds(view, video, film, "--film")
+    kinds = film_kinds(view, video, gif)
     (flight,), model = read_flights([log], reader, vehicle, map, piece)
     drawn = bool(kinds) or view or rrd
-    rows = shown_rows(flight, log, begin, film_seconds) if drawn else None
+    rows = shown_rows(flight, log, film_from, film_seconds) if drawn else None
     folder = results_folder(out)
     if smooth is None:
         smooth = (flight.gyro is None) == (flight.accelerometer is None)

@@ -34,7 +34,8 @@ def shown_rows(log: "FlightLog", path: Path, begin: float, seconds: float) -> Ro
     since = log.t - log.t[0]
     if begin >= since[-1]:
         raise InputError(
-            f"--from {begin:g}: {path} ends after {since[-1]:.6g} s; expected a time before that"
+            f"--film-from {begin:g}: {path} ends after {since[-1]:.6g} s; expected a time before "
+            f"that"
         )
     rows = np.flatnonzero((since >= begin) & (since <= begin + seconds))
     if len(rows) < 2:

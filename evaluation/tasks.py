@@ -11,8 +11,6 @@ from ..controllers.registry import STANDARD_TASK, TASK_LAWS, make_controller, sh
 from ..controllers.trained_policy import TrainedPolicy, is_policy_path, load_policy
 from ..envs.fan_tracking import FanTrackingEnv, scenario_env
 from ..envs.fan_tracking_2d import FanTracking2DEnv
-from ..envs.scenarios import SCENARIOS
-from ..envs.wind_scenarios import WIND_SCENARIOS
 from ..envs.wind_tasks import WindHoverEnv, WindTrajectoryEnv
 from ..runtime.errors import InputError, unknown_name
 from .statistics import episode_bootstrap, hierarchical_bootstrap
@@ -22,8 +20,7 @@ from .statistics import episode_bootstrap, hierarchical_bootstrap
 class Task:
     """What a benchmark needs to know of a task."""
 
-    environment: Callable[..., Any]
-    scenarios: Mapping[str, Any]
+    environment: Any  # class of the task
     laws: Mapping[str, Callable[..., Any]]
     rival: str  # the law over which wins are counted
     flown: str  # the law that is flown where none is named
@@ -41,7 +38,6 @@ class Task:
 
 
 _WIND = {
-    "scenarios": WIND_SCENARIOS,
     "rival": "pid",
     "flown": "pid-force",
     "defaults": ("base", "turbulent"),
@@ -50,7 +46,6 @@ _WIND = {
 TASKS: dict[str, Task] = {
     "FanTracking": Task(
         FanTrackingEnv,
-        SCENARIOS,
         TASK_LAWS["FanTracking"],
         "admittance",
         "admittance",
@@ -62,7 +57,6 @@ TASKS: dict[str, Task] = {
     ),
     "FanTracking2D": Task(
         FanTracking2DEnv,
-        SCENARIOS,
         TASK_LAWS["FanTracking2D"],
         "admittance",
         "admittance",
