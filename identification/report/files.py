@@ -51,7 +51,7 @@ def write_report(
     data = json.dumps(report_data(diagnosis), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
     page = as_text(report_page(diagnosis, command))
     numbers, html, vehicle = folder / "report.json", folder / "report.html", folder / "vehicle.yaml"
-    save_vehicle(diagnosis.amended, vehicle)
+    save_vehicle(diagnosis.amended, vehicle, {e.name: e.std for e in diagnosis.effects})
     for path, text in ((html, page), (numbers, data)):
         with replaced(path) as partial:
             partial.write_text(text, encoding="utf-8")
