@@ -156,6 +156,18 @@ def test_a_recorded_flight_can_be_estimated(call, log, tmp_path):
         f"out/{name}" for name in ("wrench.csv", "wrench.png", "tuning.yaml", "run.json")
     }
     wrench = np.genfromtxt(tmp_path / "out" / "wrench.csv", delimiter=",", names=True)
+    for ending in ("csv", "mcap", "rrd"):
+        track = tmp_path / f"track.{ending}"
+        assert call("estimate", log, "--no-smooth", "--no-tune", "--out", track)[0] == 0
+        beside = {"track.png", "track.tuning.yaml", "track.run.json", track.name}
+        assert beside == {p.name for p in tmp_path.glob("track.*")}
+        if ending == "rrd":
+            reader = [sys.executable, "-m", "rerun", "rrd", "print", track]
+            printed = subprocess.run(reader, capture_output=True, text=True, check=True).stdout
+            assert "/force_x/estimated" in printed
+            assert "/world/vehicle" in printed
+        for path in tmp_path.glob("track.*"):
+            path.unlink()
     names = "t fx fy fz tx ty tz std_fx std_fy std_fz std_tx std_ty std_tz nis status"
     assert list(wrench.dtype.names) == names.split()
     assert np.mean(wrench["fx"][wrench["t"] > 5.0]) == pytest.approx(0.2, abs=0.03)

@@ -124,7 +124,7 @@ def test_the_page_in_a_real_browser(watched, tmp_path):
     if BROWSER is None:
         pytest.skip("no browser is installed")
     with WebView(watched, 0) as view:
-        view._over.set()  # one event, and the page is done
+        threading.Timer(15.0, view._over.set).start()  # the page is done
         shown = subprocess.run(
             [
                 BROWSER, "--headless=new", "--no-sandbox", "--disable-gpu",
