@@ -12,8 +12,8 @@ import yaml
 
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.forms import checked
+from ..runtime.page_files import write_text
 from ..runtime.plain_values import plain
-from ..runtime.whole_files import replaced
 from ..runtime.yaml_file import parse_yaml, read_yaml
 from .effects import check_setting
 from .vehicle import _SPIN, Vehicle
@@ -141,5 +141,4 @@ def save_vehicle(vehicle: Vehicle, path: str | Path, std: Deviations | None = No
     Raises:
         InputError: the file cannot be written.
     """
-    with replaced(Path(path)) as partial:
-        partial.write_text(dump_vehicle(vehicle, std), encoding="utf-8")
+    write_text(dump_vehicle(vehicle, std), Path(path))

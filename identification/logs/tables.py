@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from ...runtime.errors import InputError
+from ...runtime.page_files import write_text
 from ...runtime.whole_files import replaced
 from .array_table import open_arrays
 from .parquet_table import open_parquet, write_parquet
@@ -64,8 +65,7 @@ def write_csv(columns: Mapping[str, Array], path: Path) -> None:
     Raises:
         InputError: the file cannot be written.
     """
-    with replaced(path) as temporary:
-        temporary.write_text(_csv_text(columns, "nan", "{:.9g}".format), encoding="utf-8")
+    write_text(_csv_text(columns, "nan", "{:.9g}".format), path)
 
 
 def _csv_text(
