@@ -10,6 +10,7 @@ from .terminal import (
     film_kinds,
     gate_of,
     note,
+    result_file,
     results_folder,
     run,
     say,
@@ -76,12 +77,10 @@ def estimate(
     kinds = film_kinds(view, video, gif)
     (flight,), model = read_flights([log], reader, vehicle, map, piece)
     rows = shown_rows(flight, log, film_from, film_seconds) if kinds or view else None
-    named = out.suffix in _TRACKS and not out.is_dir()
-    folder = results_folder(out.parent if named else out)
-    track = out if named else folder / "wrench.csv"
-    begin = f"{track.stem}." if named else ""  # of the names of what lies beside it
-    if named:
-        run.record = folder / f"{begin}run.json"
+    track = result_file(out, "wrench.csv", _TRACKS)
+    folder = results_folder(track.parent)
+    begin = f"{track.stem}." if track == out else ""  # of the names of what lies beside it
+    run.record = folder / f"{begin}run.json"
     if smooth is None:
         smooth = (flight.gyro is None) == (flight.accelerometer is None)
     smooth = smooth or reads_imu(flight)

@@ -113,11 +113,12 @@ def film_kinds(view: bool, video: bool, gif: bool) -> list[str]:
     return kinds
 
 
-def result_file(out: Path, usual: str) -> Path:
-    """Return the main result's file, which ``--out`` names itself, or else has under its ``usual``
-    name in the folder that ``--out`` names.
+def result_file(out: Path, usual: str, endings: Sequence[str] = ()) -> Path:
+    """Return the main result's file: ``--out`` itself where it has one of the ``endings``, or any
+    where none is given; else that of the ``usual`` name in the folder that ``--out`` names.
     """
-    return out if out.suffix and not out.is_dir() else out / usual
+    named = out.suffix in endings if endings else out.suffix
+    return out if named and not out.is_dir() else out / usual
 
 
 def results_folder(out: Path, **plan: object) -> Path:
