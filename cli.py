@@ -20,23 +20,27 @@ from .commands.flying import fly, record
 from .commands.identifying import identify
 from .commands.learning import train
 from .commands.live import live
+from .commands.looking import is_path, look
 from .commands.output import prepare_output
 from .commands.paper import reproduce
 from .commands.running import as_command, command_name
 from .commands.terminal import errors
+from .commands.warming import warm
 from .runtime.errors import InputError, unknown_name
 from .runtime.interrupts import INTERRUPTED, forget, noted
 from .runtime.printable import printable
 
 
 class _Commands(TyperGroup):
-    """Names the nearest command where one is mistyped."""
+    """Takes a log in place of a command, and names the nearest command where one is mistyped."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Return the command that the first argument names."""
+        """Return the command that the first argument names, or that looks at the log."""
         name = args[0] if args else ""
         if name and not name.startswith("-") and name not in self.commands:
-            raise unknown_name("command", name, self.commands)
+            if not is_path(name):
+                raise unknown_name("command", name, set(self.commands) - {"look", "warm"})
+            args = ["look", *args]
         return super().resolve_command(ctx, args)
 
 
@@ -73,6 +77,8 @@ def windwrench(
     Find what the model of the vehicle lacks. Simulate flights in wind; compare and train
     controllers.
 
+    windwrench LOG says of a flight log all that it allows, on one page.
+
     Example: windwrench fly --scenario base --seed 4
     """
 
@@ -98,6 +104,8 @@ _EARLIER: dict[str, dict[str, str]] = {
     "estimate": {"film": "gif", "from": "film-from"},
     "live": {"view": "browser"},
 }
+for command in (look, warm):
+    app.command(command_name(command), hidden=True)(as_command(command))
 for command in _COMMANDS:
     name = command_name(command)
     earlier = _EARLIER.get(name, {})

@@ -1,20 +1,26 @@
 """Two sets of flights of one vehicle, compared."""
 
 from collections.abc import Iterator, Sequence
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from typer.core import TyperCommand
 
+from ..runtime.errors import InputError
 from .flight_logs import log_notes, read_flights
 from .terminal import console, results_folder, say, show_table
 
 _AGAINST = "--against"
+_EXAMPLE = """A Crazyflie 2.1 flies 26 s with a propeller of the rear left rotor that was cut from \
+47 to 39 mm, and three times before with whole ones (CrazyPAD, Masalimov and others, Data 2024, 9, \
+79; MIT licence, beside the logs). The logs hold motor commands and the battery's voltage alone."""
 
 
 def compare(
-    logs: list[Path],
-    against: list[Path],
+    logs: list[Path] | None = None,
+    against: list[Path] | None = None,
+    example: bool = False,
     reader: str | None = None,
     map: str | None = None,
     vehicle: str | None = None,
@@ -25,6 +31,31 @@ def compare(
 
     Example: windwrench compare today.csv --against yesterday.csv --vehicle my_drone.yaml
     """
+    if example:
+        if logs or against:
+            raise InputError(f"--example: has logs of its own; expected it without {_AGAINST}")
+        console.print(_EXAMPLE)
+        with resources.as_file(
+            resources.files("windwrench.identification.comparison") / "example"
+        ) as flown:
+            normal = sorted(flown.glob("normal-*.csv.gz"))
+            return _compare([flown / "cut.csv.gz"], normal, None, None, None, out)
+    if not logs or not against:
+        raise InputError(
+            f"compare: expected logs after the change and {_AGAINST} logs before it, or --example"
+        )
+    return _compare(logs, against, reader, map, vehicle, out)
+
+
+def _compare(
+    logs: Sequence[Path],
+    against: Sequence[Path],
+    reader: str | None,
+    map: str | None,
+    vehicle: str | None,
+    out: Path,
+) -> dict[str, Any]:
+    """Compare two sets of flights; write the result."""
     from ..identification.comparison.change import compare as find_change
     from ..identification.comparison.trim import trim_of_log
     from ..identification.comparison.words import change_data, change_headline, write_change

@@ -61,8 +61,7 @@ def check(
         write_text(found.map_text, write_map)
         written.append(write_map)
     flight = found.log
-    seconds = float(flight.t[-1] - flight.t[0])
-    console.print(f"{flight.name}: {len(flight.t)} rows, {seconds:.1f} s, read by {found.read_by}")
+    console.print(f"{flight.name}: {found.sentence()}")
     if known := flight.flown.rows():
         show_table(("what flew", "", "by"), known)
     show_table(

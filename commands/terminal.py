@@ -56,6 +56,7 @@ class Run:
     record: Path | None = None  # where it is noted how the results came about
     made: list[Path] = field(default_factory=list)  # folders, innermost first
     code: int = 0  # exit code of work that was ended and has a result all the same
+    notes: bool = True  # whether notes on the input are told
 
     def begin(self, dry: bool = False) -> None:
         """Forget the command before."""
@@ -180,9 +181,21 @@ def working(text: str, total: float = 1.0) -> Iterator[Callable[..., None]]:
         yield report
 
 
+@contextmanager
+def silently() -> Iterator[None]:
+    """Print nothing of what another command would print; its progress is shown."""
+    quiet, console.quiet = console.quiet, True
+    told, run.notes = run.notes, False
+    try:
+        yield
+    finally:
+        console.quiet, run.notes = quiet, told
+
+
 def note(text: str) -> None:
     """Say on standard error what is worth knowing about the input; a warning stands out."""
-    errors.print(text, style="yellow" if text.startswith("warning") else "dim")
+    if run.notes:
+        errors.print(text, style="yellow" if text.startswith("warning") else "dim")
 
 
 def show_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

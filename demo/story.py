@@ -1,6 +1,5 @@
 """The steps of the demonstration, each with what it found, in words, a picture and its command."""
 
-import base64
 import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,7 +10,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from .. import __version__
 from ..controllers import make_controller
 from ..dynamics.vehicle import EffectSetting, Vehicle
 from ..envs.fan_tracking import FanTrackingEnv
@@ -25,7 +23,8 @@ from ..identification.logs.flight_log import FlightLog, write_log
 from ..identification.report.files import write_report
 from ..identification.report.headline import headline
 from ..identification.report.words import name_in_words
-from ..runtime.page_files import page_template, write_png, write_text
+from ..runtime.page_files import write_png
+from .steps import Step
 
 CONTROLLER, SCENARIO = "admittance", "base"
 LAWS = ("hover", "admittance", "ratio", "oracle")  # of the leaderboard
@@ -34,27 +33,6 @@ TRAJECTORY = "excite"
 _BEFORE, _AFTER, _JET = "#d1495b", "#30638e", "#cfe5f5"
 
 Report = Callable[[float], None]  # takes the share that is done
-
-
-@dataclass(frozen=True)
-class Step:
-    """One step of the story.
-
-    Attributes:
-        title: of a few words.
-        sentences: what came of it.
-        command: what a user types to repeat it.
-        picture: PNG, or None.
-        report: page that the demonstration's page links to, or empty.
-        board: rows of a leaderboard.
-    """
-
-    title: str
-    sentences: tuple[str, ...]
-    command: str
-    picture: Path | None = None
-    report: str = ""
-    board: Sequence[Standing] = ()
 
 
 @dataclass(frozen=True)
@@ -84,7 +62,9 @@ class Request:
         return f"{self.effect.name}:{given}"
 
 
-def _fly(env: FanTrackingEnv, seeds: list[int], report: Report) -> list[Episode]:
+def _fly(
+    env: FanTrackingEnv, seeds: list[int], report: Report, controller: str = CONTROLLER
+) -> list[Episode]:
     flown: list[Episode] = []
     done = 0
 
@@ -94,7 +74,7 @@ def _fly(env: FanTrackingEnv, seeds: list[int], report: Report) -> list[Episode]
         report(done / (DECISIONS * len(seeds)))
 
     for i, seed in enumerate(seeds):
-        flown.append(fly_episode(env, make_controller(CONTROLLER), seed, each))
+        flown.append(fly_episode(env, make_controller(controller), seed, each))
         done = DECISIONS * (i + 1)
     return flown
 
@@ -103,7 +83,9 @@ def fly_and_feel(request: Request, report: Report) -> list[Step]:
     """Fly one episode in the jet with a true model; compare the estimated wrench with the true
     one.
     """
-    (episode,) = _fly(FanTrackingEnv(SCENARIO, vehicle=request.vehicle), [request.seed], report)
+    env = FanTrackingEnv(SCENARIO, vehicle=request.vehicle)
+    (episode,) = _fly(env, [request.seed], lambda share: report(share / 2))
+    (still,) = _fly(env, [request.seed], lambda share: report(0.5 + share / 2), "hover")
     picture = request.out / "fly.png"
     draw_episode(episode, f"{CONTROLLER}, {SCENARIO}", picture)
     error = np.column_stack(
@@ -123,7 +105,8 @@ def fly_and_feel(request: Request, report: Report) -> list[Step]:
                 "The vehicle must stay in the jet. Its controller sees the estimated force and "
                 "torque, never the fan.",
                 f"It keeps {episode.rmse:.2f} m from the axis (RMSE over 20 s)"
-                f"{', and is lost' if episode.lost else ''}.",
+                f"{', and is lost' if episode.lost else ''}; a vehicle that hovers on the spot "
+                f"{still.rmse:.2f} m.",
             ),
             command,
             picture,
@@ -248,32 +231,6 @@ def compare(request: Request, rows: Sequence[Standing], folder: Path) -> Step:
         folder / "leaderboard.png",
         board=rows,
     )
-
-
-def write_page(steps: Sequence[Step], command: str, seconds: float, path: Path) -> None:
-    """Write the steps as one page that needs no network.
-
-    Args:
-        steps: of the story, in order.
-        command: that made the page.
-        seconds: that the demonstration took.
-        path: of the page.
-
-    Raises:
-        InputError: the page cannot be written.
-    """
-    template = page_template(__package__, "page.html.j2")
-    pictures = [
-        "" if step.picture is None else base64.b64encode(step.picture.read_bytes()).decode()
-        for step in steps
-    ]
-    text = template.render(
-        steps=list(zip(steps, pictures, strict=True)),
-        command=command,
-        seconds=seconds,
-        version=__version__,
-    )
-    write_text(text + "\n", path)
 
 
 def _draw(before: Episode, after: Episode, path: Path) -> None:

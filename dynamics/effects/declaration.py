@@ -72,6 +72,7 @@ class Role(StrEnum):
     INFLOW_THRUST = "inflow thrust"  # lost by each rotor that climbs, N/(rad/s m/s)
     TRANSLATIONAL_LIFT = "translational lift"  # of each rotor, N/(m/s)^2
     RATE_DAMPING = "rate damping"  # about x, y and z, Nm/(rad/s)
+    FLAPPING_MOMENT = "flapping moment"  # of each rotor, Nm/(rad/s m/s)
 
 
 _RELATIVE = ("1",)
@@ -95,6 +96,7 @@ _UNITS: dict[Role, tuple[tuple[str, ...], ...]] = {
     Role.INFLOW_THRUST: (("N/(rad/s m/s)",),),
     Role.TRANSLATIONAL_LIFT: (("N/(m/s)^2",),),
     Role.RATE_DAMPING: (("Nm/(rad/s)",),) * 3,
+    Role.FLAPPING_MOMENT: (("Nm/(rad/s m/s)",),),
 }
 
 

@@ -8,7 +8,7 @@ body axes. It is the k_flap of RotorPy. The force that goes with flapping is ``r
 from numba import cfunc
 
 from .base import EFFECT_MODEL, ROTOR_POSITION, ROTOR_SPEED, Coefficient, Effect
-from .declaration import Family, Need
+from .declaration import Family, Need, Role
 from .parts import air_velocity
 
 
@@ -35,4 +35,5 @@ EFFECT = Effect(
     model=effect_model,
     family=Family.AERODYNAMICS,
     needs=(Need.MOMENTS,),
+    role=Role.FLAPPING_MOMENT,
 )

@@ -34,6 +34,7 @@ class InertialSettings:
     fewest: int = 10  # comparisons that decide something
     samples: int = 20  # of pose and of sensor that do
     still: float = 0.1  # rad/s: what pose noise makes of the rate of a vehicle that stands still
+    moving: float = 0.5  # m/s2 of horizontal acceleration, far above what pose noise makes of it
 
 
 INERTIAL = InertialSettings()
@@ -61,6 +62,15 @@ def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, tu
             shares = gyro_shares(t, measured, *pose, turns)
             doubt = sensor_doubt(shares, GYRO_READINGS, "contradict the attitude's rate")
         else:
+            turned = _from_world(t, measured, *pose, log.position[seen], gravity)
+            if turned is not None:
+                values = np.full_like(values, np.nan)
+                values[np.isin(log.t, t)] = turned
+                log, measured = replace(log, accelerometer=values), turned
+                notes.append(
+                    f"{', '.join(names)} are an acceleration in world axes, by the position's own: "
+                    "they were turned into body axes by the attitude"
+                )
             shares = _force_shares(t, measured, *pose, log.position[seen], gravity)
             otherwise = "contradict the position's acceleration and gravity"
             doubt = sensor_doubt(shares, ACCELEROMETER_READINGS, otherwise)
@@ -138,30 +148,75 @@ def _force_shares(
     middles = _windows(pose_times, t, before=INERTIAL.window)
     if len(middles) < INERTIAL.fewest:
         return None
-    inside = (t >= pose_times[0]) & (t <= pose_times[-1])
-    t, measured = t[inside], measured[inside]
-    turned, g = Slerp(pose_times, attitude)(t), np.array([0.0, 0.0, gravity])
-
-    def second_difference(times: Array, values: Array) -> Array:
-        before, at, after = (
-            resampled(middles + k * INERTIAL.window, times, values) for k in (-1, 0, 1)
-        )
-        difference: Array = (after - 2.0 * at + before) / INERTIAL.window**2
-        return difference
-
-    def mean(reading: SensorReading) -> Array:
-        speed = cumulative_trapezoid(
-            turned.apply(measured @ reading.turn.T), t, axis=0, initial=0.0
-        )
-        way = cumulative_trapezoid(speed, t, axis=0, initial=0.0)
-        mean_force: Array = second_difference(t, way) + reading.lacks_gravity * g
-        return mean_force
-
-    needed = second_difference(pose_times, position) + g
+    t, measured, turned = _beside_pose(t, measured, pose_times, attitude)
+    g = np.array([0.0, 0.0, gravity])
+    needed = _second_difference(middles, pose_times, position) + g
     size = _middle(needed)
     return [
-        _middle(needed - mean(reading)) / size for reading in (AS_DECLARED, *ACCELEROMETER_READINGS)
+        _middle(
+            needed
+            - _mean(middles, t, turned.apply(measured @ reading.turn.T))
+            - reading.lacks_gravity * g
+        )
+        / size
+        for reading in (AS_DECLARED, *ACCELEROMETER_READINGS)
     ]
+
+
+def _from_world(
+    t: Array,
+    measured: Array,
+    pose_times: Array,
+    attitude: Rotation,
+    position: Array,
+    gravity: float,
+) -> Array | None:
+    """Return the specific force in body axes (N, 3) where an accelerometer's columns hold an
+    acceleration in world axes; None where they do not.
+
+    Gravity hides the axes: along z both look alike. The horizontal acceleration of the position
+    tells them.
+    """
+    middles = _windows(pose_times, t, before=INERTIAL.window)
+    if len(middles) < INERTIAL.fewest:
+        return None
+    inside, values, turned = _beside_pose(t, measured, pose_times, attitude)
+    needed = _second_difference(middles, pose_times, position)[:, :2]
+    moves = np.linalg.norm(needed, axis=1) > INERTIAL.moving
+    if np.count_nonzero(moves) < INERTIAL.fewest:
+        return None
+    body, world = (
+        _middle((needed - _mean(middles, inside, x)[:, :2])[moves]) / _middle(needed[moves])
+        for x in (turned.apply(values), values)
+    )
+    if world > EVIDENCE.good or likelihood([world] * 2) - likelihood([body] * 2) < OTHER:
+        return None
+    lacks = gravity if np.median(values[:, 2]) < 0.5 * gravity else 0.0
+    at = Slerp(pose_times, attitude)(np.clip(t, pose_times[0], pose_times[-1]))
+    return np.asarray(at.inv().apply(measured + np.array([0.0, 0.0, lacks])))
+
+
+def _beside_pose(
+    t: Array, measured: Array, pose_times: Array, attitude: Rotation
+) -> tuple[Array, Array, Rotation]:
+    """Return times, readings and attitude of those samples that have poses around them."""
+    inside = (t >= pose_times[0]) & (t <= pose_times[-1])
+    return t[inside], measured[inside], Slerp(pose_times, attitude)(t[inside])
+
+
+def _second_difference(middles: Array, times: Array, values: Array) -> Array:
+    before, at, after = (
+        resampled(middles + k * INERTIAL.window, times, values) for k in (-1, 0, 1)
+    )
+    return np.asarray((after - 2.0 * at + before) / INERTIAL.window**2)
+
+
+def _mean(middles: Array, t: Array, force: Array) -> Array:
+    """Return the mean (n, 3) of a force (N, 3) over two windows, as a position's second difference
+    weighs it.
+    """
+    speed = cumulative_trapezoid(force, t, axis=0, initial=0.0)
+    return _second_difference(middles, t, cumulative_trapezoid(speed, t, axis=0, initial=0.0))
 
 
 def gravity_doubt(force: Array, gravity: float) -> str:

@@ -141,9 +141,23 @@ def _read(
     chosen = chosen or reader_by_columns(path, table.header)
     if chosen is not None:
         return chosen.read(table, vehicle=vehicle)
+    if (guessed := _certainly(table, vehicle)) is not None:
+        return guessed
     raise InputError(
         f"{path}: missing column(s) {', '.join(missing)}; expected {', '.join(REQUIRED)}, or the "
         f"columns of {looked_for_columns()}, found {', '.join(table.header[:_SHOWN])}. A table of "
         f"other columns is read with a map: windwrench check {path.name} --write-map map.yaml "
         "proposes one"
     )
+
+
+def _certainly(table: Table, vehicle: Vehicle | None) -> FlightLog | None:
+    """Return the log that a table of unknown columns holds, where a guess leaves no doubt."""
+    from .map_guess import guess_map  # the guess is dear, and few logs need it
+
+    guess = guess_map(table, vehicle)
+    if guess.missing or guess.doubts:
+        return None
+    log = map_table(table, guess.log_map, vehicle)
+    said = "columns: by a map that was guessed without a doubt; windwrench check shows it"
+    return replace(log, notes=(said, *log.notes))

@@ -46,7 +46,8 @@ def headline(diagnosis: Diagnosis) -> str:
 def _undecided(diagnosis: Diagnosis, effects: Sequence[NamedEffect]) -> str:
     """Return which effects these logs cannot tell from which others, in one sentence."""
     pairs = [
-        f"{title(e.name)} from {in_words([title(x) for x in e.indistinguishable_from], 'or')}"
+        f"{with_amounts(e, diagnosis.declared)} from "
+        f"{in_words([title(x) for x in e.indistinguishable_from], 'or')}"
         for e in effects
     ]
     declared = {e.name for e in diagnosis.declared.effects}

@@ -37,6 +37,11 @@ class LogCheck:
     guess: Guess | None = None
     map_text: str = ""  # the map by which it was read, as a YAML file; empty where it needed none
 
+    def sentence(self) -> str:
+        """Return how long the log is, and how it was read."""
+        seconds = float(self.log.t[-1] - self.log.t[0])
+        return f"{len(self.log.t)} rows, {seconds:.1f} s, read by {self.read_by}"
+
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain values."""
         log = self.log

@@ -27,6 +27,7 @@ _EFFECTS = {
     Role.INFLOW_THRUST: 1,
     Role.TRANSLATIONAL_LIFT: 1,
     Role.RATE_DAMPING: 3,
+    Role.FLAPPING_MOMENT: 1,
 }
 
 

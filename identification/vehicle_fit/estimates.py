@@ -31,6 +31,7 @@ _AIR: dict[str, tuple[Role, int, str]] = {
     "inflow": (Role.INFLOW_THRUST, 0, "z"),
     "lift": (Role.TRANSLATIONAL_LIFT, 0, "z"),
     **{f"damping {a}": (Role.RATE_DAMPING, i, "turning") for i, a in enumerate("xyz")},
+    "flapping": (Role.FLAPPING_MOMENT, 0, "turning"),
 }
 UNKNOWN: Interval = (math.nan, math.nan, math.nan)
 
@@ -279,7 +280,7 @@ class _Estimates:
             self.add("drag", UNKNOWN, "N/(m/s)", how, NOTHING)
             return
         along = f"{self.sources.force} along body x and y against velocity"
-        damped = f"{self.sources.rate} against its own derivative"
+        damped = f"{self.sources.rate}, its own derivative against it and against velocity"
         for kind, (role, first, channel) in _AIR.items():
             how = {"": along, "z": "force along body z", "turning": damped}[channel]
             for index, parameter in enumerate(OPTIONAL[kind] if kind in self.kept else (), first):

@@ -97,6 +97,12 @@ def identify(
         )
     report(0.5, "asking what else shows")
     fit, kept = _with_optional(pieces, fit, step / math.sqrt(12.0))
+    if "answered torque" in kept:
+        shares = ", ".join(f"{100 * fit.values[f'answered {a}']:.0f} %" for a in "xyz")
+        notes.append(
+            f"below 3 Hz {shares} of the rotors' torque about x, y and z turn nothing: the flight "
+            "loop answers moments that nothing measures. Inertia is told by what is quicker"
+        )
     report(0.8, "asking what can be told")
     reasons, instead = _not_told(fit, geometry)
     if turned:
@@ -253,7 +259,8 @@ def _with_optional(
     kept: list[str] = []
     for name, parameters in OPTIONAL.items():
         air = {p for p in parameters if "drag" in p or p == "lift"}
-        of_speeds = name in ("rotor drag", "inflow")
+        air |= {"rotor drag x"} & {"rotor drag x" for p in parameters if p == "flapping"}
+        of_speeds = name in ("rotor drag", "inflow", "flapping")
         if not air <= set(fit.balance.names) or (fit.drive.commands and of_speeds):
             continue
         model, start = fit.model.with_more(fit.theta, *parameters)

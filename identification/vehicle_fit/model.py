@@ -94,6 +94,13 @@ def coefficients(p: Mapping[str, float], names: tuple[str, ...], mass: float, po
     moment[2, place["spin up"]] += spin
     moment[0, place["spin x"]] += spin
     moment[1, place["spin y"]] += spin
+    if "flapping" in p:  # the columns of rotor drag are minus the sum of speeds times velocity
+        moment[0, place["rotor drag y"]] += p["flapping"]
+        moment[1, place["rotor drag x"]] -= p["flapping"]
+    for i, axis in enumerate(_AXES):
+        if answered := get(f"answered {axis}", 0.0):
+            for name in (n for n in names if n.startswith(f"slow {axis.upper()}")):
+                moment[i, place[name]] -= answered * moment[i, place[name.removeprefix("slow ")]]
     out[3:] = np.linalg.solve(inertia, moment)
     for i, axis in enumerate(_AXES):
         out[3 + i, place["1"]] += get(f"turn bias {axis}", 0.0)

@@ -36,7 +36,8 @@ BASE = (
 )
 BIASES = ("force bias x", "force bias y", "force bias z")
 # of these a negative value is no physics, but another fault of the model
-POSITIVE = tuple(f"{kind} {a}" for kind in ("rotor drag", "linear drag", "damping") for a in "xyz")
+_LOSSES = ("rotor drag", "linear drag", "quadratic drag", "damping")
+POSITIVE = (*(f"{kind} {a}" for kind in _LOSSES for a in "xyz"), "flapping")
 # each is added where it makes the logs much likelier
 OPTIONAL: dict[str, tuple[str, ...]] = {
     "rotor drag": ("rotor drag x", "rotor drag y"),
@@ -45,6 +46,8 @@ OPTIONAL: dict[str, tuple[str, ...]] = {
     "vertical drag": ("linear drag z",),
     "inflow": ("rotor drag z",),
     "lift": ("lift",),
+    "answered torque": ("answered x", "answered y", "answered z"),
+    "flapping": ("flapping",),
     "damping x": ("damping x",),
     "damping y": ("damping y",),
     "damping z": ("damping z",),
@@ -100,6 +103,8 @@ def first_model(
         **{f"quadratic drag {a}": 0.03 * mass for a in "xyz"},
         "lift": 0.03 * mass,
         **{f"damping {a}": inertia[0] for a in "xyz"},
+        "flapping": 0.05 * mass / speed * 0.03 * arm,
+        **{f"answered {a}": 0.3 for a in "xyz"},
     }
     free = (*(f"a{j}" for j in range(len(each))), *BASE)
     prior = {"delay": DELAY}

@@ -26,6 +26,9 @@ def test_the_demo_tells_its_story_on_one_offline_page(call):
         assert step["title"] in page
         assert step["command"].startswith("windwrench ")
     assert "diagnose/report.html" in page
+    words = " ".join(result["steps"][0]["sentences"])
+    ours, hover = map(float, re.findall(r"([0-9.]+) m\b", words))
+    assert ours < 0.5 * hover
     assert Path("demo/diagnose/report.html").is_file()
     # the log holds no truth that would give the effect away
     assert "fx" not in Path("demo/flight.csv").read_text().splitlines()[0].split(",")
@@ -61,3 +64,18 @@ def test_the_example_is_diagnosed_beside_what_is_known(call):
     assert "rotor_drag or body_drag: known, and found" in out
     assert "page: file://" in out
     assert json.loads(Path("example/report.json").read_text())["effects"]
+
+
+def test_the_example_of_a_comparison_has_the_known_answer(call):
+    code, out, _ = call("compare", "--example", "--out", "compared", "--json")
+    assert code == 0
+    found = json.loads(out)["result"]
+    assert found["place"] == "rotor 2 (rear-left)"
+    assert found["probabilities"]["rotor 2 (rear-left)"] > 0.95
+
+
+def test_the_example_of_a_comparison_has_logs_of_its_own(call):
+    Path("flight.csv").write_text("t")
+    code, _, err = call("compare", "--example", "flight.csv")
+    assert code == 2
+    assert "--example: has logs of its own" in err

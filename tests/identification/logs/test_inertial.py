@@ -55,6 +55,16 @@ def test_honest_sensors_pass(moving, seconds):
     assert checked is log
 
 
+@pytest.mark.parametrize("gravity", [9.81, 0.0])
+def test_an_acceleration_in_world_axes_is_turned_into_body_axes(gravity):
+    log = flight()
+    turn = Rotation.from_quat(log.quaternion, scalar_first=True)
+    world = turn.apply(log.accelerometer) - [0.0, 0.0, 9.81 - gravity]
+    checked, notes = check_inertial(replace(log, accelerometer=world))
+    assert "in world axes" in notes[0]
+    np.testing.assert_allclose(checked.accelerometer, log.accelerometer, atol=1e-9)
+
+
 WRONG = {
     "gyro": {
         "degrees per second; expected rad/s": 180 / np.pi,

@@ -4,10 +4,12 @@ import gzip
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from tests.support.data_paths import DATA
 from tests.support.map_tables import hover_columns, table_text
-from windwrench.dynamics import InputError
+from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.logs.readers import (
     READERS,
     TABLES,
@@ -16,6 +18,7 @@ from windwrench.identification.logs.readers import (
     reader_by_content,
 )
 from windwrench.identification.logs.reading import read_log
+from windwrench.identification.logs.tables import write_csv
 
 BEGINNINGS = {
     b"ULog\x01\x12\x35\x01": "px4_ulog",
@@ -91,3 +94,22 @@ def test_tables_are_known_by_their_columns(tmp_path, reader):
     path = tmp_path / "flight.csv"
     path.write_bytes(table_text(hover_columns(TABLES[reader])))
     assert f"reader {reader}" in read_log(path).source
+
+
+def test_a_table_whose_guess_leaves_no_doubt_is_read_at_once(tmp_path):
+    path = DATA / "flights" / "labelled_01.csv.gz"
+    if not path.exists():
+        pytest.skip(f"{path} is not here")
+    log, vehicle = read_log(path), load_vehicle(DATA / "flights" / "vehicle.yaml")
+    down = [1.0, -1.0, -1.0]
+    columns = {
+        "time_ms": 1e3 * log.t,
+        **dict(zip("xyz", (log.position * down).T, strict=True)),
+        **dict(zip(("qw", "qx", "qy", "qz"), (log.quaternion * [1.0, *down]).T, strict=True)),
+        **{f"rpm{i + 1}": w * 60.0 / (2.0 * np.pi) for i, w in enumerate(log.rotor_speeds.T)},
+    }
+    write_csv(columns, tmp_path / "theirs.csv")
+    read = read_log(tmp_path / "theirs.csv", vehicle=vehicle)
+    assert any("guessed without a doubt" in note for note in read.notes)
+    np.testing.assert_allclose(read.position, log.position, atol=1e-9)
+    np.testing.assert_allclose(read.rotor_speeds, log.rotor_speeds, atol=1e-6)

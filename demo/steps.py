@@ -1,0 +1,64 @@
+"""Steps of a command as one page: what each found in words, a picture, and the command that does it
+alone.
+"""
+
+import base64
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from .. import __version__
+from ..evaluation.leaderboard import Standing
+from ..runtime.page_files import page_template, write_text
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step.
+
+    Attributes:
+        title: of a few words.
+        sentences: what came of it.
+        command: what a user types to repeat it.
+        picture: PNG, or None.
+        report: page that this page links to, or empty.
+        board: rows of a leaderboard.
+    """
+
+    title: str
+    sentences: tuple[str, ...]
+    command: str
+    picture: Path | None = None
+    report: str = ""
+    board: Sequence[Standing] = ()
+
+
+def write_page(
+    title: str, lead: str, steps: Sequence[Step], then: str, command: str, path: Path
+) -> None:
+    """Write steps as one page that needs no network.
+
+    Args:
+        title: of the page.
+        lead: the sentence below it.
+        steps: in order.
+        then: what to do next; a line that begins with ``windwrench`` is a command. Empty: nothing.
+        command: that made the page.
+        path: of the page.
+
+    Raises:
+        InputError: the page cannot be written.
+    """
+    pictures = [
+        "" if step.picture is None else base64.b64encode(step.picture.read_bytes()).decode()
+        for step in steps
+    ]
+    text = page_template(__package__, "page.html.j2").render(
+        title=title,
+        lead=lead,
+        steps=list(zip(steps, pictures, strict=True)),
+        then=then.splitlines(),
+        command=command,
+        version=__version__,
+    )
+    write_text(text + "\n", path)

@@ -1,0 +1,61 @@
+"""``windwrench LOG``: all that a log allows, in one go."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+RECORD = [
+    "record",
+    "--effect",
+    "constant_force:fx=0.2",
+    "--trajectory",
+    "excite",
+    "--seconds",
+    "12",
+]
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    """A recorded flight with a constant force of 0.2 N along x."""
+    from windwrench.cli import app
+
+    path = tmp_path_factory.mktemp("look") / "flight.csv"
+    app([*RECORD, "--out", str(path)], standalone_mode=False)
+    return path
+
+
+def test_a_log_in_place_of_a_command_ends_with_a_sentence_and_a_page(call, log):
+    code, out, _ = call(log, "--out", "all", "--no-open")
+    assert code == 0
+    last = " ".join(out.split()).rpartition("page: file://")[2]
+    assert "0.2" in last.partition(" ")[2]  # the force, N
+    page = Path("all/log.html").read_text(encoding="utf-8")
+    for name in ("check", "estimate", "diagnose"):
+        command = f"windwrench {name} {log}"
+        assert command in out
+        assert command in page
+    assert "diagnose/report.html" in page
+    effects = json.loads(Path("all/diagnose/report.json").read_text())["effects"]
+    assert [e["name"] for e in effects] == ["constant_force"]
+    assert "look" in json.loads(Path("all/run.json").read_text())
+
+
+def test_a_log_of_an_unknown_vehicle_is_told_how_one_is_made(call, log):
+    text = log.read_text().replace("ardrone2", "nobodys")
+    Path("theirs.csv").write_text(text)
+    code, out, _ = call("theirs.csv", "--out", "all", "--no-open")
+    assert code == 0
+    assert "windwrench identify theirs.csv --mass KG" in out
+    assert "12.0 s" in out.strip().splitlines()[-1]
+    assert not Path("all/estimate").exists()
+
+
+def test_neither_a_log_nor_a_command(call):
+    code, _, err = call("no_such_flight.csv")
+    assert code == 2
+    assert "no_such_flight.csv" in err
+    code, _, err = call("diagnoze")
+    assert code == 2
+    assert "'diagnose'" in err
