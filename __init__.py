@@ -6,6 +6,8 @@ laws, and as ``-v1`` normalised, for learners.
 """
 
 import warnings
+from importlib import import_module
+from typing import Any
 
 from .runtime.interrupts import is_command, leaving_at_once
 
@@ -13,6 +15,8 @@ with leaving_at_once(is_command()):
     import gymnasium
 
 __version__ = "1.0.0"
+# rooms that are imported when they are asked for
+__all__ = ["__version__", "controllers", "dynamics", "envs", "estimator", "identification"]
 
 _TASKS = {  # pytest imports this file a second time, as a folder's
     "FanTracking": ("fan_tracking:FanTrackingEnv", "make_fan_tracking_vector", 250),
@@ -32,3 +36,13 @@ for _name, (_single, _vector, _steps) in _TASKS.items():
             )
 # Gymnasium takes the older for outdated
 warnings.filterwarnings("ignore", r".*windwrench/\w+-v0 is out of date", DeprecationWarning)
+
+
+def __getattr__(name: str) -> Any:
+    if name in __all__:
+        return import_module(f".{name}", __name__)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

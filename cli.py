@@ -99,11 +99,23 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
     reproduce,
     train,
 )
+# what an option of a command was called before: it is taken, and not shown
+_EARLIER: dict[str, dict[str, str]] = {
+    "estimate": {"film": "gif", "from": "film-from"},
+    "live": {"view": "browser"},
+}
 for command in (look, warm):
     app.command(command_name(command), hidden=True)(as_command(command))
 for command in _COMMANDS:
-    kind = LogsAgainstLogs if command is compare else None
-    app.command(command_name(command), cls=kind)(as_command(command))
+    name = command_name(command)
+    earlier = _EARLIER.get(name, {})
+    app.command(
+        name,
+        cls=LogsAgainstLogs if command is compare else None,
+        context_settings={
+            "token_normalize_func": lambda word, earlier=earlier: earlier.get(word, word)
+        },
+    )(as_command(command))
 
 
 def main() -> None:

@@ -5,7 +5,18 @@ from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import InputError
 from .flight_logs import log_notes, read_flights
-from .terminal import console, film_kinds, gate_of, note, results_folder, say, show_table, working
+from .terminal import (
+    console,
+    film_kinds,
+    gate_of,
+    note,
+    result_file,
+    results_folder,
+    run,
+    say,
+    show_table,
+    working,
+)
 
 if TYPE_CHECKING:
     from ..dynamics.vehicle import Vehicle
@@ -13,6 +24,7 @@ if TYPE_CHECKING:
     from ..estimator.consistency import Consistency
     from ..identification.logs.flight_log import FlightLog
 
+_TRACKS = (".csv", ".mcap", ".rrd")  # endings of the wrench's file
 # what innovations that agree within a second say, of a given and of a fitted tuning
 _TOO_SLOW = (
     "warning: innovations agree with each other within a second: the wrench changes faster than "
@@ -33,18 +45,18 @@ def estimate(
     gate: float | None = None,
     tune: bool | None = None,
     tuning: Path | None = None,
-    film: bool = False,
     video: bool = False,
+    gif: bool = False,
     rrd: bool = False,
     view: bool = False,
-    begin: float = 0.0,
+    film_from: float = 0.0,
     film_seconds: float = 30.0,
     out: Path = Path("results/estimate"),
 ) -> dict[str, Any]:
     """Estimate the wrench on a logged flight. Write wrench.csv and a picture, and a film of the
     flight on request.
 
-    Example: windwrench estimate flight.csv --vehicle crazyflie --film
+    Example: windwrench estimate flight.csv --vehicle crazyflie --gif
     """
     import numpy as np
 
@@ -57,15 +69,18 @@ def estimate(
         uncertainty_note,
         write_wrench,
     )
-    from .log_film import draw_film, shown_rows
+    from ..identification.wrench_track import write_mcap
+    from .log_film import draw_film, flight_of, shown_rows
     from .tuning_file import load_tuning, save_tuning
 
     level = gate_of(gate)
-    kinds = film_kinds(view, video, film, "--film")
+    kinds = film_kinds(view, video, gif)
     (flight,), model = read_flights([log], reader, vehicle, map, piece)
-    drawn = bool(kinds) or view or rrd
-    rows = shown_rows(flight, log, begin, film_seconds) if drawn else None
-    folder = results_folder(out)
+    rows = shown_rows(flight, log, film_from, film_seconds) if kinds or view else None
+    track = result_file(out, "wrench.csv", _TRACKS)
+    folder = results_folder(track.parent)
+    begin = f"{track.stem}." if track == out else ""  # of the names of what lies beside it
+    run.record = folder / f"{begin}run.json"
     if smooth is None:
         smooth = (flight.gyro is None) == (flight.accelerometer is None)
     smooth = smooth or reads_imu(flight)
@@ -73,11 +88,21 @@ def estimate(
     fit, consistency, said = _tuned(flight, model, given, tuning is None if tune is None else tune)
     with working("estimating") as progress:
         series = estimate_log(flight, model, fit.tuning if fit else given, progress, smooth, level)
-    written = [write_wrench(series, folder), plot_wrench(series, flight, folder / "wrench.png")]
-    written.append(folder / "tuning.yaml")
-    save_tuning(series.tuning, flight.period, written[-1])
+    if track.suffix == ".csv":
+        write_wrench(series, track)
+    elif track.suffix == ".mcap":
+        write_mcap(series, track)
+    recordings = [track] * (track.suffix == ".rrd") + [folder / "film.rrd"] * rrd
+    for path in recordings:
+        from ..envs.rerun_export import write_rrd
+
+        write_rrd(flight_of(flight, series), model, path)
+    written = [track, plot_wrench(series, flight, track.with_suffix(".png"))]
+    written += [folder / f"{begin}tuning.yaml", *(p for p in recordings if p != track)]
+    save_tuning(series.tuning, flight.period, written[2])
     if rows is not None:
-        written += draw_film(flight, model, series, rows, folder, kinds, view, rrd)
+        title, whole = f"{flight.name}: {model.name}", flight_of(flight, series)
+        written += draw_film(title, model, whole, rows, folder, kinds, view)
     log_notes(series.notes)
     seconds = float(flight.t[-1] - flight.t[0])
     console.print(f"{flight.name}: {len(flight.t)} samples, {seconds:.1f} s, vehicle {model.name}")

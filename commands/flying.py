@@ -3,7 +3,16 @@
 from pathlib import Path
 from typing import Any
 
-from .terminal import console, film_kinds, results_folder, run, say, show_table, working
+from .terminal import (
+    console,
+    film_kinds,
+    result_file,
+    results_folder,
+    run,
+    say,
+    show_table,
+    working,
+)
 
 
 def fly(
@@ -35,7 +44,7 @@ def fly(
     from ..evaluation.tasks import make_pilot, short_names, task_of
     from .filming import SIZE, Tally, caption_of, films, written
 
-    kinds = film_kinds(view, video, gif, "--gif")
+    kinds = film_kinds(view, video, gif)
     effects = [parse_setting(e) for e in effect or []]
     known = task_of(task)
     controller = controller or known.flown
@@ -131,6 +140,7 @@ def record(
 
     model = load_vehicle(vehicle)
     effects = tuple(parse_setting(e, model) for e in effect or [])
+    out = result_file(out, "flight.csv")
     file_kind(out)
     with working(f"flying {seconds:g} s") as progress:
         flown: dict[str, Any] = record_flight(

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..runtime.errors import InputError
 from .flight_logs import log_notes, read_logs
-from .terminal import console, run, say, show_table, working
+from .terminal import console, result_file, run, say, show_table, working
 
 _WINDOW = re.compile(r"(.+):(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?)")
 
@@ -49,6 +49,7 @@ def identify(
     from ..identification.vehicle_fit.identify import identify as fit
     from ..identification.vehicle_fit.report import headline, identified_data, write_identified
 
+    out = result_file(out, "vehicle.yaml")
     if out.suffix not in (".yaml", ".yml"):
         raise InputError(f"--out {out}: expected a name that ends in .yaml")
     if not (math.isfinite(mass) and 0.0 < mass < 1e4):

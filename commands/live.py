@@ -26,7 +26,7 @@ def live(
     vehicle: str | None = None,
     map: str | None = None,
     record: Path | None = None,
-    view: bool = False,
+    browser: bool = False,
     port: int = 8765,
     diagnose_after: bool = False,
     out: Path = Path("results/diagnose"),
@@ -78,11 +78,11 @@ def live(
             Lines(sys.stdout),
             tallies,
             # who alone read the estimates has enough of them
-            failed=lambda: None if stream.answers or recorder or view else session.stop(),
+            failed=lambda: None if stream.answers or recorder or browser else session.stop(),
         )
     session = Session(stream, settings, recording, telling)
     with ExitStack() as shown:
-        if view:
+        if browser:
             from ..live.web_view import WebView
 
             address = shown.enter_context(WebView(session, port)).address

@@ -13,6 +13,7 @@ from .terminal import working
 
 if TYPE_CHECKING:
     from ..dynamics.vehicle import Vehicle
+    from ..envs.replay import Flight
     from ..identification.logs.flight_log import FlightLog
     from ..identification.wrench_series import WrenchSeries
 
@@ -34,7 +35,8 @@ def shown_rows(log: "FlightLog", path: Path, begin: float, seconds: float) -> Ro
     since = log.t - log.t[0]
     if begin >= since[-1]:
         raise InputError(
-            f"--from {begin:g}: {path} ends after {since[-1]:.6g} s; expected a time before that"
+            f"--film-from {begin:g}: {path} ends after {since[-1]:.6g} s; expected a time before "
+            f"that"
         )
     rows = np.flatnonzero((since >= begin) & (since <= begin + seconds))
     if len(rows) < 2:
@@ -45,37 +47,13 @@ def shown_rows(log: "FlightLog", path: Path, begin: float, seconds: float) -> Ro
     return rows
 
 
-def draw_film(
-    log: "FlightLog",
-    model: "Vehicle",
-    series: "WrenchSeries",
-    rows: Rows,
-    folder: Path,
-    kinds: Sequence[str],
-    view: bool,
-    rrd: bool,
-) -> list[Path]:
-    """Draw a flight as films, in a window, or for the Rerun viewer; return the files.
-
-    Args:
-        log: the flight.
-        model: its vehicle.
-        series: the estimated wrench.
-        rows: of the log that are shown.
-        folder: for the files.
-        kinds: of films, ``gif`` and ``mp4``.
-        view: show the flight in a window instead.
-        rrd: also write a recording of the whole flight for the Rerun viewer.
+def flight_of(log: "FlightLog", series: "WrenchSeries") -> "Flight":
+    """Return a logged flight as it is drawn: where motion capture lost the vehicle, the filter's
+    own pose.
     """
-    from ..envs.captions import Caption
-    from ..envs.drawing import Viewer
-    from ..envs.replay import Flight, arrow_scales, drawn_arm, pictures
-    from ..envs.rerun_export import write_rrd
-    from ..envs.video import FPS
-    from .filming import SIZE, films, written
+    from ..envs.replay import Flight
 
-    # where motion capture lost the vehicle, the filter's own pose
-    whole = Flight(
+    return Flight(
         series.t,
         series.position,
         series.quaternion,
@@ -84,11 +62,34 @@ def draw_film(
         log.force,
         log.torque,
     )
-    if rrd:
-        write_rrd(whole, model, folder / "film.rrd")
-    made = [folder / "film.rrd"] if rrd else []
-    if not kinds and not view:
-        return made
+
+
+def draw_film(
+    title: str,
+    model: "Vehicle",
+    whole: "Flight",
+    rows: Rows,
+    folder: Path,
+    kinds: Sequence[str],
+    view: bool,
+) -> list[Path]:
+    """Draw a part of a flight as films, or in a window; return the files.
+
+    Args:
+        title: what flew.
+        model: its vehicle.
+        whole: the flight.
+        rows: of it that are shown.
+        folder: for the files.
+        kinds: of films, ``gif`` and ``mp4``.
+        view: show the flight in a window instead.
+    """
+    from ..envs.captions import Caption
+    from ..envs.drawing import Viewer
+    from ..envs.replay import arrow_scales, drawn_arm, pictures
+    from ..envs.video import FPS
+    from .filming import SIZE, films, written
+
     part = whole.part(rows)
     arm = drawn_arm(part, model)
     scales, larger = arrow_scales(part, arm), arm / model.arm_l
@@ -103,8 +104,8 @@ def draw_film(
         speed = np.linalg.norm(part.position[k] - part.position[before])
         speed /= max(part.t[k] - part.t[before], 1e-6)
         return Caption(
-            f"{log.name}: {model.name}",
-            float(part.t[k] - log.t[0]),
+            title,
+            float(part.t[k] - whole.t[0]),
             part.force[k],
             float(part.torque[k, 2]),
             None if force is None else force[k],
@@ -132,4 +133,4 @@ def draw_film(
                 progress(min(1.0, (count + 1) / total))
     finally:
         viewer.close()
-    return [*made, *written(folder, "film", list(kinds), "png")]
+    return written(folder, "film", list(kinds), "png")

@@ -100,7 +100,7 @@ def gate_of(gate: float | None) -> float | None:
     return gate or None
 
 
-def film_kinds(view: bool, video: bool, gif: bool, gif_option: str) -> list[str]:
+def film_kinds(view: bool, video: bool, gif: bool) -> list[str]:
     """Return the kinds of films that are wanted, ``mp4`` and ``gif``.
 
     Raises:
@@ -109,9 +109,17 @@ def film_kinds(view: bool, video: bool, gif: bool, gif_option: str) -> list[str]
     kinds = [kind for kind, wanted in (("mp4", video), ("gif", gif)) if wanted]
     if view and kinds:
         raise InputError(
-            f"--view shows the flight in a window; expected it without --video and {gif_option}"
+            "--view shows the flight in a window; expected it without --video and --gif"
         )
     return kinds
+
+
+def result_file(out: Path, usual: str, endings: Sequence[str] = ()) -> Path:
+    """Return the main result's file: ``--out`` itself where it has one of the ``endings``, or any
+    where none is given; else that of the ``usual`` name in the folder that ``--out`` names.
+    """
+    named = out.suffix in endings if endings else out.suffix
+    return out if named and not out.is_dir() else out / usual
 
 
 def results_folder(out: Path, **plan: object) -> Path:
@@ -191,11 +199,32 @@ def note(text: str) -> None:
 
 
 def show_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table."""
-    table = Table(*header, box=box.SIMPLE_HEAD)
-    for row in rows:
-        table.add_row(*row)
-    console.print(table)
+    """Print a table, no word of which is cut: what is too wide for the terminal is folded at
+    spaces, and columns that do not fit even so follow below, beside the first column again.
+    """
+    columns = list(zip(header, *rows, strict=True))
+    full = [max(map(len, column)) for column in columns]
+    least = [max(len(w) for text in column for w in (text.split() or [""])) for column in columns]
+    shown = [0]
+    for i in range(1, len(columns) + 1):
+        if i < len(columns) and _width(least[k] for k in (*shown, i)) <= console.width:
+            shown.append(i)
+            continue
+        widths = {k: full[k] for k in shown}
+        while _width(widths.values()) > max(console.width, _width([1] * len(shown))):
+            widths[max(shown, key=lambda k: (widths[k] > 1, widths[k] - least[k]))] -= 1
+        table = Table(box=box.SIMPLE_HEAD)
+        for k, width in widths.items():
+            table.add_column(columns[k][0], width=width, overflow="fold")
+        for row in zip(*(columns[k][1:] for k in shown), strict=True):
+            table.add_row(*row)
+        console.print(table)
+        shown = [0, i]
+
+
+def _width(columns: Iterable[int]) -> int:
+    """Return the characters across a table whose columns have so many."""
+    return 1 + sum(width + 3 for width in columns)
 
 
 def say(*paths: Path) -> None:

@@ -6,8 +6,8 @@ import yaml
 
 from ..estimator.tuning import PERIOD, UKFTuning
 from ..runtime.errors import InputError, unknown_name
+from ..runtime.page_files import write_text
 from ..runtime.plain_values import plain
-from ..runtime.whole_files import replaced
 from ..runtime.yaml_file import read_yaml
 
 
@@ -17,10 +17,8 @@ def save_tuning(tuning: UKFTuning, period: float, path: Path) -> None:
     Raises:
         InputError: the file cannot be written.
     """
-    with replaced(path) as partial:
-        data = plain(tuning.scaled(period, PERIOD))
-        text = yaml.safe_dump(data, sort_keys=False, default_flow_style=None)
-        partial.write_text(text, encoding="utf-8")
+    data = plain(tuning.scaled(period, PERIOD), 9)
+    write_text(yaml.safe_dump(data, sort_keys=False, default_flow_style=None), path)
 
 
 def load_tuning(path: Path, period: float = PERIOD) -> UKFTuning:

@@ -20,3 +20,7 @@ __all__ = [
     "Tracker",
     "make_controller",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

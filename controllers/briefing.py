@@ -2,6 +2,8 @@
 kind of fan, and for those that say so, how the fan is known to move.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 from typing import Any, Self
 

@@ -1,5 +1,7 @@
 """What a learned policy sees: scaled quantities of an observation, over the last few decisions."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -6,7 +6,7 @@ from typing import Any
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.python_file import import_file
 
-_WHAT = "a Python file with a class whose objects have reset() and __call__(observation, info)"
+_WHAT = "a Python file with a class whose objects have __call__(observation, info)"
 
 
 def is_file_name(name: str) -> bool:
@@ -29,7 +29,6 @@ def load_controller(name: str) -> Any:
         for key, value in vars(module).items()
         if inspect.isclass(value)
         and value.__module__ == module.__name__
-        and callable(getattr(value, "reset", None))
         and any("__call__" in vars(base) for base in value.__mro__)
     }
     if not known:
@@ -40,6 +39,8 @@ def load_controller(name: str) -> Any:
             f"{path}:{next(iter(known))}"
         )
     if wanted and wanted not in known:
+        if wanted in vars(module):
+            raise InputError(f"{path}: {wanted} is no controller; expected {_WHAT}")
         raise unknown_name("controller", wanted, known, path)
     try:
         return known[wanted or next(iter(known))]()

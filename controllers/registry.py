@@ -28,7 +28,7 @@ class Controller(Protocol):
     truth.
 
     One that also has ``brief(briefing)`` is told what its vehicle, its sensors and the fan are
-    (``controllers.briefing.Briefing``) before ``reset``.
+    (``controllers.briefing.Briefing``) before ``reset``, which one without a memory may lack.
     """
 
     def reset(self) -> None:

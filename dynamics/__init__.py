@@ -16,3 +16,7 @@ __all__ = [
     "preset_names",
     "save_vehicle",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

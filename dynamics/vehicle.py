@@ -6,6 +6,8 @@ Rotor geometry, mixing and its inverse are equations (1) and (8)-(10) of McKinno
 IROS 2016.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -306,6 +308,6 @@ class Vehicle:
         """Return the rotor speeds (N, 4) in rad/s whose thrust is ``commanded_thrust``."""
         return np.sqrt(self.commanded_thrust(command, voltage) / self.k)
 
-    def with_effects(self, *effects: EffectSetting) -> "Vehicle":
+    def with_effects(self, *effects: EffectSetting) -> Vehicle:
         """Return this vehicle with exactly these effects in its model."""
         return replace(self, effects=tuple(effects))

@@ -1,18 +1,24 @@
 """Vehicles as YAML files: the presets in ``vehicles/`` and a user's own."""
 
+import math
+from collections.abc import Mapping
+from dataclasses import fields
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
 
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.forms import checked
+from ..runtime.page_files import write_text
 from ..runtime.plain_values import plain
-from ..runtime.whole_files import replaced
 from ..runtime.yaml_file import parse_yaml, read_yaml
 from .effects import check_setting
-from .vehicle import Vehicle
+from .vehicle import _SPIN, Vehicle
+
+Deviations = Mapping[str, Mapping[str, float]]  # of coefficients, by effect
 
 
 def preset_names() -> list[str]:
@@ -76,18 +82,63 @@ def _vehicle(data: object, where: str) -> Vehicle:
     return vehicle.with_effects(*(check_setting(effect, where) for effect in vehicle.effects))
 
 
-def dump_vehicle(vehicle: Vehicle) -> str:
-    """Return the YAML text of a vehicle: ``parse_vehicle`` of it gives the vehicle again."""
-    data = {key: value for key, value in plain(vehicle).items() if value is not None}
-    return yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
+def dump_vehicle(vehicle: Vehicle, std: Deviations | None = None) -> str:
+    """Return the YAML text of a vehicle, without fields at their defaults: ``parse_vehicle`` of it
+    gives the vehicle again.
+
+    Args:
+        vehicle: what is written.
+        std: of a vehicle that was measured, the standard deviations of its effects' coefficients.
+            They stand beside the coefficients, and every number has two digits more than what is
+            known of it, six significant ones where nothing is. A coefficient that is zero within
+            its error is written too: one that a file does not state is fixed at zero.
+    """
+    data = plain(vehicle)
+    if not np.any(vehicle.inertia - np.diag(np.diag(vehicle.inertia))):
+        data["inertia"] = np.diag(vehicle.inertia).tolist()
+    if std is not None:
+        shares = vehicle.uncertainty
+        known = {name: getattr(shares, name) for name in ("mass", "inertia", "arm_l")}
+        known["k"] = math.hypot(shares.thrust, shares.rotor)
+        known["p"] = math.hypot(shares.thrust, shares.torque)
+        known["uncertainty"] = 0.5
+        data = {key: _rounded(value, known.get(key, 0.0)) for key, value in data.items()}
+        for effect in data["effects"]:
+            deviations = std.get(effect["name"], {})
+            for name, value in effect["coefficients"].items():
+                effect["coefficients"][name] = _rounded(value, 0.0, deviations.get(name, 0.0))
+    usual = {f.name: plain(f.default) for f in fields(Vehicle)}
+    usual |= {"com": [0.0] * 3, "spin": plain(_SPIN)}
+    stated = {k: x for k, x in data.items() if x is not None and (k not in usual or x != usual[k])}
+    lines, effect = [], ""
+    for line in yaml.safe_dump(stated, sort_keys=False, allow_unicode=True).splitlines():
+        name, _, value = line.strip().partition(": ")
+        effect = value if name == "- name" else effect
+        deviation = (std or {}).get(effect, {}).get(name, 0.0) if line.startswith("    ") else 0.0
+        lines.append(line + (f"  # ± {deviation:.2g}" if deviation > 0.0 else ""))
+    return "\n".join(lines) + "\n"
 
 
-def save_vehicle(vehicle: Vehicle, path: str | Path) -> None:
-    """Write a vehicle to a YAML file, whole or not at all: ``load_vehicle`` of it gives the vehicle
-    again.
+def _rounded(value: Any, share: float, deviation: float = 0.0) -> Any:
+    """Return numbers, in lists and mappings too, with two digits more than a standard deviation, or
+    one that is a share of each; where there is neither, with six significant digits.
+    """
+    if isinstance(value, dict):
+        return {key: _rounded(item, share, deviation) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_rounded(item, share, deviation) for item in value]
+    if not isinstance(value, float):
+        return value
+    deviation = deviation or share * abs(value)
+    if not 0.0 < deviation < math.inf:
+        return float(f"{value:.6g}")
+    return round(value, 2 - math.floor(math.log10(deviation)))
+
+
+def save_vehicle(vehicle: Vehicle, path: str | Path, std: Deviations | None = None) -> None:
+    """Write a vehicle to a YAML file, whole or not at all; ``std`` as ``dump_vehicle`` takes it.
 
     Raises:
         InputError: the file cannot be written.
     """
-    with replaced(Path(path)) as partial:
-        partial.write_text(dump_vehicle(vehicle), encoding="utf-8")
+    write_text(dump_vehicle(vehicle, std), Path(path))

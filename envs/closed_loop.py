@@ -14,6 +14,8 @@ A tick takes 5 ms and is a pipeline of named stages, ``STAGES``:
 A user's own ``Stage`` stands before one of them.
 """
 
+from __future__ import annotations
+
 import ctypes
 import math
 from collections.abc import Callable, Sequence
@@ -136,7 +138,7 @@ class Stage:
     """
 
     name: str
-    run: Callable[["ClosedLoop"], object]
+    run: Callable[[ClosedLoop], object]
     before: str
 
     def __post_init__(self) -> None:
@@ -312,15 +314,15 @@ def is_healthy(state: Array, qvel: Array) -> bool:
     return healthy
 
 
-def _compiled_stage(function: Callable[..., None]) -> Callable[["ClosedLoop"], None]:
-    def run(loop: "ClosedLoop") -> None:
+def _compiled_stage(function: Callable[..., None]) -> Callable[[ClosedLoop], None]:
+    def run(loop: ClosedLoop) -> None:
         function(loop.record, loop.world, loop.fan_path, loop.noise, loop.row)
 
     return run
 
 
 # the kit's own stages, in their order
-STAGES: dict[str, Callable[["ClosedLoop"], object]] = {
+STAGES: dict[str, Callable[[ClosedLoop], object]] = {
     "wind": lambda loop: loop.blow(),
     "sense": _compiled_stage(_sense),
     "estimate": _compiled_stage(_estimate),
@@ -448,7 +450,7 @@ class ClosedLoop:
         self._is_healthy = specialised(is_healthy, self.state, self.world.qvel)
 
     @staticmethod
-    def _pipeline(own: Sequence[Stage]) -> dict[str, Callable[["ClosedLoop"], object]]:
+    def _pipeline(own: Sequence[Stage]) -> dict[str, Callable[[ClosedLoop], object]]:
         """Return the stages of a tick by their names, in the order in which they run."""
         stages = {}
         for name, run in STAGES.items():

@@ -1,5 +1,7 @@
 """The fan-tracking environment."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from dataclasses import replace

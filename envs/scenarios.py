@@ -1,14 +1,48 @@
-"""The scenarios of the fan-tracking task, as data."""
+"""The scenarios of the fan-tracking task, as data, and those of a user's own as YAML files."""
+
+from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, Field
 
+from ..dynamics.vehicle import NotNegative
 from ..runtime.errors import unknown_name
+from ..runtime.forms import STRICT, Positive, checked, expected
+from ..runtime.yaml_file import read_yaml
 
 Array = NDArray[np.float64]
+AnyScenario = TypeVar("AnyScenario")
+
+
+def _ordered(value: tuple[float, float]) -> tuple[float, float]:
+    if not value[0] <= value[1]:
+        raise ValueError("falls")
+    return value
+
+
+# what a scenario's file may state
+Range = Annotated[
+    tuple[NotNegative, NotNegative],
+    AfterValidator(_ordered),
+    expected("two numbers that are not negative, the lower one first"),
+]
+Factors = Annotated[
+    tuple[Positive, Positive],
+    AfterValidator(_ordered),
+    expected("two positive numbers, the lower one first"),
+]
+Motions = Annotated[
+    tuple[Literal["sine", "triangle", "ramp", "still"], ...],
+    Field(min_length=1),
+    expected("a list of one or more of sine, triangle, ramp and still"),
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,11 +51,13 @@ class Drawn:
     ``PlantSettings`` say, in their units; None: as these say.
     """
 
-    actuator_delay: tuple[float, float] | None = None
-    pose_delay: tuple[float, float] | None = None
-    imu_delay: tuple[float, float] | None = None
-    dropout: tuple[float, float] | None = None
-    dropout_burst: tuple[float, float] | None = None
+    __pydantic_config__ = STRICT
+
+    actuator_delay: Range | None = None
+    pose_delay: Range | None = None
+    imu_delay: Range | None = None
+    dropout: Range | None = None
+    dropout_burst: Range | None = None
 
     def draw(self, rng: np.random.Generator) -> dict[str, float]:
         """Return one value of each field by its name, uniform, in the order of the fields."""
@@ -37,27 +73,29 @@ class Variation(Drawn):
     ``Scenario(..., varied=True, variation=Variation(mass=(0.8, 1.2)))``.
     """
 
-    distance: tuple[float, float] = (2.0, 2.7)  # m, from the fan
+    distance: Factors = (2.0, 2.7)  # m, from the fan
     # factors on what fan, plant and vehicle state
-    fan_speed: tuple[float, float] = (0.85, 1.25)
-    rotor_drag: tuple[float, float] = (0.8, 1.2)
-    hull_area: tuple[float, float] = (0.8, 1.2)
-    mass: tuple[float, float] = (0.93, 1.07)  # of the true vehicle; the filter keeps the declared
-    inertia: tuple[float, float] = (0.9, 1.1)
+    fan_speed: Factors = (0.85, 1.25)
+    rotor_drag: Range = (0.8, 1.2)
+    hull_area: Range = (0.8, 1.2)
+    mass: Factors = (0.93, 1.07)  # of the true vehicle; the filter keeps the declared
+    inertia: Factors = (0.9, 1.1)
 
 
 @dataclass(frozen=True)
 class Scenario:
     """How the fan moves, where the vehicle starts, and what it measures with."""
 
-    summary: str
-    motions: tuple[str, ...] = ("sine", "triangle", "ramp", "still")
-    speed: tuple[float, float] = (0.05, 0.35)  # m/s, largest speed of the fan
-    offset: tuple[float, float] = (0.0, 0.1)  # m, from the fan's axis at the start, either side
-    rise_time: float = 0.45  # s, of the filter
-    sigma_position: float = 0.001  # m
-    sigma_attitude: float = 0.005  # rad
-    turbulence: float = 0.10
+    __pydantic_config__ = STRICT
+
+    summary: str = ""
+    motions: Motions = ("sine", "triangle", "ramp", "still")
+    speed: Range = (0.05, 0.35)  # m/s, largest speed of the fan
+    offset: Range = (0.0, 0.1)  # m, from the fan's axis at the start, either side
+    rise_time: Positive = 0.45  # s, of the filter
+    sigma_position: Positive = 0.001  # m
+    sigma_attitude: Positive = 0.005  # rad
+    turbulence: NotNegative = 0.10
     varied: bool = False  # fan strength, distance and vehicle drawn anew each episode,
     variation: Variation = Variation()  # from this distribution
 
@@ -82,15 +120,20 @@ SCENARIOS: dict[str, Scenario] = {
 }
 
 
-def get_scenario(name: str) -> Scenario:
-    """Return a scenario by its name.
+def find_scenario(name: str, known: Mapping[str, AnyScenario]) -> AnyScenario:
+    """Return a scenario by its name, or that of a YAML file, whose fields are those of the known
+    ones and keep their defaults where the file states nothing.
 
     Raises:
-        InputError: no scenario has this name.
+        InputError: no scenario has this name; no such file; or a field of it that is unknown,
+            malformed or out of range.
     """
-    if name not in SCENARIOS:
-        raise unknown_name("scenario", name, SCENARIOS)
-    return SCENARIOS[name]
+    if name.endswith((".yaml", ".yml")):
+        form = type(next(iter(known.values())))
+        return checked(form, read_yaml(Path(name), "a scenario file"), name)
+    if name not in known:
+        raise unknown_name("scenario", name, known)
+    return known[name]
 
 
 def draw_fan_path(

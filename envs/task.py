@@ -28,7 +28,7 @@ from .fan import Fan
 from .normals import draw_normals, generator_list
 from .observing import Episodes, Motion, View
 from .plant import TICK, PlantSettings
-from .scenarios import Drawn
+from .scenarios import Drawn, find_scenario
 
 Frame = NDArray[np.float32]
 
@@ -69,7 +69,7 @@ class Task(gym.Env[Frame, Frame], ABC):
     """A quadrotor in closed loop, whose agent commands the flight loop.
 
     Args:
-        scenario: a name, or a scenario of the task's kind.
+        scenario: a name, a YAML path, or a scenario of the task's kind.
         render_mode: ``"human"`` (needs a display), ``"rgb_array"`` or None.
         vehicle: what filter and flight loop know: preset, YAML path or ``Vehicle``.
         effects: of the true vehicle, which nobody declared.
@@ -133,9 +133,7 @@ class Task(gym.Env[Frame, Frame], ABC):
         if estimator not in ESTIMATORS:
             raise unknown_name("estimator", estimator, ESTIMATORS)
         if isinstance(scenario, str):
-            if scenario not in self.scenarios:
-                raise unknown_name("scenario", scenario, self.scenarios)
-            scenario = self.scenarios[scenario]
+            scenario = find_scenario(scenario, self.scenarios)
         self.scenario = scenario
         self.vehicle = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle)
         # a declared vehicle whose model was amended must not bring its effects into the world a

@@ -1,13 +1,18 @@
 """The scenarios of the tasks in the wind, as data, and the winds that are drawn from them."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from ..dynamics.motion import Array
+from ..dynamics.vehicle import NotNegative
+from ..runtime.forms import STRICT, Positive
 from .references import figure_of_eight, hold, random_spline
-from .scenarios import Drawn
+from .scenarios import Drawn, Factors, Range
 from .wind import (
     CompiledWind,
     FanWall,
@@ -20,8 +25,6 @@ from .wind import (
 )
 from .wind.jets import TABLE_PERIOD
 
-Range = tuple[float, float]
-
 
 @dataclass(frozen=True)
 class WindVariation(Drawn):
@@ -29,8 +32,8 @@ class WindVariation(Drawn):
     state.
     """
 
-    mass: Range = (0.93, 1.07)  # of the true vehicle; filter and flight loop keep the declared
-    inertia: Range = (0.9, 1.1)
+    mass: Factors = (0.93, 1.07)  # of the true vehicle; filter and flight loop keep the declared
+    inertia: Factors = (0.9, 1.1)
     rotor_drag: Range = (0.8, 1.2)
     hull_area: Range = (0.8, 1.2)
 
@@ -39,18 +42,20 @@ class WindVariation(Drawn):
 class WindScenario:
     """What blows, and what is measured with. A range is drawn from evenly, once an episode."""
 
-    summary: str
+    __pydantic_config__ = STRICT
+
+    summary: str = ""
     mean: Range = (0.0, 0.0)  # m/s at the vehicle's height, from any side; sheared by the log law
     # "", or the spectrum of turbulence with the strengths and lengths of MIL-F-8785C near the
     # ground in the mean wind, times ``strength``
-    turbulence: str = ""
-    strength: float = 1.0
+    turbulence: Literal["", "dryden", "von-karman"] = ""
+    strength: NotNegative = 1.0
     gusts: Range = (0.0, 0.0)  # m/s, of gusts 1 - cos of 1-3 m that pass every 3-6 s
     wall: Range = (0.0, 0.0)  # m/s, jets of a wall of 3 x 3 fans that switch by themselves
     wash: bool = False  # another vehicle crosses 1.0-1.6 m above, to and fro
-    rise_time: float = 0.45  # s, of the filter
-    sigma_position: float = 0.001  # m
-    sigma_attitude: float = 0.005  # rad
+    rise_time: Positive = 0.45  # s, of the filter
+    sigma_position: Positive = 0.001  # m
+    sigma_attitude: Positive = 0.005  # rad
     varied: bool = False
     variation: WindVariation = WindVariation()
 

@@ -27,3 +27,7 @@ __all__ = [
     "WrenchUKFBatch",
     "fit_noise",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,5 +1,7 @@
 """What every estimator of this kit returns."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np
@@ -54,7 +56,7 @@ class WrenchEstimate:
             f"{in_brackets(self.torque)} Nm, NIS {self.nis:.3g}>"
         )
 
-    def at(self, i: int) -> "WrenchEstimate":
+    def at(self, i: int) -> WrenchEstimate:
         """Return the estimate at place ``i`` of the axis in front."""
         return WrenchEstimate(self.numbers[i], None if self._std is None else self._std[i])
 

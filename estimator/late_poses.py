@@ -11,6 +11,8 @@ All that a step changes is taken back with it: state, covariance, what effects s
 latency remember, and what the filter keeps count of (refusals and restarts of its gate).
 """
 
+from __future__ import annotations
+
 import math
 from bisect import bisect_right
 from dataclasses import dataclass

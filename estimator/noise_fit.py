@@ -12,6 +12,8 @@ White noise often is not: below some size it changes nothing, and then it stays 
 comes to rest on its bound.
 """
 
+from __future__ import annotations
+
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -236,7 +238,7 @@ def _numbers(tuning: UKFTuning) -> Array:
     )
 
 
-def _starts(flight: "_Flight") -> list[UKFTuning]:
+def _starts(flight: _Flight) -> list[UKFTuning]:
     """Return the given tuning, and what it is with other walks and less white noise."""
     tunings = []
     for rise in flight.use.rise_times:
@@ -269,7 +271,7 @@ def _bounds(vehicle: Vehicle, period: float, use: NoiseFitSettings) -> Array:
     return np.array([bounds[name] for name, _ in _PARAMETERS])
 
 
-def _excerpts(flight: "_Flight") -> list[Piece]:
+def _excerpts(flight: _Flight) -> list[Piece]:
     """Return excerpts of a long flight, spread evenly over it."""
     use, t = flight.use, flight.columns[0]
     count = max(2, round(use.rows * flight.period / use.excerpt))

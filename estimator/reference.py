@@ -8,6 +8,8 @@ States are rows (..., 19): quaternion, then the parts of the error state (rho, o
 force) behind rho, in their order.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 
 import numpy as np

@@ -2,6 +2,8 @@
 way out.
 """
 
+from __future__ import annotations
+
 import math
 
 import numpy as np
@@ -31,7 +33,7 @@ class Sample:
         view = memoryview(self.z)  # type: ignore[arg-type]
         self._speeds, self._position, self._quaternion = view[0:4], view[4:7], view[7:11]
 
-    def __reduce__(self) -> tuple[type["Sample"], tuple[Array]]:
+    def __reduce__(self) -> tuple[type[Sample], tuple[Array]]:
         return Sample, (self.z,)
 
     def read(

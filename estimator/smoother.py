@@ -5,6 +5,8 @@ so only a block of steps is in memory at a time: the filter's memory is kept at 
 block, and the block is run again, to the same bits, on the way back.
 """
 
+from __future__ import annotations
+
 import math
 import struct
 

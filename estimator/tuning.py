@@ -1,5 +1,7 @@
 """How much the filter trusts its model and its measurements."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -83,7 +85,7 @@ class UKFTuning:
     @classmethod
     def for_vehicle(
         cls, vehicle: Vehicle, period: float = PERIOD, rise_time: float = 1.0
-    ) -> "UKFTuning":
+    ) -> UKFTuning:
         """Return the default tuning scaled to a vehicle's weight and size, its motion capture and
         the period in s.
 
@@ -100,7 +102,7 @@ class UKFTuning:
             attitude_noise=vehicle.mocap.sigma_att_rad,
         ).scaled(PERIOD, period)
 
-    def scaled(self, period: float, to: float) -> "UKFTuning":
+    def scaled(self, period: float, to: float) -> UKFTuning:
         """Return the same tuning of steps of ``to`` s, stated for steps of ``period`` s: white
         noise averages, a walk grows.
         """

@@ -14,6 +14,8 @@ McKinnon and Schoellig, *Unscented External Force and Torque Estimation for Quad
   update.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from copy import deepcopy

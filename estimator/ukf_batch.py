@@ -5,6 +5,8 @@ Filters of one vehicle without effects stand side by side in the lanes of a vect
 stepped one after the other in a compiled loop.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 

@@ -4,7 +4,8 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 
 from ..controllers.registry import STANDARD_TASK
-from ..runtime.errors import InputError, unknown_name
+from ..envs.scenarios import find_scenario
+from ..runtime.errors import InputError
 from ..runtime.workers import every
 from .episodes import Episode, benchmark_seeds, fly_episode
 from .tasks import TASKS, make_environment, make_pilot, task_of
@@ -36,8 +37,7 @@ def check_request(
     for name in controllers:
         make_pilot(name, task)
     for name in scenarios:
-        if name not in known.scenarios:
-            raise unknown_name("scenario", name, known.scenarios)
+        find_scenario(name, known.environment.scenarios)
 
 
 def count_flights(
@@ -61,7 +61,7 @@ def fly_all(
 
     Args:
         controllers: names, of trained policies too, or their paths, or FILE.py:CLASS.
-        scenarios: names.
+        scenarios: names, or paths of YAML files.
         episodes: a scenario.
         seed: of the benchmark.
         jobs: processes; default: one a core. The results do not depend on it.

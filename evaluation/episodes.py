@@ -84,8 +84,9 @@ def fly_episode(
 
     Args:
         env: the environment.
-        controller: called with ``observation`` and ``info``. Its ``brief``, where it has one, is
-            called first, with ``briefing_of(env)``; its ``foresight`` is how many
+        controller: called with ``observation`` and ``info``. Its ``brief`` and its ``reset``,
+            where it has them, are called first, the former with ``briefing_of(env)``; its
+            ``foresight`` is how many
             decisions ahead it sees wind or fan.
         seed: of the episode.
         each: called with the ``info`` of every decision.
@@ -94,10 +95,10 @@ def fly_episode(
     if hasattr(env.unwrapped, "foresight"):
         env.unwrapped.foresight = getattr(controller, "foresight", 0)
     observation, info = env.reset(seed=seed)
-    brief = getattr(controller, "brief", None)
-    if brief is not None:
-        brief(briefing_of(env))
-    controller.reset()
+    if hasattr(controller, "brief"):
+        controller.brief(briefing_of(env))
+    if hasattr(controller, "reset"):
+        controller.reset()
     loop, rows, observations, total = loop_of(env), [], [], 0.0
     for _ in range(decisions):
         action = controller(observation, info)

@@ -6,6 +6,8 @@ The definitions are those of Agarwal, Schwarzer, Castro, Courville and Bellemare
 reinforcement learning at the edge of the statistical precipice*, NeurIPS 2021.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any
 

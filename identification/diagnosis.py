@@ -6,6 +6,8 @@ balance does (``force_verdict``). Effects and coefficients are chosen on the fit
 flight; the errors before and after are those of blocks, or logs, that the fit never saw.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 

@@ -7,6 +7,8 @@ later. ``nis_without_wrench_state`` is what a filter would see that has nothing 
 explain the motion with.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,5 +1,7 @@
 """The external wrench over a flight log: the wrench filter run from its first row to its last."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -308,9 +310,9 @@ def _take_in_imu(ukf: WrenchUKF, log: FlightLog, k: int) -> None:
         ukf.correct_imu(gyro, accelerometer)
 
 
-def write_wrench(series: WrenchSeries, out_dir: str | Path) -> Path:
-    """Write ``wrench.csv`` (t, force, torque, their standard deviations, nis, and status: 0
-    tracking, 1 coasting, 2 rejected, 3 restarted) into a folder and return its path.
+def write_wrench(series: WrenchSeries, path: Path) -> None:
+    """Write a CSV file: t, force, torque, their standard deviations, nis, and status (0 tracking, 1
+    coasting, 2 rejected, 3 restarted).
 
     Raises:
         InputError: the file cannot be written.
@@ -323,9 +325,7 @@ def write_wrench(series: WrenchSeries, out_dir: str | Path) -> Path:
         columns |= {f"{name}{axis}": wrench[:, i] for i, axis in enumerate("xyz")}
     columns["nis"] = series.nis
     columns["status"] = series.numbers[:, STATUS]
-    path = Path(out_dir) / "wrench.csv"
     write_csv(columns, path)
-    return path
 
 
 def truth_rmse(series: WrenchSeries, log: FlightLog) -> tuple[Array, Array] | None:

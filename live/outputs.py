@@ -27,7 +27,9 @@ def as_fields(output: Output) -> dict[str, Any]:
 
 def as_line(output: Output) -> str:
     """Return an estimate as a line of ``wrench.csv``."""
-    return ",".join(map(repr, [*_values(output), float(output.estimate.status_code)])) + "\n"
+    t, *values = _values(output)
+    numbers = (f"{x:.9g}" for x in [*values, output.estimate.status_code])
+    return ",".join([repr(t), *numbers]) + "\n"
 
 
 class Lines(Sink[Output]):

@@ -143,7 +143,8 @@ class WebView:
                 over = self._over.is_set()
                 points = ",".join(text for t, text in self._points if t > last)
                 last, missed = self._points[-1][0] if self._points else last, 0
-                head = json.dumps({**first, "over": over})[1:-1]
+                ended = (self._session.ended or "the stream ended") if over else ""
+                head = json.dumps({**first, "over": ended})[1:-1]
                 writer.write(f'data: {{{head},{self._state},"points":[{points}]}}\n\n'.encode())
                 first = {}
                 if over:

@@ -7,3 +7,7 @@ NAMES = ("fig3", "fig4", "fig5", "fig6", "fig7")
 KEPT = ("extension",)
 
 __all__ = ["KEPT", "NAMES", "NonlinearObserver", "ObserverTuning"]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -22,6 +22,8 @@ filter: the vehicle's own manoeuvres cancel. Both filters are discretised exactl
 straight line between samples, u as constant over a step): any cutoff at any period is stable.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, fields
 

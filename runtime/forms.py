@@ -5,7 +5,7 @@ pydantic; an error is one line that names the file, the field and what was expec
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
-from typing import Annotated, Any, TypeVar, cast, get_args
+from typing import Annotated, Any, TypeVar, cast, get_args, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -172,8 +172,8 @@ def _form_at(form: Any, location: Any) -> Any:
     """Return the form of the section at a location within another."""
     for part in location:
         if isinstance(part, str):
-            kinds = [field.type for field in fields(form) if field.name == part]
-            form = next((one for kind in kinds for one in _parts(kind) if is_dataclass(one)), form)
+            kind = get_type_hints(form, include_extras=True).get(part)
+            form = next((one for one in _parts(kind) if is_dataclass(one)), form)
     return form
 
 

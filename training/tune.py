@@ -9,6 +9,7 @@ import numpy as np
 import yaml
 
 from ..controllers.registry import STANDARD_TASK
+from ..envs.scenarios import find_scenario
 from ..evaluation.episodes import fly_episode
 from ..evaluation.tasks import TASKS, make_environment, task_of
 from ..runtime.errors import InputError, unknown_name
@@ -31,13 +32,13 @@ def check_request(task: str, law: str, scenario: str, trials: int, episodes: int
     Raises:
         InputError: an unknown task, law or scenario, no trials, or too many episodes.
     """
-    known = task_of(task)
+    environment = task_of(task).environment
     if law not in RANGES[task]:
         raise unknown_name("law", law, RANGES[task])
     if task == STANDARD_TASK:
         check_training_env(scenario)
-    elif scenario not in known.scenarios:
-        raise unknown_name("scenario", scenario, known.scenarios)
+    else:
+        find_scenario(scenario, environment.scenarios)
     if trials < 1:
         raise InputError(f"tune: trials must be at least 1, got {trials}")
     validation_seeds(episodes)

@@ -43,6 +43,11 @@ __all__ = [
     "playing",
 ]
 
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 _FOLDERS = "WINDWRENCH_EFFECTS"
 _NOT_EFFECTS = {"__init__", "__main__", "base", "call", "declaration", "parts", "vanishing"}
 

@@ -3,6 +3,8 @@
 Both ask for the wind at points of the world in m, z up, and take m/s, as these winds do.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any
 

@@ -1,5 +1,7 @@
 """What a wind is, and how a flight evaluates one."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
@@ -99,7 +101,7 @@ class CompiledWind:
         specialised(add_winds, self.calls, now, rows, out)(self.calls, now, rows, out)
         return np.ascontiguousarray(out.T)
 
-    def __add__(self, other: Wind) -> "Sum":
+    def __add__(self, other: Wind) -> Sum:
         return Sum(self, other)
 
 

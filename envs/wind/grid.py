@@ -6,6 +6,8 @@ same units and the variables ``u``, ``v``, ``w`` in any order of dimensions (nee
 without a time is steady.
 """
 
+from __future__ import annotations
+
 import io
 from pathlib import Path
 from typing import Any

@@ -5,6 +5,8 @@ add (Reichardt's hypothesis, which that jet follows, too): ``u^2 = sum u_i^2``; 
 draw in adds as velocity.
 """
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

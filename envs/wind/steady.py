@@ -1,5 +1,7 @@
 """Winds that have a formula: uniform, sheared with height, and single gusts."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -11,6 +11,8 @@ each component is drawn from a field of its own, whose spectrum along the mean w
 one. It is frozen (Taylor's hypothesis): a point sees ``u(x - U t)``.
 """
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

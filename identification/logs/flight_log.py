@@ -24,6 +24,8 @@ pose has rows of its own. Other columns are ignored. The name of the vehicle sta
 numbers still reads one.
 """  # noqa: E501
 
+from __future__ import annotations
+
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

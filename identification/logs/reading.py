@@ -1,5 +1,7 @@
 """Reading a flight log from a file: by its reader, or as a table by a map of its columns."""
 
+from __future__ import annotations
+
 import warnings
 from dataclasses import replace
 from inspect import signature

@@ -3,10 +3,11 @@ written whole or not at all.
 """
 
 import gzip
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from ...runtime.errors import InputError
+from ...runtime.page_files import write_text
 from ...runtime.whole_files import replaced
 from .array_table import open_arrays
 from .parquet_table import open_parquet, write_parquet
@@ -57,19 +58,21 @@ def write_table(columns: Mapping[str, Array], path: Path) -> None:
         temporary.write_bytes(gzip.compress(data, 6, mtime=0) if kind == ".csv.gz" else data)
 
 
-def write_csv(columns: Mapping[str, Array], path: Path, missing: str = "nan") -> None:
-    """Write columns (rows,) to a CSV file, with ``missing`` for NaN.
+def write_csv(columns: Mapping[str, Array], path: Path) -> None:
+    """Write columns (rows,) of results to a CSV file: numbers with nine significant digits, the
+    first column's, the time, exactly.
 
     Raises:
         InputError: the file cannot be written.
     """
-    with replaced(path) as temporary:
-        temporary.write_text(_csv_text(columns, missing), encoding="utf-8")
+    write_text(_csv_text(columns, "nan", "{:.9g}".format), path)
 
 
-def _csv_text(columns: Mapping[str, Array], missing: str = "") -> str:
+def _csv_text(
+    columns: Mapping[str, Array], missing: str = "", form: Callable[[float], str] = repr
+) -> str:
     texts = [
-        [missing if value != value else repr(value) for value in column.tolist()]
-        for column in columns.values()
+        [missing if x != x else form(x) if i else repr(x) for x in column.tolist()]
+        for i, column in enumerate(columns.values())
     ]
     return "\n".join([",".join(columns), *map(",".join, zip(*texts, strict=True))]) + "\n"

@@ -32,6 +32,9 @@ class NoiseSpectrumSettings:
     # power of 1/f by which the amplitude falls over the band. White noise has 0, cameras' poses and
     # onboard attitudes that were not filtered up to 1.0 (vibration), a first-order low-pass 1
     most_slope: float = 1.2
+    # more of it in rotor speeds: a rotor with a lag is a first-order low-pass itself, and what it
+    # turns at is no sensor's noise. Recordings of the presets have up to 1.9
+    of_rotors: float = 1.0
     # where the log is fast enough: level between these shares of half the sampling rate, over that
     # at the top of the band. White noise has 1; a first-order filter, as an estimator's own is, has
     # 2 there though its slope is no larger than a vibrating camera's
@@ -59,12 +62,14 @@ class ChannelNoise:
     @property
     def filtered(self) -> bool:
         """Whether it falls faster than an unfiltered sensor's noise does."""
-        return self.slope > NOISE_SPECTRUM.most_slope or (
+        most = NOISE_SPECTRUM.most_slope + (self.channel == ROTORS) * NOISE_SPECTRUM.of_rotors
+        return self.slope > most or (
             self.fall > NOISE_SPECTRUM.most_fall and self.channel in POSE_CHANNELS
         )
 
 
 POSE_CHANNELS = ("position", "attitude")
+ROTORS = "rotor speeds"
 
 
 def noise_spectra(log: FlightLog) -> list[ChannelNoise]:
@@ -94,7 +99,7 @@ def _channels(log: FlightLog) -> Iterator[tuple[str, list[Array], float]]:
         ("attitude", position),
         ("gyro", log.gyro),
         ("accelerometer", log.accelerometer),
-        ("rotor speeds", None if log.commanded else log.rotor_speeds),
+        (ROTORS, None if log.commanded else log.rotor_speeds),
     ):
         rows = np.flatnonzero(np.isfinite(x).all(axis=1)) if x is not None else np.zeros(0, int)
         if x is None or len(rows) <= NOISE_SPECTRUM.segment:

@@ -3,3 +3,7 @@
 from .files import report_data, report_schema, write_report
 
 __all__ = ["report_data", "report_schema", "write_report"]
+
+
+def __dir__() -> list[str]:
+    return __all__

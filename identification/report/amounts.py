@@ -11,10 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...dynamics import effects as library
 from ...dynamics.vehicle import Vehicle
 from ..findings import CHANNELS, Diagnosis, NamedEffect
-from .words import SPACE, in_words, with_std
+from .words import SPACE, coefficient_meaning, effect_summary, in_words, with_std
 
 _ROTORS = 4
 _SMALL = 0.5
@@ -62,19 +61,15 @@ class Amount:
 
 def title(name: str) -> str:
     """Return an effect's plain name: the words before the colon of what describes it."""
-    if name not in library.names():
-        return name
-    words = " ".join(library.model_in_words(name).split("\n\n")[0].split())
-    plain = words.split(":")[0] if ":" in words else name
-    return plain[:1].lower() + plain[1:]
+    plain, colon, _ = effect_summary(name).partition(":")
+    return plain[:1].lower() + plain[1:] if colon else name
 
 
 def amount(effect: NamedEffect, coefficient: str, vehicle: Vehicle) -> Amount:
     """Return what a coefficient of a named effect does to a vehicle as it is declared."""
     value, std = effect.coefficients[coefficient], effect.std.get(coefficient, 0.0)
     unit = effect.units.get(coefficient, "1")
-    known = library.get(effect.name).coefficients if effect.name in library.names() else ()
-    meaning = next((c.meaning for c in known if c.name == coefficient), "")
+    meaning = coefficient_meaning(effect.name, coefficient)
     factor, when = float(_ROTORS) if "per rotor" in meaning else 1.0, ""
     if unit.endswith("/(rad/s m/s)"):
         factor, unit, when = factor * vehicle.hover_rate, unit.split("/")[0], "at 1 m/s"

@@ -12,8 +12,8 @@ from typing import Any
 
 from ... import __version__
 from ...dynamics.vehicle_file import save_vehicle
+from ...runtime.page_files import write_text
 from ...runtime.plain_values import as_text, plain
-from ...runtime.whole_files import replaced
 from ..findings import Diagnosis, Errors, Probabilities
 from .headline import headline
 from .page import report_page
@@ -51,10 +51,9 @@ def write_report(
     data = json.dumps(report_data(diagnosis), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
     page = as_text(report_page(diagnosis, command))
     numbers, html, vehicle = folder / "report.json", folder / "report.html", folder / "vehicle.yaml"
-    save_vehicle(diagnosis.amended, vehicle)
-    for path, text in ((html, page), (numbers, data)):
-        with replaced(path) as partial:
-            partial.write_text(text, encoding="utf-8")
+    save_vehicle(diagnosis.amended, vehicle, {e.name: e.std for e in diagnosis.effects})
+    write_text(page, html)
+    write_text(data, numbers)
     return [numbers, html, vehicle]
 
 

@@ -98,7 +98,8 @@
     const piece_at = x => time.pieces.reduce((found, p, i) => p.x <= x + 1e-9 ? i : found, 0);
     const held_at = x => time.held.some(([a, b]) => a <= x && x <= b);
     const name_of = x => {
-      const i = piece_at(x), p = time.pieces[i], t = `t = ${(x - p.x + p.t).toFixed(2)} s`;
+      const i = piece_at(x), p = time.pieces[i], { min, max } = plots[0].u.scales.x;
+      const t = `t = ${(x - p.x + p.t).toFixed(Math.max(2, 3 - Math.floor(Math.log10(max - min))))} s`;
       return (time.pieces.length > 1 ? `piece ${i + 1}, ${t}` : t) + (held_at(x) ? ", held out" : "");
     };
     const shade = u => {
@@ -154,7 +155,8 @@
           (sum, row, i) => sum + row.reduce((s, v, j) => s + weight[i] * weight[j] * v, 0), 0), 0));
       };
       const idle = () => `rms ${shown(channel.rms, 2)} → ${shown(channel.chosen_rms(), 2)} ${channel.unit}`;
-      const say = (u, i) => `${name_of(u.data[0][i])}: before ${shown(u.data[1][i])}, after ${shown(u.data[2][i])} ${channel.unit}`;
+      /* the cursor's own time: samples that were kept differ from channel to channel */
+      const say = (u, i) => `${name_of(u.posToVal(u.cursor.left, "x"))}: before ${shown(u.data[1][i])}, after ${shown(u.data[2][i])} ${channel.unit}`;
       const line = name => ({ stroke: () => colour(name), width: 1.3, points: { show: false } });
       const plot = place(channel.key, HEIGHT.time, {
         scales: { x: { time: false }, y: { range: (u, low, high) => {

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _SHOWN_HZ = 8.0  # of the picture: what is faster is the pose's noise
+_LEAST_HZ = 0.4  # of the shares: what is slower holds the mean, such as the weight
 _SHOWN_SECONDS = 10.0
 
 
@@ -70,7 +71,16 @@ def write_identified(found: Identified, path: Path) -> tuple[Path, Path, Path]:
     Raises:
         InputError: a file cannot be written.
     """
-    save_vehicle(found.vehicle, path)
+    known = found.by_name
+    std = {
+        e.name: {
+            c: (estimate.high - estimate.low) / 3.92
+            for c in e.coefficients
+            if (estimate := known.get(f"{e.name} {c}", known.get(e.name)))
+        }
+        for e in found.vehicle.effects
+    }
+    save_vehicle(found.vehicle, path, std)
     data, picture = (path.with_name(f"{path.stem}.identify.{end}") for end in ("json", "png"))
     write_text(json.dumps(identified_data(found), indent=1) + "\n", data)
     write_png(_picture(found), picture)
@@ -79,7 +89,7 @@ def write_identified(found: Identified, path: Path) -> tuple[Path, Path, Path]:
 
 def fitted(found: Identified, piece: MotionPiece) -> tuple[Array, Array]:
     """Return measured and fitted specific force (m/s2) and angular acceleration (rad/s2), (n, 6)
-    each, of a piece; both through the picture's low-pass.
+    each, of a piece; both through the picture's low-pass, within the band that was used.
     """
     fit = found.fit
     rotors = rotor_columns(piece, fit.drive)
@@ -93,10 +103,26 @@ def fitted(found: Identified, piece: MotionPiece) -> tuple[Array, Array]:
     measured = piece.measured()
     if piece.specific_force is None:
         measured[:, :3] = np.nan
-    return (
-        low_pass(measured, _SHOWN_HZ, piece.period),
-        low_pass(model, _SHOWN_HZ, piece.period),
-    )
+    shown_hz = min(_SHOWN_HZ, fit.drive.band)
+    return low_pass(measured, shown_hz, piece.period), low_pass(model, shown_hz, piece.period)
+
+
+def explained(found: Identified) -> Array:
+    """Return the share (6,) of measured force and turning that the fit explains in the band that it
+    used: of the power, in which a frequency counts by how far it stands out of its noise; NaN where
+    nothing is measured.
+    """
+    fit = found.fit
+    names, values = fit.balance.names, fit.values
+    model = coefficients(values, names, fit.model.mass, fit.model.powers)
+    total, left = np.zeros((2, 6))
+    for s, spectrum in zip(fit.balance.segments, fit.spectra, strict=True):
+        inside = s.frequency >= _LEAST_HZ
+        measured = s.columns[:, inside, :6]
+        residual = measured - s.columns[:, inside, 6 : 6 + len(names)] @ model.T
+        for sum_, x in ((total, measured), (left, residual)):
+            sum_ += np.sum(np.abs(x) ** 2 / spectrum[inside], axis=(0, 1))
+    return np.clip(1.0 - left / np.where(total > 0.0, total, np.nan), 0.0, 1.0)
 
 
 def _picture(found: Identified) -> "Figure":
@@ -106,6 +132,7 @@ def _picture(found: Identified) -> "Figure":
     scale = np.concatenate([np.full(3, mass), inertia])
     longest = max(found.pieces, key=lambda p: len(p.t))
     measured, model = fitted(found, longest)
+    share, band = explained(found), found.fit.drive.band
     middle = longest.t[len(longest.t) // 2]
     shown = np.abs(longest.t - middle) <= 0.5 * _SHOWN_SECONDS
     figure = Figure(figsize=(11, 6), layout="constrained")
@@ -116,8 +143,13 @@ def _picture(found: Identified) -> "Figure":
             plot = axes[row, i]
             plot.plot(longest.t[shown], scale[j] * measured[shown, j], lw=1.4, label="measured")
             plot.plot(longest.t[shown], scale[j] * model[shown, j], lw=1.0, label="fitted")
-            left = np.std((measured - model)[:, j]) / max(float(np.std(measured[:, j])), 1e-12)
-            plot.set_title(f"{what} {axis} ({unit}), residual {100 * left:.0f} %", fontsize=9)
+            told = "not measured" if np.isnan(share[j]) else f"{share[j]:.0%} explained"
+            plot.set_title(f"{what} {axis} ({unit}), {told}", fontsize=9)
         axes[1, i].set_xlabel("time (s)")
     axes[0, 0].legend(fontsize=8)
+    figure.suptitle(
+        f"explained: of the power from {_LEAST_HZ:g} to {band:g} Hz, each frequency by its noise; "
+        f"drawn: up to {min(_SHOWN_HZ, band):g} Hz",
+        fontsize=9,
+    )
     return figure

@@ -13,7 +13,7 @@ import numpy as np
 from ...controllers import make_controller
 from ...envs.fan_tracking import DECISION_TICKS, FanTrackingEnv
 from ...envs.plant import NOISE, TICK
-from ...envs.scenarios import draw_fan_path, get_scenario
+from ...envs.scenarios import SCENARIOS, draw_fan_path, find_scenario
 from ...runtime.errors import InputError
 from ..messages import Array, Sample
 from .base import WAITS, Source
@@ -29,7 +29,7 @@ class Simulated(Source):
     kind, options = "sim", ("seed", "speed")
 
     def _prepare(self) -> None:
-        self._scenario = get_scenario(self.address.path or "base")
+        self._scenario = find_scenario(self.address.path or "base", SCENARIOS)
         self._speed = self.address.number("speed", 1.0)
         self.paced = self._speed == 1.0
         self.patience = 0.0 if self.paced else WAITS

@@ -124,7 +124,7 @@ def test_the_page_in_a_real_browser(watched, tmp_path):
     if BROWSER is None:
         pytest.skip("no browser is installed")
     with WebView(watched, 0) as view:
-        view._over.set()  # one event, and the page is done
+        threading.Timer(15.0, view._over.set).start()  # the page is done
         shown = subprocess.run(
             [
                 BROWSER, "--headless=new", "--no-sandbox", "--disable-gpu",
@@ -136,6 +136,7 @@ def test_the_page_in_a_real_browser(watched, tmp_path):
         )  # fmt: skip
     assert "sim:base?speed=0, ardrone2" in shown.stdout
     assert "rates: row" in shown.stdout
+    assert "finished: 2 s have passed" in shown.stdout
     assert not [line for line in shown.stderr.splitlines() if "CONSOLE" in line]
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.parameters import mostly_slow
+from windwrench.commands.terminal import console, show_table
 from windwrench.runtime.printable import printable
 
 pytestmark = pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux's devices")
@@ -56,6 +57,19 @@ def assert_one_line(done, *words):
 )
 def test_what_a_terminal_acts_on_is_shown(text, shown):
     assert printable(text) == shown
+
+
+@pytest.mark.parametrize("width", [5, 40, 60, 80, 120])
+def test_a_table_cuts_no_interval_and_no_name(width, monkeypatch, capsys):
+    monkeypatch.setattr(console, "width", width)
+    law = "admittance-tuned-slow-filter"
+    cells = [law, "0.160 (0.150-0.170)", "0 of 40", "0.83 (0.80-0.85)", "+0.012 (-0.003-0.034)"]
+    show_table(("controller", "RMSE (m), 95 %", "lost", "score", "against the best"), [cells])
+    said = capsys.readouterr().out
+    if width >= 60:
+        assert set(" ".join(cells).split()) <= set(said.split())
+    assert "…" not in said
+    assert all(len(line) <= max(width, 8) for line in said.splitlines())
 
 
 @pytest.mark.parametrize("arguments", [["estimate", "--help"], ["--version"], ["--help"]])

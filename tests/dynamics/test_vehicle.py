@@ -7,7 +7,14 @@ import pytest
 import yaml
 
 from tests.support.data_paths import data_file
-from windwrench.dynamics import EffectSetting, InputError, dump_vehicle, load_vehicle, preset_names
+from windwrench.dynamics import (
+    EffectSetting,
+    InputError,
+    Mocap,
+    dump_vehicle,
+    load_vehicle,
+    preset_names,
+)
 from windwrench.dynamics.vehicle_file import parse_vehicle, save_vehicle
 
 GOOD = {
@@ -145,6 +152,21 @@ def test_a_saved_vehicle_is_the_vehicle_again(tmp_path):
 def test_presets_survive_dumping(name):
     text = dump_vehicle(load_vehicle(name))
     assert dump_vehicle(parse_vehicle(text)) == text
+
+
+def test_a_measured_vehicle_has_the_digits_that_are_known():
+    vehicle = replace(
+        load_vehicle("ardrone2"),
+        k=np.full(4, 8.0481234567e-6),
+        mocap=Mocap(200.00000000000426, 0.0004993438472289853, 0.005072951427662196),
+        effects=(EffectSetting("com_offset", {"cx": 0.0123456789, "cy": -0.000123456}),),
+    )
+    text = dump_vehicle(vehicle, {"com_offset": {"cx": 0.00034}})
+    assert "    cx: 0.012346  # ± 0.00034\n    cy: -0.000123456\n" in text
+    assert "- 8.048e-06\n" in text
+    assert "rate_hz: 200.0\n  sigma_pos_m: 0.000499344\n" in text
+    assert not {"gravity", "spin", "com", "omega_source"} & set(text.replace(":", " ").split())
+    assert parse_vehicle(text).effects[0].coefficients["cx"] == 0.012346
 
 
 def test_mixing_is_the_paper_s():

@@ -218,7 +218,7 @@ def test_commands_write_films_and_replays(tmp_path):
     red, green, blue = np.moveaxis(picture[..., :3], 2, 0)
     assert np.count_nonzero((red - green > 0.25) & (red - blue > 0.25)) > 30  # path and force
     assert done.stdout.splitlines()[-1] == "exit 2"
-    assert "--from 4" in done.stderr
+    assert "--film-from 4" in done.stderr
     assert not (tmp_path / "late").exists()
 
 

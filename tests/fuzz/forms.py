@@ -37,7 +37,7 @@ from windwrench.dynamics.effects import names as effect_names
 from windwrench.dynamics.effects import parse_setting
 from windwrench.dynamics.vehicle import Vehicle
 from windwrench.dynamics.vehicle_file import dump_vehicle, load_vehicle, parse_vehicle
-from windwrench.envs.scenarios import get_scenario
+from windwrench.envs.scenarios import SCENARIOS, find_scenario
 from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.identification.logs.flight_log import FlightLog, write_log
 from windwrench.identification.logs.map_guess import guess_map
@@ -221,7 +221,7 @@ def _use_effect(path: Path) -> None:
 def _use_names(path: Path) -> None:
     scenario, _, rest = _text(path).partition("\n")
     controller, _, vehicle = rest.partition("\n")
-    get_scenario(scenario)
+    find_scenario(scenario, SCENARIOS)
     make_controller(controller)
     load_vehicle(vehicle)
 

@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
 
 from tests.support.model_flights import simulate_model
 from windwrench.dynamics import InputError, load_vehicle
@@ -24,6 +26,7 @@ from windwrench.identification.wrench_series import (
     tune_to_log,
     write_wrench,
 )
+from windwrench.identification.wrench_track import write_mcap
 
 WRENCH = [f"{kind}{axis}" for kind in "ft" for axis in "xyz"]
 HEADER = ["t", *WRENCH, *(f"std_{name}" for name in WRENCH), "nis", "status"]
@@ -154,21 +157,42 @@ def test_a_log_without_a_pose_is_refused(vehicle):
 def test_wrench_csv(vehicle, tmp_path):
     log = held_flight(vehicle, 0.005 * np.arange(50), lost=slice(10, 20))
     series = estimate_log(log, vehicle)
-    path = write_wrench(series, tmp_path / "new" / "folder")
+    path = tmp_path / "new" / "folder" / "wrench.csv"
+    write_wrench(series, path)
     assert [p.name for p in path.parent.iterdir()] == ["wrench.csv"]
     with path.open() as file:
         rows = list(csv.reader(file))
     assert rows[0] == HEADER
     values = np.array(rows[1:], dtype=float)
     np.testing.assert_array_equal(values[:, 0], log.t)
-    np.testing.assert_array_equal(values[:, 1:7], np.column_stack([series.force, series.torque]))
-    np.testing.assert_array_equal(
-        values[:, 7:13], np.column_stack([series.std_force, series.std_torque])
-    )
-    np.testing.assert_array_equal(values[:, 13], series.nis)
+    wrench = np.column_stack([series.force, series.torque])
+    std = np.column_stack([series.std_force, series.std_torque])
+    for found, known in ((values[:, 1:7], wrench), (values[:, 7:13], std)):
+        np.testing.assert_allclose(found, known, rtol=1e-8, atol=0.0)
+    np.testing.assert_allclose(values[:, 13], series.nis, rtol=1e-8)
+    assert max(len(field.lstrip("-0.")) for row in rows[1:] for field in row[1:]) < 15
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be written"):
-        write_wrench(series, tmp_path / "file")
+        write_wrench(series, tmp_path / "file" / "wrench.csv")
+
+
+def test_a_track_of_the_wrench_is_a_bag_that_ros_s_reader_opens(vehicle, tmp_path):
+    log = held_flight(vehicle, 0.005 * np.arange(50))
+    series = estimate_log(log, vehicle)
+    path = tmp_path / "new" / "wrench.mcap"
+    write_mcap(series, path)
+    assert [p.name for p in path.parent.iterdir()] == ["wrench.mcap"]
+    with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        assert set(reader.topics) == {"/wrench", "/wrench_std", "/pose"}
+        read = [
+            (c.topic, at, reader.deserialize(raw, c.msgtype)) for c, at, raw in reader.messages()
+        ]
+    wrench = [message.wrench for topic, _, message in read if topic == "/wrench"]
+    np.testing.assert_array_equal([w.force.x for w in wrench], series.force[:, 0])
+    np.testing.assert_array_equal([w.torque.z for w in wrench], series.torque[:, 2])
+    poses = [(at, m.pose) for topic, at, m in read if topic == "/pose"]
+    np.testing.assert_allclose([1e-9 * at for at, _ in poses], log.t, atol=1e-9)
+    np.testing.assert_array_equal([p.orientation.w for _, p in poses], series.quaternion[:, 0])
 
 
 # phases

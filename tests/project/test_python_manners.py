@@ -5,6 +5,7 @@ in.
 import dataclasses
 import inspect
 import re
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -110,3 +111,17 @@ def test_a_batch_refuses_the_same():
         batch.step(["a", "b"])
     with pytest.raises(InputError, match="must not be negative, got -3 rad/s"):
         batch.step(np.array([SPEEDS, [376.0, 376.0, -3.0, 376.0]]))
+
+
+@pytest.mark.parametrize(
+    "package",
+    ["", ".controllers", ".dynamics", ".envs", ".estimator", ".identification", ".paper"],
+)
+def test_a_prompt_shows_public_names_and_their_short_types(package):
+    module = import_module(f"windwrench{package}")
+    assert dir(module) == sorted(module.__all__)
+    for name in dir(module):
+        kind = getattr(module, name)
+        for function in (kind, *vars(kind).values()) if inspect.isclass(kind) else (kind,):
+            if inspect.isfunction(function) and not function.__name__.startswith("__"):
+                assert len(str(inspect.signature(function))) < 400, (name, function)

@@ -38,7 +38,7 @@ STOREYS = (
     {"judged"},
     {"search_verdict", "force_verdict"},
     {"diagnosis"},
-    {"report"},
+    {"report", "wrench_track"},
     {"fleet"},
 )
 STOREY = {room: height for height, rooms in enumerate(STOREYS) for room in rooms}

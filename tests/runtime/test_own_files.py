@@ -23,8 +23,6 @@ LIMIT = 1.0
 class Left:
     def __init__(self, speed=0.25):
         self.speed = speed
-    def reset(self):
-        pass
     def __call__(self, observation, info=None):
         return np.array([min(self.speed, LIMIT)], dtype=np.float32)
 """
@@ -110,6 +108,11 @@ def test_workers_fly_it(laws, tmp_path):
             LAWS + LAWS.replace("Left", "Right"),
             "laws.py",
             r"holds Left, Right; expected one of them",
+        ),
+        (
+            LAWS + "class Plain:\n    pass\n",
+            "laws.py:Plain",
+            "Plain is no controller; expected a P",
         ),
         (LAWS.replace("speed=0.25", "speed"), "laws.py", "cannot be made without arguments"),
     ],

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 
-from windwrench.dynamics import load_vehicle
+from windwrench.dynamics import load_vehicle, preset_names
 from windwrench.envs.recording import record_flight
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.noise_spectrum import (
@@ -76,3 +76,14 @@ def test_a_log_that_is_short_or_still_says_nothing():
     )
     assert noise_spectra(still) == []
     assert filtering_notes(still) == ()
+
+
+@pytest.mark.parametrize("vehicle", preset_names())
+@pytest.mark.parametrize("trajectory", ["hover", "fast"])
+def test_a_rotor_s_own_lag_is_no_filter(vehicle, trajectory):
+    flown = record_flight(load_vehicle(vehicle), (), trajectory, 15.0, 5)
+    log = FlightLog(**flown, name="flight")
+    assert filtering_notes(log) == ()
+    smoothed = sosfilt(butter(1, 0.2, output="sos"), log.rotor_speeds, axis=0)
+    (note,) = filtering_notes(replace(log, rotor_speeds=np.abs(smoothed)))
+    assert note.startswith("the rotor speeds were filtered before the log was written")

@@ -226,3 +226,12 @@ def test_keys_zoom_and_switches_in_a_browser(tmp_path, width, dark):
     assert done["plots"] == 6 + 2 + 2
     assert done["tables"] == 6 + 2 + 2
     assert done["first"] < 900  # pixels: the answers fit a telephone's first screen
+
+
+@needs_browser
+def test_cursors_over_a_long_flight_say_one_time(tmp_path):
+    trace = made_trace(400.0)  # of which each channel keeps other samples
+    act = ACT.split('  await key("time-Fx", "Escape"')[0] + "  return out;"
+    done = look(report_page(made_diagnosis(trace), "command"), 1280, tmp_path, act=act)["done"]
+    for texts in (done["linked"], done["zoomed"]):
+        assert len({text.split(":")[0] for text in texts}) == 1

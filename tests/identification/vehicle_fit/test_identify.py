@@ -31,6 +31,7 @@ from windwrench.identification.vehicle_fit.columns import Drive
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
 from windwrench.identification.vehicle_fit.identify import identify
 from windwrench.identification.vehicle_fit.parameters import first_model
+from windwrench.identification.vehicle_fit.report import explained
 from windwrench.identification.wrench_series import estimate_log
 from windwrench.runtime.errors import InputError
 
@@ -74,6 +75,9 @@ def test_commanded_speeds_show_the_vehicle_and_its_lag(crazyflie, commanded):
     again = parse_vehicle(dump_vehicle(found.vehicle))
     assert [e.name for e in again.effects] == ["motor_lag"]
     assert again.omega_source == "commanded"
+    share = explained(found)  # of force z and all torques; along x and y nothing acts
+    assert (share[2:] > 0.9).all()
+    assert (share[:2] < 0.1).all()
 
 
 def test_a_vehicle_of_rounded_speeds_reads_the_log_that_it_comes_from(crazyflie):
