@@ -94,6 +94,11 @@ def wanted_columns(log_map: LogMap) -> list[str]:
     return [name for name in dict.fromkeys([*names, log_map.time.column]) if name]
 
 
+def topics_of(log_map: LogMap) -> set[str]:
+    """Return the kinds of messages in which the map's columns stand."""
+    return {way.topic for section in log_map.sections for way in ways(log_map, section)}
+
+
 def ways(log_map: LogMap, section: str) -> tuple[Any, ...]:
     """Return the ways to fill a section, in their order."""
     first = getattr(log_map, section)

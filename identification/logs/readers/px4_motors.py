@@ -16,11 +16,19 @@ from ..log_map import LogMap
 from ..map_fit import ways
 from ..rotor_orders import ORDERS, Order
 from ..table import Array
-from ..what_flew import MAV_TYPES, QUADROTOR, WhatFlew, order_by_places, running
+from ..what_flew import (
+    PLUS,
+    QUADROTOR,
+    WhatFlew,
+    airframes,
+    order_by_places,
+    running,
+    slots_of_motors,
+)
 
 Parameters = Mapping[str, float]
 
-_MOTOR1 = 101  # PX4's number of the output function "motor 1"
+MOTOR1 = 101  # PX4's number of the output function "motor 1"
 _BANKS = {"MAIN": "PWM_MAIN_FUNC", "AUX": "PWM_AUX_FUNC", "UAVCAN": "UAVCAN_EC_FUNC"}
 _OUTPUTS = 16  # of a bank
 _ESCS = 8
@@ -30,14 +38,6 @@ _UAVCAN = (0.0, 8191.0)
 _DSHOT_TIMERS = range(-5, -1)  # of PWM_MAIN_TIMn: DShot150 to DShot1200
 _LEAST_PULSE = 700.0  # us: no speed controller is sent a shorter one, disarmed or not
 _ABOVE_PULSES = 1.1  # of the longest pulse, which no pulse reaches
-_PLUS = ((0.0, -1.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 0.0))  # motors 1 to 4, x forward, y left
-# CA_AIRFRAME, and thousands of SYS_AUTOSTART, that are no multirotor of four
-_AIRFRAMES = {1: MAV_TYPES[1], 2: MAV_TYPES[22], 3: MAV_TYPES[21], 4: MAV_TYPES[20]}
-_AIRFRAMES |= dict.fromkeys((5, 6, 13), MAV_TYPES[10]) | dict.fromkeys((10, 11, 12), MAV_TYPES[4])
-_STARTS = {2: MAV_TYPES[1], 3: MAV_TYPES[1], 4: QUADROTOR, 5: QUADROTOR, 6: MAV_TYPES[13]}
-_STARTS |= {7: MAV_TYPES[13], 8: MAV_TYPES[14], 9: MAV_TYPES[14], 10: QUADROTOR}
-_STARTS |= {11: MAV_TYPES[13], 12: MAV_TYPES[14], 13: MAV_TYPES[22], 14: MAV_TYPES[15]}
-_STARTS |= {15: MAV_TYPES[4], 50: MAV_TYPES[10], 60: MAV_TYPES[12]}
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,14 +64,14 @@ def what_flew(parameters: Parameters, statuses: Sequence[Mapping[str, Any]]) -> 
         parameters: as the log begins.
         statuses: of the topic vehicle_status.
     """
+    known = airframes()
     count = int(parameters.get("CA_ROTOR_COUNT", 0)) or None
     by_count = "parameter CA_ROTOR_COUNT" if count else ""
     frame, start = int(parameters.get("CA_AIRFRAME", 0)), int(parameters.get("SYS_AUTOSTART", 0))
-    if frame in _AIRFRAMES:
-        return WhatFlew(_AIRFRAMES[frame], f"parameter CA_AIRFRAME = {frame}")
-    for fields in statuses:
-        if np.any(np.asarray(fields.get("is_vtol", 0))):
-            return WhatFlew(MAV_TYPES[22], "vehicle_status.is_vtol")
+    if frame in known["px4_airframe"]:
+        return WhatFlew(known["px4_airframe"][frame], f"parameter CA_AIRFRAME = {frame}")
+    if any(np.any(np.asarray(fields.get("is_vtol", 0))) for fields in statuses):
+        return WhatFlew("a VTOL plane", "vehicle_status.is_vtol")
     kinds = [("parameter MAV_TYPE", int(parameters.get("MAV_TYPE", 0)))]
     kinds += [
         ("vehicle_status.system_type", int(np.asarray(fields["system_type"])[-1]))
@@ -79,11 +79,11 @@ def what_flew(parameters: Parameters, statuses: Sequence[Mapping[str, Any]]) -> 
         if "system_type" in fields and len(np.asarray(fields["system_type"]))
     ]
     for by, kind in kinds:
-        if kind in MAV_TYPES:
-            return WhatFlew(MAV_TYPES[kind], by_count or f"{by} = {kind}", count)
-    if start // 1000 in _STARTS:
+        if kind in known["mav_type"]:
+            return WhatFlew(known["mav_type"][kind], by_count or f"{by} = {kind}", count)
+    if start // 1000 in known["px4_start"]:
         by = by_count or f"parameter SYS_AUTOSTART = {start}"
-        return WhatFlew(_STARTS[start // 1000], by, count)
+        return WhatFlew(known["px4_start"][start // 1000], by, count)
     return WhatFlew(QUADROTOR if count == 4 else "", by_count, count)
 
 
@@ -104,7 +104,7 @@ def motor_order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> 
     if parameters.get("CA_ROTOR_COUNT") and any(x or y for x, y in places):
         whence, said = "by the positions in CA_ROTORn_PX and PY", "CA_ROTORn_PX and CA_ROTORn_PY"
     elif start // 1000 == 5:
-        places, whence = list(_PLUS), f"as on a quad plus (SYS_AUTOSTART = {start})"
+        places, whence = list(PLUS), f"as on a quad plus (SYS_AUTOSTART = {start})"
         said = f"SYS_AUTOSTART = {start}, a quad plus,"
     else:
         order, whence = ORDERS["px4-x"], "as on PX4's quad x, which the log does not state"
@@ -151,7 +151,7 @@ def slots_of_escs(fields: Mapping[str, Any]) -> list[int]:
     """Return the ESCs, from 0, of motors 1 to 4: by the function that each states, if all do."""
     functions = [f"esc[{i}].actuator_function" for i in range(_ESCS)]
     named = [int(fields[name][-1]) if name in fields else -1 for name in functions]
-    return slots_of_motors(named) or list(range(4))
+    return slots_of_motors(named, MOTOR1) or list(range(4))
 
 
 def outputs_of(
@@ -176,10 +176,7 @@ def outputs_of(
     outputs = _range(path, parameters, bank, slots, motors)
     if not tables:
         return outputs, None
-    others = [i for i in range(tables[0].shape[1]) if i not in slots]
-    every = tables[0][:, [*slots, *others]]
-    low, high = float(outputs.low.min()), float(outputs.high.max())
-    return outputs, len(running(every, low, high))
+    return outputs, running(tables[0], slots, float(outputs.low.min()), float(outputs.high.max()))
 
 
 def _moving(table: Array, slots: list[int]) -> bool:
@@ -206,17 +203,9 @@ def _output_slots(parameters: Parameters) -> tuple[str, list[int]]:
     """Return the bank and the outputs, from 0, of motors 1 to 4."""
     for bank, prefix in _BANKS.items():
         functions = (parameters.get(f"{prefix}{i + 1}", 0.0) for i in range(_OUTPUTS))
-        if slots := slots_of_motors([int(function) for function in functions]):
+        if slots := slots_of_motors([int(function) for function in functions], MOTOR1):
             return bank, slots
     return "MAIN", list(range(4))
-
-
-def slots_of_motors(functions: Sequence[int]) -> list[int]:
-    """Return the slots of motors 1 to 4, by PX4's numbers of what each slot does; none: not all
-    are there.
-    """
-    motors = [_MOTOR1 + i for i in range(4)]
-    return [functions.index(motor) for motor in motors] if {*motors} <= {*functions} else []
 
 
 def _range(

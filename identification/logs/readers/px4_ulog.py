@@ -30,7 +30,7 @@ from ....runtime.regular_files import check_regular, open_regular
 from ..channels import Samples
 from ..flight_log import FlightLog
 from ..log_map import recording_map
-from ..map_fit import ways
+from ..map_fit import topics_of
 from ..mapped_log import recording_of
 from ..streams import Recording
 from ..table import Array
@@ -137,8 +137,7 @@ def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bo
     need("pyulog", "logs", path)
     from pyulog import ULog as Parser
 
-    log_map = recording_map("px4")
-    wanted = {way.topic for name in log_map.sections for way in ways(log_map, name)} | {_STATUS}
+    wanted = topics_of(recording_map("px4")) | {_STATUS}
     check_regular(path, WHAT, LIMITS.ulog_file)
     try:
         with open_regular(path, WHAT) as file:

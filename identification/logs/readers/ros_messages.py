@@ -15,7 +15,8 @@ from ....runtime.yaml_file import read_yaml
 from ..log_map import MAPS
 from ..rotor_orders import ORDERS
 from ..table import Array
-from .px4_motors import slots_of_motors
+from ..what_flew import slots_of_motors
+from .px4_motors import MOTOR1
 
 _NUMBERS = ["Float32", "Float64", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64"]
 # messages that are arrays of numbers, whatever these are, and the field that holds them
@@ -66,7 +67,7 @@ def _odometry(message: Any) -> list[float]:
 
 def _esc_rpm(message: Any) -> list[float]:
     """Return the rpm of motors 1 to 4, by the function that each ESC states where all do."""
-    slots = slots_of_motors([int(esc.actuator_function) for esc in message.esc])
+    slots = slots_of_motors([int(esc.actuator_function) for esc in message.esc], MOTOR1)
     return [message.esc[i].esc_rpm for i in slots or range(4)]
 
 

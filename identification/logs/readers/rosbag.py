@@ -266,5 +266,4 @@ def _running(every: Sequence[Array], topic: Topic) -> int | None:
     if len({len(values) for values in every}) != 1 or len(every[0]) <= 4:
         return None
     motors = [element - 1 for element in topic.elements]
-    others = [i for i in range(len(every[0])) if i not in motors]
-    return len(running(np.array(every)[:, [*motors, *others]], *topic.kind.range))
+    return running(np.array(every), motors, *topic.kind.range)
