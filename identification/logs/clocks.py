@@ -95,26 +95,19 @@ def _of_piece(
         np.split(np.arange(len(samples.t)), cut) if len(cut) + 1 == many else None
         for samples, cut in zip(groups, cuts, strict=True)
     ]
+    both = list(zip(groups, parts, strict=True))
     seconds = [
-        max(
-            float(np.ptp(samples.t[part[i]]))
-            for samples, part in zip(groups, parts, strict=True)
-            if part is not None
-        )
+        max(float(np.ptp(samples.t[part[i]])) for samples, part in both if part is not None)
         for i in range(many)
     ]
     chosen = int(np.argmax(seconds)) if piece is None else piece - 1
     lengths = ", ".join(f"{x:.3g}" for x in seconds)
-    why = "the longest, " if piece is None else ""
+    why, how = ("the longest, ", "; --piece reads another") if piece is None else ("", "")
     note = (
         f"the clock starts anew {many - 1} time(s): the file holds {many} pieces of {lengths} s; "
-        f"{why}piece {chosen + 1}, was read"
+        f"{why}piece {chosen + 1}, was read{how}"
     )
-    kept = [
-        samples if part is None else samples.cut(part[chosen])
-        for samples, part in zip(groups, parts, strict=True)
-    ]
-    return kept, [note + ("" if piece else "; --piece reads another")]
+    return [s if part is None else s.cut(part[chosen]) for s, part in both], [note]
 
 
 def check_piece(path: Path, piece: int | None, many: int) -> None:

@@ -11,7 +11,7 @@ unit in a name is taken unless the numbers contradict it.
 
 import re
 import warnings
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 from typing import Any
@@ -24,9 +24,10 @@ from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS
 from .channels import BODY_TURNS
 from .column_names import Group, Name, named_alone, take_apart, words
-from .column_numbers import PARTS, Numbers
 from .column_parts import (
+    PARTS,
     Candidate,
+    Numbers,
     find_parts,
     further_rotors,
     named_columns,
@@ -36,15 +37,9 @@ from .evidence import EVIDENCE, Evidence, Ranking, likelihood
 from .excerpt import LONGEST
 from .inertial import gyro_shares
 from .log_map import (
-    ACCELERATION_UNITS,
-    ANGLE_UNITS,
     COMMAND_UNITS,
-    LENGTH_UNITS,
-    RATE_UNITS,
-    ROTOR_UNITS,
-    TIME_UNITS,
+    UNITS,
     UNKNOWN,
-    VOLTAGE_UNITS,
     Attitude,
     Battery,
     Columns,
@@ -84,7 +79,7 @@ class GuessSettings:
 
 GUESS = GuessSettings()
 _Choice = tuple[str, bool, str]  # what is taken, whether it is certain, and why
-_G = ACCELERATION_UNITS["g"]
+_G = UNITS["accelerometer"]["g"]
 _EXAMPLES = {
     "position": "x, y, z",
     "attitude": "qw, qx, qy, qz or roll, pitch, yaw",
@@ -296,16 +291,13 @@ class _Guessing:
         self.say(section, name, sure, f"{value}: {why}")
         return value
 
-    def unit(
-        self, section: str, named: str, known: Container[str], guess: Callable[[], _Choice]
-    ) -> str:
+    def unit(self, section: str, named: str, choice: _Choice) -> str:
         """Return a section's unit: as its columns' names say unless their numbers are certain to be
         in another, else as guessed.
         """
-        choice = guess()
-        if named in known and (choice[0] == named or not choice[1]):
+        if named in UNITS[section] and (choice[0] == named or not choice[1]):
             choice = named, True, "by the columns' names"
-        elif named in known:
+        elif named in UNITS[section]:
             choice = choice[0], False, f"{choice[2]}, though the columns' names say {named}"
         return self.take(section, "unit", choice)
 
@@ -317,11 +309,11 @@ class _Guessing:
         steps = np.diff(raw[np.isfinite(raw)])
         step = float(np.median(steps[steps > 0.0]))
         guessed, sure = time_unit(step)
-        rate = f"{1.0 / max(step * TIME_UNITS[guessed], 1e-300):.4g} rows a second"
-        if clock.unit in TIME_UNITS:  # an unusual rate is no reason to doubt a name
-            sure &= not within(1.0 / max(step * TIME_UNITS[clock.unit], 1e-300), GUESS.rates)
-        unit = self.unit("time", clock.unit, TIME_UNITS, lambda: (guessed, sure, rate))
-        t = np.asarray((raw - raw[np.isfinite(raw)][0]) * TIME_UNITS[unit])
+        rate = f"{1.0 / max(step * UNITS['time'][guessed], 1e-300):.4g} rows a second"
+        if clock.unit in UNITS["time"]:  # an unusual rate is no reason to doubt a name
+            sure &= not within(1.0 / max(step * UNITS["time"][clock.unit], 1e-300), GUESS.rates)
+        unit = self.unit("time", clock.unit, (guessed, sure, rate))
+        t = np.asarray((raw - raw[np.isfinite(raw)][0]) * UNITS["time"][unit])
         middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
         t[~(np.abs(t - middle) <= 0.5 * LONGEST)] = np.nan
         self.sections["time"] = TimeColumn(clock.column, unit)
@@ -353,7 +345,7 @@ class _Guessing:
             lengths=(place.unit,) if place.unit == "ft" else ("m", "cm", "mm"),
             hint="ned" if re.search("ned|down|d$", "".join(place.columns).lower()) else "",
         )
-        if place.unit in LENGTH_UNITS:
+        if place.unit in UNITS["position"]:
             readings = [
                 replace(r, unlikely=r.unlikely + OTHER * (r.length != place.unit)) for r in readings
             ]
@@ -362,7 +354,7 @@ class _Guessing:
         evidence = Evidence(self.t, thrusts, self.values["position"], attitude)
         self.ranking = Ranking.of(evidence, readings, torques=False)
         best = self.ranking.best
-        length = self.unit("position", place.unit, LENGTH_UNITS, lambda: self.by_motion("length"))
+        length = self.unit("position", place.unit, self.by_motion("length"))
         told = [("world", "", "world"), ("body", "", "body"), ("attitude", "sense", "sense")]
         made = Attitude(group.columns, order=best.order, sense=best.sense)
         if not is_quaternion:
@@ -370,7 +362,7 @@ class _Guessing:
             made = replace(made, unit=best.unit, euler=best.euler, signs=signs)
             beyond = best.unit, best.unit != group.unit, "angles beyond pi"
             guessed = self.by_motion("unit") if len(units) > 1 else beyond
-            self.unit("attitude", group.unit, ANGLE_UNITS, lambda: guessed)
+            self.unit("attitude", group.unit, guessed)
             told += [("attitude", "euler", "euler"), ("attitude", "signs", "pitch_sign")]
         elif group.numbered:
             told.append(("attitude", "order", "order"))
@@ -404,7 +396,7 @@ class _Guessing:
         why, scale = f"its median size is {size:.4g}", 1.0
         if group.unit in units or likely:
             likely = likely or [group.unit]
-            unit = self.unit("accelerometer", group.unit, units, lambda: (likely[0], True, why))
+            unit = self.unit("accelerometer", group.unit, (likely[0], True, why))
             if unit == group.unit and not within(size * units[unit] / _G, MAGNITUDES.doubtful):
                 self.say("accelerometer", "unit", False, f"{unit}: {why}, which is not gravity's")
         else:
@@ -433,7 +425,7 @@ class _Guessing:
         else:
             axes, guessed = self.gyro_by_pose(values, ("rad/s", "deg/s"), group.unit)
             self.take("gyro", "body", (axes, *guessed[1:]))
-        unit = self.unit("gyro", group.unit, RATE_UNITS, lambda: guessed)
+        unit = self.unit("gyro", group.unit, guessed)
         self.sections["gyro"] = Sensor(group.columns, unit, body=axes)
 
     def gyro_by_pose(self, values: Array, units: Sequence[str], named: str) -> tuple[str, _Choice]:
@@ -445,7 +437,7 @@ class _Guessing:
         times = self.t[good]
         seen = np.isfinite(times)
         ways = list(product(units, BODY_TURNS))
-        turns = [RATE_UNITS[unit] * BODY_TURNS[body] for unit, body in ways]
+        turns = [UNITS["gyro"][unit] * BODY_TURNS[body] for unit, body in ways]
         shares = gyro_shares(self.t, values, times[seen], rotation[seen], turns)
         if shares is None:
             return ways[0][1], (ways[0][0], False, "the log is too short")
@@ -495,7 +487,7 @@ class _Guessing:
         evidence, best = None, DECLARED
         if "gyro" in self.sections:
             sensor = self.sections["gyro"]
-            rates = self.values["gyro"] * RATE_UNITS[sensor.unit] @ BODY_TURNS[sensor.body]
+            rates = self.values["gyro"] * UNITS["gyro"][sensor.unit] @ BODY_TURNS[sensor.body]
             evidence = Evidence(self.t, np.square(values), gyro=rates)
         elif self.ranking is not None and self.turning_known:
             best = self.ranking.best
@@ -527,7 +519,7 @@ class _Guessing:
             return
         group, middle = self.parts["battery"], float(np.median(values))
         guessed = *voltage_unit(middle), f"its median is {middle:.4g}"
-        unit = self.unit("battery", group.unit, VOLTAGE_UNITS, lambda: guessed)
+        unit = self.unit("battery", group.unit, guessed)
         self.sections["battery"] = Battery(group.columns, unit)
 
 
@@ -552,7 +544,9 @@ def motor_unit(
     carrying: list[str] = []
     if vehicle is not None and not commanded:
         there = values[np.isfinite(values).all(axis=1)]
-        carrying = [u for u in carrying_units(thrust_by_weight(there, vehicle)) if u in ROTOR_UNITS]
+        carrying = [
+            u for u in carrying_units(thrust_by_weight(there, vehicle)) if u in UNITS["rotors"]
+        ]
     # numbers of 1000 to 2000 may be pulses as well, whatever they would carry
     doubt = "pulses in us" if pulses else "percents" if high <= 100.0 else ""
     doubt = "" if speeds else doubt
@@ -563,10 +557,10 @@ def motor_unit(
     carries = f"in it the rotors carry the weight of {vehicle.name if vehicle else ''}"
     carries += f", though they may be {doubt}" if doubt else ""
     # by the vehicle's weight a name may be wrong, but poles of eRPM are unknown
-    lifts = len(carrying) == 1 and named in ROTOR_UNITS and named not in ("eRPM", *carrying)
+    lifts = len(carrying) == 1 and named in UNITS["rotors"] and named not in ("eRPM", *carrying)
     rules = (
         (lifts, "rotors", "".join(carrying), False, f"{carries}, not in {named} as names say"),
-        (named in ROTOR_UNITS, "rotors", named, True, by_names),
+        (named in UNITS["rotors"], "rotors", named, True, by_names),
         (high <= 1.0, "commands", "normalised", "omega" not in names, up_to),
         (named in ("us", "percent"), "commands", named, True, by_names),
         (commanded and pulses, "commands", "us", True, between),

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from .channels import WORLD_TURNS
-from .log_map import ANGLE_UNITS, LENGTH_UNITS, SENSES
+from .log_map import SENSES, UNITS
 from .rotor_orders import ORDERS, Order, order_names
 from .table import Array, Mask
 
@@ -122,7 +122,7 @@ def _sensor_readings(units: dict[str, float], inverted: str = "") -> tuple[Senso
 
 
 GYRO_READINGS = _sensor_readings(
-    {"degrees per second; expected rad/s: multiply by 0.0174533": ANGLE_UNITS["deg"]}
+    {"degrees per second; expected rad/s: multiply by 0.0174533": UNITS["attitude"]["deg"]}
 )
 ACCELEROMETER_READINGS = (
     *_sensor_readings(
@@ -198,7 +198,7 @@ class Reading:
             name = {"mm": "milli", "cm": "centi"}[self.length]
             return (
                 f"px, py, pz look like {name}metres; expected metres: divide them by "
-                f"{1.0 / LENGTH_UNITS[self.length]:.0f}"
+                f"{1.0 / UNITS['position'][self.length]:.0f}"
             )
         return "; ".join([*self._pose_words(), *self._rotor_words()])
 
@@ -351,7 +351,7 @@ def as_written(columns: Array, reading: Reading) -> tuple[Mask, Rotation]:
     """Return the same, body to world, in the columns' own frames."""
     good: Mask = np.asarray(np.isfinite(columns).all(axis=1))
     if reading.euler:
-        angles = columns[good] * ANGLE_UNITS[reading.unit] * [1.0, reading.pitch_sign, 1.0]
+        angles = columns[good] * UNITS["attitude"][reading.unit] * [1.0, reading.pitch_sign, 1.0]
         axes = ["xyz".index(axis) for axis in reading.euler]
         rotation = Rotation.from_euler(reading.euler.upper(), angles[:, axes])
     else:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...runtime.errors import InputError
 from .channels import Samples
-from .log_map import TIME_UNITS, Columns, LogMap
+from .log_map import UNITS, Columns, LogMap
 from .table import Array, Mask, Rows, Table
 
 _STRAY_GAP = 5.0  # median time steps; shorter gaps leave no stray rows
@@ -69,7 +69,7 @@ def rows_of(
             f"before; expected {'strictly ' if is_whole else ''}increasing times"
         )
     begin = raw[0] if clock.offset is None else 0.0
-    t = (raw - begin) * TIME_UNITS[clock.unit] + (clock.offset or 0.0)
+    t = (raw - begin) * UNITS["time"][clock.unit] + (clock.offset or 0.0)
     if not np.all(np.isfinite(t)) or np.any((np.diff(t) <= 0.0) & (step > 0.0)):
         raise InputError(
             f"{table.path}: column {clock.column}: times of {raw[0]:.6g} to {raw[-1]:.6g} "

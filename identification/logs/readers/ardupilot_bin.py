@@ -25,7 +25,6 @@ from ..channels import Samples
 from ..clocks import in_order
 from ..flight_log import FlightLog
 from ..log_map import Commands, LogMap, recording_map
-from ..map_fit import topics_of, wanted_columns
 from ..mapped_log import recording_of
 from ..rotor_orders import ORDERS, Order, order_words
 from ..streams import Stream
@@ -73,7 +72,7 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
             inertial sensors.
     """
     log_map = recording_map("ardupilot")
-    messages, skipped = read_dataflash(path, {*topics_of(log_map), "PARM", "MSG"})
+    messages, skipped = read_dataflash(path, {*log_map.topics, "PARM", "MSG"})
     parameters = _parameters(messages.pop("PARM", {}))
     flown = _what_flew(parameters, messages.pop("MSG", {}))
     check_flown(path, flown)
@@ -84,7 +83,7 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
         flown = replace(flown, running=_running(pulses, log_map))
     telemetry, telemetry_notes = _telemetry(messages.pop("ESC", {}), parameters)
     notes += telemetry_notes
-    columns = {*wanted_columns(log_map), *_PLACE}
+    columns = {*log_map.wanted, *_PLACE}
     groups = (_samples(name, rows, columns) for name, rows in messages.items())
     recorded = [samples for samples in groups if samples is not None]
     if skipped:

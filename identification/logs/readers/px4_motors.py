@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ..log_map import LogMap
-from ..map_fit import ways
 from ..rotor_orders import ORDERS, Order
 from ..table import Array
 from ..what_flew import (
@@ -126,7 +126,7 @@ def _renumbered(order: Order, whence: str) -> str:
 def with_motors(log_map: LogMap, order: Order, parameters: Parameters, outputs: Outputs) -> LogMap:
     """Return the map with the order of the motors, and with the thrust curve of their outputs."""
     factor = min(max(parameters.get("THR_MDL_FAC", 0.0), 0.0), 1.0)
-    rotors, (motors, sent) = log_map.rotors, ways(log_map, "commands")
+    rotors, (motors, sent) = log_map.rotors, log_map.ways("commands")
     assert rotors is not None
     note = (
         f"commands: actuator_outputs, x = 0 to 1 ({outputs.words}), gives relative thrust "
@@ -171,7 +171,8 @@ def outputs_of(
     bank, slots = _output_slots(parameters)
     names = [f"output[{i}]" for i in range(_OUTPUTS)]
     tables = [np.column_stack([fields[n] for n in names if n in fields]) for fields in sent]
-    tables = [table.astype(np.float64) for table in tables if _moving(table, slots)]
+    # where all outputs of motors change: no servos, and no bank that is not in use
+    tables = [x.astype(float) for x in tables if x.shape[1] > max(slots) and _move(x[:, slots])]
     motors = tables[0][:, slots] if tables else np.zeros((0, 4))
     outputs = _range(path, parameters, bank, slots, motors)
     if not tables:
@@ -179,10 +180,9 @@ def outputs_of(
     return outputs, running(tables[0], slots, float(outputs.low.min()), float(outputs.high.max()))
 
 
-def _moving(table: Array, slots: list[int]) -> bool:
-    """Return whether all outputs of motors change: no servos, and no bank that is not in use."""
-    inside = table.shape[1] > max(slots)
-    return inside and bool(np.all(np.ptp(np.nan_to_num(table[:, slots]), axis=0) > 0.0))
+def _move(outputs: NDArray[Any]) -> bool:
+    """Return whether all outputs (N, 4) change."""
+    return bool(np.all(np.ptp(np.nan_to_num(outputs), axis=0) > 0.0))
 
 
 def shares_of_motors(columns: Mapping[str, Array], outputs: Outputs) -> dict[str, Array]:
@@ -193,7 +193,7 @@ def shares_of_motors(columns: Mapping[str, Array], outputs: Outputs) -> dict[str
     if not set(names) <= set(columns):
         return {}
     sent = np.nan_to_num(np.column_stack([columns[name] for name in names]), nan=0.0)
-    if not np.all(np.ptp(sent, axis=0) > 0.0):
+    if not _move(sent):
         return {}
     shares = np.clip((sent - outputs.low) / (outputs.high - outputs.low), 0.0, 1.0)
     return {f"output[{motor}]": share for motor, share in enumerate(shares.T)}

@@ -30,7 +30,6 @@ from ....runtime.regular_files import check_regular, open_regular
 from ..channels import Samples
 from ..flight_log import FlightLog
 from ..log_map import recording_map
-from ..map_fit import topics_of
 from ..mapped_log import recording_of
 from ..streams import Recording
 from ..table import Array
@@ -137,7 +136,7 @@ def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bo
     need("pyulog", "logs", path)
     from pyulog import ULog as Parser
 
-    wanted = topics_of(recording_map("px4")) | {_STATUS}
+    wanted = recording_map("px4").topics | {_STATUS}
     check_regular(path, WHAT, LIMITS.ulog_file)
     try:
         with open_regular(path, WHAT) as file:
