@@ -100,6 +100,11 @@ class Numbers:
             return np.full((len(t), len(columns)), np.nan)
         return np.column_stack([np.interp(t, times, x) for x in values.T])
 
+    def _bend(self, t: Array, columns: Sequence[str]) -> Array:
+        """Return the second differences (n, k) around times (n,)."""
+        before, at, after = (self.between(t + k * PARTS.window, columns) for k in (-1, 0, 1))
+        return np.asarray(before - 2.0 * at + after)
+
     def varies(self, column: str) -> bool:
         """Return whether a column takes more than a few values: no counter's and no switch's."""
         return column in self.data and len(np.unique(self.some([column]))) > PARTS.levels
@@ -173,8 +178,7 @@ class Numbers:
         """
         if len(self.begins) < PARTS.fewest or len(self.rows(columns)[0]) < PARTS.fewest:
             return 0.0
-        p = [self.between(self.begins + k * PARTS.window, columns) for k in (-1, 0, 1)]
-        force = p[0] - 2.0 * p[1] + p[2]
+        force = self._bend(self.begins, columns)
         best = 0.0
         for w, x, y, z in (self.attitude.T, self.attitude[:, [3, 0, 1, 2]].T):
             for sign in (1.0, -1.0):
@@ -223,8 +227,7 @@ class Numbers:
         if accelerometer:
             self.felt = [np.linalg.norm(self.between(self.clock, accelerometer), axis=1)]
         elif position:
-            p = [self.between(self.clock + k * PARTS.window, position) for k in (-1, 0, 1)]
-            force = (p[0] - 2.0 * p[1] + p[2]).T
+            force = self._bend(self.clock, position).T
             self.felt = [*force, *-force]
 
     def elasticity(self, values: Array) -> float:
@@ -261,7 +264,7 @@ def named_columns(names: Sequence[Name]) -> set[str]:
         group
         for ways in words()["parts"].values()
         for way in ways
-        for endings in (*way.get("endings", ()), *way.get("numbered", ()))
+        for endings in way["endings"]
         for group in groups_of(names, endings)
         if _is_named(group, "")
     ]
@@ -307,18 +310,15 @@ def _candidates(part: str, names: Sequence[Name], numbers: Numbers) -> Iterator[
     fours = (group for ending in _FOURS for group in groups_of(names, ending))
     commanded = part == "motors" and any(_is_named(group, part) for group in fours)
     for number, way in enumerate(words()["parts"][part]):
-        for kind in ("endings", "numbered"):
-            for endings in way.get(kind, ()):
-                for group in groups_of(names, endings):
-                    i = _place_of(group.key, way["words"])
-                    if i is None and (commanded or _is_named(group, part)):
-                        continue
-                    named |= set(group.columns)
-                    if i is None:
-                        yield from _judged(part, group, -1.0, "their names go together", numbers)
-                        continue
-                    by_name = PARTS.numbers - 0.3 * i - 0.5 * number
-                    yield from _judged(part, group, by_name, "by the columns' names", numbers)
+        for group in (group for endings in way["endings"] for group in groups_of(names, endings)):
+            i = _place_of(group.key, way["words"])
+            if i is None and (commanded or _is_named(group, part)):
+                continue
+            named |= set(group.columns)
+            by_name, why = -1.0, "their names go together"
+            if i is not None:
+                by_name, why = PARTS.numbers - 0.3 * i - 0.5 * number, "by the columns' names"
+            yield from _judged(part, group, by_name, why, numbers)
     width = 4 if part in ("attitude", "motors") else 3
     if part == "commands" or commanded:
         return
@@ -333,8 +333,7 @@ def _is_named(group: Group, part: str) -> bool:
         _place_of(group.key, way["words"]) is not None
         for other, ways in words()["parts"].items()
         for way in ways
-        if other != part
-        and list(group.endings) in (*way.get("endings", ()), *way.get("numbered", ()))
+        if other != part and list(group.endings) in way["endings"]
     )
 
 

@@ -62,11 +62,6 @@ _CHANNELS = 14  # of RCOU
 def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -> FlightLog:
     """Read a DataFlash log.
 
-    Args:
-        path: the file.
-        vehicle: turns commands into rotor speeds where none were measured.
-        piece: which part is read where the clock started anew, from 1; default: the longest.
-
     Raises:
         InputError: the file is no such log, is not a quadrotor's, or lacks motors, or a pose and
             inertial sensors.

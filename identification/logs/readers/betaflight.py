@@ -48,13 +48,7 @@ _MORE_MOTORS = tuple(f"motor[{i}]" for i in range(4, 8))  # of vehicles that are
 def read(
     path: Path, vehicle: Vehicle | None = None, option: str = "", piece: int | None = None
 ) -> FlightLog:
-    """Read a blackbox.
-
-    Args:
-        path: the file.
-        vehicle: turns commands into rotor speeds where none were measured.
-        option: number of the motors' magnet poles, for eRPM.
-        piece: which of the file's logs is read, from 1; default: the longest.
+    """Read a blackbox; ``option``: number of the motors' magnet poles, for eRPM.
 
     Raises:
         InputError: the file cannot be read, is no blackbox, is damaged from its start, or has no

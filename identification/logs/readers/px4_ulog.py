@@ -63,11 +63,6 @@ _HEADER, _MESSAGE = 16, 3  # bytes, of a file and of a message
 def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -> FlightLog:
     """Read a ULog.
 
-    Args:
-        path: the file.
-        vehicle: turns commands into rotor speeds where none were measured.
-        piece: which part is read where the clock started anew, from 1; default: the longest.
-
     Raises:
         InputError: pyulog is missing, the file is no ULog, or lacks four motors, or a pose and
             inertial sensors.
