@@ -45,6 +45,10 @@ class Samples:
             values[:, i] = self.columns[name] if fixed is None else fixed
         return scaled(part, values)
 
+    def there(self, part: Columns) -> Mask:
+        """Return in which rows (N,) a section has all of its values."""
+        return np.asarray(np.isfinite(self.values(part)).all(axis=1))
+
     def has(self, part: Columns) -> bool:
         """Return whether a section's columns are there."""
         return part.topic in ("", self.topic) and set(part.named) <= set(self.columns)

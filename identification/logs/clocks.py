@@ -47,26 +47,26 @@ def on_one_clock(
     Raises:
         InputError: there is no such piece.
     """
-    notes: dict[str, None] = {}
+    notes: list[str] = []
     rolled = [_unrolled(samples.t) for samples in recorded]
     if any(over for _, over in rolled):
-        notes["the clock of 32 bits rolled over in the log; later times go on behind it"] = None
+        notes.append("the clock of 32 bits rolled over in the log; later times go on behind it")
     groups = [replace(s, t=t) for s, (t, _) in zip(recorded, rolled, strict=True)]
     groups, said = _of_piece(path, groups, piece)
-    notes |= dict.fromkeys(said)
+    notes += said
     out = []
     for samples in groups:
         rows, late = in_order(samples.t)
         name = samples.topic or next(iter(samples.columns), "rows")
         if late:
-            notes[f"{name}: {late} of {len(samples.t)} rows were written late and sorted in"] = None
+            notes.append(f"{name}: {late} of {len(samples.t)} rows were written late and sorted in")
         if left := len(samples.t) - len(rows):
-            notes[
+            notes.append(
                 f"{name}: {left} of {len(samples.t)} samples repeat a time or have one that the "
                 "samples around them contradict, and were left out"
-            ] = None
+            )
         out.append(samples if left == 0 and late == 0 else samples.cut(rows))
-    return out, list(notes)
+    return out, list(dict.fromkeys(notes))
 
 
 def _unrolled(t: Array) -> tuple[Array, bool]:

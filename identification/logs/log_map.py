@@ -74,7 +74,7 @@ OWN_MAP = "windwrench"  # of this kit's own columns
 UNKNOWN = "?"  # what a guessed map leaves to a person to choose
 
 WORLDS = {"enu": "enu", "nwu": "enu", "flu": "enu", "ned": "ned", "frd": "ned", "y_up": "y_up"}
-BODIES = {"flu": "flu", "frd": "frd"}
+BODIES = ("flu", "frd")
 # units of each section in the kit's; the first is taken where a section states none. A rotor's of
 # eRPM is divided by the pairs of poles
 UNITS: dict[str, dict[str, float]] = {
@@ -292,7 +292,7 @@ class LogMap:
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     time: Annotated[TimeColumn, AfterValidator(_clock)]
-    world: Annotated[str, one_of(WORLDS)] = "enu"
+    world: Annotated[str, one_of(WORLDS), AfterValidator(WORLDS.__getitem__)] = "enu"
     body: Annotated[str, one_of(BODIES)] = "flu"
     position: Annotated[Position, _section(3, UNITS["position"])] | None = None
     attitude: Annotated[Attitude, _section(4, UNITS["attitude"])] | None = None

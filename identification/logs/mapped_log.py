@@ -237,7 +237,7 @@ def _attitude(path: Path, log_map: LogMap, part: Attitude, samples: Samples) -> 
     Raises:
         InputError: a quaternion's length is not 1.
     """
-    samples = samples.cut(np.asarray(np.isfinite(samples.values(part)).all(axis=1)))
+    samples = samples.cut(samples.there(part))
     turns = quaternions(part, samples.values(part))
     with np.errstate(over="ignore"):
         length = np.linalg.norm(turns, axis=1)
@@ -264,17 +264,12 @@ def _kept_rows(samples: Samples, log_map: LogMap, part: Columns) -> Mask:
     if log_map.rows in ("whole", "messages"):
         return everything
     if samples.table is not None and rows_apart(samples, log_map):
-        return np.asarray(np.isfinite(samples.values(part)).all(axis=1))
-    if (place := log_map.position) is not None and samples.has(place):
-        placed = np.isfinite(samples.values(place)).all(axis=1)
-        if np.mean(placed) > 0.5:
-            return everything
-    inertial = (log_map.position, log_map.accelerometer, log_map.gyro)
-    there = [
-        np.isfinite(samples.values(one)).all(axis=1)
-        for one in inertial
-        if one is not None and samples.has(one)
-    ]
+        return samples.there(part)
+    place = log_map.position
+    if place is not None and samples.has(place) and np.mean(samples.there(place)) > 0.5:
+        return everything
+    inertial = (place, log_map.accelerometer, log_map.gyro)
+    there = [samples.there(one) for one in inertial if one is not None and samples.has(one)]
     return np.asarray(np.any(there, axis=0))
 
 

@@ -165,11 +165,7 @@ def rows_apart(samples: Samples, log_map: LogMap) -> bool:
     (or without a gyro's sample, in a log of no pose) far more often than rows lack one. Where a
     pose is lost, the others are in all rows alike.
     """
-    there = {
-        name: np.asarray(np.isfinite(samples.values(part)).all(axis=1))
-        for name, part in log_map.sections.items()
-        if samples.has(part)
-    }
+    there = {n: samples.there(part) for n, part in log_map.sections.items() if samples.has(part)}
     base = next((name for name in ("position", "gyro") if name in there), "")
     if not base:
         return False

@@ -49,12 +49,6 @@ _EARTH = 6_378_137.0  # m
 _PLACE = ("Lat", "Lng", "Alt")  # of POS
 _NUMBERS = ("C", "I", "Inst")  # of a core, a sensor or a battery
 _PLUS = 0  # of FRAME_TYPE, and of FRAME before Copter 3.5
-_FRAMES: dict[int, Order] = {  # of FRAME_TYPE; H has the places of X
-    **dict.fromkeys((1, 3), ORDERS["ardupilot-x"]),
-    **dict.fromkeys((12, 18), ORDERS["betaflight"]),
-    13: ORDERS["dji"],
-    14: ORDERS["crazyflie"],
-}
 _MOTOR1 = 33  # of SERVOn_FUNCTION
 _CHANNELS = 14  # of RCOU
 
@@ -184,14 +178,16 @@ def _order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> tuple
     if kind == _PLUS and (found := order_by_places(PLUS, vehicle)) is not None:
         motors = ", ".join(map(str, found))
         return found, f"{name} {kind}, a plus: rotors 1, 2, 3, 4 of the vehicle are motors {motors}"
-    if kind not in _FRAMES:
+    known = airframes()["ardupilot_order"]
+    if kind not in known:
         what = f"{kind}, a plus," if kind == _PLUS else str(kind)
         raise InputError(
             f"{path}: parameter {name} is {what} whose rotors do not stand as the vehicle's; "
-            f"expected one of {', '.join(map(str, _FRAMES))}, whose rotors stand in an x"
+            f"expected one of {', '.join(map(str, known))}, whose rotors stand in an x"
             + (", or a vehicle file with rotor_positions of a plus" if kind == _PLUS else "")
         )
-    return _FRAMES[kind], f"{name} {kind}: {order_words(_FRAMES[kind])}"
+    order = ORDERS[known[kind]]
+    return order, f"{name} {kind}: {order_words(order)}"
 
 
 def _functions(parameters: Parameters) -> list[int]:

@@ -6,10 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
@@ -57,7 +55,7 @@ class Outputs:
     words: str
 
 
-def what_flew(parameters: Parameters, statuses: Sequence[Mapping[str, Any]]) -> WhatFlew:
+def what_flew(parameters: Parameters, statuses: Sequence[Mapping[str, Array]]) -> WhatFlew:
     """Return what a log states of its vehicle.
 
     Args:
@@ -70,13 +68,13 @@ def what_flew(parameters: Parameters, statuses: Sequence[Mapping[str, Any]]) -> 
     frame, start = int(parameters.get("CA_AIRFRAME", 0)), int(parameters.get("SYS_AUTOSTART", 0))
     if frame in known["px4_airframe"]:
         return WhatFlew(known["px4_airframe"][frame], f"parameter CA_AIRFRAME = {frame}")
-    if any(np.any(np.asarray(fields.get("is_vtol", 0))) for fields in statuses):
+    if any(np.any(fields.get("is_vtol", 0)) for fields in statuses):
         return WhatFlew("a VTOL plane", "vehicle_status.is_vtol")
     kinds = [("parameter MAV_TYPE", int(parameters.get("MAV_TYPE", 0)))]
     kinds += [
-        ("vehicle_status.system_type", int(np.asarray(fields["system_type"])[-1]))
+        ("vehicle_status.system_type", int(fields["system_type"][-1]))
         for fields in statuses
-        if "system_type" in fields and len(np.asarray(fields["system_type"]))
+        if "system_type" in fields and len(fields["system_type"])
     ]
     for by, kind in kinds:
         if kind in known["mav_type"]:
@@ -147,7 +145,7 @@ def without_ranges(parameters: Parameters) -> Parameters:
     return {n: x for n, x in parameters.items() if not re.search(r"_(MIN|MAX)\d*$", n)}
 
 
-def slots_of_escs(fields: Mapping[str, Any]) -> list[int]:
+def slots_of_escs(fields: Mapping[str, Array]) -> list[int]:
     """Return the ESCs, from 0, of motors 1 to 4: by the function that each states, if all do."""
     functions = [f"esc[{i}].actuator_function" for i in range(_ESCS)]
     named = [int(fields[name][-1]) if name in fields else -1 for name in functions]
@@ -155,7 +153,7 @@ def slots_of_escs(fields: Mapping[str, Any]) -> list[int]:
 
 
 def outputs_of(
-    path: Path, sent: Sequence[Mapping[str, Any]], parameters: Parameters
+    path: Path, sent: Sequence[Mapping[str, Array]], parameters: Parameters
 ) -> tuple[Outputs, int | None]:
     """Return which outputs the motors are, and what of them is 0 and 1; and how many outputs run as
     motors do, None where none was sent.
@@ -172,7 +170,7 @@ def outputs_of(
     names = [f"output[{i}]" for i in range(_OUTPUTS)]
     tables = [np.column_stack([fields[n] for n in names if n in fields]) for fields in sent]
     # where all outputs of motors change: no servos, and no bank that is not in use
-    tables = [x.astype(float) for x in tables if x.shape[1] > max(slots) and _move(x[:, slots])]
+    tables = [x for x in tables if x.shape[1] > max(slots) and _move(x[:, slots])]
     motors = tables[0][:, slots] if tables else np.zeros((0, 4))
     outputs = _range(path, parameters, bank, slots, motors)
     if not tables:
@@ -180,7 +178,7 @@ def outputs_of(
     return outputs, running(tables[0], slots, float(outputs.low.min()), float(outputs.high.max()))
 
 
-def _move(outputs: NDArray[Any]) -> bool:
+def _move(outputs: Array) -> bool:
     """Return whether all outputs (N, 4) change."""
     return bool(np.all(np.ptp(np.nan_to_num(outputs), axis=0) > 0.0))
 

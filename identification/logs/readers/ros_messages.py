@@ -18,13 +18,6 @@ from ..table import Array
 from ..what_flew import slots_of_motors
 from .px4_motors import MOTOR1
 
-_NUMBERS = ["Float32", "Float64", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64"]
-# messages that are arrays of numbers, whatever these are, and the field that holds them
-ARRAYS = {f"std_msgs/msg/{kind}MultiArray": "data" for kind in _NUMBERS}
-ARRAYS |= {
-    "crazyswarm/msg/GenericLogData": "values",
-    "crazyflie_interfaces/msg/LogDataGeneric": "values",
-}
 PARTS = ("pose", "rotors", "command", "voltage", "imu")
 MOTORS = ("rotors", "command")  # parts
 _SECOND = 10**9  # ns
@@ -79,7 +72,8 @@ _SPECIAL: Mapping[str, Callable[[Any], list[float]]] = {
 
 
 @cache
-def _stated() -> dict[str, Any]:
+def stated() -> dict[str, Any]:
+    """Return what ``ros.yaml`` states."""
     found: dict[str, Any] = read_yaml(MAPS / "recordings" / "ros.yaml", "a map of messages")
     return found
 
@@ -87,11 +81,11 @@ def _stated() -> dict[str, Any]:
 @cache
 def kinds(part: str) -> dict[str, Kind]:
     """Return how a part is read from messages, by their types."""
-    found = {name: Kind((field,)) for name, field in ARRAYS.items() if part in MOTORS}
-    for name, stated in _stated()[part].items():
-        fields, order = stated["fields"], stated.get("order")
+    found = {name: Kind((field,)) for name, field in stated()["arrays"].items() if part in MOTORS}
+    for name, given in stated()[part].items():
+        fields, order = given["fields"], given.get("order")
         paths = fields if isinstance(fields, str) else tuple(fields)
-        found[name] = Kind(**stated | {"fields": paths, "order": ORDERS[order] if order else ()})
+        found[name] = Kind(**given | {"fields": paths, "order": ORDERS[order] if order else ()})
     return found
 
 
@@ -99,7 +93,7 @@ def definitions() -> list[dict[str, str]]:
     """Return the definitions of the types that rosbags does not know, in several variants: the
     newest of each comes first.
     """
-    known: dict[str, list[str]] = _stated()["definitions"]
+    known: dict[str, list[str]] = stated()["definitions"]
     return [
         {name: texts[min(variant, len(texts) - 1)] for name, texts in known.items()}
         for variant in range(max(map(len, known.values())))

@@ -31,7 +31,7 @@ from ..log_map import (
 )
 from ..rotor_orders import ORDERS, order_names
 from ..table import Array
-from .ros_messages import ARRAYS, MOTORS, PARTS, Kind, kinds
+from .ros_messages import MOTORS, PARTS, Kind, kinds, stated
 
 UNITS = {"rotors": ("rad/s", "rpm", "Hz"), "command": ("normalised", "us")}
 KEYS = {  # what may be said of a part
@@ -43,11 +43,6 @@ KEYS = {  # what may be said of a part
 }
 _FRAMES = {"flu": ("enu", "flu"), "ned": ("ned", "frd")}  # world and body
 _LARGEST_COMMAND = 1e5
-_SETPOINTS = ("setpoint", "set_point", "reference", "command", "cmd", "desired", "target", "goal")
-_MOCAP = (
-    *("vicon", "vrpn", "mocap", "motion_capture", "optitrack", "qualisys", "natnet"),
-    *("vision_pose", "ground_truth", "groundtruth"),
-)
 _SECTIONS: Mapping[str, Mapping[str, Columns]] = {  # of a log map, that a part fills
     "pose": {
         "position": Position(("x", "y", "z"), "m"),
@@ -153,18 +148,18 @@ class Topic:
     def log_map(self) -> LogMap:
         """What the columns of its messages mean."""
         world, body = _FRAMES[self.kind.frame]
-        stated: dict[str, Any] = {"topic": self.name}
+        given: dict[str, Any] = {"topic": self.name}
         if self.part == "imu":
-            stated["body"] = body
+            given["body"] = body
         elif self.part in MOTORS:
             picked = sorted(self.elements)
-            stated["columns"] = tuple(f"{self.part} {element}" for element in picked)
-            stated["order"] = tuple(picked.index(element) + 1 for element in self.elements)
-            stated["unit"] = self.kind.unit
+            given["columns"] = tuple(f"{self.part} {element}" for element in picked)
+            given["order"] = tuple(picked.index(element) + 1 for element in self.elements)
+            given["unit"] = self.kind.unit
         if self.part == "command":
-            stated["range"] = self.kind.range
+            given["range"] = self.kind.range
         parts: dict[str, Any] = {
-            name: replace(part, **stated) for name, part in _SECTIONS[self.part].items()
+            name: replace(part, **given) for name, part in _SECTIONS[self.part].items()
         }
         return LogMap(TimeColumn("stamp", "ns"), world, body, rows="messages", **parts)
 
@@ -284,14 +279,14 @@ def _topic(
     if named and named not in types:
         raise unknown_name("topic", named, types, f"{path}: {part} (named in {where})")
     # an array of numbers may be anything until somebody names its unit
-    fitting = [kind for kind in kinds(part) if kind not in ARRAYS or setting.unit]
+    fitting = [kind for kind in kinds(part) if kind not in stated()["arrays"] or setting.unit]
     several = sorted(topic for topic, kind in types.items() if kind in fitting)
     if part in ("pose", "rotors"):
-        flown = [t for t in several if not any(word in t.lower() for word in _SETPOINTS)]
+        flown = [topic for topic in several if not _has_word(topic, "setpoint_words")]
         several = flown or (several if part == "rotors" else [])
     found = [named] if named else several
     if part == "pose" and len(found) > 1:
-        measured = [t for t in several if any(word in t.lower() for word in _MOCAP)]
+        measured = [topic for topic in several if _has_word(topic, "measured_words")]
         found = measured if len(measured) == 1 else several
     elif part == "imu" and len(found) > 1:
         found = [t for t in several if not t.endswith("_raw")] or several
@@ -308,12 +303,16 @@ def _topic(
     return topic_of(part, found[0], types[found[0]], setting, places, why if others else "")
 
 
+def _has_word(topic: str, words: str) -> bool:
+    return any(word in topic.lower() for word in stated()[words])
+
+
 def _missing(path: Path, types: Mapping[str, str], part: str, where: str) -> InputError:
     """Return the error for a bag without rotor speeds and commands, or without a pose and inertial
     sensors.
     """
     topics = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(types.items())) or "none"
-    arrays = sorted(topic for topic, kind in types.items() if kind in ARRAYS)
+    arrays = sorted(topic for topic, kind in types.items() if kind in stated()["arrays"])
     if part == "rotors" and arrays:
         return InputError(
             f"{path}: rotors: {', '.join(arrays)} could be it, but a multi-array states no "
@@ -322,7 +321,8 @@ def _missing(path: Path, types: Mapping[str, str], part: str, where: str) -> Inp
             f"(or {UNITS['command'][0]}). The bag's topics: {topics}"
         )
     parts = ("pose",) if part == "pose" else MOTORS
-    known = dict.fromkeys(kind for one in parts for kind in kinds(one) if kind not in ARRAYS)
+    every = (kind for one in parts for kind in kinds(one))
+    known = dict.fromkeys(kind for kind in every if kind not in stated()["arrays"])
     left_out = sorted(topic for topic, kind in types.items() if kind in known)
     names = f"but set-points by their names ({', '.join(left_out)})"
     more = "" if part == "pose" else " or a multi-array of std_msgs with a unit"
