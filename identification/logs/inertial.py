@@ -146,16 +146,13 @@ def _force_shares(
         before, at, after = (
             resampled(middles + k * INERTIAL.window, times, values) for k in (-1, 0, 1)
         )
-        difference: Array = (after - 2.0 * at + before) / INERTIAL.window**2
-        return difference
+        return np.asarray((after - 2.0 * at + before) / INERTIAL.window**2)
 
     def mean(reading: SensorReading) -> Array:
-        speed = cumulative_trapezoid(
-            turned.apply(measured @ reading.turn.T), t, axis=0, initial=0.0
-        )
+        force = turned.apply(measured @ reading.turn.T)
+        speed = cumulative_trapezoid(force, t, axis=0, initial=0.0)
         way = cumulative_trapezoid(speed, t, axis=0, initial=0.0)
-        mean_force: Array = second_difference(t, way) + reading.lacks_gravity * g
-        return mean_force
+        return second_difference(t, way) + reading.lacks_gravity * g
 
     needed = second_difference(pose_times, position) + g
     size = _middle(needed)

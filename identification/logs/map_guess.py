@@ -26,7 +26,6 @@ from .channels import BODY_TURNS
 from .column_names import Group, Name, named_alone, take_apart, words
 from .column_parts import (
     PARTS,
-    Candidate,
     Numbers,
     find_parts,
     further_rotors,
@@ -143,13 +142,11 @@ def guess_map(table: Table, vehicle: Vehicle | None = None, name: str = "guess")
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # columns that hold nothing, or the absurd
         found = _Guessing(table, take_apart(table.header, table.units), vehicle)
-        if "position" in found.parts:
-            found.pose()
-        found.accelerometer()
-        found.gyro()
-        found.motors("motors")
-        found.motors("commands")
-        found.battery()
+        steps = {"position": found.pose, "accelerometer": found.accelerometer, "gyro": found.gyro}
+        steps |= {"motors": found.motors, "commands": found.motors, "battery": found.battery}
+        for part, find in steps.items():
+            if part in found.parts:
+                find(part)
     missing = tuple(found.missing())
     parts = [part for part in found.sections.values() if isinstance(part, Columns)]
     used = {found.clock and found.clock.column, *(c for part in parts for c in part.columns)}
@@ -226,17 +223,13 @@ class _Guessing:
             part: np.column_stack([data[name] for name in group.columns])
             for part, group in self.parts.items()
         }
-        for part in ("position", "attitude", "accelerometer", "gyro"):
-            if part in self.parts:
-                self.say_rivals(part, self.ranked[part])
-
-    def say_rivals(self, part: str, ranked: Sequence[Candidate]) -> None:
-        """Keep that other columns may be a part, where they do."""
-        least = max(0.0, ranked[0].score - PARTS.certain)
-        likely = [candidate for candidate in ranked if candidate.score > least]
-        if len(likely) > 1 or not self.by_name[part]:
-            field = "order" if len(ranked[0].group.columns) == 4 else "columns"
-            self.say(part, field, False, "; or ".join(map(str, likely[: PARTS.shown])))
+        for part in (part for part in _EXAMPLES if part in self.parts):
+            ranked = self.ranked[part]
+            least = max(0.0, ranked[0].score - PARTS.certain)
+            likely = [candidate for candidate in ranked if candidate.score > least]
+            if len(likely) > 1 or not self.by_name[part]:  # other columns may be it
+                field = "order" if len(ranked[0].group.columns) == 4 else "columns"
+                self.say(part, field, False, "; or ".join(map(str, likely[: PARTS.shown])))
 
     def missing(self) -> list[Missing]:
         """Return what the map lacks for a flight log."""
@@ -249,28 +242,23 @@ class _Guessing:
         if self.clock is None:
             why = "no column looks like a time; expected one such as t, time or timestamp"
             lack("time", "time", 1, why, "column")
-        has = {part for part in ("position", "accelerometer", "gyro") if part in self.sections}
-        imu = "accelerometer", "gyro"
+        pose, imu, has = ("position", "attitude"), ("accelerometer", "gyro"), set(self.sections)
         if "position" not in has and not has.issuperset(imu):
-            likely = {
-                part for part, ranked in self.ranked.items() if ranked and ranked[0].score > 0
-            }
-            poses = likely & {"position", "attitude"}
+            firsts = {part: self.ranked[part][0] for part in pose if self.ranked.get(part)}
+            firsts = {part: first for part, first in firsts.items() if first.score > 0.0}
             # what is nearest to be whole: half a pose, half an IMU, else a pose
-            wanted = ("position", "attitude") if poses or not has else imu
-            for part in wanted:
-                if part not in has and part not in poses:
+            for part in pose if firsts or not has.intersection(imu) else imu:
+                if part not in has and part not in firsts:
                     why = f"no columns look like one (such as {_EXAMPLES[part]})"
                     lack(part, part, 4 if part == "attitude" else 3, why)
-            for part in poses:
-                group, why = self.ranked[part][0].group, self.ranked[part][0].why
-                self.say(part, "columns", False, why)
-                if part == "position":
-                    self.sections[part] = Columns(group.columns, group.unit or "m")
-                else:
-                    euler = "zyx" if len(group.columns) == 3 else ""
-                    unit = (group.unit or "rad") if euler else ""
-                    self.sections[part] = Attitude(group.columns, unit, euler=euler)
+            for part, first in firsts.items():
+                self.say(part, "columns", False, first.why)
+                group, euler = first.group, "zyx" if len(first.group.columns) == 3 else ""
+                self.sections[part] = (
+                    Columns(group.columns, group.unit or "m")
+                    if part == "position"
+                    else Attitude(group.columns, euler and (group.unit or "rad"), euler=euler)
+                )
         for part in self.further:
             why = rotors_said(self.parts[part].columns, self.further[part])
             lack(part, "rotors", 4, why)
@@ -329,9 +317,9 @@ class _Guessing:
             why += f", and {other} is less likely by a log-likelihood ratio of {lead:.3g}"
         return value, self.ranking.certain(prop), why
 
-    def pose(self) -> None:
+    def pose(self, part: str) -> None:
         """Find frames, units, order and sense of the pose."""
-        place, group = self.parts["position"], self.parts["attitude"]
+        place, group = self.parts[part], self.parts["attitude"]
         attitude, is_quaternion = self.values["attitude"], len(group.columns) == 4
         units: tuple[str, ...] = ("deg", "rad")
         if np.nanmax(np.abs(attitude[:, :2]), initial=0.0) > np.pi:
@@ -351,7 +339,7 @@ class _Guessing:
             ]
         motors = self.values.get("motors", self.values.get("commands"))
         thrusts = np.ones((len(self.t), 4)) if motors is None else np.square(motors)
-        evidence = Evidence(self.t, thrusts, self.values["position"], attitude)
+        evidence = Evidence(self.t, thrusts, self.values[part], attitude)
         self.ranking = Ranking.of(evidence, readings, torques=False)
         best = self.ranking.best
         length = self.unit("position", place.unit, self.by_motion("length"))
@@ -380,11 +368,9 @@ class _Guessing:
         names = ("world", "body", "sense", "order", "pitch_sign", "unit")
         return self.ranking is not None and self.ranking.certain(*names)
 
-    def accelerometer(self) -> None:
+    def accelerometer(self, part: str) -> None:
         """Find unit and axes of the accelerometer by gravity."""
-        if "accelerometer" not in self.parts:
-            return
-        group, values = self.parts["accelerometer"], self.values["accelerometer"]
+        group, values = self.parts[part], self.values[part]
         size = float(np.nanmedian(np.linalg.norm(values, axis=1)))
         z = float(np.nanmean(values[:, 2])) / max(size, 1e-12)
         # without a pose, turned over may also be gravity in place of the specific force
@@ -407,17 +393,13 @@ class _Guessing:
         if self.ranking is None:
             self.sections["body"] = axes
 
-    def gyro(self) -> None:
+    def gyro(self, part: str) -> None:
         """Find unit and axes of the gyro: by the pose's turns, or by size and accelerometer."""
-        if "gyro" not in self.parts:
-            return
-        group, values = self.parts["gyro"], self.values["gyro"]
+        group, values = self.parts[part], self.values[part]
         if self.ranking is None:
             axes = self.sections.get("body", "flu")
-            sure = any(
-                r.section == "accelerometer" and r.field == "body" and r.certain
-                for r in self.reasons
-            )
+            told = {(r.section, r.field) for r in self.reasons if r.certain}
+            sure = ("accelerometer", "body") in told
             self.say("gyro", "body", sure, "as the accelerometer's")
             high = float(np.nanquantile(np.abs(values), 0.995))
             unit = "deg/s" if high > GUESS.slow_gyro else "rad/s"
@@ -453,8 +435,6 @@ class _Guessing:
 
     def motors(self, part: str) -> None:
         """Find unit and order of rotor speeds or commands, where the map has none of the kind."""
-        if part not in self.parts:
-            return
         group, values = self.parts[part], self.values[part]
         power = self.numbers.elasticity(values)
         kind, unit, sure, why = motor_unit(group, values, self.vehicle, power)
@@ -511,13 +491,13 @@ class _Guessing:
             return order, False, why
         return ORDERS[hint], False, f"{hint}: no order is much likelier than all others"
 
-    def battery(self) -> None:
+    def battery(self, part: str) -> None:
         """Find the unit of the battery's voltage."""
-        values = self.values.get("battery", np.empty(0))
+        values = self.values[part]
         values = values[np.isfinite(values) & (values > 0.0)]
         if not values.size:
             return
-        group, middle = self.parts["battery"], float(np.median(values))
+        group, middle = self.parts[part], float(np.median(values))
         guessed = *voltage_unit(middle), f"its median is {middle:.4g}"
         unit = self.unit("battery", group.unit, guessed)
         self.sections["battery"] = Battery(group.columns, unit)

@@ -50,21 +50,13 @@ RUNNING = RunningSettings()
 
 @dataclass(frozen=True)
 class WhatFlew:
-    """What a log states of its vehicle; empty and None: nothing.
+    """What a log states of its vehicle; empty and None: nothing."""
 
-    Attributes:
-        airframe: in words, such as "a hexarotor".
-        by: the parameter, message or header that says so.
-        rotors: how many it has.
-        running: how many outputs run as motors do.
-        outputs: protocol and range of the motors' outputs, in words.
-    """
-
-    airframe: str = ""
-    by: str = ""
-    rotors: int | None = None
-    running: int | None = None
-    outputs: str = ""
+    airframe: str = ""  # in words, such as "a hexarotor"
+    by: str = ""  # the parameter, message or header that says so
+    rotors: int | None = None  # how many it has
+    running: int | None = None  # how many outputs run as motors do
+    outputs: str = ""  # protocol and range of the motors' outputs, in words
 
     def refusal(self) -> str:
         """Return why the log is none of a quadrotor, as a sentence; empty where it may be one."""

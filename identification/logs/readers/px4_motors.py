@@ -40,19 +40,12 @@ _ABOVE_PULSES = 1.1  # of the longest pulse, which no pulse reaches
 
 @dataclass(frozen=True, eq=False)
 class Outputs:
-    """The outputs of motors 1 to 4, and what of them is 0 and 1.
+    """The outputs of motors 1 to 4, and what of them is 0 and 1."""
 
-    Attributes:
-        slots: outputs, from 0.
-        low: (4,) what is 0.
-        high: (4,) what is 1.
-        words: protocol and range.
-    """
-
-    slots: list[int]
-    low: Array
-    high: Array
-    words: str
+    slots: list[int]  # from 0
+    low: Array  # (4,) what is 0
+    high: Array  # (4,) what is 1
+    words: str  # protocol and range
 
 
 def what_flew(parameters: Parameters, statuses: Sequence[Mapping[str, Array]]) -> WhatFlew:
@@ -99,26 +92,20 @@ def motor_order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> 
         (parameters.get(f"CA_ROTOR{i}_PX", 0.0), -parameters.get(f"CA_ROTOR{i}_PY", 0.0))
         for i in range(4)
     ]
+    said, whence = "", "as on PX4's quad x, which the log does not state"
     if parameters.get("CA_ROTOR_COUNT") and any(x or y for x, y in places):
         whence, said = "by the positions in CA_ROTORn_PX and PY", "CA_ROTORn_PX and CA_ROTORn_PY"
     elif start // 1000 == 5:
         places, whence = list(PLUS), f"as on a quad plus (SYS_AUTOSTART = {start})"
         said = f"SYS_AUTOSTART = {start}, a quad plus,"
-    else:
-        order, whence = ORDERS["px4-x"], "as on PX4's quad x, which the log does not state"
-        return order, _renumbered(order, whence)
-    found = order_by_places(places, vehicle)
-    if found is None:
+    order = order_by_places(places, vehicle) if said else ORDERS["px4-x"]
+    if order is None:
         raise InputError(
             f"{path}: parameters {said} put the rotors at {places} (x forward, y left); expected "
             "one in each quadrant, as on a quad x, or a vehicle file with these rotor_positions"
         )
-    return found, _renumbered(found, whence)
-
-
-def _renumbered(order: Order, whence: str) -> str:
     motors = ", ".join(map(str, order))
-    return f"motors renumbered {whence}: rotors 1, 2, 3, 4 are motors {motors}"
+    return order, f"motors renumbered {whence}: rotors 1, 2, 3, 4 are motors {motors}"
 
 
 def with_motors(log_map: LogMap, order: Order, parameters: Parameters, outputs: Outputs) -> LogMap:
@@ -166,7 +153,11 @@ def outputs_of(
     Raises:
         InputError: a range of pulses is none, or the outputs fit no protocol.
     """
-    bank, slots = _output_slots(parameters)
+    bank, slots = "MAIN", [0, 1, 2, 3]
+    for name, prefix in reversed(_BANKS.items()):  # of several the first
+        functions = [int(parameters.get(f"{prefix}{i + 1}", 0.0)) for i in range(_OUTPUTS)]
+        if found := slots_of_motors(functions, MOTOR1):
+            bank, slots = name, found
     names = [f"output[{i}]" for i in range(_OUTPUTS)]
     tables = [np.column_stack([fields[n] for n in names if n in fields]) for fields in sent]
     # where all outputs of motors change: no servos, and no bank that is not in use
@@ -195,15 +186,6 @@ def shares_of_motors(columns: Mapping[str, Array], outputs: Outputs) -> dict[str
         return {}
     shares = np.clip((sent - outputs.low) / (outputs.high - outputs.low), 0.0, 1.0)
     return {f"output[{motor}]": share for motor, share in enumerate(shares.T)}
-
-
-def _output_slots(parameters: Parameters) -> tuple[str, list[int]]:
-    """Return the bank and the outputs, from 0, of motors 1 to 4."""
-    for bank, prefix in _BANKS.items():
-        functions = (parameters.get(f"{prefix}{i + 1}", 0.0) for i in range(_OUTPUTS))
-        if slots := slots_of_motors([int(function) for function in functions], MOTOR1):
-            return bank, slots
-    return "MAIN", list(range(4))
 
 
 def _range(
