@@ -152,7 +152,7 @@ def _force_shares(
         force = turned.apply(measured @ reading.turn.T)
         speed = cumulative_trapezoid(force, t, axis=0, initial=0.0)
         way = cumulative_trapezoid(speed, t, axis=0, initial=0.0)
-        return second_difference(t, way) + reading.lacks_gravity * g
+        return np.asarray(second_difference(t, way) + reading.lacks_gravity * g)
 
     needed = second_difference(pose_times, position) + g
     size = _middle(needed)
