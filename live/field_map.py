@@ -13,7 +13,7 @@ from ..dynamics.vehicle import Vehicle
 from ..identification.logs.channels import in_kit_axes, in_kit_units, quaternions, scaled
 from ..identification.logs.log_map import (
     OWN_MAP,
-    TIME_UNITS,
+    UNITS,
     Attitude,
     Columns,
     LogMap,
@@ -21,7 +21,7 @@ from ..identification.logs.log_map import (
     load_map,
 )
 from ..identification.logs.magnitudes import Magnitudes
-from ..identification.logs.map_fit import ways, with_range
+from ..identification.logs.mapped_log import with_range
 from ..runtime.errors import InputError
 from .messages import Array, Malformed, Sample
 
@@ -51,8 +51,8 @@ class FieldMap:
             )
         self.map, self.where = with_range(given, vehicle, where), where
         self._rows = 0
-        self._sections = {name: ways(self.map, name) for name in self.map.sections}
-        self._clocks = ways(self.map, "time")
+        self._sections = {name: self.map.ways(name) for name in self.map.sections}
+        self._clocks = self.map.ways("time")
 
     def check(self, names: Iterable[str]) -> None:
         """Check that the fields of all messages are there.
@@ -140,9 +140,9 @@ class FieldMap:
         value = fields.get(clock.column)
         if isinstance(value, int) and not isinstance(value, bool):
             if abs(value) < 2**63:
-                return round(value * round(TIME_UNITS[clock.unit] * _SECOND))
+                return round(value * round(UNITS["time"][clock.unit] * _SECOND))
         elif isinstance(value, float) and math.isfinite(value) and abs(value) < 1e12:
-            return round(value * (TIME_UNITS[clock.unit] * _SECOND))
+            return round(value * (UNITS["time"][clock.unit] * _SECOND))
         raise Malformed(f"field {clock.column}: {_shown(value)}; expected a time")
 
     def _attitude(self, part: Attitude, values: Array) -> Array:

@@ -23,18 +23,8 @@ from .table import WHAT, Array, Table
 # and a packed one; classes of arrays; and types of numbers
 _HEAD, _MATRIX, _PACKED = 128, 14, 15
 _STRUCT, _NUMBERS = 2, range(6, 16)
-_TYPES = {
-    1: "i1",
-    2: "u1",
-    3: "i2",
-    4: "u2",
-    5: "i4",
-    6: "u4",
-    7: "f4",
-    9: "f8",
-    12: "i8",
-    13: "u8",
-}
+_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8"}
+_TYPES |= {12: "i8", 13: "u8"}
 _Order = Literal["big", "little"]
 _SHOWN = 10  # arrays that a note lists
 

@@ -12,22 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .log_map import (
-    ACCELERATION_UNITS,
-    ANGLE_UNITS,
-    LENGTH_UNITS,
-    RATE_UNITS,
-    ROTOR_UNITS,
-    VOLTAGE_UNITS,
-    Attitude,
-    Battery,
-    Columns,
-    Commands,
-    LogMap,
-    Rotors,
-    Sensor,
-    constant,
-)
+from .log_map import UNITS, Attitude, Battery, Columns, Commands, LogMap, Rotors, Sensor, constant
 from .table import Array, Mask, Rows, Table
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])
@@ -59,6 +44,10 @@ class Samples:
             fixed = constant(name)
             values[:, i] = self.columns[name] if fixed is None else fixed
         return scaled(part, values)
+
+    def there(self, part: Columns) -> Mask:
+        """Return in which rows (N,) a section has all of its values."""
+        return np.asarray(np.isfinite(self.values(part)).all(axis=1))
 
     def has(self, part: Columns) -> bool:
         """Return whether a section's columns are there."""
@@ -93,22 +82,18 @@ def in_kit_units(log_map: LogMap, section: str, part: Columns, values: Array) ->
     """Return a section's scaled values (N, k), but no attitude's, in SI units, and in the kit's
     axes and order of rotors; commands as 0 to 1.
     """
+    unit = UNITS.get(section, {}).get(part.unit, 1.0)
     if isinstance(part, Rotors):
-        order = [motor - 1 for motor in part.order]
-        return np.asarray(values[:, order] * (ROTOR_UNITS[part.unit] / part.pole_pairs))
+        return np.asarray(values[:, [m - 1 for m in part.order]] * (unit / part.pole_pairs))
     if isinstance(part, Commands):
         assert part.range is not None
         low, high = part.range
         return np.asarray((values[:, [m - 1 for m in part.order]] - low) / (high - low))
     if isinstance(part, Battery):
-        return np.asarray(values * VOLTAGE_UNITS[part.unit] * part.cells)
+        return np.asarray(values * unit * part.cells)
     if isinstance(part, Sensor):
-        units = ACCELERATION_UNITS if section == "accelerometer" else RATE_UNITS
-        return np.asarray(values * units[part.unit] @ BODY_TURNS[part.body or log_map.body].T)
-    if section == "wrench":
-        return values
-    unit = LENGTH_UNITS.get(part.unit, 1e-3 if part.unit in ("mN", "mNm") else 1.0)
-    return np.asarray(values * unit @ WORLD_TURNS[log_map.world].T)
+        return np.asarray(values * unit @ BODY_TURNS[part.body or log_map.body].T)
+    return values if section == "wrench" else values * unit @ WORLD_TURNS[log_map.world].T
 
 
 def quaternions(part: Attitude, values: Array) -> Array:
@@ -118,7 +103,7 @@ def quaternions(part: Attitude, values: Array) -> Array:
     if not part.euler:
         return values[:, [3, 0, 1, 2]] if part.order == "xyzw" else values
     order = ["xyz".index(axis) for axis in part.euler]
-    turn = Rotation.from_euler(part.euler.upper(), values[:, order] * ANGLE_UNITS[part.unit])
+    turn = Rotation.from_euler(part.euler.upper(), values[:, order] * UNITS["attitude"][part.unit])
     return np.asarray(turn.as_quat(scalar_first=True))
 
 

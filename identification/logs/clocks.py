@@ -47,26 +47,26 @@ def on_one_clock(
     Raises:
         InputError: there is no such piece.
     """
-    notes: dict[str, None] = {}
+    notes: list[str] = []
     rolled = [_unrolled(samples.t) for samples in recorded]
     if any(over for _, over in rolled):
-        notes["the clock of 32 bits rolled over in the log; later times go on behind it"] = None
+        notes.append("the clock of 32 bits rolled over in the log; later times go on behind it")
     groups = [replace(s, t=t) for s, (t, _) in zip(recorded, rolled, strict=True)]
     groups, said = _of_piece(path, groups, piece)
-    notes |= dict.fromkeys(said)
+    notes += said
     out = []
     for samples in groups:
         rows, late = in_order(samples.t)
         name = samples.topic or next(iter(samples.columns), "rows")
         if late:
-            notes[f"{name}: {late} of {len(samples.t)} rows were written late and sorted in"] = None
+            notes.append(f"{name}: {late} of {len(samples.t)} rows were written late and sorted in")
         if left := len(samples.t) - len(rows):
-            notes[
+            notes.append(
                 f"{name}: {left} of {len(samples.t)} samples repeat a time or have one that the "
                 "samples around them contradict, and were left out"
-            ] = None
+            )
         out.append(samples if left == 0 and late == 0 else samples.cut(rows))
-    return out, list(notes)
+    return out, list(dict.fromkeys(notes))
 
 
 def _unrolled(t: Array) -> tuple[Array, bool]:
@@ -95,26 +95,19 @@ def _of_piece(
         np.split(np.arange(len(samples.t)), cut) if len(cut) + 1 == many else None
         for samples, cut in zip(groups, cuts, strict=True)
     ]
+    both = list(zip(groups, parts, strict=True))
     seconds = [
-        max(
-            float(np.ptp(samples.t[part[i]]))
-            for samples, part in zip(groups, parts, strict=True)
-            if part is not None
-        )
+        max(float(np.ptp(samples.t[part[i]])) for samples, part in both if part is not None)
         for i in range(many)
     ]
     chosen = int(np.argmax(seconds)) if piece is None else piece - 1
     lengths = ", ".join(f"{x:.3g}" for x in seconds)
-    why = "the longest, " if piece is None else ""
+    why, how = ("the longest, ", "; --piece reads another") if piece is None else ("", "")
     note = (
         f"the clock starts anew {many - 1} time(s): the file holds {many} pieces of {lengths} s; "
-        f"{why}piece {chosen + 1}, was read"
+        f"{why}piece {chosen + 1}, was read{how}"
     )
-    kept = [
-        samples if part is None else samples.cut(part[chosen])
-        for samples, part in zip(groups, parts, strict=True)
-    ]
-    return kept, [note + ("" if piece else "; --piece reads another")]
+    return [s if part is None else s.cut(part[chosen]) for s, part in both], [note]
 
 
 def check_piece(path: Path, piece: int | None, many: int) -> None:

@@ -9,18 +9,241 @@ are looked at by threes and fours that stand side by side.
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from .column_names import Group, Name, groups_of, named_alone, side_by_side, words
-from .column_numbers import PARTS, Numbers
-from .magnitudes import within
-from .table import Table
+from .log_map import UNITS
+from .magnitudes import MAGNITUDES, within
+from .table import Array, Table
 
 _FOURS = (("1", "2", "3", "4"), ("0", "1", "2", "3"))
 _TRIPLES = (("x", "y", "z"), ("roll", "pitch", "yaw"))  # of which no column is another group's
+
+
+@dataclass(frozen=True)
+class PartSettings:
+    """When numbers speak for a part, and what that counts beside a name (4 for the likeliest)."""
+
+    numbers: float = 4.0  # what numbers that obey the part's physics count
+    certain: float = 2.0  # lead over the next candidate
+    length: tuple[float, float] = (2e-3, 0.02)  # error of a quaternion's: median, and of 98 %
+    window: float = 0.2  # s, over which rates are taken
+    rows: int = 20_000  # in the middle of the flight that are looked at, at most
+    samples: int = 4000  # of them that are compared, at most
+    levels: int = 10  # that a switch may take
+    fewest: int = 30  # that decide something
+    follows: float = 0.7  # correlation from which on one follows the other
+    same_size: float = 1.3  # up to which rates in one unit are of one size
+    alike: float = 1.6  # ratio of medians of four rotors
+    is_rate: float = 0.9  # the same, of a rate that a column states
+    felt: float = 0.5  # correlation of rotors with the specific force
+    left: float = 0.5  # share of a further rotor's variance that the four leave, at most
+    rotor_sizes: tuple[float, float] = (0.5, 2.0)  # of its median by theirs
+    shown: int = 4  # candidates that a map lists
+
+
+PARTS = PartSettings()
+
+
+def correlation(x: Array, y: Array) -> float:
+    """Return the correlation of two series (n,); 0 where one is constant."""
+    return float(np.nan_to_num(np.corrcoef(x, y)[0, 1]))
+
+
+class Numbers:
+    """What the numbers of columns obey.
+
+    Args:
+        t: (N,) s; NaN in rows that are not looked at.
+        data: columns (N,) by name.
+    """
+
+    def __init__(self, t: Array, data: Mapping[str, Array]) -> None:
+        order = np.argsort(t, kind="stable")[: int(np.isfinite(t).sum())]
+        self.order = order[max(0, (len(order) - PARTS.rows) // 2) :][: PARTS.rows]
+        self.t = t[self.order]
+        self.data = {name: x for name, x in data.items() if np.isfinite(x[self.order]).any()}
+        self._rows: dict[tuple[str, ...], tuple[Array, Array]] = {}
+        self.attitude: Array = np.empty((0, 0))  # (n, 4) at ``self.begins``, where there is one
+        self.begins = self.ends = np.empty(0)
+        self.rate: Array = np.empty(0)  # (n,) rad/s, of the attitude
+        self.felt: list[Array] = []  # what may be the specific force, at ``self.clock``
+
+    @cached_property
+    def clock(self) -> Array:
+        """Times (n,) in s at which motors are compared."""
+        count = min(PARTS.samples, len(self.t))
+        return np.asarray(self.t[np.linspace(0, len(self.t) - 1, count).astype(int)])
+
+    def rows(self, columns: Sequence[str]) -> tuple[Array, Array]:
+        """Return the times (n,) and values (n, k) of the rows in which columns are all there."""
+        if (key := tuple(columns)) not in self._rows:
+            values = np.column_stack([self.data[name][self.order] for name in columns])
+            there = np.isfinite(values).all(axis=1)
+            self._rows[key] = self.t[there], values[there]
+        return self._rows[key]
+
+    def some(self, columns: Sequence[str]) -> Array:
+        """Return values (n, k) of some rows, spread over all."""
+        values = self.rows(columns)[1]
+        return values[:: max(1, len(values) // PARTS.samples)]
+
+    def between(self, t: Array, columns: Sequence[str]) -> Array:
+        """Return values (n, k) at times (n,), of lines between the rows."""
+        times, values = self.rows(columns)
+        if not len(times):
+            return np.full((len(t), len(columns)), np.nan)
+        return np.column_stack([np.interp(t, times, x) for x in values.T])
+
+    def _bend(self, t: Array, columns: Sequence[str]) -> Array:
+        """Return the second differences (n, k) around times (n,)."""
+        before, at, after = (self.between(t + k * PARTS.window, columns) for k in (-1, 0, 1))
+        return np.asarray(before - 2.0 * at + after)
+
+    def varies(self, column: str) -> bool:
+        """Return whether a column takes more than a few values: no counter's and no switch's."""
+        return column in self.data and len(np.unique(self.some([column]))) > PARTS.levels
+
+    def is_quaternion(self, columns: Sequence[str]) -> bool:
+        """Return whether four columns have length 1, and turn."""
+        x = self.some(columns)
+        length = np.linalg.norm(x, axis=1)
+        there = length > 0.5  # zeros stand for one that is not there
+        if there.sum() < max(2, 0.5 * len(x)):
+            return False
+        off = np.abs(length[there] - 1.0)
+        return bool(np.median(off) < PARTS.length[0] and np.quantile(off, 0.98) < PARTS.length[1])
+
+    def take_attitude(self, columns: Sequence[str]) -> None:
+        """Keep a quaternion, by which gyro and position are known."""
+        t, q = self.rows(columns)
+        if len(t) < PARTS.fewest:
+            return
+        step = max(1, len(t) // PARTS.samples)
+        ends = np.searchsorted(t, t + PARTS.window)[::step]
+        begins = np.arange(len(t))[::step]
+        begins, ends = begins[ends < len(t)], ends[ends < len(t)]
+        apart = t[ends] - t[begins]
+        keep = (apart > 0.0) & (apart < 2.0 * PARTS.window)
+        begins, ends = begins[keep], ends[keep]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            q = q / np.linalg.norm(q, axis=1, keepdims=True)
+        cosine = np.abs(np.sum(q[begins] * q[ends], axis=1))
+        self.begins, self.ends, self.attitude = t[begins], t[ends], q[begins]
+        self.rate = 2.0 * np.arccos(np.clip(cosine, 0.0, 1.0)) / (self.ends - self.begins)
+
+    def gyro_unit(self, columns: Sequence[str]) -> tuple[str, float]:
+        """Return the unit in which three columns turn as fast as the attitude, and how alike the
+        two are, at most 1; nothing: in none.
+        """
+        t, values = self.rows(columns)
+        if len(self.rate) < PARTS.fewest or len(t) < PARTS.fewest:
+            return "", 0.0
+        turned = cumulative_trapezoid(values - np.median(values, axis=0), t, axis=0, initial=0.0)
+        mean = [
+            (np.interp(self.ends, t, x) - np.interp(self.begins, t, x)) / (self.ends - self.begins)
+            for x in turned.T
+        ]
+        size = np.linalg.norm(mean, axis=0)
+        good = np.isfinite(size) & np.isfinite(self.rate)
+        alike = correlation(size[good], self.rate[good])
+        ratio = float(np.mean(size[good]) / max(float(np.mean(self.rate[good])), 1e-12))
+        one = 1.0 / PARTS.same_size, PARTS.same_size
+        units = ("rad/s", "deg/s")
+        unit = next((unit for unit in units if within(ratio * UNITS["gyro"][unit], one)), "")
+        return (unit, alike) if alike > PARTS.follows else ("", 0.0)
+
+    def gravity_unit(self, columns: Sequence[str]) -> tuple[str, float]:
+        """Return the unit in which three columns have the size of gravity, and 1, or less where it
+        does not lie along the third; nothing: in none.
+        """
+        x = self.some(columns)
+        length = np.linalg.norm(x, axis=1)
+        size, middle = float(np.median(length)), np.abs(np.median(x, axis=0))
+        if np.std(length) < 1e-6 * size or middle.max() < 0.8 * size:
+            return "", 0.0  # a direction, or all that turns
+        one = UNITS["accelerometer"]["g"]
+        sizes = {"m/s2": size / one, "g": size}
+        unit = next((u for u, by_g in sizes.items() if within(by_g, MAGNITUDES.gravity)), "")
+        return unit, 1.0 if middle.argmax() == 2 else 0.8
+
+    def follows_tilt(self, columns: Sequence[str]) -> float:
+        """Return how the second difference of two of three columns follows the tilt, at most 1; 0
+        where it does not.
+        """
+        if len(self.begins) < PARTS.fewest or len(self.rows(columns)[0]) < PARTS.fewest:
+            return 0.0
+        force = self._bend(self.begins, columns)
+        best = 0.0
+        for w, x, y, z in (self.attitude.T, self.attitude[:, [3, 0, 1, 2]].T):
+            for sign in (1.0, -1.0):
+                tilt = x * z + sign * w * y, y * z - sign * w * x
+                found = [abs(correlation(f, d)) for f, d in zip(force.T, tilt, strict=False)]
+                best = max(best, min(found))
+        return best if best > PARTS.follows else 0.0
+
+    @cached_property
+    def _series(self) -> tuple[list[str], Array]:
+        """The columns that change, and each at ``self.clock`` without its mean, of length 1."""
+        names = [name for name in self.data if len(self.rows([name])[0]) >= PARTS.fewest]
+        series = np.array([self.between(self.clock, [name])[:, 0] for name in names])
+        series -= series.mean(axis=1, keepdims=True) if len(names) else 0.0
+        size = np.linalg.norm(series, axis=1) if len(names) else np.empty(0)
+        moving = size > 0.0
+        names = [name for name, moves in zip(names, moving, strict=True) if moves]
+        return names, series[moving] / size[moving, None]
+
+    def has_rate(self, columns: Sequence[str]) -> bool:
+        """Return whether three columns have their rates in three others."""
+        names, series = self._series
+        if len(self.rows(columns)[0]) < PARTS.fewest or not names:
+            return False
+        ahead = self.between(self.clock + 0.5 * PARTS.window, columns)
+        speed = ahead - self.between(self.clock - 0.5 * PARTS.window, columns)
+        speed -= speed.mean(axis=0)
+        alike = series @ (speed / np.maximum(np.linalg.norm(speed, axis=0), 1e-300))
+        alike[[name in columns for name in names]] = 0.0
+        return bool(alike.max(axis=0).min() > PARTS.is_rate)
+
+    def moves_together(self, columns: Sequence[str]) -> bool:
+        """Return whether four columns are of one size and move with the specific force."""
+        x = self.some(columns)
+        x = x[np.any(x != 0.0, axis=1)]
+        if len(x) < PARTS.fewest or np.mean(x < 0.0) > 0.01 or not np.all(np.ptp(x, axis=0) > 0.0):
+            return False
+        middle = np.median(x, axis=0)
+        if not middle.min() * PARTS.alike >= middle.max() > 0.0:
+            return False
+        total = self.between(self.clock, columns).sum(axis=1)
+        return any(correlation(total, felt) > PARTS.felt for felt in self.felt)
+
+    def feel(self, accelerometer: Sequence[str], position: Sequence[str]) -> None:
+        """Keep what may be the specific force: an accelerometer's size, else accelerations."""
+        if accelerometer:
+            self.felt = [np.linalg.norm(self.between(self.clock, accelerometer), axis=1)]
+        elif position:
+            force = self._bend(self.clock, position).T
+            self.felt = [*force, *-force]
+
+    def elasticity(self, values: Array) -> float:
+        """Return by which power of four motors' mean (N, 4) the specific force grows: 2 of rotor
+        speeds, more of pulses that stand on an offset. NaN where the flight does not show it.
+        """
+        if len(self.felt) != 1:
+            return np.nan
+        total = np.nanmean(values[self.order], axis=1)
+        good = np.isfinite(total)
+        mean = np.interp(self.clock, self.t[good], total[good])
+        there = (mean > 0.5 * np.median(mean)) & (self.felt[0] > 0.3 * np.median(self.felt[0]))
+        x, y = np.log(mean[there]), np.log(self.felt[0][there])
+        if len(x) < PARTS.fewest or correlation(x, y) < 0.85:
+            return np.nan
+        return float(np.std(y) / np.std(x))
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +264,7 @@ def named_columns(names: Sequence[Name]) -> set[str]:
         group
         for ways in words()["parts"].values()
         for way in ways
-        for endings in (*way.get("endings", ()), *way.get("numbered", ()))
+        for endings in way["endings"]
         for group in groups_of(names, endings)
         if _is_named(group, "")
     ]
@@ -87,18 +310,15 @@ def _candidates(part: str, names: Sequence[Name], numbers: Numbers) -> Iterator[
     fours = (group for ending in _FOURS for group in groups_of(names, ending))
     commanded = part == "motors" and any(_is_named(group, part) for group in fours)
     for number, way in enumerate(words()["parts"][part]):
-        for kind in ("endings", "numbered"):
-            for endings in way.get(kind, ()):
-                for group in groups_of(names, endings):
-                    i = _place_of(group.key, way["words"])
-                    if i is None and (commanded or _is_named(group, part)):
-                        continue
-                    named |= set(group.columns)
-                    if i is None:
-                        yield from _judged(part, group, -1.0, "their names go together", numbers)
-                        continue
-                    by_name = PARTS.numbers - 0.3 * i - 0.5 * number
-                    yield from _judged(part, group, by_name, "by the columns' names", numbers)
+        for group in (group for endings in way["endings"] for group in groups_of(names, endings)):
+            i = _place_of(group.key, way["words"])
+            if i is None and (commanded or _is_named(group, part)):
+                continue
+            named |= set(group.columns)
+            by_name, why = -1.0, "their names go together"
+            if i is not None:
+                by_name, why = PARTS.numbers - 0.3 * i - 0.5 * number, "by the columns' names"
+            yield from _judged(part, group, by_name, why, numbers)
     width = 4 if part in ("attitude", "motors") else 3
     if part == "commands" or commanded:
         return
@@ -113,8 +333,7 @@ def _is_named(group: Group, part: str) -> bool:
         _place_of(group.key, way["words"]) is not None
         for other, ways in words()["parts"].items()
         for way in ways
-        if other != part
-        and list(group.endings) in (*way.get("endings", ()), *way.get("numbered", ()))
+        if other != part and list(group.endings) in way["endings"]
     )
 
 

@@ -80,23 +80,20 @@ def _speeds(
     relative = model.thrust_factor * np.square(share) + (1.0 - model.thrust_factor) * share
     total = relative.sum(axis=1)
     felt = _felt(log)
-    if felt is not None:
-        scale, where = _scale_by_accelerometer(log.t, total, felt, vehicle), "an accelerometer"
-        balance = (
-            f"the thrust in flight is, on the median, the mass of {vehicle.name} "
-            f"({vehicle.mass:.4g} kg) times the accelerometer along the rotors' axis"
-        )
-    elif log.has_pose:
-        scale, where = _scale_by_weight(log, total, vehicle), "a pose"
-        balance = (
-            f"the mean vertical thrust in flight is the weight of {vehicle.name} "
-            f"({vehicle.weight:.4g} N)"
-        )
-    else:
+    where = "a pose" if felt is None else "an accelerometer"
+    if felt is None and not log.has_pose:
         return None, [
             f"{unknown}, no pose and no accelerometer, and the vehicle {vehicle.name} states no "
             "motor_curve; state it to turn commands into thrust"
         ]
+    scale = _scale(log, total, felt, vehicle)
+    balance = "the mean vertical thrust in flight is the weight of "
+    balance += f"{vehicle.name} ({vehicle.weight:.4g} N)"
+    if felt is not None:
+        balance = (
+            f"the thrust in flight is, on the median, the mass of {vehicle.name} "
+            f"({vehicle.mass:.4g} kg) times the accelerometer along the rotors' axis"
+        )
     if scale is None:
         return None, [f"no rotor speeds: the motor commands are 0 wherever there is {where}"]
     return np.sqrt(scale * relative / vehicle.k), [
@@ -175,22 +172,22 @@ def _felt(log: FlightLog) -> Array | None:
     return log.accelerometer[:, 2] if is_usual or not log.has_pose else None
 
 
-def _scale_by_weight(log: FlightLog, total: Array, vehicle: Vehicle) -> float | None:
-    """Return N of a motor at full command, or None where no motor runs."""
-    _, x, y, _ = log.quaternion[log.valid].T
-    total = total[log.valid]
-    aloft = _aloft(log.t[log.valid], total)
+def _scale(log: FlightLog, total: Array, felt: Array | None, vehicle: Vehicle) -> float | None:
+    """Return N of a motor at full command, or None where no motor runs in flight: by what is felt
+    (N,) along the rotors' axis in m/s2, else by the weight.
+    """
+    rows = log.valid if felt is None else np.isfinite(felt)
+    total = total[rows]
+    aloft = _aloft(log.t[rows], total)
+    if felt is not None:
+        felt = felt[rows]
+        usable = aloft & (total > 0.0) & (felt > 0.0)
+        share = felt[usable] / total[usable]
+        return vehicle.mass * float(np.median(share)) if len(share) else None
+    _, x, y, _ = log.quaternion[rows].T
     vertical = (total * (1.0 - 2.0 * (x * x + y * y)))[aloft]
     mean = float(np.mean(vertical)) if len(vertical) else 0.0
     return vehicle.weight / mean if mean > 0.0 else None
-
-
-def _scale_by_accelerometer(t: Array, total: Array, felt: Array, vehicle: Vehicle) -> float | None:
-    """Return N of a motor at full command, or None where no motor runs in flight."""
-    read = np.isfinite(felt)
-    t, total, felt = t[read], total[read], felt[read]
-    usable = _aloft(t, total) & (total > 0.0) & (felt > 0.0)
-    return vehicle.mass * float(np.median(felt[usable] / total[usable])) if usable.any() else None
 
 
 def _aloft(t: Array, total: Array) -> Mask:

@@ -27,7 +27,7 @@ from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import CUTOFFS, continuous, derivative, low_pass, resampled, unbroken
 from .flight_log import FlightLog
 from .flight_phases import usual_thrust
-from .log_map import LENGTH_UNITS
+from .log_map import UNITS
 from .readings import DECLARED, Reading, as_written, log_readings
 from .table import Array, Mask, Rows
 
@@ -338,7 +338,7 @@ class Evidence:
             return 0.0, 0.0, np.column_stack([felt, self._torques(reading)])
         frames, axes = reading.frames, self._motion(*reading.attitude)[0]
         push = np.einsum("ij,njk,k->ni", frames.world, axes, frames.body[:, 2])
-        force = self._acceleration @ frames.position.T * LENGTH_UNITS[reading.length]
+        force = self._acceleration @ frames.position.T * UNITS["position"][reading.length]
         force += np.array([0.0, 0.0, _G])
         needed, given = (np.ravel(x[:, :2] - x[:, :2].mean(axis=0)) for x in (force, push))
         variances = float(needed @ needed), float(given @ given), float(needed @ given)

@@ -96,8 +96,7 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
 def _climb_rate(t: Array, height: Array) -> Array:
     """Return the mean climb rate (N,) in m/s around each time."""
     later, sooner = np.interp(t + _CLIMB_WINDOW, t, height), np.interp(t - _CLIMB_WINDOW, t, height)
-    rate: Array = (later - sooner) / (2 * _CLIMB_WINDOW)
-    return rate
+    return np.asarray((later - sooner) / (2 * _CLIMB_WINDOW))
 
 
 def _run(true: Mask) -> int:

@@ -74,17 +74,19 @@ OWN_MAP = "windwrench"  # of this kit's own columns
 UNKNOWN = "?"  # what a guessed map leaves to a person to choose
 
 WORLDS = {"enu": "enu", "nwu": "enu", "flu": "enu", "ned": "ned", "frd": "ned", "y_up": "y_up"}
-BODIES = {"flu": "flu", "frd": "frd"}
-# units; the first of each is taken where a section states none
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
-LENGTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "ft": 0.3048}
-ANGLE_UNITS = {"deg": math.pi / 180.0, "rad": 1.0}
-# a rotor's unit in rad/s; that of eRPM is divided by the pairs of poles
-ROTOR_UNITS = {
-    "rad/s": 1.0,
-    "rpm": math.pi / 30.0,
-    "Hz": 2.0 * math.pi,
-    "eRPM": math.pi / 30.0,
+BODIES = ("flu", "frd")
+# units of each section in the kit's; the first is taken where a section states none. A rotor's of
+# eRPM is divided by the pairs of poles
+UNITS: dict[str, dict[str, float]] = {
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
+    "position": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "ft": 0.3048},
+    "attitude": {"deg": math.pi / 180.0, "rad": 1.0},
+    "rotors": {"rad/s": 1.0, "rpm": math.pi / 30.0, "Hz": 2.0 * math.pi, "eRPM": math.pi / 30.0},
+    "battery": {"V": 1.0, "mV": 1e-3, "cV": 1e-2},
+    "accelerometer": {"m/s2": 1.0, "g": 9.80665, "raw": 1.0},
+    "gyro": {"rad/s": 1.0, "deg/s": math.pi / 180.0, "raw": 1.0},
+    "force": {"N": 1.0, "mN": 1e-3},
+    "torque": {"Nm": 1.0, "mNm": 1e-3},
 }
 # what stands for no and for full command; None: must be said
 COMMAND_UNITS: dict[str, tuple[float, float] | None] = {
@@ -95,9 +97,6 @@ COMMAND_UNITS: dict[str, tuple[float, float] | None] = {
     "dshot": (48.0, 2047.0),
     "counts": None,
 }
-VOLTAGE_UNITS = {"V": 1.0, "mV": 1e-3, "cV": 1e-2}
-ACCELERATION_UNITS = {"m/s2": 1.0, "g": 9.80665, "raw": 1.0}
-RATE_UNITS = {"rad/s": 1.0, "deg/s": math.pi / 180.0, "raw": 1.0}
 SENSES = ("body_to_world", "world_to_body")
 QUATERNIONS = ("wxyz", "xyzw")
 EULER_ORDERS = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")
@@ -180,7 +179,7 @@ class TimeColumn:
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     column: _Name = ""
-    unit: Annotated[str, one_of(TIME_UNITS)] = "s"
+    unit: Annotated[str, one_of(UNITS["time"])] = "s"
     offset: Number | None = None  # s, added; None: so that the flight begins at 0
     rate_hz: Positive = 0.0  # of rows, where there is no column
     note: str = ""
@@ -293,18 +292,18 @@ class LogMap:
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     time: Annotated[TimeColumn, AfterValidator(_clock)]
-    world: Annotated[str, one_of(WORLDS)] = "enu"
+    world: Annotated[str, one_of(WORLDS), AfterValidator(WORLDS.__getitem__)] = "enu"
     body: Annotated[str, one_of(BODIES)] = "flu"
-    position: Annotated[Position, _section(3, LENGTH_UNITS)] | None = None
-    attitude: Annotated[Attitude, _section(4, ANGLE_UNITS)] | None = None
-    rotors: Annotated[Rotors, _section(4, ROTOR_UNITS)] | None = None
+    position: Annotated[Position, _section(3, UNITS["position"])] | None = None
+    attitude: Annotated[Attitude, _section(4, UNITS["attitude"])] | None = None
+    rotors: Annotated[Rotors, _section(4, UNITS["rotors"])] | None = None
     commands: Annotated[Commands, _section(4, COMMAND_UNITS)] | None = None
     wrench: Annotated[Columns, _section(4, ("N",))] | None = None
-    battery: Annotated[Battery, _section(1, VOLTAGE_UNITS)] | None = None
-    accelerometer: Annotated[Sensor, _section(3, ACCELERATION_UNITS)] | None = None
-    gyro: Annotated[Sensor, _section(3, RATE_UNITS)] | None = None
-    force: Annotated[Columns, _section(3, ("N", "mN"))] | None = None
-    torque: Annotated[Columns, _section(3, ("Nm", "mNm"))] | None = None
+    battery: Annotated[Battery, _section(1, UNITS["battery"])] | None = None
+    accelerometer: Annotated[Sensor, _section(3, UNITS["accelerometer"])] | None = None
+    gyro: Annotated[Sensor, _section(3, UNITS["gyro"])] | None = None
+    force: Annotated[Columns, _section(3, UNITS["force"])] | None = None
+    torque: Annotated[Columns, _section(3, UNITS["torque"])] | None = None
     about: str = ""
     vehicle: str = ""
     recognise: tuple[str, ...] = ()
@@ -326,6 +325,23 @@ class LogMap:
     def is_own(self) -> bool:
         """Are the columns this kit's own?"""
         return self.name == OWN_MAP
+
+    def ways(self, section: str) -> tuple[Any, ...]:
+        """Return the ways to fill a section, in their order."""
+        first = getattr(self, section)
+        return () if first is None else (first, *self.alternatives.get(section, ()))
+
+    @property
+    def wanted(self) -> list[str]:
+        """The columns that the map asks for, each once."""
+        parts = [way for section in self.sections for way in self.ways(section)]
+        names = [name for part in (*parts, *self.extra.values()) for name in part.named]
+        return [name for name in dict.fromkeys([*names, self.time.column]) if name]
+
+    @property
+    def topics(self) -> set[str]:
+        """The kinds of messages in which the columns stand."""
+        return {way.topic for section in self.sections for way in self.ways(section)}
 
 
 SECTIONS = (

@@ -12,7 +12,7 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from .flight_log import FlightLog, parts_of
 from .flight_phases import usual_thrust
-from .log_map import ROTOR_UNITS, TIME_UNITS, VOLTAGE_UNITS
+from .log_map import UNITS
 from .table import Array
 
 
@@ -40,8 +40,8 @@ class Magnitudes:
 MAGNITUDES = Magnitudes()
 _TIMES = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 _SPEEDS = {
-    "rpm": ("revolutions per minute", ROTOR_UNITS["rpm"]),
-    "Hz": ("revolutions per second", ROTOR_UNITS["Hz"]),
+    "rpm": ("revolutions per minute", UNITS["rotors"]["rpm"]),
+    "Hz": ("revolutions per second", UNITS["rotors"]["Hz"]),
     "deg/s": ("degrees per second", np.pi / 180.0),
 }
 
@@ -55,13 +55,13 @@ def time_unit(step: float) -> tuple[str, bool]:
     """Return the unit in which a median step (in the column's unit) is a flight's, and whether
     that is certain.
     """
-    rates = {unit: 1.0 / max(step * TIME_UNITS[unit], 1e-300) for unit in _TIMES}
+    rates = {unit: 1.0 / max(step * UNITS["time"][unit], 1e-300) for unit in _TIMES}
     return _likely_unit(rates, MAGNITUDES.rates, MAGNITUDES.sure_rates)
 
 
 def voltage_unit(median: float) -> tuple[str, bool]:
     """Return the unit in which a median voltage is a battery's, and whether that is certain."""
-    volts = {unit: median * size for unit, size in VOLTAGE_UNITS.items()}
+    volts = {unit: median * size for unit, size in UNITS["battery"].items()}
     return _likely_unit(volts, MAGNITUDES.voltages, MAGNITUDES.sure_voltages)
 
 
@@ -82,7 +82,7 @@ def time_doubt(step: float) -> str:
         return ""
     return (
         f"t looks like {_TIMES[unit]}: its median step is {step:.4g}; expected seconds: divide t "
-        f"by {1.0 / TIME_UNITS[unit]:g}"
+        f"by {1.0 / UNITS['time'][unit]:g}"
     )
 
 

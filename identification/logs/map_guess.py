@@ -11,7 +11,7 @@ unit in a name is taken unless the numbers contradict it.
 
 import re
 import warnings
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 from typing import Any
@@ -24,9 +24,9 @@ from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS
 from .channels import BODY_TURNS
 from .column_names import Group, Name, named_alone, take_apart, words
-from .column_numbers import PARTS, Numbers
 from .column_parts import (
-    Candidate,
+    PARTS,
+    Numbers,
     find_parts,
     further_rotors,
     named_columns,
@@ -36,15 +36,9 @@ from .evidence import EVIDENCE, Evidence, Ranking, likelihood
 from .excerpt import LONGEST
 from .inertial import gyro_shares
 from .log_map import (
-    ACCELERATION_UNITS,
-    ANGLE_UNITS,
     COMMAND_UNITS,
-    LENGTH_UNITS,
-    RATE_UNITS,
-    ROTOR_UNITS,
-    TIME_UNITS,
+    UNITS,
     UNKNOWN,
-    VOLTAGE_UNITS,
     Attitude,
     Battery,
     Columns,
@@ -84,7 +78,7 @@ class GuessSettings:
 
 GUESS = GuessSettings()
 _Choice = tuple[str, bool, str]  # what is taken, whether it is certain, and why
-_G = ACCELERATION_UNITS["g"]
+_G = UNITS["accelerometer"]["g"]
 _EXAMPLES = {
     "position": "x, y, z",
     "attitude": "qw, qx, qy, qz or roll, pitch, yaw",
@@ -148,13 +142,11 @@ def guess_map(table: Table, vehicle: Vehicle | None = None, name: str = "guess")
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # columns that hold nothing, or the absurd
         found = _Guessing(table, take_apart(table.header, table.units), vehicle)
-        if "position" in found.parts:
-            found.pose()
-        found.accelerometer()
-        found.gyro()
-        found.motors("motors")
-        found.motors("commands")
-        found.battery()
+        steps = {"position": found.pose, "accelerometer": found.accelerometer, "gyro": found.gyro}
+        steps |= {"motors": found.motors, "commands": found.motors, "battery": found.battery}
+        for part, find in steps.items():
+            if part in found.parts:
+                find(part)
     missing = tuple(found.missing())
     parts = [part for part in found.sections.values() if isinstance(part, Columns)]
     used = {found.clock and found.clock.column, *(c for part in parts for c in part.columns)}
@@ -231,17 +223,13 @@ class _Guessing:
             part: np.column_stack([data[name] for name in group.columns])
             for part, group in self.parts.items()
         }
-        for part in ("position", "attitude", "accelerometer", "gyro"):
-            if part in self.parts:
-                self.say_rivals(part, self.ranked[part])
-
-    def say_rivals(self, part: str, ranked: Sequence[Candidate]) -> None:
-        """Keep that other columns may be a part, where they do."""
-        least = max(0.0, ranked[0].score - PARTS.certain)
-        likely = [candidate for candidate in ranked if candidate.score > least]
-        if len(likely) > 1 or not self.by_name[part]:
-            field = "order" if len(ranked[0].group.columns) == 4 else "columns"
-            self.say(part, field, False, "; or ".join(map(str, likely[: PARTS.shown])))
+        for part in (part for part in _EXAMPLES if part in self.parts):
+            ranked = self.ranked[part]
+            least = max(0.0, ranked[0].score - PARTS.certain)
+            likely = [candidate for candidate in ranked if candidate.score > least]
+            if len(likely) > 1 or not self.by_name[part]:  # other columns may be it
+                field = "order" if len(ranked[0].group.columns) == 4 else "columns"
+                self.say(part, field, False, "; or ".join(map(str, likely[: PARTS.shown])))
 
     def missing(self) -> list[Missing]:
         """Return what the map lacks for a flight log."""
@@ -254,28 +242,23 @@ class _Guessing:
         if self.clock is None:
             why = "no column looks like a time; expected one such as t, time or timestamp"
             lack("time", "time", 1, why, "column")
-        has = {part for part in ("position", "accelerometer", "gyro") if part in self.sections}
-        imu = "accelerometer", "gyro"
+        pose, imu, has = ("position", "attitude"), ("accelerometer", "gyro"), set(self.sections)
         if "position" not in has and not has.issuperset(imu):
-            likely = {
-                part for part, ranked in self.ranked.items() if ranked and ranked[0].score > 0
-            }
-            poses = likely & {"position", "attitude"}
+            firsts = {part: self.ranked[part][0] for part in pose if self.ranked.get(part)}
+            firsts = {part: first for part, first in firsts.items() if first.score > 0.0}
             # what is nearest to be whole: half a pose, half an IMU, else a pose
-            wanted = ("position", "attitude") if poses or not has else imu
-            for part in wanted:
-                if part not in has and part not in poses:
+            for part in pose if firsts or not has.intersection(imu) else imu:
+                if part not in has and part not in firsts:
                     why = f"no columns look like one (such as {_EXAMPLES[part]})"
                     lack(part, part, 4 if part == "attitude" else 3, why)
-            for part in poses:
-                group, why = self.ranked[part][0].group, self.ranked[part][0].why
-                self.say(part, "columns", False, why)
-                if part == "position":
-                    self.sections[part] = Columns(group.columns, group.unit or "m")
-                else:
-                    euler = "zyx" if len(group.columns) == 3 else ""
-                    unit = (group.unit or "rad") if euler else ""
-                    self.sections[part] = Attitude(group.columns, unit, euler=euler)
+            for part, first in firsts.items():
+                self.say(part, "columns", False, first.why)
+                group, euler = first.group, "zyx" if len(first.group.columns) == 3 else ""
+                self.sections[part] = (
+                    Columns(group.columns, group.unit or "m")
+                    if part == "position"
+                    else Attitude(group.columns, euler and (group.unit or "rad"), euler=euler)
+                )
         for part in self.further:
             why = rotors_said(self.parts[part].columns, self.further[part])
             lack(part, "rotors", 4, why)
@@ -296,16 +279,13 @@ class _Guessing:
         self.say(section, name, sure, f"{value}: {why}")
         return value
 
-    def unit(
-        self, section: str, named: str, known: Container[str], guess: Callable[[], _Choice]
-    ) -> str:
+    def unit(self, section: str, named: str, choice: _Choice) -> str:
         """Return a section's unit: as its columns' names say unless their numbers are certain to be
         in another, else as guessed.
         """
-        choice = guess()
-        if named in known and (choice[0] == named or not choice[1]):
+        if named in UNITS[section] and (choice[0] == named or not choice[1]):
             choice = named, True, "by the columns' names"
-        elif named in known:
+        elif named in UNITS[section]:
             choice = choice[0], False, f"{choice[2]}, though the columns' names say {named}"
         return self.take(section, "unit", choice)
 
@@ -317,11 +297,11 @@ class _Guessing:
         steps = np.diff(raw[np.isfinite(raw)])
         step = float(np.median(steps[steps > 0.0]))
         guessed, sure = time_unit(step)
-        rate = f"{1.0 / max(step * TIME_UNITS[guessed], 1e-300):.4g} rows a second"
-        if clock.unit in TIME_UNITS:  # an unusual rate is no reason to doubt a name
-            sure &= not within(1.0 / max(step * TIME_UNITS[clock.unit], 1e-300), GUESS.rates)
-        unit = self.unit("time", clock.unit, TIME_UNITS, lambda: (guessed, sure, rate))
-        t = np.asarray((raw - raw[np.isfinite(raw)][0]) * TIME_UNITS[unit])
+        rate = f"{1.0 / max(step * UNITS['time'][guessed], 1e-300):.4g} rows a second"
+        if clock.unit in UNITS["time"]:  # an unusual rate is no reason to doubt a name
+            sure &= not within(1.0 / max(step * UNITS["time"][clock.unit], 1e-300), GUESS.rates)
+        unit = self.unit("time", clock.unit, (guessed, sure, rate))
+        t = np.asarray((raw - raw[np.isfinite(raw)][0]) * UNITS["time"][unit])
         middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
         t[~(np.abs(t - middle) <= 0.5 * LONGEST)] = np.nan
         self.sections["time"] = TimeColumn(clock.column, unit)
@@ -337,9 +317,9 @@ class _Guessing:
             why += f", and {other} is less likely by a log-likelihood ratio of {lead:.3g}"
         return value, self.ranking.certain(prop), why
 
-    def pose(self) -> None:
+    def pose(self, part: str) -> None:
         """Find frames, units, order and sense of the pose."""
-        place, group = self.parts["position"], self.parts["attitude"]
+        place, group = self.parts[part], self.parts["attitude"]
         attitude, is_quaternion = self.values["attitude"], len(group.columns) == 4
         units: tuple[str, ...] = ("deg", "rad")
         if np.nanmax(np.abs(attitude[:, :2]), initial=0.0) > np.pi:
@@ -353,16 +333,16 @@ class _Guessing:
             lengths=(place.unit,) if place.unit == "ft" else ("m", "cm", "mm"),
             hint="ned" if re.search("ned|down|d$", "".join(place.columns).lower()) else "",
         )
-        if place.unit in LENGTH_UNITS:
+        if place.unit in UNITS["position"]:
             readings = [
                 replace(r, unlikely=r.unlikely + OTHER * (r.length != place.unit)) for r in readings
             ]
         motors = self.values.get("motors", self.values.get("commands"))
         thrusts = np.ones((len(self.t), 4)) if motors is None else np.square(motors)
-        evidence = Evidence(self.t, thrusts, self.values["position"], attitude)
+        evidence = Evidence(self.t, thrusts, self.values[part], attitude)
         self.ranking = Ranking.of(evidence, readings, torques=False)
         best = self.ranking.best
-        length = self.unit("position", place.unit, LENGTH_UNITS, lambda: self.by_motion("length"))
+        length = self.unit("position", place.unit, self.by_motion("length"))
         told = [("world", "", "world"), ("body", "", "body"), ("attitude", "sense", "sense")]
         made = Attitude(group.columns, order=best.order, sense=best.sense)
         if not is_quaternion:
@@ -370,7 +350,7 @@ class _Guessing:
             made = replace(made, unit=best.unit, euler=best.euler, signs=signs)
             beyond = best.unit, best.unit != group.unit, "angles beyond pi"
             guessed = self.by_motion("unit") if len(units) > 1 else beyond
-            self.unit("attitude", group.unit, ANGLE_UNITS, lambda: guessed)
+            self.unit("attitude", group.unit, guessed)
             told += [("attitude", "euler", "euler"), ("attitude", "signs", "pitch_sign")]
         elif group.numbered:
             told.append(("attitude", "order", "order"))
@@ -388,11 +368,9 @@ class _Guessing:
         names = ("world", "body", "sense", "order", "pitch_sign", "unit")
         return self.ranking is not None and self.ranking.certain(*names)
 
-    def accelerometer(self) -> None:
+    def accelerometer(self, part: str) -> None:
         """Find unit and axes of the accelerometer by gravity."""
-        if "accelerometer" not in self.parts:
-            return
-        group, values = self.parts["accelerometer"], self.values["accelerometer"]
+        group, values = self.parts[part], self.values[part]
         size = float(np.nanmedian(np.linalg.norm(values, axis=1)))
         z = float(np.nanmean(values[:, 2])) / max(size, 1e-12)
         # without a pose, turned over may also be gravity in place of the specific force
@@ -404,7 +382,7 @@ class _Guessing:
         why, scale = f"its median size is {size:.4g}", 1.0
         if group.unit in units or likely:
             likely = likely or [group.unit]
-            unit = self.unit("accelerometer", group.unit, units, lambda: (likely[0], True, why))
+            unit = self.unit("accelerometer", group.unit, (likely[0], True, why))
             if unit == group.unit and not within(size * units[unit] / _G, MAGNITUDES.doubtful):
                 self.say("accelerometer", "unit", False, f"{unit}: {why}, which is not gravity's")
         else:
@@ -415,17 +393,13 @@ class _Guessing:
         if self.ranking is None:
             self.sections["body"] = axes
 
-    def gyro(self) -> None:
+    def gyro(self, part: str) -> None:
         """Find unit and axes of the gyro: by the pose's turns, or by size and accelerometer."""
-        if "gyro" not in self.parts:
-            return
-        group, values = self.parts["gyro"], self.values["gyro"]
+        group, values = self.parts[part], self.values[part]
         if self.ranking is None:
             axes = self.sections.get("body", "flu")
-            sure = any(
-                r.section == "accelerometer" and r.field == "body" and r.certain
-                for r in self.reasons
-            )
+            told = {(r.section, r.field) for r in self.reasons if r.certain}
+            sure = ("accelerometer", "body") in told
             self.say("gyro", "body", sure, "as the accelerometer's")
             high = float(np.nanquantile(np.abs(values), 0.995))
             unit = "deg/s" if high > GUESS.slow_gyro else "rad/s"
@@ -433,7 +407,7 @@ class _Guessing:
         else:
             axes, guessed = self.gyro_by_pose(values, ("rad/s", "deg/s"), group.unit)
             self.take("gyro", "body", (axes, *guessed[1:]))
-        unit = self.unit("gyro", group.unit, RATE_UNITS, lambda: guessed)
+        unit = self.unit("gyro", group.unit, guessed)
         self.sections["gyro"] = Sensor(group.columns, unit, body=axes)
 
     def gyro_by_pose(self, values: Array, units: Sequence[str], named: str) -> tuple[str, _Choice]:
@@ -445,7 +419,7 @@ class _Guessing:
         times = self.t[good]
         seen = np.isfinite(times)
         ways = list(product(units, BODY_TURNS))
-        turns = [RATE_UNITS[unit] * BODY_TURNS[body] for unit, body in ways]
+        turns = [UNITS["gyro"][unit] * BODY_TURNS[body] for unit, body in ways]
         shares = gyro_shares(self.t, values, times[seen], rotation[seen], turns)
         if shares is None:
             return ways[0][1], (ways[0][0], False, "the log is too short")
@@ -461,8 +435,6 @@ class _Guessing:
 
     def motors(self, part: str) -> None:
         """Find unit and order of rotor speeds or commands, where the map has none of the kind."""
-        if part not in self.parts:
-            return
         group, values = self.parts[part], self.values[part]
         power = self.numbers.elasticity(values)
         kind, unit, sure, why = motor_unit(group, values, self.vehicle, power)
@@ -495,7 +467,7 @@ class _Guessing:
         evidence, best = None, DECLARED
         if "gyro" in self.sections:
             sensor = self.sections["gyro"]
-            rates = self.values["gyro"] * RATE_UNITS[sensor.unit] @ BODY_TURNS[sensor.body]
+            rates = self.values["gyro"] * UNITS["gyro"][sensor.unit] @ BODY_TURNS[sensor.body]
             evidence = Evidence(self.t, np.square(values), gyro=rates)
         elif self.ranking is not None and self.turning_known:
             best = self.ranking.best
@@ -519,15 +491,15 @@ class _Guessing:
             return order, False, why
         return ORDERS[hint], False, f"{hint}: no order is much likelier than all others"
 
-    def battery(self) -> None:
+    def battery(self, part: str) -> None:
         """Find the unit of the battery's voltage."""
-        values = self.values.get("battery", np.empty(0))
+        values = self.values[part]
         values = values[np.isfinite(values) & (values > 0.0)]
         if not values.size:
             return
-        group, middle = self.parts["battery"], float(np.median(values))
+        group, middle = self.parts[part], float(np.median(values))
         guessed = *voltage_unit(middle), f"its median is {middle:.4g}"
-        unit = self.unit("battery", group.unit, VOLTAGE_UNITS, lambda: guessed)
+        unit = self.unit("battery", group.unit, guessed)
         self.sections["battery"] = Battery(group.columns, unit)
 
 
@@ -552,7 +524,9 @@ def motor_unit(
     carrying: list[str] = []
     if vehicle is not None and not commanded:
         there = values[np.isfinite(values).all(axis=1)]
-        carrying = [u for u in carrying_units(thrust_by_weight(there, vehicle)) if u in ROTOR_UNITS]
+        carrying = [
+            u for u in carrying_units(thrust_by_weight(there, vehicle)) if u in UNITS["rotors"]
+        ]
     # numbers of 1000 to 2000 may be pulses as well, whatever they would carry
     doubt = "pulses in us" if pulses else "percents" if high <= 100.0 else ""
     doubt = "" if speeds else doubt
@@ -563,10 +537,10 @@ def motor_unit(
     carries = f"in it the rotors carry the weight of {vehicle.name if vehicle else ''}"
     carries += f", though they may be {doubt}" if doubt else ""
     # by the vehicle's weight a name may be wrong, but poles of eRPM are unknown
-    lifts = len(carrying) == 1 and named in ROTOR_UNITS and named not in ("eRPM", *carrying)
+    lifts = len(carrying) == 1 and named in UNITS["rotors"] and named not in ("eRPM", *carrying)
     rules = (
         (lifts, "rotors", "".join(carrying), False, f"{carries}, not in {named} as names say"),
-        (named in ROTOR_UNITS, "rotors", named, True, by_names),
+        (named in UNITS["rotors"], "rotors", named, True, by_names),
         (high <= 1.0, "commands", "normalised", "omega" not in names, up_to),
         (named in ("us", "percent"), "commands", named, True, by_names),
         (commanded and pulses, "commands", "us", True, between),

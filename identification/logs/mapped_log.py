@@ -1,6 +1,7 @@
 """From columns of any names and a map of what they mean to a flight log: of a table, whose channels
 share its rows, and of a recording, whose groups of channels have a clock each.
 
+Of several ways to fill a section the first is taken whose columns are there and hold measurements.
 Each section of the map becomes a stream (``streams``). Where channels stand in rows of their own,
 the pose's rows are the log's, and the others are interpolated to them. Else rows of a table that
 hold neither a pose nor an inertial sensor's sample are left out, unless most rows have a pose,
@@ -10,7 +11,9 @@ rows than the position is interpolated to the position's.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,14 +24,26 @@ from .clocks import on_one_clock
 from .column_parts import further_rotors, rotors_said
 from .commanded_speeds import flown_vehicle
 from .flight_log import NORM_TOLERANCE, FlightLog, vehicle_of_columns
-from .log_map import Attitude, Battery, Columns, Commands, LogMap, Position, Rotors, constant
-from .map_fit import NO_QUATERNION, chosen, fitted, wanted_columns, ways
+from .log_map import (
+    Attitude,
+    Battery,
+    Columns,
+    Commands,
+    LogMap,
+    Position,
+    Rotors,
+    TimeColumn,
+    check_whole,
+    constant,
+)
 from .rotor_orders import order_names, order_words
 from .streams import Recording, Stream, readable, slerp
 from .table import Mask, Table
 from .table_rows import LONGEST_STEPS, check_rows, rows_apart, rows_of
 from .what_flew import UNSTATED, WhatFlew, check_flown
 
+_SHOWN = 30  # columns that an error lists
+NO_QUATERNION = 0.5  # length; shorter stands for one that is not there
 _IMU = ("accelerometer", "gyro")
 _ATTITUDE_GAP = 0.1  # s, across which an attitude is not interpolated
 _OUTSIDE = 0.5  # share of commands beyond their range from which on the range is wrong
@@ -57,7 +72,7 @@ def map_table(
     for motors in filter(None, (log_map.rotors, log_map.commands)):
         if further := further_rotors(motors.columns, table):
             raise InputError(f"{table.path}: {rotors_said(motors.columns, further)}")
-    columns = table.read(wanted_columns(log_map))
+    columns = table.read(log_map.wanted)
     if log_map.is_own and rows_apart(Samples(np.arange(float(table.rows)), columns), log_map):
         log_map = replace(log_map, rows="mixed")
     notes = [*table.notes, *log_map.notes, *([log_map.time.note] if log_map.time.note else [])]
@@ -95,8 +110,8 @@ def recording_of(
     """
     check_flown(path, flown)
     recorded, of_clock = on_one_clock(path, recorded, piece)
-    motors = (*ways(log_map, "rotors"), *ways(log_map, "commands"))
-    poses = ways(log_map, "position")
+    motors = (*log_map.ways("rotors"), *log_map.ways("commands"))
+    poses = log_map.ways("position")
     log_map, sources = chosen(recorded, log_map)
     if not (log_map.rotors or log_map.commands or log_map.wrench):
         names = [s.topic for s in recorded if s.topic] or [x for s in recorded for x in s.columns]
@@ -222,7 +237,7 @@ def _attitude(path: Path, log_map: LogMap, part: Attitude, samples: Samples) -> 
     Raises:
         InputError: a quaternion's length is not 1.
     """
-    samples = samples.cut(np.asarray(np.isfinite(samples.values(part)).all(axis=1)))
+    samples = samples.cut(samples.there(part))
     turns = quaternions(part, samples.values(part))
     with np.errstate(over="ignore"):
         length = np.linalg.norm(turns, axis=1)
@@ -249,17 +264,12 @@ def _kept_rows(samples: Samples, log_map: LogMap, part: Columns) -> Mask:
     if log_map.rows in ("whole", "messages"):
         return everything
     if samples.table is not None and rows_apart(samples, log_map):
-        return np.asarray(np.isfinite(samples.values(part)).all(axis=1))
-    if (place := log_map.position) is not None and samples.has(place):
-        placed = np.isfinite(samples.values(place)).all(axis=1)
-        if np.mean(placed) > 0.5:
-            return everything
-    inertial = (log_map.position, log_map.accelerometer, log_map.gyro)
-    there = [
-        np.isfinite(samples.values(one)).all(axis=1)
-        for one in inertial
-        if one is not None and samples.has(one)
-    ]
+        return samples.there(part)
+    place = log_map.position
+    if place is not None and samples.has(place) and np.mean(samples.there(place)) > 0.5:
+        return everything
+    inertial = (place, log_map.accelerometer, log_map.gyro)
+    there = [samples.there(one) for one in inertial if one is not None and samples.has(one)]
     return np.asarray(np.any(there, axis=0))
 
 
@@ -291,3 +301,127 @@ def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream
 def _order_note(order: tuple[int, int, int, int]) -> str:
     names = order_names(order)
     return f"{order_words(order)}{f' ({names[0]})' if names else ''}"
+
+
+def fitted(table: Table, log_map: LogMap, vehicle: Vehicle | None, reader: str) -> LogMap:
+    """Return a map with the ways to fill a section for which a table has the columns, without the
+    optional sections that the table lacks, and with the range of its commands.
+
+    Raises:
+        InputError: it does not fit the table.
+    """
+    header = set(table.header)
+    where = f"{table.path}: map {log_map.name}"
+    clocks: list[TimeColumn] = [c for c in log_map.ways("time") if c.column in {*header, ""}]
+    missing = [] if clocks else [(log_map.time.column, "time")]
+    kept: dict[str, Any] = {"time": clocks[0] if clocks else log_map.time}
+    others: dict[str, tuple[Columns, ...]] = {}
+    for section, part in log_map.sections.items():
+        fitting = [way for way in log_map.ways(section) if set(way.named) <= header]
+        absent = [name for name in part.named if name not in header]
+        if fitting:
+            kept[section], others[section] = fitting[0], tuple(fitting[1:])
+        elif part.optional and (len(absent) == len(part.named) or reader):
+            kept[section] = None
+        else:
+            whose = f"{section} (all or none)" if part.optional else section
+            missing += [(name, whose) for name in absent]
+    if missing and reader:
+        names = ", ".join(name for name, _ in missing)
+        raise InputError(
+            f"{table.path}: missing column(s) {names}; expected those of {log_map.about}"
+        )
+    if missing:
+        raise InputError(f"{where} does not fit: {_missing_words(missing, table.header)}")
+    log_map = replace(log_map, **kept, alternatives=others)
+    check_whole(log_map, f"{where} does not fit")
+    extra = {name: part for name, part in log_map.extra.items() if set(part.named) <= header}
+    log_map = replace(log_map, extra=extra)
+    return with_range(log_map, vehicle, where)
+
+
+def with_range(log_map: LogMap, vehicle: Vehicle | None, where: str) -> LogMap:
+    """Return a map that states the range of its commands: its own, or that of the vehicle.
+
+    Raises:
+        InputError: neither states one.
+    """
+    commands = log_map.commands
+    if commands is None or commands.range is not None:
+        return log_map
+    curve = vehicle.motor_curve if vehicle is not None else None
+    if curve is None:
+        raise InputError(
+            f"{where}: commands: unit counts without a range; expected what stands for no and "
+            "for full command, such as range: [0, 65535], or a vehicle whose motor_curve "
+            "states it"
+        )
+    return replace(log_map, commands=replace(commands, range=curve.command))
+
+
+def _missing_words(missing: list[tuple[str, str]], header: tuple[str, ...]) -> str:
+    lower = {name.lower(): name for name in header}
+    parts = []
+    for name, section in missing[:8]:
+        near = get_close_matches(name.lower(), lower, n=2, cutoff=0.6)
+        hint = f" (like {' or '.join(lower[x] for x in near)})" if near else ""
+        parts.append(f"{name!r} of {section}{hint}")
+    more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
+    found = ", ".join(header[:_SHOWN]) + (", ..." if len(header) > _SHOWN else "")
+    return f"no column {', '.join(parts)}{more}; found {found}"
+
+
+def chosen(recorded: Sequence[Samples], log_map: LogMap) -> tuple[LogMap, dict[str, Samples]]:
+    """Return a map with one way to fill each section, and the samples in which its columns stand:
+    the first way whose columns are there, and hold measurements; a position with an attitude that
+    goes with it. Optional sections of which there are none are left out.
+    """
+    usable = {section: _usable(recorded, log_map, section) for section in log_map.sections}
+    places, turns = usable.get("position", []), usable.get("attitude", [])
+    pairs = [
+        ([place], [turn])
+        for place in places
+        for turn in turns
+        if not turn[0].of or place[0].topic in turn[0].of
+    ]
+    if pairs:
+        usable["position"], usable["attitude"] = pairs[0]
+    elif not (log_map.is_own and places):
+        usable["position"], usable["attitude"] = [], []
+    found: dict[str, Any] = {
+        section: ways[0][0] if ways else None for section, ways in usable.items()
+    }
+    samples = {section: ways[0][1] for section, ways in usable.items() if ways}
+    return replace(log_map, alternatives={}, **found), samples
+
+
+def _usable(
+    recorded: Sequence[Samples], log_map: LogMap, section: str
+) -> list[tuple[Any, Samples]]:
+    """Return the ways to fill a section that hold measurements, each with its samples; the only
+    way that is there, where the section must be filled.
+    """
+    there = [
+        (way, samples) for way in log_map.ways(section) for samples in recorded if samples.has(way)
+    ]
+    stated = log_map.rows == "whole" or log_map.is_own
+    if len(there) == 1 and (stated or not there[0][0].optional):
+        return there
+    return [one for one in there if _is_measured(section, *one, log_map.rows)]
+
+
+def _is_measured(section: str, way: Columns, samples: Samples, rows: str) -> bool:
+    """Return whether a section's columns hold measurements: rotors that turn, a voltage, but of
+    ``messages`` a position that changes, and two samples of others.
+    """
+    values = samples.values(way)
+    values = values[np.isfinite(values).all(axis=1)]
+    if isinstance(way, Attitude) and not way.euler:
+        return bool(np.any(np.linalg.norm(values, axis=1) > NO_QUATERNION))
+    if section == "rotors":
+        return bool(np.any(values != 0.0))
+    if section == "battery":
+        return bool(np.any(values > 0.0))
+    if section == "position" and rows != "messages" and len(values):
+        return bool(np.any(np.ptp(values, axis=0) > 0.0))
+    return len(values) > 1

@@ -7,19 +7,21 @@ to columns. ``evidence`` says how well a flight agrees with each.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import permutations, product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ...runtime.yaml_file import read_yaml
 from .channels import WORLD_TURNS
-from .log_map import ANGLE_UNITS, LENGTH_UNITS, SENSES
+from .log_map import SENSES, UNITS
 from .rotor_orders import ORDERS, Order, order_names
 from .table import Array, Mask
 
 _I = np.eye(3)
-_DOWN, _Y_UP = WORLD_TURNS["ned"], WORLD_TURNS["y_up"]
-_SWAP_YZ = _I[[0, 2, 1]]
+_DOWN = WORLD_TURNS["ned"]
+_STATED: dict[str, Any] = read_yaml(Path(__file__).with_name("conventions.yaml"), "conventions")
 _PLACE, _QUATERNION = ("px", "py", "pz"), ("qw", "qx", "qy", "qz")
 
 
@@ -37,64 +39,32 @@ class Frames:
     unusual: bool = False  # its axes do not belong together in any usual convention
 
 
-PLAIN = Frames(names=("enu", "flu"))
-NED = Frames(
-    "the world is z down (north, east, down) and the body z down (forward, right, down)",
-    *(_DOWN, _DOWN, _DOWN),
-    ("ned", "frd"),
-)
-MAP_FRAMES = (  # that a map has names for
-    PLAIN,
-    NED,
-    Frames(
-        "the body axes are forward, right, down in a world that is z up",
-        *(_I, _I, _DOWN),
-        ("enu", "frd"),
-        unusual=True,
-    ),
-    Frames(
-        "the world is z down while the body axes are forward, left, up",
-        *(_DOWN, _DOWN, _I),
-        ("ned", "flu"),
-        unusual=True,
-    ),
-)
-_USUAL_FRAMES = (
-    *MAP_FRAMES,
-    Frames(
-        "the attitude is z down (north, east, down; forward, right, down) but the position z up",
-        *(_I, _DOWN, _DOWN),
-    ),
-    Frames(
-        "the world is y up, as motion capture often is, with body axes forward, left, up",
-        *(_Y_UP, _Y_UP, _I),
-    ),
-    Frames("the world and the body are y up, as motion capture often is", *(_Y_UP, _Y_UP, _Y_UP.T)),
-)
-_YZ_SWAPPED = Frames("y and z are swapped, in position and quaternion", *(_SWAP_YZ,) * 3)
-_POSITION_FACTS = {  # by the columns that are x, y, z of the attitude's world
-    "px, -py, -pz": "the position is z down (north, east, down) but the attitude z up",
-    "px, -pz, py": "the position is y up but the attitude z up",
-    "px, py, -pz": "the position's z points down",
-    "-px, py, pz": "px points the other way than the attitude's world",
-    "px, -py, pz": "py points the other way than the attitude's world",
-    "px, pz, py": "py and pz are swapped, the attitude is not",
-    "py, px, pz": "px and py are swapped against the attitude",
-    "pz, py, px": "px and pz are swapped, the attitude is not",
-    "-px, -py, pz": "the position's world is turned against the attitude's by 180 degrees about z",
-    "py, -px, pz": "the position's world is turned against the attitude's by 90 degrees about z",
-    "-py, px, pz": "the position's world is turned against the attitude's by -90 degrees about z",
-}
+def _axes(text: str) -> Array:
+    """Return the matrix (3, 3) that makes of x, y and z what a text such as ``x -y -z`` says."""
+    rows = [_I["xyz".index(axis[-1])] * (-1.0 if "-" in axis else 1.0) for axis in text.split()]
+    return np.array(rows) + 0.0  # no negative zeros
+
+
+def _frames(
+    says: str = "", map: Sequence[str] = ("", ""), unusual: bool = False, **axes: str
+) -> Frames:
+    turns = {name: _axes(text) for name, text in axes.items()}
+    return Frames(says, **turns, names=(map[0], map[1]), unusual=unusual)
+
+
+_USUAL_FRAMES = tuple(_frames(**stated) for stated in _STATED["frames"])
+MAP_FRAMES = tuple(frames for frames in _USUAL_FRAMES if frames.names[0])  # that a map can say
+PLAIN = MAP_FRAMES[0]
 
 
 def _positions() -> Iterator[Frames]:
     """Yield the 47 other ways in which px, py, pz may lie along axes of the attitude's world."""
-    for columns, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
-        turn = np.diag(signs) @ _I[list(columns)]
-        fact = _POSITION_FACTS.get(_combined(turn, _PLACE)[1:-1], "")
-        other = "px, py, pz lie along other axes than the attitude's world"
-        if not np.array_equal(turn, _I):
-            yield Frames(fact or other, turn, unusual=not fact)
+    other = "px, py, pz lie along other axes than the attitude's world"
+    for axes, signs in product(permutations("xyz"), product(("", "-"), repeat=3)):
+        text = " ".join(sign + axis for sign, axis in zip(signs, axes, strict=True))
+        fact = _STATED["positions"].get(text, "")
+        if text != "x y z":
+            yield Frames(fact or other, _axes(text), unusual=not fact)
 
 
 ROTORS: Order = ORDERS["windwrench"]
@@ -122,7 +92,7 @@ def _sensor_readings(units: dict[str, float], inverted: str = "") -> tuple[Senso
 
 
 GYRO_READINGS = _sensor_readings(
-    {"degrees per second; expected rad/s: multiply by 0.0174533": ANGLE_UNITS["deg"]}
+    {"degrees per second; expected rad/s: multiply by 0.0174533": UNITS["attitude"]["deg"]}
 )
 ACCELEROMETER_READINGS = (
     *_sensor_readings(
@@ -198,7 +168,7 @@ class Reading:
             name = {"mm": "milli", "cm": "centi"}[self.length]
             return (
                 f"px, py, pz look like {name}metres; expected metres: divide them by "
-                f"{1.0 / LENGTH_UNITS[self.length]:.0f}"
+                f"{1.0 / UNITS['position'][self.length]:.0f}"
             )
         return "; ".join([*self._pose_words(), *self._rotor_words()])
 
@@ -311,8 +281,7 @@ def log_readings(has_pose: bool) -> list[Reading]:
     others = _each(gyro=GYRO_READINGS)
     if has_pose:
         others = _each(order=("wxyz", "xyzw", "zwxy"), sense=SENSES, frames=_USUAL_FRAMES)[1:]
-        # an exchange of two axes mirrors the rotation: its inverse is what turns as the body does
-        others.append(Reading(sense="world_to_body", frames=_YZ_SWAPPED))
+        others.append(Reading(sense="world_to_body", frames=_frames(**_STATED["mirrored"])))
         others += _each(frames=tuple(_positions())) + _each(length=("cm", "mm"))
     others += _each(mirrored=(False, True), rotors=tuple(permutations(ROTORS)))[1:]
     count = round(_LATEST / _OFFSET_STEP)
@@ -351,7 +320,7 @@ def as_written(columns: Array, reading: Reading) -> tuple[Mask, Rotation]:
     """Return the same, body to world, in the columns' own frames."""
     good: Mask = np.asarray(np.isfinite(columns).all(axis=1))
     if reading.euler:
-        angles = columns[good] * ANGLE_UNITS[reading.unit] * [1.0, reading.pitch_sign, 1.0]
+        angles = columns[good] * UNITS["attitude"][reading.unit] * [1.0, reading.pitch_sign, 1.0]
         axes = ["xyz".index(axis) for axis in reading.euler]
         rotation = Rotation.from_euler(reading.euler.upper(), angles[:, axes])
     else:

@@ -190,15 +190,13 @@ def _cleaned(
     made: dict[str, Stream] = {}
     notes: tuple[str, ...] = ()
     for name, stream in streams.items():
-        needed = name in ("position", "rotors", "commands", "wrench")
-        if needed and len(stream.t) < 2:
+        if name in ("position", *_MOTORS) and len(stream.t) < 2:
             raise InputError(
                 f"{path}: {stream.name}: {len(stream.t)} message(s); expected at least two"
             )
-        words: tuple[str, ...] = ()
         values = stream.values
-        if name in ("rotors", "commands", "wrench"):
-            words += _check_motors(path, name, stream)
+        if name in _MOTORS:
+            notes += _check_motors(path, name, stream)
             values = np.abs(values) if name == "rotors" else values
             values = np.clip(values, 0.0, 1.0) if name == "commands" else values
         elif name == "battery":
@@ -216,7 +214,6 @@ def _cleaned(
             made[name] = Stream(stream.name, stream.t, values)
         elif name == "battery" and not np.any(values > 0.0):
             notes += (f"{stream.name}: no positive voltage; left out",)
-        notes += words if needed else ()
     return made, notes
 
 

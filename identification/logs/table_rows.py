@@ -12,7 +12,7 @@ import numpy as np
 
 from ...runtime.errors import InputError
 from .channels import Samples
-from .log_map import TIME_UNITS, Columns, LogMap
+from .log_map import UNITS, Columns, LogMap
 from .table import Array, Mask, Rows, Table
 
 _STRAY_GAP = 5.0  # median time steps; shorter gaps leave no stray rows
@@ -69,7 +69,7 @@ def rows_of(
             f"before; expected {'strictly ' if is_whole else ''}increasing times"
         )
     begin = raw[0] if clock.offset is None else 0.0
-    t = (raw - begin) * TIME_UNITS[clock.unit] + (clock.offset or 0.0)
+    t = (raw - begin) * UNITS["time"][clock.unit] + (clock.offset or 0.0)
     if not np.all(np.isfinite(t)) or np.any((np.diff(t) <= 0.0) & (step > 0.0)):
         raise InputError(
             f"{table.path}: column {clock.column}: times of {raw[0]:.6g} to {raw[-1]:.6g} "
@@ -165,11 +165,7 @@ def rows_apart(samples: Samples, log_map: LogMap) -> bool:
     (or without a gyro's sample, in a log of no pose) far more often than rows lack one. Where a
     pose is lost, the others are in all rows alike.
     """
-    there = {
-        name: np.asarray(np.isfinite(samples.values(part)).all(axis=1))
-        for name, part in log_map.sections.items()
-        if samples.has(part)
-    }
+    there = {n: samples.there(part) for n, part in log_map.sections.items() if samples.has(part)}
     base = next((name for name in ("position", "gyro") if name in there), "")
     if not base:
         return False

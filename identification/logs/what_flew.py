@@ -6,43 +6,34 @@ one gate refuses what is none, before four of six motors are taken for a quadrot
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
+from ...runtime.yaml_file import read_yaml
+from .log_map import MAPS
 from .rotor_orders import Order
 from .table import Array
 
-# MAVLink's MAV_TYPE, as PX4's parameter MAV_TYPE, its vehicle_status and heartbeats have it
-MAV_TYPES = {
-    1: "a fixed-wing plane",
-    2: "a quadrotor",
-    3: "a coaxial helicopter",
-    4: "a helicopter",
-    7: "an airship",
-    10: "a ground rover",
-    11: "a boat",
-    12: "a submarine",
-    13: "a hexarotor",
-    14: "an octorotor",
-    15: "a tricopter",
-    16: "a flapping wing",
-    19: "a VTOL plane",
-    20: "a VTOL plane",
-    21: "a VTOL plane",
-    22: "a VTOL plane",
-    23: "a VTOL plane",
-    24: "a VTOL plane",
-    25: "a VTOL plane",
-    29: "a dodecarotor",
-    35: "a decarotor",
-}
 QUADROTOR = "a quadrotor"
 _ROTORS = {QUADROTOR: 4, "a tricopter": 3, "a hexarotor": 6, "an octorotor": 8}
 _ROTORS |= {"a decarotor": 10, "a dodecarotor": 12}
+# motors 1 to 4 of PX4's and ArduPilot's plus: right, left, front, rear; x forward, y left
+PLUS = ((0.0, -1.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 0.0))
 _QUADRANTS = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))  # x forward, y left
 _APART = np.radians(30.0)  # by which a motor may stand off the rotor that it is
+
+
+@cache
+def airframes() -> dict[str, dict[Any, str]]:
+    """Return what numbers and words of autopilots stand for, as ``airframes.yaml`` states."""
+    found: dict[str, dict[Any, str]] = read_yaml(
+        MAPS / "recordings" / "airframes.yaml", "airframes"
+    )
+    return found
 
 
 @dataclass(frozen=True)
@@ -59,21 +50,13 @@ RUNNING = RunningSettings()
 
 @dataclass(frozen=True)
 class WhatFlew:
-    """What a log states of its vehicle; empty and None: nothing.
+    """What a log states of its vehicle; empty and None: nothing."""
 
-    Attributes:
-        airframe: in words, such as "a hexarotor".
-        by: the parameter, message or header that says so.
-        rotors: how many it has.
-        running: how many outputs run as motors do.
-        outputs: protocol and range of the motors' outputs, in words.
-    """
-
-    airframe: str = ""
-    by: str = ""
-    rotors: int | None = None
-    running: int | None = None
-    outputs: str = ""
+    airframe: str = ""  # in words, such as "a hexarotor"
+    by: str = ""  # the parameter, message or header that says so
+    rotors: int | None = None  # how many it has
+    running: int | None = None  # how many outputs run as motors do
+    outputs: str = ""  # protocol and range of the motors' outputs, in words
 
     def refusal(self) -> str:
         """Return why the log is none of a quadrotor, as a sentence; empty where it may be one."""
@@ -113,27 +96,32 @@ def check_flown(path: object, flown: WhatFlew) -> None:
         raise InputError(f"{path}: {why}")
 
 
-def running(outputs: Array, low: float, high: float) -> list[int]:
-    """Return which outputs (N, k), of which the first four are motors, run as these do.
+def running(outputs: Array, motors: Sequence[int], low: float, high: float) -> int:
+    """Return how many outputs (N, k) run as the motors do.
 
     Args:
         outputs: in any unit; NaN: not sent.
+        motors: which of them, from 0, are the four motors.
         low: end of the motors' range, where they stand.
         high: the other end.
     """
     x = (np.nan_to_num(outputs, nan=low) - low) / (high - low)
-    flying = x[:, :4].mean(axis=1) > 0.5 * float(np.quantile(x[:, :4].mean(axis=1), 0.9))
-    x = x[flying]
-    out = list(range(min(4, outputs.shape[1])))
-    if len(x) < 2:
-        return out
-    motors = x[:, :4].mean(axis=1)
-    for i in range(4, x.shape[1]):
-        near = abs(float(np.median(x[:, i])) - float(np.median(motors))) < RUNNING.level
+    mean = x[:, motors].mean(axis=1)
+    flying = mean > 0.5 * float(np.quantile(mean, 0.9))
+    x, mean, count = x[flying], mean[flying], len(motors)
+    for i in set(range(x.shape[1])) - set(motors) if len(x) > 1 else ():
+        near = abs(float(np.median(x[:, i])) - float(np.median(mean))) < RUNNING.level
         moves = float(np.ptp(x[:, i])) > RUNNING.moves
-        if near and moves and np.corrcoef(x[:, i], motors)[0, 1] > RUNNING.correlation:
-            out.append(i)
-    return out
+        count += near and moves and np.corrcoef(x[:, i], mean)[0, 1] > RUNNING.correlation
+    return int(count)
+
+
+def slots_of_motors(functions: Sequence[int], first: int) -> list[int]:
+    """Return the slots of motors 1 to 4, by the numbers of what each slot does, of which motor 1's
+    is ``first``; none: not all are there.
+    """
+    motors = range(first, first + 4)
+    return [functions.index(motor) for motor in motors] if {*motors} <= {*functions} else []
 
 
 def order_by_places(

@@ -5,8 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from windwrench.dynamics import load_vehicle
-from windwrench.identification.logs import log_map as units
-from windwrench.identification.logs.log_map import load_map
+from windwrench.identification.logs.log_map import UNITS, load_map
 
 
 def vehicle_of(name):
@@ -21,7 +20,7 @@ def hover_columns(name, count=60, period=0.01):
     log_map = load_map(name)
     vehicle = load_vehicle(vehicle_of(name))
     t = period * np.arange(count)
-    columns = {log_map.time.column: t / units.TIME_UNITS[log_map.time.unit]}
+    columns = {log_map.time.column: t / UNITS["time"][log_map.time.unit]}
     for section, part in log_map.sections.items():
         values = _hover(section, part, t, vehicle.hover_rate)
         columns |= dict(zip(part.columns, values, strict=True))
@@ -32,19 +31,19 @@ def hover_columns(name, count=60, period=0.01):
 def _hover(section, part, t, hover_rate):
     """Return a value for each column of a section of a map."""
     if section == "position":
-        return np.array([0.0 * t, 0.0 * t, 1.0 + 0.01 * t]) / units.LENGTH_UNITS[part.unit]
+        return np.array([0.0 * t, 0.0 * t, 1.0 + 0.01 * t]) / UNITS["position"][part.unit]
     if section == "attitude":
         return [0.0] * 3 if part.euler else [float(axis == "w") for axis in part.order]
     if section == "rotors":
-        return [hover_rate / units.ROTOR_UNITS[part.unit]] * 4
+        return [hover_rate / UNITS["rotors"][part.unit]] * 4
     if section == "commands":
         low, high = part.range
         return [low + 0.6 * (high - low)] * 4
     if section == "accelerometer":
         force = np.array([0.0 * t, 0.0 * t, 9.81 + 0.01 * np.sin(20.0 * t)])  # m/s2
-        return force / (units.ACCELERATION_UNITS[part.unit] * part.scale)
+        return force / (UNITS["accelerometer"][part.unit] * part.scale)
     if section == "gyro":
-        return [1e-3 * np.sin(20.0 * t) / units.RATE_UNITS[part.unit]] * 3
+        return [1e-3 * np.sin(20.0 * t) / UNITS["gyro"][part.unit]] * 3
     return {"wrench": [0.33, 0.0, 0.0, 0.0], "battery": [3.9]}[section]  # N, Nm; V
 
 

@@ -1,7 +1,7 @@
 """A measured flight that comes with the kit, and what is known of it."""
 
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -13,7 +13,7 @@ import yaml
 class Known:
     """Something that is known of the flight."""
 
-    effects: tuple[str, ...]  # names, any of which says it
+    effects: list[str]  # names, any of which says it
     why: str  # it is known
 
 
@@ -25,7 +25,7 @@ class Example:
     vehicle: str  # that flew
     what: str  # flew, where and how long
     source: str  # and licence
-    known: tuple[Known, ...]
+    known: list[Known]
     unknown: str  # of it
 
 
@@ -34,12 +34,5 @@ def example_flight() -> Iterator[Example]:
     """Give the flight; its file is there for as long as the block lasts."""
     folder = resources.files(__package__)
     about = yaml.safe_load((folder / "about.yaml").read_text(encoding="utf-8"))
-    with ExitStack() as kept:
-        yield Example(
-            kept.enter_context(resources.as_file(folder / about["log"])),
-            about["vehicle"],
-            about["what"],
-            about["source"],
-            tuple(Known(tuple(k["effects"]), k["why"]) for k in about["known"]),
-            about["unknown"],
-        )
+    with resources.as_file(folder / about["log"]) as log:
+        yield Example(**about | {"log": log, "known": [Known(**one) for one in about["known"]]})

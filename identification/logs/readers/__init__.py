@@ -5,7 +5,9 @@ A table needs no code: a file in ``identification/logs/maps/`` that says what it
 its name in ``TABLES``. A reader of another form is a file in this folder with a function
 ``read(path, vehicle)`` that returns a FlightLog, and a line in ``READERS``; of a table, it takes
 the open table. It decodes the file into named columns, each group with its clock; a map in
-``maps/recordings/`` says what they mean.
+``maps/recordings/`` says what they mean. The vehicle, which may be None, turns commands into rotor
+speeds where none were measured; a reader with a ``piece`` reads the part of that number, from 1, of
+a file whose clock started anew or that holds several logs, and the longest by default.
 
 Which reader a log needs is told from what is in it: the first bytes of a file, or the columns of a
 table. A file's name decides nothing but how a table is packed.
@@ -106,10 +108,7 @@ def reader_by_content(path: Path) -> Reader | None:
         head = _head(path)
     except InputError:
         return None  # whoever reads it says what is wrong
-    for reader in READERS.values():
-        if reader.begins and head.startswith(reader.begins):
-            return reader
-    return None
+    return next((r for r in READERS.values() if head.startswith(r.begins)), None)
 
 
 def binary_logs() -> str:
@@ -128,8 +127,12 @@ def unknown_content(path: Path) -> InputError:
         return InputError(
             f"{path}: is packed (gzip); expected a table, .csv.gz by name, or the log unpacked"
         )
+    start = head[:16]
+    is_text = all(32 <= byte < 127 or byte in b"\t\r\n" for byte in start)
+    shown = repr(start.decode("ascii")) if is_text else " ".join(f"{x:02x}" for x in start[:8])
+    shown = shown if head else "nothing (it is empty)"
     return InputError(
-        f"{path}: unknown kind of file: it begins with {_shown(head)}; expected {binary_logs()}, "
+        f"{path}: unknown kind of file: it begins with {shown}; expected {binary_logs()}, "
         f"or a table, with a name that ends in {', '.join(SUFFIXES)}"
     )
 
@@ -181,13 +184,3 @@ def _folder(path: Path) -> Reader:
         f"{path}: is a folder; expected a file, or the folder of a ROS 2 bag, which has one of "
         f"{', '.join(_BAG_FOLDER)}; found {', '.join(names[:_LISTED]) or 'nothing in it'}{more}"
     )
-
-
-def _shown(head: bytes) -> str:
-    """Return the first bytes in words."""
-    if not head:
-        return "nothing (it is empty)"
-    start = head[:16]
-    if all(32 <= byte < 127 or byte in b"\t\r\n" for byte in start):
-        return repr(start.decode("ascii"))
-    return " ".join(f"{byte:02x}" for byte in start[:8])

@@ -25,12 +25,20 @@ from ..channels import Samples
 from ..clocks import in_order
 from ..flight_log import FlightLog
 from ..log_map import Commands, LogMap, recording_map
-from ..map_fit import wanted_columns, ways
 from ..mapped_log import recording_of
 from ..rotor_orders import ORDERS, Order, order_words
 from ..streams import Stream
-from ..table import Array
-from ..what_flew import QUADROTOR, UNSTATED, WhatFlew, check_flown, order_by_places, running
+from ..table import Array, Mask
+from ..what_flew import (
+    PLUS,
+    UNSTATED,
+    WhatFlew,
+    airframes,
+    check_flown,
+    order_by_places,
+    running,
+    slots_of_motors,
+)
 from .dataflash import BEGINS as BEGINS
 from .dataflash import WHAT as WHAT
 from .dataflash import Messages, read_dataflash
@@ -41,62 +49,6 @@ _EARTH = 6_378_137.0  # m
 _PLACE = ("Lat", "Lng", "Alt")  # of POS
 _NUMBERS = ("C", "I", "Inst")  # of a core, a sensor or a battery
 _PLUS = 0  # of FRAME_TYPE, and of FRAME before Copter 3.5
-# motors 1 to 4 of a plus: right, left, front, rear; x forward, y left
-_PLUS_PLACES = ((0.0, -1.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 0.0))
-_FRAMES: dict[int, Order] = {  # of FRAME_TYPE
-    1: ORDERS["ardupilot-x"],
-    3: ORDERS["ardupilot-x"],  # H: the same places
-    12: ORDERS["betaflight"],
-    13: ORDERS["dji"],
-    14: ORDERS["crazyflie"],
-    18: ORDERS["betaflight"],
-}
-_CLASSES = {  # of FRAME_CLASS and Q_FRAME_CLASS
-    1: QUADROTOR,
-    2: "a hexarotor",
-    3: "an octorotor",
-    4: "an octorotor",
-    5: "a hexarotor",
-    6: "a helicopter",
-    7: "a tricopter",
-    8: "a single rotor",
-    9: "a coaxial helicopter",
-    10: "a tail-sitter",
-    11: "a helicopter",
-    12: "a dodecarotor",
-    13: "a helicopter",
-    14: "a decarotor",
-}
-_FIRMWARES = {  # at the beginning of a MSG
-    "ArduPlane": "a fixed-wing plane",
-    "ArduSub": "a submarine",
-    "ArduRover": "a ground rover",
-    "APMrover2": "a ground rover",
-    "Rover": "a ground rover",
-    "Blimp": "an airship",
-    "AntennaTracker": "an antenna tracker",
-}
-_PARAMETERS = {  # that no multirotor has
-    "FRAME_CONFIG": "a submarine",
-    "LIM_ROLL_CD": "a fixed-wing plane",
-    "ROLL_LIMIT_DEG": "a fixed-wing plane",
-    "ARSPD_FBW_MIN": "a fixed-wing plane",
-    "AIRSPEED_MIN": "a fixed-wing plane",
-    "CRUISE_THROTTLE": "a ground rover",
-    "CRUISE_SPEED": "a ground rover",
-}
-_FRAME_WORDS = {  # in a MSG such as "Frame: HEXA" or "Frame: QUAD/X"
-    "QUAD": QUADROTOR,
-    "HEXA": "a hexarotor",
-    "OCTA": "an octorotor",
-    "Y6": "a hexarotor",
-    "TRI": "a tricopter",
-    "HELI": "a helicopter",
-    "COAX": "a coaxial helicopter",
-    "SINGLE": "a single rotor",
-    "DODECA": "a dodecarotor",
-    "DECA": "a decarotor",
-}
 _MOTOR1 = 33  # of SERVOn_FUNCTION
 _CHANNELS = 14  # of RCOU
 
@@ -104,34 +56,25 @@ _CHANNELS = 14  # of RCOU
 def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -> FlightLog:
     """Read a DataFlash log.
 
-    Args:
-        path: the file.
-        vehicle: turns commands into rotor speeds where none were measured.
-        piece: which part is read where the clock started anew, from 1; default: the longest.
-
     Raises:
         InputError: the file is no such log, is not a quadrotor's, or lacks motors, or a pose and
             inertial sensors.
     """
     log_map = recording_map("ardupilot")
-    topics = {way.topic for name in log_map.sections for way in ways(log_map, name)}
-    messages, skipped = read_dataflash(path, {*topics, "PARM", "MSG"})
-    parameters = _parameters(messages.get("PARM"))
-    flown = _what_flew(parameters, messages.pop("MSG", None))
+    messages, skipped = read_dataflash(path, {*log_map.topics, "PARM", "MSG"})
+    parameters = _parameters(messages.pop("PARM", {}))
+    flown = _what_flew(parameters, messages.pop("MSG", {}))
     check_flown(path, flown)
     pulses = messages.get("RCOU")
     letter = "Ch" if pulses is not None and "Ch1" in pulses else "C"  # before Copter 3.4
     log_map, notes = _with_parameters(path, log_map, parameters, vehicle, letter)
     if pulses is not None:
         flown = replace(flown, running=_running(pulses, log_map))
-    columns = {*wanted_columns(log_map), *_PLACE}
-    recorded = [
-        samples
-        for name, rows in messages.items()
-        if name not in ("PARM", "ESC") and (samples := _samples(rows, columns)) is not None
-    ]
-    telemetry, telemetry_notes = _telemetry(messages.get("ESC"), parameters)
+    telemetry, telemetry_notes = _telemetry(messages.pop("ESC", {}), parameters)
     notes += telemetry_notes
+    columns = {*log_map.wanted, *_PLACE}
+    groups = (_samples(name, rows, columns) for name, rows in messages.items())
+    recorded = [samples for samples in groups if samples is not None]
     if skipped:
         notes.append(f"{skipped} bytes of the file belong to no message; it was cut or is damaged")
     recording = recording_of(
@@ -143,25 +86,29 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
 def _times(messages: Messages) -> Array:
     """Return times (N,) in s of the vehicle's clock."""
     if "TimeUS" in messages:
-        return 1e-6 * messages.column("TimeUS")
-    return 1e-3 * messages.column("TimeMS") if "TimeMS" in messages else np.empty(0)
+        return np.asarray(1e-6 * messages["TimeUS"])
+    return np.asarray(1e-3 * messages.get("TimeMS", np.empty(0)))
 
 
-def _samples(messages: Messages, columns: set[str]) -> Samples | None:
+def _where(messages: Messages, mask: Mask) -> Messages:
+    """Return the messages of a mask (N,)."""
+    return {name: column[mask] for name, column in messages.items()}
+
+
+def _samples(name: str, messages: Messages, columns: set[str]) -> Samples | None:
     """Return some columns of a type's messages, of the first core, sensor or battery; None where
     there are less than two.
     """
     for number in _NUMBERS:
         if number in messages:
-            which = messages.column(number)
-            messages = messages.where(which == which.min())
+            messages = _where(messages, messages[number] == messages[number].min())
     t = _times(messages)
     if len(t) < 2:
         return None
-    found = {name: messages.column(name) for name in messages.units if name in columns}
+    found = {name: messages[name] for name in messages if name in columns}
     if set(_PLACE) <= set(found):
         found |= _metres(*(found.pop(name) for name in _PLACE))
-    return Samples(t, found, messages.name)
+    return Samples(t, found, name)
 
 
 def _metres(latitude: Array, longitude: Array, altitude: Array) -> dict[str, Array]:
@@ -173,42 +120,35 @@ def _metres(latitude: Array, longitude: Array, altitude: Array) -> dict[str, Arr
     return {"N": north, "E": east, "D": -altitude}
 
 
-def _parameters(messages: Messages | None) -> Parameters:
+def _texts(messages: Messages, column: str) -> list[str]:
+    return [x.decode("ascii", "replace").strip("\0 ") for x in messages.get(column, ())]
+
+
+def _parameters(messages: Messages) -> Parameters:
     """Return the parameters as the log first states them."""
-    if messages is None or "Name" not in messages or "Value" not in messages:
-        return {}
-    names = [name.decode("ascii", "replace") for name in messages.rows["Name"].tolist()]
     found: dict[str, float] = {}
-    for name, value in zip(names, messages.column("Value").tolist(), strict=True):
+    for name, value in zip(_texts(messages, "Name"), messages.get("Value", ()), strict=False):
         if math.isfinite(value):
-            found.setdefault(name, value)
+            found.setdefault(name, float(value))
     return found
 
 
-def _what_flew(parameters: Parameters, messages: Messages | None) -> WhatFlew:
+def _what_flew(parameters: Parameters, messages: Messages) -> WhatFlew:
     """Return what a log states of its vehicle: by its texts, else by its parameters."""
-    texts: list[bytes] = []
-    if messages is not None and "Message" in messages:
-        texts = messages.rows["Message"].tolist()
-    for text in (raw.decode("ascii", "replace").strip("\0 ") for raw in texts):
-        said = f"MSG {text[:40]!r}"
-        for firmware, airframe in _FIRMWARES.items():
-            if text.startswith(firmware):
-                plane = parameters.get("Q_ENABLE", 0.0) > 0.0 and firmware == "ArduPlane"
-                return WhatFlew("a VTOL plane" if plane else airframe, said)
-        if found := re.match(r"Frame: ([A-Z0-9]+)", text):
-            for word, airframe in _FRAME_WORDS.items():
-                if found[1].startswith(word):
-                    return WhatFlew(airframe, said)
-    for name, airframe in _PARAMETERS.items():
+    known = airframes()
+    for text in _texts(messages, "Message"):
+        for begin, airframe in known["ardupilot_text"].items():
+            if text.startswith(begin):
+                is_vtol = parameters.get("Q_ENABLE", 0.0) > 0.0 and begin == "ArduPlane"
+                return WhatFlew("a VTOL plane" if is_vtol else airframe, f"MSG {text[:40]!r}")
+    for name, airframe in known["ardupilot_parameter"].items():
         if name in parameters:
             return WhatFlew(airframe, f"parameter {name}")
     if "FRAME_CLASS" in parameters:
         number = int(parameters["FRAME_CLASS"])
-        by = f"parameter FRAME_CLASS = {number}"
-        return WhatFlew(_CLASSES.get(number, "an unknown frame"), by)
-    functions = {int(parameters.get(f"SERVO{i}_FUNCTION", 0)) for i in range(1, _CHANNELS + 1)}
-    motors = len(functions & {*range(_MOTOR1, _MOTOR1 + 8)})
+        airframe = known["ardupilot_class"].get(number, "an unknown frame")
+        return WhatFlew(airframe, f"parameter FRAME_CLASS = {number}")
+    motors = len({*_functions(parameters)} & {*range(_MOTOR1, _MOTOR1 + 8)})
     return WhatFlew("", "SERVOn_FUNCTION", motors) if motors else UNSTATED
 
 
@@ -217,11 +157,11 @@ def _running(pulses: Messages, log_map: LogMap) -> int | None:
     sent = log_map.commands
     assert sent is not None
     assert sent.range is not None
-    if not all(name in pulses for name in sent.columns):
+    names = [name for name in pulses if re.fullmatch(r"Ch?\d+", name)]
+    if not set(sent.columns) <= set(names):
         return None
-    others = [name for name in pulses.units if re.fullmatch(r"Ch?\d+", name)]
-    names = [*sent.columns, *(name for name in others if name not in sent.columns)]
-    return len(running(np.column_stack([pulses.column(name) for name in names]), *sent.range))
+    outputs = np.column_stack([pulses[name] for name in names])
+    return running(outputs, [names.index(name) for name in sent.columns], *sent.range)
 
 
 def _order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> tuple[Order, str]:
@@ -235,26 +175,29 @@ def _order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> tuple
         order = ORDERS["ardupilot-x"]
         return order, f"quad x assumed, which the log does not state: {order_words(order)}"
     kind = int(parameters.get(name, 1))
-    if kind == _PLUS and (found := order_by_places(_PLUS_PLACES, vehicle)) is not None:
+    if kind == _PLUS and (found := order_by_places(PLUS, vehicle)) is not None:
         motors = ", ".join(map(str, found))
         return found, f"{name} {kind}, a plus: rotors 1, 2, 3, 4 of the vehicle are motors {motors}"
-    if kind not in _FRAMES:
+    known = airframes()["ardupilot_order"]
+    if kind not in known:
         what = f"{kind}, a plus," if kind == _PLUS else str(kind)
         raise InputError(
             f"{path}: parameter {name} is {what} whose rotors do not stand as the vehicle's; "
-            f"expected one of {', '.join(map(str, _FRAMES))}, whose rotors stand in an x"
+            f"expected one of {', '.join(map(str, known))}, whose rotors stand in an x"
             + (", or a vehicle file with rotor_positions of a plus" if kind == _PLUS else "")
         )
-    return _FRAMES[kind], f"{name} {kind}: {order_words(_FRAMES[kind])}"
+    order = ORDERS[known[kind]]
+    return order, f"{name} {kind}: {order_words(order)}"
 
 
-def _outputs(parameters: Parameters) -> list[int]:
-    """Return the outputs, from 1, of motors 1 to 4."""
-    functions = [int(parameters.get(f"SERVO{i}_FUNCTION", 0)) for i in range(1, _CHANNELS + 1)]
-    motors = [_MOTOR1 + i for i in range(4)]
-    if all(motor in functions for motor in motors):
-        return [functions.index(motor) + 1 for motor in motors]
-    return [1, 2, 3, 4]
+def _functions(parameters: Parameters) -> list[int]:
+    """Return what each output does."""
+    return [int(parameters.get(f"SERVO{i}_FUNCTION", 0)) for i in range(1, _CHANNELS + 1)]
+
+
+def _slots(parameters: Parameters) -> list[int]:
+    """Return the outputs, from 0, of motors 1 to 4."""
+    return slots_of_motors(_functions(parameters), _MOTOR1) or [0, 1, 2, 3]
 
 
 def _with_parameters(
@@ -280,7 +223,7 @@ def _with_parameters(
     least, most = parameters.get("MOT_SPIN_MIN", 0.15), parameters.get("MOT_SPIN_MAX", 0.95)
     if not 0.0 <= least < most:
         least, most = 0.0, 1.0
-    outputs = _outputs(parameters)
+    outputs = [slot + 1 for slot in _slots(parameters)]
     assert log_map.rotors is not None
     assert log_map.commands is not None
     commands: Commands = replace(
@@ -300,25 +243,21 @@ def _with_parameters(
     ]
 
 
-def _telemetry(
-    messages: Messages | None, parameters: Parameters
-) -> tuple[list[Samples], list[str]]:
+def _telemetry(messages: Messages, parameters: Parameters) -> tuple[list[Samples], list[str]]:
     """Return what the ESCs of motors 1 to 4 reported, at the times of the first of them, and
     notes.
     """
-    if messages is None or not all(name in messages for name in ("Instance", "RPM", "TimeUS")):
+    if not {"Instance", "RPM", "TimeUS"} <= set(messages):
         return [], []
-    slots, which = [output - 1 for output in _outputs(parameters)], messages.column("Instance")
-    if not set(slots) <= set(which.astype(int).tolist()):
-        slots = [0, 1, 2, 3]
+    slots, which = _slots(parameters), messages["Instance"]
+    slots = slots if set(slots) <= set(which.astype(int).tolist()) else [0, 1, 2, 3]
     each: list[Stream] = []
     for slot in slots:
-        one = messages.where(which == slot)
-        if len(one.rows) < 2 or not np.any(one.column("RPM") > 0.0):
+        one = _where(messages, which == slot)
+        if len(one["RPM"]) < 2 or not np.any(one["RPM"] > 0.0):
             return [], ["ESC telemetry: not of all four motors, or without rpm; left out"]
-        times = _times(one)
-        rows, _ = in_order(times)
-        each.append(Stream("ESC", times[rows], one.column("RPM")[rows, None]))
+        rows, _ = in_order(times := _times(one))
+        each.append(Stream("ESC", times[rows], one["RPM"][rows, None]))
     t = each[0].t
     columns = {f"RPM {motor}": stream.at(t)[:, 0] for motor, stream in enumerate(each, 1)}
     poles = parameters.get("SERVO_BLH_POLES", 14.0)

@@ -25,7 +25,6 @@ from ....runtime.errors import InputError
 from ..channels import Samples
 from ..flight_log import FlightLog
 from ..log_map import recording_map
-from ..map_fit import wanted_columns
 from ..mapped_log import recording_of
 from ..streams import MOST_VOLTS
 from ..table import Array, Table
@@ -49,20 +48,14 @@ _MORE_MOTORS = tuple(f"motor[{i}]" for i in range(4, 8))  # of vehicles that are
 def read(
     path: Path, vehicle: Vehicle | None = None, option: str = "", piece: int | None = None
 ) -> FlightLog:
-    """Read a blackbox.
-
-    Args:
-        path: the file.
-        vehicle: turns commands into rotor speeds where none were measured.
-        option: number of the motors' magnet poles, for eRPM.
-        piece: which of the file's logs is read, from 1; default: the longest.
+    """Read a blackbox; ``option``: number of the motors' magnet poles, for eRPM.
 
     Raises:
         InputError: the file cannot be read, is no blackbox, is damaged from its start, or has no
             motors or inertial sensors.
     """
     poles = _magnet_poles(option, path)
-    wanted = [*wanted_columns(recording_map("betaflight")), *_MORE_MOTORS]
+    wanted = [*recording_map("betaflight").wanted, *_MORE_MOTORS]
     headers, fields, notes = read_blackbox(path, wanted, piece)
     return _log(path, "betaflight", fields, set(), headers, poles, vehicle, notes)
 
@@ -80,7 +73,7 @@ def read_table(table: Table, vehicle: Vehicle | None = None, option: str = "") -
         raise InputError(
             f"{path}: missing column(s) {', '.join(missing)}; expected those of blackbox_decode"
         )
-    wanted = {*wanted_columns(recording_map("betaflight")), *_MORE_MOTORS}
+    wanted = {*recording_map("betaflight").wanted, *_MORE_MOTORS}
     scales, names = {}, {"time": "time (us)"}
     for name in table.header:
         field, _, unit = name.removesuffix(")").partition(" (")

@@ -27,8 +27,7 @@ from ....runtime.regular_files import read_bytes
 from ..channels import Samples
 from ..flight_log import FlightLog
 from ..log_map import load_map
-from ..map_fit import chosen
-from ..mapped_log import recording_of
+from ..mapped_log import chosen, recording_of
 
 BEGINS = (b"\xbc\x01\x00", b"\xbc\x02\x00")
 

@@ -7,8 +7,7 @@ Here compiled code goes through a file, first to count and then to note the plac
 that are wanted, and their columns are read at once, so that any file costs a bounded time.
 """
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -19,60 +18,21 @@ from ....runtime.compiled import compiled
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
-from ..table import Array, Mask
 
 Bytes = NDArray[np.uint8]
+Messages = dict[str, NDArray[Any]]  # (N,) of one type: columns by name, numbers or bytes of texts
 
 BEGINS = (b"\xa3\x95",)
 
 WHAT = "an ArduPilot log (DataFlash .BIN)"
 _FMT, _FMT_LENGTH = 128, 89
 _GATHERED = 10_000  # messages copied at a time
-# letters of columns: type, and what one unit of it is
-_LETTERS = {
-    "a": ("(32,)<i2", 1.0),
-    "b": ("i1", 1.0),
-    "B": ("u1", 1.0),
-    "h": ("<i2", 1.0),
-    "H": ("<u2", 1.0),
-    "i": ("<i4", 1.0),
-    "I": ("<u4", 1.0),
-    "f": ("<f4", 1.0),
-    "d": ("<f8", 1.0),
-    "g": ("<f2", 1.0),
-    "n": ("S4", 1.0),
-    "N": ("S16", 1.0),
-    "Z": ("S64", 1.0),
-    "c": ("<i2", 0.01),
-    "C": ("<u2", 0.01),
-    "e": ("<i4", 0.01),
-    "E": ("<u4", 0.01),
-    "L": ("<i4", 1e-7),
-    "M": ("u1", 1.0),
-    "q": ("<i8", 1.0),
-    "Q": ("<u8", 1.0),
-}
-
-
-@dataclass(frozen=True)
-class Messages:
-    """All messages of one type."""
-
-    name: str
-    rows: NDArray[Any]  # (N,) structured, as they stand in the file
-    units: Mapping[str, float]  # of a column
-
-    def __contains__(self, column: str) -> bool:
-        return column in self.units
-
-    def column(self, name: str) -> Array:
-        """Return a column of numbers (N,)."""
-        with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
-            return np.asarray(self.rows[name].astype(np.float64) * self.units[name])
-
-    def where(self, mask: Mask) -> "Messages":
-        """Return the messages of a mask (N,)."""
-        return Messages(self.name, self.rows[mask], self.units)
+# types of columns by their letters, those of ``struct`` among them; and what one unit is of
+# those that are no whole units
+_TYPES = {letter: f"<{letter}" for letter in "bBhHiIqQfd"}
+_TYPES |= {"a": "(32,)<i2", "g": "<f2", "n": "S4", "N": "S16", "Z": "S64", "M": "<B"}
+_TYPES |= {"c": "<h", "C": "<H", "e": "<i", "E": "<I", "L": "<i"}
+_UNITS = dict.fromkeys("cCeE", 0.01) | {"L": 1e-7}
 
 
 def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messages], int]:
@@ -102,7 +62,7 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messa
         count = int(counts[number])
         check_count(f"{path}: {name}", count, LIMITS.table_rows, "messages")
         if count:
-            found[name] = Messages(name, _rows(data, places(number, count), layout), units)
+            found[name] = _columns(_rows(data, places(number, count), layout), units)
     if not kinds and not counts[_FMT]:
         raise InputError(f"{path}: cannot be read as {WHAT}: no FMT message; expected some")
     return found, len(data) - int(used)
@@ -132,13 +92,26 @@ def _layout(
     columns = message[25:89].split(b"\0")[0].decode("ascii", "replace").split(",")
     if len(letters) != len(columns) or len(set(columns)) < len(columns):
         return None
-    if any(letter not in _LETTERS for letter in letters) or not all(columns):
+    if any(letter not in _TYPES for letter in letters) or not all(columns):
         return None
-    pairs = list(zip(columns, letters, strict=True))
-    layout = np.dtype([(column, _LETTERS[letter][0]) for column, letter in pairs])
+    layout = np.dtype([(c, _TYPES[letter]) for c, letter in zip(columns, letters, strict=True)])
     if layout.itemsize + 3 != length:
         return None
-    return number, name, layout, {column: _LETTERS[letter][1] for column, letter in pairs}
+    units = [_UNITS.get(letter, 1.0) for letter in letters]
+    return number, name, layout, dict(zip(columns, units, strict=True))
+
+
+def _columns(rows: NDArray[Any], units: dict[str, float]) -> Messages:
+    """Return the columns of messages: numbers in whole units, or texts; lists of numbers are left
+    out.
+    """
+    found = {}
+    with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
+        for name, unit in units.items():
+            is_text = rows[name].dtype.kind == "S"
+            if rows[name].ndim == 1:
+                found[name] = rows[name] if is_text else rows[name].astype(np.float64) * unit
+    return found
 
 
 @compiled

@@ -6,21 +6,27 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ..log_map import LogMap
-from ..map_fit import ways
 from ..rotor_orders import ORDERS, Order
 from ..table import Array
-from ..what_flew import MAV_TYPES, QUADROTOR, WhatFlew, order_by_places, running
+from ..what_flew import (
+    PLUS,
+    QUADROTOR,
+    WhatFlew,
+    airframes,
+    order_by_places,
+    running,
+    slots_of_motors,
+)
 
 Parameters = Mapping[str, float]
 
-_MOTOR1 = 101  # PX4's number of the output function "motor 1"
+MOTOR1 = 101  # PX4's number of the output function "motor 1"
 _BANKS = {"MAIN": "PWM_MAIN_FUNC", "AUX": "PWM_AUX_FUNC", "UAVCAN": "UAVCAN_EC_FUNC"}
 _OUTPUTS = 16  # of a bank
 _ESCS = 8
@@ -30,60 +36,45 @@ _UAVCAN = (0.0, 8191.0)
 _DSHOT_TIMERS = range(-5, -1)  # of PWM_MAIN_TIMn: DShot150 to DShot1200
 _LEAST_PULSE = 700.0  # us: no speed controller is sent a shorter one, disarmed or not
 _ABOVE_PULSES = 1.1  # of the longest pulse, which no pulse reaches
-_PLUS = ((0.0, -1.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 0.0))  # motors 1 to 4, x forward, y left
-# CA_AIRFRAME, and thousands of SYS_AUTOSTART, that are no multirotor of four
-_AIRFRAMES = {1: MAV_TYPES[1], 2: MAV_TYPES[22], 3: MAV_TYPES[21], 4: MAV_TYPES[20]}
-_AIRFRAMES |= dict.fromkeys((5, 6, 13), MAV_TYPES[10]) | dict.fromkeys((10, 11, 12), MAV_TYPES[4])
-_STARTS = {2: MAV_TYPES[1], 3: MAV_TYPES[1], 4: QUADROTOR, 5: QUADROTOR, 6: MAV_TYPES[13]}
-_STARTS |= {7: MAV_TYPES[13], 8: MAV_TYPES[14], 9: MAV_TYPES[14], 10: QUADROTOR}
-_STARTS |= {11: MAV_TYPES[13], 12: MAV_TYPES[14], 13: MAV_TYPES[22], 14: MAV_TYPES[15]}
-_STARTS |= {15: MAV_TYPES[4], 50: MAV_TYPES[10], 60: MAV_TYPES[12]}
 
 
 @dataclass(frozen=True, eq=False)
 class Outputs:
-    """The outputs of motors 1 to 4, and what of them is 0 and 1.
+    """The outputs of motors 1 to 4, and what of them is 0 and 1."""
 
-    Attributes:
-        slots: outputs, from 0.
-        low: (4,) what is 0.
-        high: (4,) what is 1.
-        words: protocol and range.
-    """
-
-    slots: list[int]
-    low: Array
-    high: Array
-    words: str
+    slots: list[int]  # from 0
+    low: Array  # (4,) what is 0
+    high: Array  # (4,) what is 1
+    words: str  # protocol and range
 
 
-def what_flew(parameters: Parameters, statuses: Sequence[Mapping[str, Any]]) -> WhatFlew:
+def what_flew(parameters: Parameters, statuses: Sequence[Mapping[str, Array]]) -> WhatFlew:
     """Return what a log states of its vehicle.
 
     Args:
         parameters: as the log begins.
         statuses: of the topic vehicle_status.
     """
+    known = airframes()
     count = int(parameters.get("CA_ROTOR_COUNT", 0)) or None
     by_count = "parameter CA_ROTOR_COUNT" if count else ""
     frame, start = int(parameters.get("CA_AIRFRAME", 0)), int(parameters.get("SYS_AUTOSTART", 0))
-    if frame in _AIRFRAMES:
-        return WhatFlew(_AIRFRAMES[frame], f"parameter CA_AIRFRAME = {frame}")
-    for fields in statuses:
-        if np.any(np.asarray(fields.get("is_vtol", 0))):
-            return WhatFlew(MAV_TYPES[22], "vehicle_status.is_vtol")
+    if frame in known["px4_airframe"]:
+        return WhatFlew(known["px4_airframe"][frame], f"parameter CA_AIRFRAME = {frame}")
+    if any(np.any(fields.get("is_vtol", 0)) for fields in statuses):
+        return WhatFlew("a VTOL plane", "vehicle_status.is_vtol")
     kinds = [("parameter MAV_TYPE", int(parameters.get("MAV_TYPE", 0)))]
     kinds += [
-        ("vehicle_status.system_type", int(np.asarray(fields["system_type"])[-1]))
+        ("vehicle_status.system_type", int(fields["system_type"][-1]))
         for fields in statuses
-        if "system_type" in fields and len(np.asarray(fields["system_type"]))
+        if "system_type" in fields and len(fields["system_type"])
     ]
     for by, kind in kinds:
-        if kind in MAV_TYPES:
-            return WhatFlew(MAV_TYPES[kind], by_count or f"{by} = {kind}", count)
-    if start // 1000 in _STARTS:
+        if kind in known["mav_type"]:
+            return WhatFlew(known["mav_type"][kind], by_count or f"{by} = {kind}", count)
+    if start // 1000 in known["px4_start"]:
         by = by_count or f"parameter SYS_AUTOSTART = {start}"
-        return WhatFlew(_STARTS[start // 1000], by, count)
+        return WhatFlew(known["px4_start"][start // 1000], by, count)
     return WhatFlew(QUADROTOR if count == 4 else "", by_count, count)
 
 
@@ -101,32 +92,26 @@ def motor_order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> 
         (parameters.get(f"CA_ROTOR{i}_PX", 0.0), -parameters.get(f"CA_ROTOR{i}_PY", 0.0))
         for i in range(4)
     ]
+    said, whence = "", "as on PX4's quad x, which the log does not state"
     if parameters.get("CA_ROTOR_COUNT") and any(x or y for x, y in places):
         whence, said = "by the positions in CA_ROTORn_PX and PY", "CA_ROTORn_PX and CA_ROTORn_PY"
     elif start // 1000 == 5:
-        places, whence = list(_PLUS), f"as on a quad plus (SYS_AUTOSTART = {start})"
+        places, whence = list(PLUS), f"as on a quad plus (SYS_AUTOSTART = {start})"
         said = f"SYS_AUTOSTART = {start}, a quad plus,"
-    else:
-        order, whence = ORDERS["px4-x"], "as on PX4's quad x, which the log does not state"
-        return order, _renumbered(order, whence)
-    found = order_by_places(places, vehicle)
-    if found is None:
+    order = order_by_places(places, vehicle) if said else ORDERS["px4-x"]
+    if order is None:
         raise InputError(
             f"{path}: parameters {said} put the rotors at {places} (x forward, y left); expected "
             "one in each quadrant, as on a quad x, or a vehicle file with these rotor_positions"
         )
-    return found, _renumbered(found, whence)
-
-
-def _renumbered(order: Order, whence: str) -> str:
     motors = ", ".join(map(str, order))
-    return f"motors renumbered {whence}: rotors 1, 2, 3, 4 are motors {motors}"
+    return order, f"motors renumbered {whence}: rotors 1, 2, 3, 4 are motors {motors}"
 
 
 def with_motors(log_map: LogMap, order: Order, parameters: Parameters, outputs: Outputs) -> LogMap:
     """Return the map with the order of the motors, and with the thrust curve of their outputs."""
     factor = min(max(parameters.get("THR_MDL_FAC", 0.0), 0.0), 1.0)
-    rotors, (motors, sent) = log_map.rotors, ways(log_map, "commands")
+    rotors, (motors, sent) = log_map.rotors, log_map.ways("commands")
     assert rotors is not None
     note = (
         f"commands: actuator_outputs, x = 0 to 1 ({outputs.words}), gives relative thrust "
@@ -147,15 +132,15 @@ def without_ranges(parameters: Parameters) -> Parameters:
     return {n: x for n, x in parameters.items() if not re.search(r"_(MIN|MAX)\d*$", n)}
 
 
-def slots_of_escs(fields: Mapping[str, Any]) -> list[int]:
+def slots_of_escs(fields: Mapping[str, Array]) -> list[int]:
     """Return the ESCs, from 0, of motors 1 to 4: by the function that each states, if all do."""
     functions = [f"esc[{i}].actuator_function" for i in range(_ESCS)]
     named = [int(fields[name][-1]) if name in fields else -1 for name in functions]
-    return slots_of_motors(named) or list(range(4))
+    return slots_of_motors(named, MOTOR1) or list(range(4))
 
 
 def outputs_of(
-    path: Path, sent: Sequence[Mapping[str, Any]], parameters: Parameters
+    path: Path, sent: Sequence[Mapping[str, Array]], parameters: Parameters
 ) -> tuple[Outputs, int | None]:
     """Return which outputs the motors are, and what of them is 0 and 1; and how many outputs run as
     motors do, None where none was sent.
@@ -168,24 +153,25 @@ def outputs_of(
     Raises:
         InputError: a range of pulses is none, or the outputs fit no protocol.
     """
-    bank, slots = _output_slots(parameters)
+    bank, slots = "MAIN", [0, 1, 2, 3]
+    for name, prefix in reversed(_BANKS.items()):  # of several the first
+        functions = [int(parameters.get(f"{prefix}{i + 1}", 0.0)) for i in range(_OUTPUTS)]
+        if found := slots_of_motors(functions, MOTOR1):
+            bank, slots = name, found
     names = [f"output[{i}]" for i in range(_OUTPUTS)]
     tables = [np.column_stack([fields[n] for n in names if n in fields]) for fields in sent]
-    tables = [table.astype(np.float64) for table in tables if _moving(table, slots)]
+    # where all outputs of motors change: no servos, and no bank that is not in use
+    tables = [x for x in tables if x.shape[1] > max(slots) and _move(x[:, slots])]
     motors = tables[0][:, slots] if tables else np.zeros((0, 4))
     outputs = _range(path, parameters, bank, slots, motors)
     if not tables:
         return outputs, None
-    others = [i for i in range(tables[0].shape[1]) if i not in slots]
-    every = tables[0][:, [*slots, *others]]
-    low, high = float(outputs.low.min()), float(outputs.high.max())
-    return outputs, len(running(every, low, high))
+    return outputs, running(tables[0], slots, float(outputs.low.min()), float(outputs.high.max()))
 
 
-def _moving(table: Array, slots: list[int]) -> bool:
-    """Return whether all outputs of motors change: no servos, and no bank that is not in use."""
-    inside = table.shape[1] > max(slots)
-    return inside and bool(np.all(np.ptp(np.nan_to_num(table[:, slots]), axis=0) > 0.0))
+def _move(outputs: Array) -> bool:
+    """Return whether all outputs (N, 4) change."""
+    return bool(np.all(np.ptp(np.nan_to_num(outputs), axis=0) > 0.0))
 
 
 def shares_of_motors(columns: Mapping[str, Array], outputs: Outputs) -> dict[str, Array]:
@@ -196,27 +182,10 @@ def shares_of_motors(columns: Mapping[str, Array], outputs: Outputs) -> dict[str
     if not set(names) <= set(columns):
         return {}
     sent = np.nan_to_num(np.column_stack([columns[name] for name in names]), nan=0.0)
-    if not np.all(np.ptp(sent, axis=0) > 0.0):
+    if not _move(sent):
         return {}
     shares = np.clip((sent - outputs.low) / (outputs.high - outputs.low), 0.0, 1.0)
     return {f"output[{motor}]": share for motor, share in enumerate(shares.T)}
-
-
-def _output_slots(parameters: Parameters) -> tuple[str, list[int]]:
-    """Return the bank and the outputs, from 0, of motors 1 to 4."""
-    for bank, prefix in _BANKS.items():
-        functions = (parameters.get(f"{prefix}{i + 1}", 0.0) for i in range(_OUTPUTS))
-        if slots := slots_of_motors([int(function) for function in functions]):
-            return bank, slots
-    return "MAIN", list(range(4))
-
-
-def slots_of_motors(functions: Sequence[int]) -> list[int]:
-    """Return the slots of motors 1 to 4, by PX4's numbers of what each slot does; none: not all
-    are there.
-    """
-    motors = [_MOTOR1 + i for i in range(4)]
-    return [functions.index(motor) for motor in motors] if {*motors} <= {*functions} else []
 
 
 def _range(

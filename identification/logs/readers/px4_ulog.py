@@ -17,10 +17,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import redirect_stdout
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
@@ -30,7 +28,6 @@ from ....runtime.regular_files import check_regular, open_regular
 from ..channels import Samples
 from ..flight_log import FlightLog
 from ..log_map import recording_map
-from ..map_fit import ways
 from ..mapped_log import recording_of
 from ..streams import Recording
 from ..table import Array
@@ -47,7 +44,7 @@ from .px4_motors import (
 )
 from .ulog_counting import counting
 
-Fields = Mapping[str, NDArray[Any]]
+Fields = Mapping[str, Array]  # (N,) of an instance of a topic, by name
 
 BEGINS = (b"ULog\x01\x12\x35",)
 
@@ -63,11 +60,6 @@ _HEADER, _MESSAGE = 16, 3  # bytes, of a file and of a message
 
 def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -> FlightLog:
     """Read a ULog.
-
-    Args:
-        path: the file.
-        vehicle: turns commands into rotor speeds where none were measured.
-        piece: which part is read where the clock started anew, from 1; default: the longest.
 
     Raises:
         InputError: pyulog is missing, the file is no ULog, or lacks four motors, or a pose and
@@ -119,7 +111,7 @@ def channels(
     if position is not None and position.topic == _FILTER:
         fields = topics[_FILTER][0]
         counters = ("xy_reset_counter", "z_reset_counter")
-        resets = [name for name in counters if np.ptp(np.asarray(fields.get(name, 0))) > 0]
+        resets = [name for name in counters if name in fields and np.ptp(fields[name]) > 0.0]
         if resets:
             recording.notes.append(
                 f"the onboard position was reset in the log ({', '.join(resets)}): it jumps there"
@@ -137,8 +129,7 @@ def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bo
     need("pyulog", "logs", path)
     from pyulog import ULog as Parser
 
-    log_map = recording_map("px4")
-    wanted = {way.topic for name in log_map.sections for way in ways(log_map, name)} | {_STATUS}
+    wanted = recording_map("px4").topics | {_STATUS}
     check_regular(path, WHAT, LIMITS.ulog_file)
     try:
         with open_regular(path, WHAT) as file:
@@ -157,7 +148,9 @@ def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bo
         if "timestamp" in data.data:
             where, count = f"{path}: topic {data.name}", len(data.data["timestamp"])
             check_count(where, count, LIMITS.table_rows, "messages")
-            topics.setdefault(data.name, []).append(data.data)
+            with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
+                fields = {name: x.astype(np.float64) for name, x in data.data.items()}
+            topics.setdefault(data.name, []).append(fields)
     parameters = {
         name: float(value)
         for name, value in parsed.initial_parameters.items()
@@ -176,27 +169,15 @@ def _is_cut(path: Path) -> bool:
     return place != size
 
 
-def _column(fields: Fields, name: str) -> Array:
-    with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
-        return np.asarray(fields[name], dtype=np.float64)
-
-
-def _times(fields: Fields) -> Array:
-    """Return when samples were taken (N,) in s: ``timestamp_sample`` where it is plausible, else
-    ``timestamp``.
-    """
-    published = _column(fields, "timestamp")
-    sampled = _column(fields, "timestamp_sample") if "timestamp_sample" in fields else published
-    plausible = np.all((sampled > 0.0) & (np.abs(published - sampled) < 1e6))
-    return _MICROSECOND * (sampled if plausible else published)
-
-
 def _samples(topic: str, fields: Fields, outputs: Outputs) -> Iterator[Samples]:
     """Yield the columns of a topic's instance, as the map names them: none, where it is not in use;
     two groups of an inertial sensor whose gyro and accelerometer have times of their own.
     """
-    t = _times(fields)
-    columns = {name: _column(fields, name) for name in fields if "timestamp" not in name}
+    published = fields["timestamp"]
+    sampled = fields.get("timestamp_sample", published)
+    plausible = np.all((sampled > 0.0) & (np.abs(published - sampled) < 1e6))
+    t = _MICROSECOND * (sampled if plausible else published)
+    columns = {name: x for name, x in fields.items() if "timestamp" not in name}
     if topic == "esc_status":
         reported = [f"esc[{slot}].esc_rpm" for slot in slots_of_escs(fields)]
         if not set(reported) <= set(columns):
@@ -224,7 +205,7 @@ def _samples(topic: str, fields: Fields, outputs: Outputs) -> Iterator[Samples]:
                 columns[name] = np.where(columns[flag] == 0.0, np.nan, columns[name])
     elif topic in ("sensor_combined", "vehicle_imu"):
         for field, gained in _SENSORS:
-            yield from _sensor(topic, t, fields, columns, field, gained)
+            yield _sensor(topic, t, fields, field, gained)
         return
     yield Samples(t, columns, topic)
 
@@ -238,18 +219,16 @@ def _is_in_earth_frame(fields: Fields) -> bool:
     return bool(np.all(np.isin(fields.get("local_frame", 0), (0, 1))))  # before: 0 NED, 1 FRD
 
 
-def _sensor(
-    topic: str, t: Array, fields: Fields, columns: Mapping[str, Array], field: str, gained: str
-) -> Iterator[Samples]:
-    """Yield a gyro or an accelerometer at its own times, where the topic has it."""
+def _sensor(topic: str, t: Array, fields: Fields, field: str, gained: str) -> Samples:
+    """Return a gyro or an accelerometer at its own times, as far as the topic has it."""
     source = field if topic == "sensor_combined" else gained
-    values = {f"{field}[{i}]": columns.get(f"{source}[{i}]") for i in range(3)}
-    found = {name: column for name, column in values.items() if column is not None}
-    if source == gained and f"{gained}_dt" in columns:
-        span = _MICROSECOND * columns[f"{gained}_dt"]
+    names = {f"{field}[{i}]": f"{source}[{i}]" for i in range(3)}
+    found = {name: fields[stored] for name, stored in names.items() if stored in fields}
+    if source == gained and f"{gained}_dt" in fields:
+        span = _MICROSECOND * fields[f"{gained}_dt"]
         found = {n: column / np.where(span > 0.0, span, np.nan) for n, column in found.items()}
         t = t - 0.5 * span
-    late = np.asarray(fields.get("accelerometer_timestamp_relative", 0), dtype=np.float64)
+    late = fields.get("accelerometer_timestamp_relative", np.zeros(len(t)))
     if field == "accelerometer_m_s2" and np.all(np.abs(late) < 1e6):
         t = t + _MICROSECOND * late
-    yield Samples(t, found, topic)
+    return Samples(t, found, topic)

@@ -15,15 +15,9 @@ from ....runtime.yaml_file import read_yaml
 from ..log_map import MAPS
 from ..rotor_orders import ORDERS
 from ..table import Array
-from .px4_motors import slots_of_motors
+from ..what_flew import slots_of_motors
+from .px4_motors import MOTOR1
 
-_NUMBERS = ["Float32", "Float64", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64"]
-# messages that are arrays of numbers, whatever these are, and the field that holds them
-ARRAYS = {f"std_msgs/msg/{kind}MultiArray": "data" for kind in _NUMBERS}
-ARRAYS |= {
-    "crazyswarm/msg/GenericLogData": "values",
-    "crazyflie_interfaces/msg/LogDataGeneric": "values",
-}
 PARTS = ("pose", "rotors", "command", "voltage", "imu")
 MOTORS = ("rotors", "command")  # parts
 _SECOND = 10**9  # ns
@@ -66,7 +60,7 @@ def _odometry(message: Any) -> list[float]:
 
 def _esc_rpm(message: Any) -> list[float]:
     """Return the rpm of motors 1 to 4, by the function that each ESC states where all do."""
-    slots = slots_of_motors([int(esc.actuator_function) for esc in message.esc])
+    slots = slots_of_motors([int(esc.actuator_function) for esc in message.esc], MOTOR1)
     return [message.esc[i].esc_rpm for i in slots or range(4)]
 
 
@@ -78,7 +72,8 @@ _SPECIAL: Mapping[str, Callable[[Any], list[float]]] = {
 
 
 @cache
-def _stated() -> dict[str, Any]:
+def stated() -> dict[str, Any]:
+    """Return what ``ros.yaml`` states."""
     found: dict[str, Any] = read_yaml(MAPS / "recordings" / "ros.yaml", "a map of messages")
     return found
 
@@ -86,11 +81,11 @@ def _stated() -> dict[str, Any]:
 @cache
 def kinds(part: str) -> dict[str, Kind]:
     """Return how a part is read from messages, by their types."""
-    found = {name: Kind((field,)) for name, field in ARRAYS.items() if part in MOTORS}
-    for name, stated in _stated()[part].items():
-        fields, order = stated["fields"], stated.get("order")
+    found = {name: Kind((field,)) for name, field in stated()["arrays"].items() if part in MOTORS}
+    for name, given in stated()[part].items():
+        fields, order = given["fields"], given.get("order")
         paths = fields if isinstance(fields, str) else tuple(fields)
-        found[name] = Kind(**stated | {"fields": paths, "order": ORDERS[order] if order else ()})
+        found[name] = Kind(**given | {"fields": paths, "order": ORDERS[order] if order else ()})
     return found
 
 
@@ -98,7 +93,7 @@ def definitions() -> list[dict[str, str]]:
     """Return the definitions of the types that rosbags does not know, in several variants: the
     newest of each comes first.
     """
-    known: dict[str, list[str]] = _stated()["definitions"]
+    known: dict[str, list[str]] = stated()["definitions"]
     return [
         {name: texts[min(variant, len(texts) - 1)] for name, texts in known.items()}
         for variant in range(max(map(len, known.values())))

@@ -51,8 +51,7 @@ from ..mapped_log import recording_of
 from ..table import Array
 from ..what_flew import UNSTATED, WhatFlew, running
 from .ros_messages import MOTORS, definitions, stamp
-from .topic_choice import chosen_topics
-from .topic_map import Topic, joined, topic_map
+from .topic_map import Topic, chosen_topics, joined, topic_map
 from .unpacking import check_bag_files, limited_unpacking
 
 WHAT = "a ROS bag (ROS 1, SQLite or MCAP)"
@@ -82,8 +81,8 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
         topics, doubts = chosen_topics(path, types, settings, where)
         for part, topic in list(topics.items()):
             try:
-                times[part], columns[part], said, count = _decoded_topic(path, topic, messages)
-                doubts += said
+                times[part], columns[part], doubt, count = _decoded_topic(path, topic, messages)
+                doubts += [doubt] if doubt else []
                 flown = flown if count is None else WhatFlew(running=count)
             except InputError as error:
                 if part in settings or part in ("pose", "rotors"):
@@ -107,14 +106,13 @@ def _notes(topic: Topic, kind: str) -> Iterator[str]:
     part, frame = topic.part, topic.kind.frame
     yield f"{part}: topic {topic.name} ({kind}){topic.why}"
     if part in MOTORS:
-        named, pulses = topic.assumed_order, ""
+        said = f", as on {topic.assumed_order}, which the bag does not state"
+        said = said if topic.assumed_order else ""
         if part == "command" and topic.kind.unit == "us":
             low, high = topic.kind.range
-            pulses = f"; pulses of {low:g} to {high:g} us are the commands 0 to 1"
-        yield (
-            f"{part}: rotors 1, 2, 3, 4 are elements {', '.join(map(str, topic.elements))} of the "
-            f"message{f', as on {named}, which the bag does not state' if named else ''}{pulses}"
-        )
+            said += f"; pulses of {low:g} to {high:g} us are the commands 0 to 1"
+        elements = ", ".join(map(str, topic.elements))
+        yield f"{part}: rotors 1, 2, 3, 4 are elements {elements} of the message{said}"
     elif part != "voltage" and frame == "flu":
         world = "world z up, " if part == "pose" else ""
         yield f"{part}: {world}body forward, left, up, as the bag has it"
@@ -205,9 +203,8 @@ def _decoded(raw: Any, kind: str, stores: list[Any], ros1: bool) -> Any:
     dropped.
     """
     while True:
-        store = stores[0]
         try:
-            return (store.deserialize_ros1 if ros1 else store.deserialize_cdr)(raw, kind)
+            return getattr(stores[0], f"deserialize_{'ros1' if ros1 else 'cdr'}")(raw, kind)
         except Exception:
             if len(stores) == 1:
                 raise
@@ -216,9 +213,9 @@ def _decoded(raw: Any, kind: str, stores: list[Any], ros1: bool) -> Any:
 
 def _decoded_topic(
     path: Path, topic: Topic, messages: _Messages
-) -> tuple[NDArray[np.int64], dict[str, Array], list[str], int | None]:
-    """Return times (N,) in ns, columns (N,) by name, and notes of a topic; and of more than four
-    commands, whose order nobody stated, how many run as motors do.
+) -> tuple[NDArray[np.int64], dict[str, Array], str, int | None]:
+    """Return times (N,) in ns and columns (N,) of a topic by name, and what is wrong with its time
+    stamps; and of more than four commands, whose order nobody stated, how many run as motors do.
 
     Raises:
         InputError: it has no message or too many, or one that cannot be used.
@@ -242,21 +239,14 @@ def _decoded_topic(
         )
     table = np.array(values).reshape(len(recorded), -1)
     columns = dict(zip(topic.columns, table.T, strict=True))
-    received_at, sampled_at = np.array(recorded), np.array(stamped)
-    count = _running(every, topic)
-    doubt = ""
+    received_at, sampled_at, doubt = np.array(recorded), np.array(stamped), ""
     if not np.any(sampled_at):
         doubt = "no time stamps"
     elif np.max(np.abs(sampled_at - received_at)) > _SAME_CLOCK:
         doubt = "its time stamps are of another clock than the bag's"
-    if doubt:
-        return (
-            received_at,
-            columns,
-            [f"{topic.name}: {doubt}; the times of recording were taken"],
-            count,
-        )
-    return sampled_at, columns, [], count
+    times = received_at if doubt else sampled_at
+    doubt = f"{topic.name}: {doubt}; the times of recording were taken" if doubt else ""
+    return times, columns, doubt, _running(every, topic)
 
 
 def _running(every: Sequence[Array], topic: Topic) -> int | None:
@@ -266,5 +256,4 @@ def _running(every: Sequence[Array], topic: Topic) -> int | None:
     if len({len(values) for values in every}) != 1 or len(every[0]) <= 4:
         return None
     motors = [element - 1 for element in topic.elements]
-    others = [i for i in range(len(every[0])) if i not in motors]
-    return len(running(np.array(every)[:, [*motors, *others]], *topic.kind.range))
+    return running(np.array(every), motors, *topic.kind.range)

@@ -108,6 +108,11 @@ def test_a_map_that_is_none_says_what_was_expected(
         parse_map({**GOOD, **change}, "map")
 
 
+def test_a_world_has_several_names() -> None:
+    for name, meant in {"nwu": "enu", "flu": "enu", "FRD": "ned", "y_up": "y_up"}.items():
+        assert parse_map({**GOOD, "world": name}, "map").world == meant
+
+
 def table(path: Path, columns: dict[str, object], count: int = 40) -> Path:
     """Write a hover; a column is a number, or a list of fields."""
     good: dict[str, object] = {"t": [f"{0.01 * k:.2f}" for k in range(count)]}

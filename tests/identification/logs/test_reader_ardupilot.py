@@ -170,7 +170,7 @@ def test_pymavlink_reads_the_same_numbers():
         if message.get_type() in wanted:
             theirs[message.get_type()].append(message)
     for name, messages in theirs.items():
-        assert len(ours[name].rows) == len(messages) > 0
-        for column in ours[name].units:
+        assert len(ours[name]["TimeUS"]) == len(messages) > 0
+        for column, found in ours[name].items():
             values = [getattr(message, column) for message in messages]
-            np.testing.assert_allclose(ours[name].column(column), values, rtol=1e-6)
+            np.testing.assert_allclose(found, values, rtol=1e-6)
