@@ -35,9 +35,9 @@ _MATHS = {
     "sqrt": "sqrtf",
     "sin": "sinf",
     "cos": "cosf",
-    "exp": "ww_exp",
+    "exp": "expf",
     "fabs": "fabsf",
-    "atan2": "ww_atan2",
+    "atan2": "atan2f",
     "isfinite": "finite_number",
 }
 _FUNCTIONS = {"abs": "fabsf", "min": "smaller", "max": "larger"}
@@ -439,11 +439,11 @@ class Function:
         return array.at(self.number(place))
 
     def power(self, base: str, exponent: ast.expr) -> Number:
-        """Return a positive number raised to any power, or any number to a small whole one."""
+        """Return a number raised to any power; a small whole one is written out."""
         match exponent:
             case ast.Constant(value=int() as times) if 2 <= times <= 4:
                 return Number(f"({' * '.join([base] * times)})")
-        return Number(f"ww_power({base}, {self.number(exponent).as_float()})")
+        return Number(f"powf({base}, {self.number(exponent).as_float()})")
 
     def name_of(self, name: str) -> Value:
         """Return what a name is: a parameter, a variable, or a constant of the file."""
@@ -472,6 +472,8 @@ class Function:
                 return self.choice(test, body, orelse)
             case ast.Call(func=ast.Name(id=name), args=[one]) if name in _PASSED_ON:
                 return self.number(one)
+            case ast.Call(func=ast.Name(id="opposite"), args=[one]):
+                return Number(f"(!{self.number(one).text})", "truth")
             case ast.Call(func=ast.Name(id="len"), args=[of]):
                 size = cast(Array, self.evaluated(of)).shape[0]
                 return Number(size, "int", int(size) if size.isdigit() else None)
