@@ -15,7 +15,6 @@ import numpy as np
 from numba import carray
 
 from ..dynamics.rotation import attitude_error
-from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled, compiled_without_gil
 from ..runtime.errors import InputError
 from .error_state import fold
@@ -23,9 +22,8 @@ from .estimate import COASTING, NIS, TRACKING, Array
 from .filter_record import FILTER, N, drive, propagate
 from .hover_covariance import carry_at_hover, catch_up, heading, jacobian_at_hover, turn_world
 from .model_uncertainty import follow_loads
-from .recovery import Recovery, after_prediction, remember
+from .recovery import after_prediction, grow_older, remember
 from .sample import check_sample, undo_sensing
-from .tuning import UKFTuning
 from .ukf import WrenchUKF, correct_parts
 from .ukf import step as ukf_step
 
@@ -67,7 +65,7 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
     if f.steady == 0:
         _step_with_covariance(f, sample, usable, dt)
         return usable
-    f.gap[:] += dt
+    grow_older(f, dt)
     f.status = COASTING
     y[:] = 0.0
     if usable & 2 != 0:
@@ -93,7 +91,8 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
     for i in range(6):
         for j in range(6):
             nis += y[i] * f.information[i, j] * y[j]
-    if f.gap[0] > _LONGEST_GAP or f.gap[1] > _LONGEST_GAP or not nis <= f.alarm[usable // 3]:
+    late = f.poses.position_age > _LONGEST_GAP or f.poses.attitude_age > _LONGEST_GAP
+    if late or not nis <= f.alarm[usable // 3]:
         _leave_steady_state(f)
         _correct_with_covariance(f, sample, usable)
         return usable
@@ -103,7 +102,7 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
     fold(f, centre, mean)
     if usable > 0:
         f.status = TRACKING
-        remember(f, sample[4:7], sample[7:11], usable & 1 != 0, usable & 2 != 0)
+        remember(f, sample[4:11], usable & 1 != 0, usable & 2 != 0)
     return usable
 
 
@@ -179,12 +178,7 @@ class ConstantGainFilter(WrenchUKF):
     that of the model linearised at hover. ``covariance`` is always that of a vehicle that faces
     along x. Where noise differs between x and y, the gain is exact at that heading only.
 
-    Args:
-        vehicle: the declared vehicle, with its declared effects.
-        tuning: noise of model and measurement; default ``UKFTuning.for_vehicle(vehicle, period)``.
-        period: time between steps, s.
-        gate: as of ``WrenchUKF``.
-        recovery: as of ``WrenchUKF``.
+    Arguments are those of ``WrenchUKF``.
 
     Raises:
         InputError: a setting is out of range, or the filter does not converge at hover.
@@ -195,17 +189,10 @@ class ConstantGainFilter(WrenchUKF):
     _no_imu = "correct_imu needs a covariance; use WrenchUKF"
     _converged: Array | None = None
 
-    def __init__(
-        self,
-        vehicle: Vehicle,
-        tuning: UKFTuning | None = None,
-        period: float = 0.005,
-        gate: float | None = None,
-        recovery: Recovery | None = None,
-    ) -> None:
-        super().__init__(vehicle, tuning, period, gate, recovery)
+    def _prepare(self) -> None:
+        """Converge at hover."""
         self.reset((0.0, 0.0, _HEIGHT), (1.0, 0.0, 0.0, 0.0))
-        P, hover = _converged(self.record.tobytes(), vehicle.voltage_ref)
+        P, hover = _converged(self.record.tobytes(), self.vehicle.voltage_ref)
         self._converged, f = P, self.record[0]
         f["hover"] = hover
         inverse = 1.0 / f["noise"]
@@ -216,7 +203,7 @@ class ConstantGainFilter(WrenchUKF):
         f["information"] = inverse[:, None] * left * inverse
         f["P"] = f["converged"] = P
         walks = f["thrust"] / f["force_walk"], f["motor_torque"] / f["torque_walk"]
-        f["settle"] = _SETTLE * period * math.sqrt(float(np.max(walks)))
+        f["settle"] = _SETTLE * self.period * math.sqrt(float(np.max(walks)))
         f["steady"] = 1
 
     def _begin(self) -> None:

@@ -44,7 +44,7 @@ def carry_at_hover(f: Record, dt: float) -> None:
 @compiled
 def catch_up(f: Record) -> None:
     """Carry the covariance over the time that has not been measured since."""
-    since = max(f.gap[0], f.gap[1])
+    since = max(f.poses.position_age, f.poses.attitude_age)
     if since <= 0.0:
         return
     steps = since / f.period
@@ -75,8 +75,9 @@ def turn_world(f: Record, sample: Array, w: float, z: float) -> None:
     and sine ``z`` of half the angle.
     """
     cosine, sine = w * w - z * z, 2.0 * w * z
-    x, seen, doubted = f.x, f.seen, f.doubted
-    poses, moved = (sample[4:7], seen[0:3], doubted[0:3]), (f.pace[0:3], f.pace[3:6])
+    x, m = f.x, f.poses
+    seen, doubted, moved = m.seen, m.doubted, (m.pace[0:3], m.pace[3:6])
+    poses = (sample[4:7], seen[0:3], doubted[0:3])
     for v in (x[0:3], x[7:10], x[13:16], x[16:19], *poses, *moved):
         v[0], v[1] = cosine * v[0] - sine * v[1], sine * v[0] + cosine * v[1]
     for q in (x[3:7], sample[7:11], seen[3:7], doubted[3:7]):
