@@ -20,7 +20,14 @@ from ..runtime.errors import InputError
 from .error_state import fold
 from .estimate import COASTING, NIS, TRACKING, Array
 from .filter_record import FILTER, N, drive, propagate
-from .hover_covariance import carry_at_hover, catch_up, heading, jacobian_at_hover, turn_world
+from .hover_covariance import (
+    carry_at_hover,
+    catch_up,
+    heading,
+    jacobian_at_hover,
+    turn_vectors,
+    turn_world,
+)
 from .model_uncertainty import follow_loads
 from .recovery import after_prediction, grow_older, remember
 from .sample import check_sample, undo_sensing
@@ -36,14 +43,6 @@ _NEAR = 1.1  # of the converged variances: nearly converged again
 # time constants of the wrench for which it must have been near: what then still differs is e^-4 of
 # it, so that it makes no difference whether the constant gain takes over a step earlier or later
 _SETTLE = 2.0
-
-
-@compiled
-def _turn(values: Array, cosine: float, sine: float) -> None:
-    """Turn the horizontal part of each three of ``values`` about the vertical, in place."""
-    for i in range(0, len(values), 3):
-        a, b = values[i], values[i + 1]
-        values[i], values[i + 1] = cosine * a - sine * b, sine * a + cosine * b
 
 
 @compiled
@@ -80,7 +79,7 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
     )
     length = math.sqrt(across * across + along * along)
     cosine, sine = (along / length, across / length) if length > 1e-6 else (1.0, 0.0)
-    _turn(y, cosine, -sine)
+    turn_vectors(y, 2, cosine, -sine)
     mean = f.mean
     for i in range(N):
         total = 0.0
@@ -97,8 +96,8 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
         _correct_with_covariance(f, sample, usable)
         return usable
     x[NIS] = nis if usable == 3 else math.nan
-    _turn(mean[0:3], cosine, sine)  # the rate, next, is in body axes
-    _turn(mean[6:N], cosine, sine)
+    turn_vectors(mean[0:3], 1, cosine, sine)  # the rate, next, is in body axes
+    turn_vectors(mean[6:N], 4, cosine, sine)
     fold(f, centre, mean)
     if usable > 0:
         f.status = TRACKING
@@ -136,9 +135,9 @@ def _step_with_covariance(f: Record, sample: Array, usable: int, dt: float) -> N
 def _correct_with_covariance(f: Record, sample: Array, usable: int) -> None:
     if usable > 0:
         w, z = heading(f.x[3:7])
-        turn_world(f, sample, w, -z)
+        turn_world(f, sample[4:11], w, -z)
         correct_parts(f, sample, usable)
-        turn_world(f, sample, w, z)
+        turn_world(f, sample[4:11], w, z)
 
 
 @compiled

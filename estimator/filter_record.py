@@ -101,6 +101,8 @@ FILTER = np.dtype(
         ("scales", "f8", (6,)),  # inverse diagonal of a root
         ("W", "f8", (6, N)),
         ("innovation", "f8", (6,)),
+        # derivatives of the torque, body, by the error state: of the linearised model
+        ("torques", "f8", (3, N)),
         # twelve sigma points side by side, one a column
         ("points", "f8", (19, 12)),
         ("accelerations", "f8", (6, 12)),

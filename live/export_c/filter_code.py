@@ -9,8 +9,10 @@ import numpy as np
 from ...dynamics.motion import rotor_wrench
 from ...dynamics.rotation import attitude_error, normalise
 from ...estimator.bias_states import bound_biases
+from ...estimator.ekf import model_jacobian
 from ...estimator.error_state import bound_variance, displace, error_from, fold
-from ...estimator.filter_record import FILTER, IMU, fields_between, propagate
+from ...estimator.filter_record import FILTER, IMU, N, fields_between, propagate
+from ...estimator.hover_covariance import heading, turn_vectors, turn_world
 from ...estimator.imu import _believed, expected_imu
 from ...estimator.recovery import (
     MEMORY,
@@ -32,11 +34,14 @@ _CALLED: dict[Any, tuple[Value | None, ...]] = {
     **dict.fromkeys((attitude_error, normalise, propagate, expected_imu), ()),
     **dict.fromkeys((displace, error_from, fold), ()),
     **dict.fromkeys((after_prediction, believable, remember, grow_older, doubted_variance), ()),
-    **dict.fromkeys((innovate, bound_biases), ()),
+    **dict.fromkeys((innovate, bound_biases, heading, turn_vectors, turn_world), ()),
     bound_variance: (Array("", ("WW_STATES", "WW_STATES"), root="matrix"), None, None),
+    model_jacobian: (None, None, Array("", ("12", str(N)), root="matrix"), None),
     _believed: (None, Array("", ("6", "6"), root="matrix"), None, None, None),
 }
 # functions of templates that these call, and which of their arguments they write
+# steps of difference quotients that single precision can still tell apart
+_STEPS = {"EFFECT_TURN": 4e-3, "EFFECT_STEP": 1e-2}
 _BY_HAND = dict.fromkeys(("_nis", "_is_push", "restore_bias_prior"), "")
 # fields of the filter's record that change in flight: by their names in C, their types
 _KEPT = {
@@ -62,7 +67,7 @@ def filter_code(record: np.void, source: str) -> str:
         by_hand["apply_effects"] = ""
     else:
         del memory["effect_wrench"]  # zeros
-    library = Library(constants=record, memory=memory, by_hand=by_hand)
+    library = Library(constants=record, memory=memory, by_hand=by_hand, numbers=_STEPS)
     for function, known in _CALLED.items():
         if re.search(rf"\b{function.__name__.lstrip('_')}\(", source):
             library.get(function, known)

@@ -56,6 +56,7 @@ class Library:
         covariance: rows and columns of P, which is a parameter of its own.
         by_hand: functions that templates have, by their names: which of their arguments they write.
         refused: functions that are not translated, and why.
+        numbers: constants of files that are others in C.
         prefix: of the names of functions.
     """
 
@@ -64,12 +65,18 @@ class Library:
     covariance: str = "WW_STATES"
     by_hand: Mapping[str, str] = field(default_factory=dict)
     refused: Mapping[Any, str] = field(default_factory=dict)
+    numbers: Mapping[str, float] = field(default_factory=dict)
     prefix: str = ""
     done: dict[tuple[Any, ...], "Function"] = field(default_factory=dict)
     counter: int = 0  # of names
 
     def get(self, function: Callable[..., Any], bound: tuple[Value | None, ...] = ()) -> "Function":
         """Return a compiled function, translated for arguments that are known (``bound``)."""
+        if "len" not in python_of(function).__code__.co_names:  # any number of rows will do
+            bound = tuple(
+                replace(one, shape=("", *one.shape[1:])) if getattr(one, "root", "") else one
+                for one in bound
+            )
         key = function, bound or (None,) * len(inspect.signature(function).parameters)
         if key not in self.done:
             made = Function(function, self, bound=key[1])
@@ -145,10 +152,11 @@ class Function:
         """Return the value of a condition on an export's constants alone, or None."""
         for node in ast.walk(test):
             match node:
-                case ast.Call() | ast.Subscript():
+                case ast.Call():
                     return None
-                case ast.Name(id=name) if not isinstance(self.names.get(name), Fields):
-                    if not isinstance(self.globals.get(name), int | float):
+                case ast.Name(id=name):
+                    given = self.names.get(name, self.globals.get(name))
+                    if not isinstance(given, Fields | int | float):
                         return None
         used = set(self.used)
         value = self.number(test).known
@@ -451,7 +459,7 @@ class Function:
             if not (self.suffix or isinstance(self.names[name], Fields)):
                 self.used.add(name)
             return self.names[name]
-        value = self.globals.get(name)
+        value = self.library.numbers.get(name, self.globals.get(name))
         if isinstance(value, int) and getattr(base, name, None) == value:
             return Number(f"WW_{name}", "int", value)
         if isinstance(value, bool | int | float):
