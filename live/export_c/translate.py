@@ -74,7 +74,9 @@ class Library:
         """Return a compiled function, translated for arguments that are known (``bound``)."""
         if "len" not in python_of(function).__code__.co_names:  # any number of rows will do
             bound = tuple(
-                replace(one, shape=("", *one.shape[1:])) if getattr(one, "root", "") else one
+                replace(one, shape=("", *one.shape[1:]))
+                if isinstance(one, Array) and one.root
+                else one
                 for one in bound
             )
         key = function, bound or (None,) * len(inspect.signature(function).parameters)
