@@ -145,7 +145,7 @@ def acceleration_jacobian(f: Record, A: Array, effects: bool) -> None:
     # thrust along the body's z axis
     thrust = f.rotor_wrench[0]
     _add_cross(A, 9, 0, R[0, 2] * thrust, R[1, 2] * thrust, R[2, 2] * thrust, -4.0)
-    if f.wrench_count > 0:
+    if f.wrench_count > 0:  # noqa: SIM102 - an export decides this one by itself
         if effects:
             _add_effect_jacobian(f, A)
     for i in range(3):

@@ -345,7 +345,8 @@ def _judge(
         restarted = restarted | refused
     _restart(f, pose, restarted & with_position, restarted & with_attitude)
     verdict = choose(refused, REJECTED, choose(measured, TRACKING, f.status))
-    return choose(restarted, RESTARTED, verdict)
+    final: float = choose(restarted, RESTARTED, verdict)
+    return final
 
 
 @compiled
