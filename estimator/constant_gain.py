@@ -15,17 +15,22 @@ import numpy as np
 from numba import carray
 
 from ..dynamics.rotation import attitude_error
-from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled, compiled_without_gil
 from ..runtime.errors import InputError
 from .error_state import fold
 from .estimate import COASTING, NIS, TRACKING, Array
 from .filter_record import FILTER, N, drive, propagate
-from .hover_covariance import carry_at_hover, catch_up, heading, jacobian_at_hover, turn_world
+from .hover_covariance import (
+    carry_at_hover,
+    catch_up,
+    heading,
+    jacobian_at_hover,
+    turn_vectors,
+    turn_world,
+)
 from .model_uncertainty import follow_loads
-from .recovery import Recovery, after_prediction, remember
+from .recovery import after_prediction, grow_older, remember
 from .sample import check_sample, undo_sensing
-from .tuning import UKFTuning
 from .ukf import WrenchUKF, correct_parts
 from .ukf import step as ukf_step
 
@@ -38,14 +43,6 @@ _NEAR = 1.1  # of the converged variances: nearly converged again
 # time constants of the wrench for which it must have been near: what then still differs is e^-4 of
 # it, so that it makes no difference whether the constant gain takes over a step earlier or later
 _SETTLE = 2.0
-
-
-@compiled
-def _turn(values: Array, cosine: float, sine: float) -> None:
-    """Turn the horizontal part of each three of ``values`` about the vertical, in place."""
-    for i in range(0, len(values), 3):
-        a, b = values[i], values[i + 1]
-        values[i], values[i + 1] = cosine * a - sine * b, sine * a + cosine * b
 
 
 @compiled
@@ -67,7 +64,7 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
     if f.steady == 0:
         _step_with_covariance(f, sample, usable, dt)
         return usable
-    f.gap[:] += dt
+    grow_older(f, dt)
     f.status = COASTING
     y[:] = 0.0
     if usable & 2 != 0:
@@ -82,7 +79,7 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
     )
     length = math.sqrt(across * across + along * along)
     cosine, sine = (along / length, across / length) if length > 1e-6 else (1.0, 0.0)
-    _turn(y, cosine, -sine)
+    turn_vectors(y, 2, cosine, -sine)
     mean = f.mean
     for i in range(N):
         total = 0.0
@@ -93,17 +90,18 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
     for i in range(6):
         for j in range(6):
             nis += y[i] * f.information[i, j] * y[j]
-    if f.gap[0] > _LONGEST_GAP or f.gap[1] > _LONGEST_GAP or not nis <= f.alarm[usable // 3]:
+    late = f.poses.position_age > _LONGEST_GAP or f.poses.attitude_age > _LONGEST_GAP
+    if late or not nis <= f.alarm[usable // 3]:
         _leave_steady_state(f)
         _correct_with_covariance(f, sample, usable)
         return usable
     x[NIS] = nis if usable == 3 else math.nan
-    _turn(mean[0:3], cosine, sine)  # the rate, next, is in body axes
-    _turn(mean[6:N], cosine, sine)
+    turn_vectors(mean[0:3], 1, cosine, sine)  # the rate, next, is in body axes
+    turn_vectors(mean[6:N], 4, cosine, sine)
     fold(f, centre, mean)
     if usable > 0:
         f.status = TRACKING
-        remember(f, sample[4:7], sample[7:11], usable & 1 != 0, usable & 2 != 0)
+        remember(f, sample[4:11], usable & 1 != 0, usable & 2 != 0)
     return usable
 
 
@@ -137,9 +135,9 @@ def _step_with_covariance(f: Record, sample: Array, usable: int, dt: float) -> N
 def _correct_with_covariance(f: Record, sample: Array, usable: int) -> None:
     if usable > 0:
         w, z = heading(f.x[3:7])
-        turn_world(f, sample, w, -z)
+        turn_world(f, sample[4:11], w, -z)
         correct_parts(f, sample, usable)
-        turn_world(f, sample, w, z)
+        turn_world(f, sample[4:11], w, z)
 
 
 @compiled
@@ -179,12 +177,7 @@ class ConstantGainFilter(WrenchUKF):
     that of the model linearised at hover. ``covariance`` is always that of a vehicle that faces
     along x. Where noise differs between x and y, the gain is exact at that heading only.
 
-    Args:
-        vehicle: the declared vehicle, with its declared effects.
-        tuning: noise of model and measurement; default ``UKFTuning.for_vehicle(vehicle, period)``.
-        period: time between steps, s.
-        gate: as of ``WrenchUKF``.
-        recovery: as of ``WrenchUKF``.
+    Arguments are those of ``WrenchUKF``.
 
     Raises:
         InputError: a setting is out of range, or the filter does not converge at hover.
@@ -195,17 +188,10 @@ class ConstantGainFilter(WrenchUKF):
     _no_imu = "correct_imu needs a covariance; use WrenchUKF"
     _converged: Array | None = None
 
-    def __init__(
-        self,
-        vehicle: Vehicle,
-        tuning: UKFTuning | None = None,
-        period: float = 0.005,
-        gate: float | None = None,
-        recovery: Recovery | None = None,
-    ) -> None:
-        super().__init__(vehicle, tuning, period, gate, recovery)
+    def _prepare(self) -> None:
+        """Converge at hover."""
         self.reset((0.0, 0.0, _HEIGHT), (1.0, 0.0, 0.0, 0.0))
-        P, hover = _converged(self.record.tobytes(), vehicle.voltage_ref)
+        P, hover = _converged(self.record.tobytes(), self.vehicle.voltage_ref)
         self._converged, f = P, self.record[0]
         f["hover"] = hover
         inverse = 1.0 / f["noise"]
@@ -216,7 +202,7 @@ class ConstantGainFilter(WrenchUKF):
         f["information"] = inverse[:, None] * left * inverse
         f["P"] = f["converged"] = P
         walks = f["thrust"] / f["force_walk"], f["motor_torque"] / f["torque_walk"]
-        f["settle"] = _SETTLE * period * math.sqrt(float(np.max(walks)))
+        f["settle"] = _SETTLE * self.period * math.sqrt(float(np.max(walks)))
         f["steady"] = 1
 
     def _begin(self) -> None:

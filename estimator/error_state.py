@@ -69,9 +69,15 @@ def symmetrise(P: Array) -> None:
             P[i, j] = a
             P[j, i] = a
     for i in range(3):
-        wide = P[i, i] > LARGEST_MRP_VARIANCE
-        if any_of(wide):
-            scale = choose(wide, math.sqrt(LARGEST_MRP_VARIANCE / P[i, i]), 1.0)
-            for j in range(n):
-                P[i, j] *= scale
-                P[j, i] *= scale
+        bound_variance(P, i, LARGEST_MRP_VARIANCE)
+
+
+@compiled
+def bound_variance(P: Array, i: int, most: float) -> None:
+    """Scale row and column ``i`` of P (n, n) down to a variance of ``most`` where it is larger."""
+    wide = P[i, i] > most
+    if any_of(wide):
+        scale = choose(wide, math.sqrt(most / P[i, i]), 1.0)
+        for j in range(len(P)):
+            P[i, j] *= scale
+            P[j, i] *= scale

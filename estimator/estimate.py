@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,19 @@ POSITION, QUATERNION, VELOCITY = slice(0, 3), slice(3, 7), slice(7, 10)
 RATE, TORQUE, FORCE = slice(10, 13), slice(13, 16), slice(16, 19)
 NIS = 19
 STATE_SIZE = 20
-# What became of the last step's measurement, in the filter's memory
-TRACKING, COASTING, REJECTED, RESTARTED = 0.0, 1.0, 2.0, 3.0
-STATUSES = ("tracking", "coasting", "rejected", "restarted")
+
+
+class Status(IntEnum):
+    """What became of the last step's measurement."""
+
+    TRACKING = 0  # it was taken in
+    COASTING = 1  # there was none
+    REJECTED = 2  # the gate refused it
+    RESTARTED = 3  # pose and twist start anew at it
+
+
+STATUSES = tuple(status.name.lower() for status in Status)
+TRACKING, COASTING, REJECTED, RESTARTED = map(float, Status)  # in the filter's memory
 # Layout of an estimate's numbers: the state, the status, the restarts, the variances of torque and
 # force that the vehicle's uncertainty makes, then perhaps the covariance
 STATUS, RESTARTS, WITHOUT_COVARIANCE = STATE_SIZE, STATE_SIZE + 1, STATE_SIZE + 8

@@ -10,10 +10,9 @@ from ..runtime.compiled import Record, compiled
 from ..runtime.vector_lanes import any_of, choose
 from .estimate import STATE_SIZE
 from .model_uncertainty import FACTORS, LOAD, factors_of
-from .recovery import Recovery, load_recovery
+from .recovery import MEMORY, N, Recovery, load_recovery
 from .tuning import UKFTuning
 
-N = 18  # error state (rho, omega, x, v, torque, force)
 BIASES = 6  # of gyro and accelerometer
 AGREEING = 5  # accelerometer samples in a row that make a push
 # of the hover's rotor speed: no vehicle lifts 900 of its weights, and a log in rpm still shows
@@ -44,24 +43,13 @@ IMU = np.dtype(
 FILTER = np.dtype(
     [
         *MODEL_FIELDS,
+        ("poses", MEMORY),  # gaps, refusals and restarts: estimator.recovery
         # the estimate, in one piece
         ("x", "f8", (STATE_SIZE,)),
         ("status", "f8"),  # what became of the last step's measurement
         ("restarts", "f8"),  # since the reset
         ("model", "f8", (6,)),  # variances of torque and force by the vehicle's uncertainty
         ("P", "f8", (N, N)),
-        # gaps, refusals and restarts: estimator.recovery
-        # s since a position, an attitude was believed, and since each was refused
-        ("gap", "f8", (4,)),
-        ("seen", "f8", (7,)),  # position and quaternion that were believed last
-        ("doubted", "f8", (7,)),  # and those refused last
-        ("refused", "f8"),  # measurements in a row
-        ("stride", "f8", (2,)),  # s between the last two positions, attitudes refused; 0: not two
-        ("pace", "f8", (6,)),  # motion of (rho, x) over that time, per second
-        ("lasting", "f8"),  # s for which those refused have agreed with each other
-        ("in_row", "f8"),  # of those refused: how many went on from each other, up to the last
-        # of (rho, x): what those from one to the next add up to, and what these may miss by
-        ("jumps", "f8", (2, 6)),
         ("load", "f8", LOAD),  # what that uncertainty scales: estimator.model_uncertainty
         ("predicted", "f8", (6,)),  # variances of torque and force before the last measurement
         ("last_speeds", "f8", (4,)),  # rotor speeds that were measured last
@@ -101,6 +89,9 @@ FILTER = np.dtype(
         ("error", "f8", (2, N)),
         ("B", "f8", (6, N)),  # scaled noise inputs, one a row
         ("mean", "f8", (N,)),
+        ("miss", "f8", (6,)),  # by which a pose misses where it was expected, (rho, x),
+        ("slack", "f8", (6,)),  # by how much it may,
+        ("disagreement", "f8", (6,)),  # and by how much it misses those refused before it
         ("point", "f8", (STATE_SIZE,)),  # the sigma point in hand
         ("next", "f8", (STATE_SIZE,)),  # where it is after the step
         ("centre", "f8", (STATE_SIZE,)),  # the same of the central one
@@ -110,6 +101,8 @@ FILTER = np.dtype(
         ("scales", "f8", (6,)),  # inverse diagonal of a root
         ("W", "f8", (6, N)),
         ("innovation", "f8", (6,)),
+        # derivatives of the torque, body, by the error state: of the linearised model
+        ("torques", "f8", (3, N)),
         # twelve sigma points side by side, one a column
         ("points", "f8", (19, 12)),
         ("accelerations", "f8", (6, 12)),

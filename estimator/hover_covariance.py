@@ -44,7 +44,7 @@ def carry_at_hover(f: Record, dt: float) -> None:
 @compiled
 def catch_up(f: Record) -> None:
     """Carry the covariance over the time that has not been measured since."""
-    since = max(f.gap[0], f.gap[1])
+    since = max(f.poses.position_age, f.poses.attitude_age)
     if since <= 0.0:
         return
     steps = since / f.period
@@ -70,18 +70,40 @@ def heading(q: Array) -> tuple[float, float]:
 
 
 @compiled
-def turn_world(f: Record, sample: Array, w: float, z: float) -> None:
-    """Turn the world about the vertical: estimate, sample (11,) and remembered poses; cosine ``w``
-    and sine ``z`` of half the angle.
+def turn_world(f: Record, pose: Array, w: float, z: float) -> None:
+    """Turn the world about the vertical: estimate, pose (7,) and remembered poses; cosine ``w`` and
+    sine ``z`` of half the angle.
     """
     cosine, sine = w * w - z * z, 2.0 * w * z
-    x, seen, doubted = f.x, f.seen, f.doubted
-    poses, moved = (sample[4:7], seen[0:3], doubted[0:3]), (f.pace[0:3], f.pace[3:6])
-    for v in (x[0:3], x[7:10], x[13:16], x[16:19], *poses, *moved):
-        v[0], v[1] = cosine * v[0] - sine * v[1], sine * v[0] + cosine * v[1]
-    for q in (x[3:7], sample[7:11], seen[3:7], doubted[3:7]):
-        q[0], q[3] = w * q[0] - z * q[3], w * q[3] + z * q[0]
-        q[1], q[2] = w * q[1] - z * q[2], w * q[2] + z * q[1]
+    _turn_pose(f.x, w, z)
+    _turn_pose(pose, w, z)
+    _turn_pose(f.poses.seen, w, z)
+    turn_vectors(f.x[7:10], 1, cosine, sine)
+    turn_vectors(f.x[13:19], 2, cosine, sine)
+    if f.gated > 0:
+        _turn_pose(f.poses.doubted, w, z)
+        turn_vectors(f.poses.pace, 2, cosine, sine)
+
+
+@compiled
+def _turn_pose(pose: Array, w: float, z: float) -> None:
+    """Turn position and quaternion, which a pose begins with."""
+    turn_vectors(pose[0:3], 1, w * w - z * z, 2.0 * w * z)
+    for i in range(2):
+        a, b = pose[3 + i], pose[6 - i]
+        pose[3 + i] = w * a - z * b
+        pose[6 - i] = w * b + z * a
+
+
+@compiled
+def turn_vectors(values: Array, count: int, cosine: float, sine: float) -> None:
+    """Turn the horizontal part of ``count`` vectors, which follow one another, about the vertical,
+    in place.
+    """
+    for k in range(count):
+        a, b = values[3 * k], values[3 * k + 1]
+        values[3 * k] = cosine * a - sine * b
+        values[3 * k + 1] = sine * a + cosine * b
 
 
 @compiled_without_gil
@@ -89,7 +111,7 @@ def _jacobian_at(record: np.ndarray, voltage: float, out: Array) -> None:
     f = record[0]
     drive(f, f.last_speeds, f.period, voltage)
     propagate(f, f.x, f.period, f.centre)
-    acceleration_jacobian(f, f.S)
+    acceleration_jacobian(f, f.S, True)
     out[:3], out[3:] = f.S[3:6], f.S[9:12]
 
 

@@ -183,7 +183,7 @@ def _pass(
         if not row.measured:
             continue
         # the filter's own gate and restarts stay out: the likelihood of outliers is stated here
-        nis = innovate(f, z[4:7], z[7:11], True, True)
+        nis = innovate(f, z[4:11], True, True)
         found.t, found.nis, found.white[:] = row.t, nis, f.innovation
         log_normal = log_inlier + _CONSTANT - 0.5 * nis
         for i in range(6):
@@ -198,7 +198,7 @@ def _pass(
             found.log_likelihood += math.log1p(math.exp(other - likelier))
         if not found.outlier:
             take_in(f)
-            remember(f, z[4:7], z[7:11], True, True)
+            remember(f, z[4:11], True, True)
 
 
 def fisher_information(found: Innovations, moved: Sequence[Innovations], step: float) -> Array:

@@ -15,6 +15,22 @@ A Kalman filter's model knows none of four events. Each breaks something else:
   there after ``Recovery.patience``, without a gate at once. Poses that do not even agree with each
   other restart it after ``Recovery.give_up``, known no better than they disagree.
 
+So a filter is in one of three phases, and each measured pose has one verdict, its ``Status``:
+
+    phase               pose                              verdict     next phase
+    any                 of a part that is lost            RESTARTED   BELIEVING
+    BELIEVING           likely                            TRACKING    BELIEVING
+    BELIEVING           unlikely, goes on (``continues``) TRACKING    BELIEVING
+    BELIEVING           unlikely, jumped; no gate         RESTARTED   BELIEVING
+    BELIEVING           unlikely, jumped                  REJECTED    ONE_REFUSED
+    ONE_REFUSED, more   back (``_is_back``)               TRACKING    BELIEVING
+    ONE_REFUSED, more   neither                           REJECTED    REFUSING
+    ONE_REFUSED, more   lasting (``_outlasts``)           RESTARTED   BELIEVING
+
+Where an unlikely pose goes on or is back, and no linear correction leads there (``_is_beyond``),
+the filter restarts instead of tracking. While a part whose jumps do not cancel is not measured,
+the phase stays.
+
 Whether refused poses agree is asked of the poses alone. A filter that took in a wrong attitude has
 a velocity that runs away, and by that velocity two poses at one spot would not agree.
 
@@ -22,10 +38,14 @@ A restart sets pose and twist anew with a prior's covariance. Force and torque k
 with variances so wide that there may be no wrench at all. A wrench that the model took for
 impossible explains a contradiction as well as a pose that jumped, and after a gap nothing says that
 the wrench still acts.
+
+One compiled code is that of single filters, of filters side by side in lanes, and of the exported
+C: so phases are numbers, and conditions have an answer for each lane (``runtime.vector_lanes``).
 """
 
 import math
 from dataclasses import dataclass, fields
+from enum import IntEnum
 
 import numpy as np
 
@@ -33,9 +53,9 @@ from ..dynamics.rotation import attitude_error
 from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
-from ..runtime.vector_lanes import any_of, choose
-from .error_state import LARGEST_MRP_VARIANCE
-from .estimate import COASTING, REJECTED, RESTARTED, Array
+from ..runtime.vector_lanes import any_of, choose, opposite
+from .error_state import LARGEST_MRP_VARIANCE, bound_variance
+from .estimate import COASTING, NIS, REJECTED, RESTARTED, TRACKING, Array
 
 N = 18  # error state (rho, omega, x, v, torque, force)
 NOISE = 12  # noise inputs of the prediction: motor torque, torque walk, thrust, force walk
@@ -43,6 +63,37 @@ _LOST = 0.9  # of a prior's variance: known no better than that
 # poses that go on from each other before they are believed again: of poses 10 cm off in directions
 # of their own one in a hundred goes on from the one before by chance, and two in a row 1e-4
 AGREEING = 3
+
+
+class Phase(IntEnum):
+    """What a filter makes of measured poses: the memory of a step for the next."""
+
+    BELIEVING = 0  # the last one was taken in, or the filter restarted there
+    ONE_REFUSED = 1  # one alone was refused since
+    REFUSING = 2  # more were
+
+
+BELIEVING, ONE_REFUSED, REFUSING = map(float, Phase)  # as a record holds them, lanes too
+
+# What is remembered of poses from one step to the next
+MEMORY = np.dtype(
+    [
+        ("phase", "f8"),
+        ("seen", "f8", (7,)),  # position and quaternion that were believed last
+        ("position_age", "f8"),  # s since a position was believed
+        ("attitude_age", "f8"),  # s since an attitude was
+        ("doubted", "f8", (7,)),  # position and quaternion that were refused last
+        ("doubted_position_age", "f8"),  # s since a position was refused
+        ("doubted_attitude_age", "f8"),  # s since an attitude was
+        ("position_stride", "f8"),  # s between the last two positions refused; 0: not two
+        ("attitude_stride", "f8"),  # the same of attitudes
+        ("pace", "f8", (6,)),  # motion of (rho, x) over that time, per second
+        ("agreeing", "f8"),  # of those refused: how many went on from each other, up to the last
+        ("agreed_for", "f8"),  # s for which they have
+        ("jump", "f8", (6,)),  # of (rho, x): what those from one to the next add up to
+        ("blur", "f8", (6,)),  # what these may miss by
+    ]
+)
 
 
 @dataclass(frozen=True)
@@ -139,24 +190,29 @@ def largest_nis(probability: float, dof: int) -> float:
 
 
 @compiled
+def grow_older(f: Record, dt: float) -> None:
+    """Count the time since poses were believed and refused."""
+    m = f.poses
+    m.position_age += dt
+    m.attitude_age += dt
+    m.doubted_position_age += dt
+    m.doubted_attitude_age += dt
+
+
+@compiled
 def after_prediction(f: Record, dt: float) -> None:
     """Count the time since the last measurements, keep the covariance within what a vehicle can do,
     and hold what is lost.
     """
-    x, P, gap = f.x, f.P, f.gap
+    x, m = f.x, f.poses
     f.status = COASTING
-    for i in range(4):
-        gap[i] += dt
+    grow_older(f, dt)
     # over a gap variances grow without an end; at 16 times the prior's they have long lost their
     # meaning
     for i in range(3, N):
-        wide = P[i, i] > 16.0 * f.prior[i]
-        if any_of(wide):
-            scale = choose(wide, math.sqrt(16.0 * f.prior[i] / P[i, i]), 1.0)
-            for j in range(len(P)):
-                P[i, j] *= scale
-                P[j, i] *= scale
-    if any_of((gap[0] > f.patience) | (gap[1] > f.patience) | (gap[0] < gap[1])):
+        bound_variance(f.P, i, 16.0 * f.prior[i])
+    late = (m.position_age > f.patience) | (m.attitude_age > f.patience)
+    if any_of(late | (m.position_age < m.attitude_age)):
         position, attitude = lost_position(f), lost_attitude(f)
         _forget(f, position, attitude, False)
         for i in range(3):
@@ -181,21 +237,15 @@ def start_over_if_broken(f: Record) -> None:
         for j in range(i):
             row += P[i, j]
         total += row
-    broken = choose(math.isfinite(total), 0.0, 1.0) > 0.5
+    broken = opposite(math.isfinite(total))
     if any_of(broken):
-        _start_over(f, broken)
-
-
-@compiled
-def _start_over(f: Record, broken: bool) -> None:
-    x = f.x
-    for i in range(7):
-        x[i] = choose(broken, f.seen[i], x[i])
-    for i in range(7, 19):
-        x[i] = choose(broken, 0.0, x[i])
-    _forget(f, broken, broken, broken)
-    f.restarts = choose(broken, f.restarts + 1.0, f.restarts)
-    f.status = choose(broken, RESTARTED, f.status)
+        for i in range(7):
+            x[i] = choose(broken, f.poses.seen[i], x[i])
+        for i in range(7, 19):
+            x[i] = choose(broken, 0.0, x[i])
+        _forget(f, broken, broken, broken)
+        f.restarts = choose(broken, f.restarts + 1.0, f.restarts)
+        f.status = choose(broken, RESTARTED, f.status)
 
 
 @compiled
@@ -207,7 +257,7 @@ def lost_position(f: Record) -> bool:
     wide = P[6, 6] > lost[6]
     for i in range(7, 12):
         wide = wide | (P[i, i] > lost[i])
-    lost_now: bool = wide & (f.gap[0] > f.patience)
+    lost_now: bool = wide & (f.poses.position_age > f.patience)
     return lost_now
 
 
@@ -217,10 +267,11 @@ def lost_attitude(f: Record) -> bool:
     while positions went on. These then are explained by a turn more or less as well as by a force,
     from sigma points that reach half a turn: rates run away and rounding errors grow.
     """
-    P, lost = f.P, f.lost
+    P, lost, m = f.P, f.lost, f.poses
     guessed = (P[0, 0] > lost[0]) | (P[1, 1] > lost[1]) | (P[2, 2] > lost[2])
     wide = guessed | (P[3, 3] > lost[3]) | (P[4, 4] > lost[4]) | (P[5, 5] > lost[5])
-    lost_now: bool = (wide & (f.gap[1] > f.patience)) | (guessed & (f.gap[0] < f.gap[1]))
+    unseen = m.attitude_age > f.patience
+    lost_now: bool = (wide & unseen) | (guessed & (m.position_age < m.attitude_age))
     return lost_now
 
 
@@ -237,78 +288,200 @@ def _forget(f: Record, position: bool, attitude: bool, wrench: bool) -> None:
 
 
 @compiled
-def judge(
-    f: Record,
-    position: Array,
-    quaternion: Array,
-    with_position: bool,
-    with_attitude: bool,
-    nis: float,
-    alarming: bool,
+def believable(
+    f: Record, pose: Array, with_position: bool, with_attitude: bool, nis: float
 ) -> bool:
-    """Decide about a measurement that is unlikely (``alarming``) or comes when its part of the
-    state is lost; restart there if it must be.
+    """Give the verdict on a measured pose, or a part of one, of which ``ukf.innovate`` was called;
+    restart there if it must be.
 
-    Returns whether it is to be taken in as any other, by a linear correction.
+    Returns whether it is to be taken in by a linear correction.
     """
-    taken = with_position | with_attitude
-    lost = (with_position & lost_position(f)) | (with_attitude & lost_attitude(f))
-    gap, first = f.gap, f.refused < 0.5
-    reachable = continues(
-        f, position, quaternion, f.seen, gap[0], gap[1], with_position, with_attitude
-    )
-    back = first
-    if f.gated > 0:
-        back = _returned(f, position, quaternion, with_position, with_attitude, alarming, reachable)
-    going_on = choose(first, choose(reachable, 1.0, 0.0), choose(back, 1.0, 0.0)) > 0.5
-    # among refused ones a likely pose too has to come back first
-    asked = alarming | (taken & (f.refused > 0.5))
-    refused = choose(asked & (choose(lost | going_on, 1.0, 0.0) < 0.5), 1.0, 0.0)
-    aliased = with_attitude & turns_between(f)
-    hopeless = choose(nis <= f.restart_at, 0.0, 1.0) > 0.5
-    contradicted = alarming & (going_on & (hopeless | aliased))
-    if f.gated > 0:
-        lasting = choose(f.in_row > 1.5, f.lasting + min(gap[2], gap[3]), 0.0)
-        f.lasting = choose(refused > 0.5, lasting, f.lasting)
-        position_doubted = (refused > 0.5) & with_position
-        attitude_doubted = (refused > 0.5) & with_attitude
-        for i in range(3):
-            f.doubted[i] = choose(position_doubted, position[i], f.doubted[i])
-        for i in range(4):
-            f.doubted[3 + i] = choose(attitude_doubted, quaternion[i], f.doubted[3 + i])
-        gap[2] = choose(position_doubted, 0.0, gap[2])
-        gap[3] = choose(attitude_doubted, 0.0, gap[3])
-        waited = choose(with_position, gap[0], gap[1])
-        at_odds = (refused > 0.5) & (waited > f.give_up)
-        contradicted = contradicted | at_odds | ((refused > 0.5) & (f.lasting > f.patience))
-        for i in range(6):
-            f.mean[12 + i] = choose(at_odds, f.mean[12 + i], 0.0)
-    else:
-        contradicted = contradicted | (refused > 0.5)
-        for i in range(6):
-            f.mean[12 + i] = 0.0
-    refused = choose(contradicted, 0.0, refused)
-    restarted = taken & (lost | contradicted)
-    f.refused = choose(refused > 0.5, f.refused + 1.0, f.refused)
-    f.status = choose(refused > 0.5, REJECTED, f.status)
-    _restart(f, position, quaternion, restarted & with_position, restarted & with_attitude)
-    f.restarts = choose(restarted, f.restarts + 1.0, f.restarts)
-    f.status = choose(restarted, RESTARTED, f.status)
-    remember(f, position, quaternion, restarted & with_position, restarted & with_attitude)
-    plain: bool = taken & (choose(restarted, 1.0, refused) < 0.5)
-    return plain
+    m, alarm = f.poses, f.alarm
+    measured = with_position | with_attitude
+    f.x[NIS] = choose(measured, nis, math.nan)
+    largest = choose(with_position & with_attitude, alarm[1], alarm[0])
+    unlikely = measured & opposite(nis <= largest)  # so is what is no number
+    late = with_position & (m.position_age > f.patience)
+    late = late | (with_attitude & (m.attitude_age > f.patience))
+    verdict = choose(measured, TRACKING, f.status)
+    if any_of(unlikely | late | (m.phase > BELIEVING)):
+        verdict = _judge(f, pose, with_position, with_attitude, nis, unlikely)
+    f.status = verdict
+    believed = measured & opposite(verdict == REJECTED)
+    remember(f, pose, believed & with_position, believed & with_attitude)
+    taken: bool = measured & (verdict == TRACKING)
+    return taken
 
 
 @compiled
-def _returned(
+def _judge(
+    f: Record, pose: Array, with_position: bool, with_attitude: bool, nis: float, unlikely: bool
+) -> float:
+    """Return the verdict on a pose that is unlikely, comes when its part is lost, or comes after
+    refused ones; change the phase, and restart where that is the verdict.
+    """
+    m = f.poses
+    measured, believing = with_position | with_attitude, m.phase == BELIEVING
+    lost = (with_position & lost_position(f)) | (with_attitude & lost_attitude(f))
+    beyond = _is_beyond(f, with_attitude, nis)
+    explained = continues(
+        f, pose, m.seen, m.position_age, m.attitude_age, with_position, with_attitude
+    )
+    if f.gated > 0:
+        _compare_refused(f, pose, with_position, with_attitude)
+        back = _is_back(f, pose, with_position, with_attitude)
+        back = back & (explained | opposite(unlikely))
+        explained = choose(believing, explained, back)
+    # among refused ones a likely pose too has to come back first
+    refused = (unlikely | (measured & opposite(believing))) & opposite(lost | explained)
+    restarted = measured & (lost | (unlikely & explained & beyond))
+    if f.gated > 0:
+        _remember_refused(f, pose, refused & with_position, refused & with_attitude)
+        lasting = _outlasts(f, with_position, refused)  # writes: asked whatever else holds
+        restarted = restarted | (refused & lasting)
+        refused = refused & opposite(restarted)
+        m.phase = choose(refused, choose(believing, ONE_REFUSED, REFUSING), m.phase)
+    else:
+        restarted = restarted | refused
+    _restart(f, pose, restarted & with_position, restarted & with_attitude)
+    verdict = choose(refused, REJECTED, choose(measured, TRACKING, f.status))
+    final: float = choose(restarted, RESTARTED, verdict)
+    return final
+
+
+@compiled
+def _is_beyond(f: Record, with_attitude: bool, nis: float) -> bool:
+    """Return whether an unlikely pose is beyond what a linear correction can follow."""
+    beyond: bool = opposite(nis <= f.restart_at) | (with_attitude & _turns_between(f))
+    return beyond
+
+
+@compiled
+def _turns_between(f: Record) -> bool:
+    """Return whether the vehicle is estimated to turn by more than half a turn from one measured
+    attitude to the next: as many attitudes are explained by one turn more in each, or one less.
+
+    Where attitudes contradict the filter as well, it has taken a vehicle that was elsewhere for one
+    that spins, and a torque for what keeps it spinning up.
+    """
+    x, age = f.x, f.poses.attitude_age
+    rate = x[10] * x[10] + x[11] * x[11] + x[12] * x[12]
+    more: bool = rate * age * age > math.pi * math.pi
+    return more
+
+
+@compiled
+def continues(
     f: Record,
-    position: Array,
-    quaternion: Array,
+    pose: Array,
+    before: Array,
+    position_age: float,
+    attitude_age: float,
     with_position: bool,
     with_attitude: bool,
-    alarming: bool,
-    reachable: bool,
 ) -> bool:
+    """Return whether a pose can follow an earlier one (7,) that was measured some seconds before,
+    of a vehicle that moves as estimated, give or take six standard deviations and a push.
+
+    Leaves in ``f.miss`` by how much it misses, MRP and m (6,), and in ``f.slack`` by how much it
+    may.
+    """
+    x, P, miss, near = f.x, f.P, f.miss, True
+    attitude_error(pose[3:7], before[3:7], miss[0:3])
+    rate = math.sqrt(x[10] * x[10] + x[11] * x[11] + x[12] * x[12])
+    for i in range(6):
+        # the difference of two measurements, at six standard deviations
+        slack = 6.0 * math.sqrt(2.0 * f.noise[i])
+        if i < 3:
+            age, measured = attitude_age, with_attitude
+            slack = slack + 0.25 * age * (
+                rate + 6.0 * math.sqrt(P[3 + i, 3 + i]) + f.push[0] * (f.response + 0.5 * age)
+            )
+        else:
+            age, measured = position_age, with_position
+            miss[i] = pose[i - 3] - before[i - 3] - age * x[4 + i]
+            slack = slack + age * (
+                6.0 * math.sqrt(P[6 + i, 6 + i]) + f.push[1] * (f.response + 0.5 * age)
+            )
+        f.slack[i] = slack
+        near = near & opposite(measured & (abs(miss[i]) > slack))
+    return near
+
+
+@compiled
+def _compare_refused(f: Record, pose: Array, with_position: bool, with_attitude: bool) -> None:
+    """Remember how a pose goes on from those that were refused before it: whether it agrees with
+    them, and by how much it jumped. The first is compared with the pose that was believed last.
+    """
+    m = f.poses
+    first, measured = m.phase == BELIEVING, with_position | with_attitude
+    for i in range(7):
+        m.doubted[i] = choose(first, m.seen[i], m.doubted[i])
+    m.doubted_position_age = choose(first, m.position_age, m.doubted_position_age)
+    m.doubted_attitude_age = choose(first, m.attitude_age, m.doubted_attitude_age)
+    m.position_stride = choose(first, 0.0, m.position_stride)
+    m.attitude_stride = choose(first, 0.0, m.attitude_stride)
+    for i in range(6):
+        m.jump[i] = choose(first, 0.0, m.jump[i])
+        m.blur[i] = choose(first, 0.0, m.blur[i])
+    agreed = _agrees(f, pose, with_position, with_attitude) & opposite(first)
+    m.agreeing = choose(measured, choose(agreed, m.agreeing + 1.0, 1.0), m.agreeing)
+    stride = choose(agreed, m.doubted_position_age, 0.0)
+    m.position_stride = choose(with_position, stride, m.position_stride)
+    stride = choose(agreed, m.doubted_attitude_age, 0.0)
+    m.attitude_stride = choose(with_attitude, stride, m.attitude_stride)
+    jumped = opposite(
+        continues(
+            f,
+            pose,
+            m.doubted,
+            m.doubted_position_age,
+            m.doubted_attitude_age,
+            with_position,
+            with_attitude,
+        )
+    )
+    for i in range(6):
+        counts = jumped & (with_attitude if i < 3 else with_position)
+        m.jump[i] += choose(counts, f.miss[i], 0.0)
+        m.blur[i] += choose(counts, f.slack[i], 0.0)
+
+
+@compiled
+def _agrees(f: Record, pose: Array, with_position: bool, with_attitude: bool) -> bool:
+    """Return whether a pose goes on from the poses that were refused before it, whatever the filter
+    believes of the vehicle's motion.
+
+    Two poses lie no farther apart than a vehicle gets at six times the prior's deviation of its
+    speed. A third goes on with the motion from the first to the second, give or take six deviations
+    of the three measurements and a push. Leaves that motion, per second, in the memory, and in
+    ``f.disagreement`` by how much the pose misses.
+    """
+    m, moved, noise, near = f.poses, f.disagreement, f.noise, True
+    attitude_error(pose[3:7], m.doubted[3:7], moved[0:3])
+    for i in range(6):
+        if i < 3:
+            measured, age, stride = with_attitude, m.doubted_attitude_age, m.attitude_stride
+            lever, push = 0.25, f.push[0]  # an MRP is a quarter of an angle
+        else:
+            measured, age, stride = with_position, m.doubted_position_age, m.position_stride
+            lever, push = 1.0, f.push[1]
+            moved[i] = pose[i - 3] - m.doubted[i - 3]
+        has_pace = stride > 0.0
+        ratio = age / max(stride, 1e-9)
+        variances = choose(has_pace, 1.0 + (1.0 + ratio) * (1.0 + ratio) + ratio * ratio, 2.0)
+        fastest = 6.0 * math.sqrt(f.prior[3 + i if i < 3 else 6 + i])
+        reach = lever * age * choose(has_pace, 0.5 * (stride + age) * push, fastest)
+        slack = 6.0 * math.sqrt(variances * noise[i]) + reach
+        miss = moved[i] - choose(has_pace, age * m.pace[i], 0.0)
+        near = near & opposite(measured & (abs(miss) > slack))
+        m.pace[i] = choose(measured, moved[i] / max(age, 1e-9), m.pace[i])
+        moved[i] = miss
+    return near
+
+
+@compiled
+def _is_back(f: Record, pose: Array, with_position: bool, with_attitude: bool) -> bool:
     """Return whether poses are back from where they jumped to, or never were away.
 
     How likely a pose is says little after half a second without one, and where a vehicle could have
@@ -323,163 +496,71 @@ def _returned(
     Poses at random may cancel and even agree with the one before by chance, so of more than one
     that were refused three have to go on from each other.
     """
-    x, P, gap, jumps, miss = f.x, f.P, f.gap, f.jumps, f.mean
-    taken, first = with_position | with_attitude, f.refused < 0.5
-    for i in range(7):
-        f.doubted[i] = choose(first, f.seen[i], f.doubted[i])
-    for k in range(2):
-        gap[2 + k] = choose(first, gap[k], gap[2 + k])
-        f.stride[k] = choose(first, 0.0, f.stride[k])
-        for i in range(6):
-            jumps[k, i] = choose(first, 0.0, jumps[k, i])
-    agreed = _agrees(f, position, quaternion, with_position, with_attitude)
-    in_row = choose(first, 1.0, choose(agreed, f.in_row + 1.0, 1.0))
-    f.in_row = choose(taken, in_row, f.in_row)
-    for k in range(2):
-        known = choose(first, 0.0, choose(agreed, gap[2 + k], 0.0))
-        f.stride[k] = choose(with_position if k == 0 else with_attitude, known, f.stride[k])
-    follows = continues(
-        f, position, quaternion, f.doubted, gap[2], gap[3], with_position, with_attitude
-    )
-    jumped = choose(follows, 0.0, 1.0) > 0.5
+    x, P, m, miss, cancelled = f.x, f.P, f.poses, f.miss, True
+    attitude_error(pose[3:7], x[3:7], miss[0:3])
+    gained = choose(with_position, 0.0, 0.0)
     for i in range(6):
-        counts = jumped & (with_attitude if i < 3 else with_position)
-        for k in range(2):
-            jumps[k, i] += choose(counts, miss[6 * k + i], 0.0)
-    attitude_error(quaternion, x[3:7], miss[0:3])
-    away, gained = choose(taken, 0.0, 1.0), choose(taken, 0.0, 0.0)
-    for i in range(6):
-        stray = abs(jumps[0, i])
+        stray = abs(m.jump[i])
         if i < 3:
             measured, row, off = with_attitude, i, miss[i]
         else:
-            measured, row, off = with_position, 3 + i, position[i - 3] - x[i - 3]
-        away += choose(measured & (stray > jumps[1, i]), 1.0, 0.0)
+            measured, row, off = with_position, 3 + i, pose[i - 3] - x[i - 3]
+        cancelled = cancelled & opposite(measured & (stray > m.blur[i]))
         # NIS if the pose still is where it jumped to, less that if it never was; in either
         # direction, since half a turn has none
         odds = stray * (stray - 2.0 * abs(off)) / (P[row, row] + f.noise[i])
         gained += choose(measured, odds, 0.0)
-    over = (away < 0.5) | (gained > f.alarm[0])
-    sure = (f.refused < 1.5) | (f.in_row > AGREEING - 0.5)
-    likely = choose(alarming, 0.0, 1.0) > 0.5
-    back: bool = (f.refused > 0.5) & over & (sure & (likely | reachable))
+    sure = (m.phase < REFUSING) | (m.agreeing > AGREEING - 0.5)
+    back: bool = (cancelled | (gained > f.alarm[0])) & sure
     return back
 
 
 @compiled
-def _agrees(
-    f: Record, position: Array, quaternion: Array, with_position: bool, with_attitude: bool
-) -> bool:
-    """Return whether a pose goes on from the poses that were refused before it, whatever the filter
-    believes of the vehicle's motion.
+def _remember_refused(f: Record, pose: Array, at_position: bool, at_attitude: bool) -> None:
+    """Keep the parts of a pose that are refused now, and for how long those refused have agreed."""
+    m = f.poses
+    agreed_for = m.agreed_for + min(m.doubted_position_age, m.doubted_attitude_age)
+    agreed_for = choose(m.agreeing > 1.5, agreed_for, 0.0)
+    m.agreed_for = choose(at_position | at_attitude, agreed_for, m.agreed_for)
+    for i in range(3):
+        m.doubted[i] = choose(at_position, pose[i], m.doubted[i])
+    for i in range(4):
+        m.doubted[3 + i] = choose(at_attitude, pose[3 + i], m.doubted[3 + i])
+    m.doubted_position_age = choose(at_position, 0.0, m.doubted_position_age)
+    m.doubted_attitude_age = choose(at_attitude, 0.0, m.doubted_attitude_age)
 
-    Two poses lie no farther apart than a vehicle gets at six times the prior's deviation of its
-    speed. A third goes on with the motion from the first to the second, give or take six deviations
-    of the three measurements and a push. Leaves that motion, per second, in ``f.pace``, and in the
-    last third of ``f.mean`` by how much the pose misses.
+
+@compiled
+def _outlasts(f: Record, with_position: bool, refused: bool) -> bool:
+    """Return whether refused poses have lasted too long to be wrong: they have agreed with each
+    other for ``Recovery.patience``, or nothing was believed for ``Recovery.give_up``. Only the
+    second leaves something in ``f.disagreement``.
     """
-    moved, pace, noise = f.mean[12:18], f.pace, f.noise
-    attitude_error(quaternion, f.doubted[3:7], moved[0:3])
-    apart = choose(with_position, 0.0, 0.0)
+    m = f.poses
+    at_odds = refused & (choose(with_position, m.position_age, m.attitude_age) > f.give_up)
     for i in range(6):
-        if i < 3:
-            measured, k, lever = with_attitude, 1, 0.25  # an MRP is a quarter of an angle
-        else:
-            measured, k, lever = with_position, 0, 1.0
-            moved[i] = position[i - 3] - f.doubted[i - 3]
-        age, stride = f.gap[2 + k], f.stride[k]
-        has_pace = stride > 0.0
-        ratio = age / max(stride, 1e-9)
-        variances = choose(has_pace, 1.0 + (1.0 + ratio) * (1.0 + ratio) + ratio * ratio, 2.0)
-        fastest = 6.0 * math.sqrt(f.prior[3 + i if i < 3 else 6 + i])
-        pushed = 0.5 * (stride + age) * f.push[1 - k]
-        reach = lever * age * choose(has_pace, pushed, fastest)
-        slack = 6.0 * math.sqrt(variances * noise[i]) + reach
-        miss = moved[i] - choose(has_pace, age * pace[i], 0.0)
-        apart += choose(measured & (abs(miss) > slack), 1.0, 0.0)
-        pace[i] = choose(measured, moved[i] / max(age, 1e-9), pace[i])
-        moved[i] = miss
-    near: bool = apart < 0.5
-    return near
+        f.disagreement[i] = choose(at_odds, f.disagreement[i], 0.0)
+    lasting: bool = at_odds | (m.agreed_for > f.patience)
+    return lasting
 
 
 @compiled
-def turns_between(f: Record) -> bool:
-    """Return whether the vehicle is estimated to turn by more than half a turn from one measured
-    attitude to the next: as many attitudes are explained by one turn more in each, or one less.
-
-    Where attitudes contradict the filter as well, it has taken a vehicle that was elsewhere for one
-    that spins, and a torque for what keeps it spinning up.
+def _restart(f: Record, pose: Array, at_position: bool, at_attitude: bool) -> None:
+    """Start pose and twist anew at what was measured, as well known as ``f.disagreement`` says, and
+    doubt the wrench.
     """
-    x, age = f.x, f.gap[1]
-    rate = x[10] * x[10] + x[11] * x[11] + x[12] * x[12]
-    more: bool = rate * age * age > math.pi * math.pi
-    return more
-
-
-@compiled
-def continues(
-    f: Record,
-    position: Array,
-    quaternion: Array,
-    before: Array,
-    position_age: float,
-    attitude_age: float,
-    with_position: bool,
-    with_attitude: bool,
-) -> bool:
-    """Return whether a pose can follow an earlier one (7,) that was measured some seconds before,
-    of a vehicle that moves as estimated, give or take six standard deviations and a push.
-
-    Leaves in ``f.mean`` by how much it misses, MRP and m (6,), and by how much it may (6,).
-    """
-    x, P, error = f.x, f.P, f.mean
-    attitude_error(quaternion, before[3:7], error[0:3])
-    far = choose(with_position, 0.0, 0.0)
-    rate = math.sqrt(x[10] * x[10] + x[11] * x[11] + x[12] * x[12])
-    for i in range(6):
-        # the difference of two measurements, at six standard deviations
-        slack = 6.0 * math.sqrt(2.0 * f.noise[i])
-        if i < 3:
-            age, measured = attitude_age, with_attitude
-            slack = slack + 0.25 * age * (
-                rate + 6.0 * math.sqrt(P[3 + i, 3 + i]) + f.push[0] * (f.response + 0.5 * age)
-            )
-        else:
-            age, measured = position_age, with_position
-            error[i] = position[i - 3] - before[i - 3] - age * x[4 + i]
-            slack = slack + age * (
-                6.0 * math.sqrt(P[6 + i, 6 + i]) + f.push[1] * (f.response + 0.5 * age)
-            )
-        error[6 + i] = slack
-        far += choose(measured & (abs(error[i]) > slack), 1.0, 0.0)
-    near: bool = far < 0.5
-    return near
-
-
-@compiled
-def _restart(
-    f: Record,
-    position: Array,
-    quaternion: Array,
-    at_position: bool,
-    at_attitude: bool,
-) -> None:
-    """Start pose and twist anew at what was measured, and doubt the wrench. The last third of
-    ``f.mean`` is by how much poses disagree with each other.
-    """
-    x, P, prior, miss = f.x, f.P, f.prior, f.mean[12:18]
+    x, P, prior, miss = f.x, f.P, f.prior, f.disagreement
     restarted = at_position | at_attitude
-    aliased = at_attitude & turns_between(f)
+    aliased = at_attitude & _turns_between(f)
     _forget(f, at_position, at_attitude, False)
     for i in range(4):
-        x[3 + i] = choose(at_attitude, quaternion[i], x[3 + i])
+        x[3 + i] = choose(at_attitude, pose[3 + i], x[3 + i])
     for i in range(3):
         variance = min(f.noise[i] + miss[i] * miss[i], prior[i])
         P[i, i] = choose(at_attitude, variance, P[i, i])
         variance = min(f.noise[3 + i] + miss[3 + i] * miss[3 + i], prior[6 + i])
         P[6 + i, 6 + i] = choose(at_position, variance, P[6 + i, 6 + i])
-        x[i] = choose(at_position, position[i], x[i])
+        x[i] = choose(at_position, pose[i], x[i])
         # the twist is still the best guess, unless none of such a vehicle
         mad = at_position & (x[7 + i] * x[7 + i] > 4.0 * prior[9 + i])
         x[7 + i] = choose(mad, 0.0, x[7 + i])
@@ -495,28 +576,26 @@ def _restart(
         x[1 + i] = choose(mad, 0.0, x[1 + i])
         doubt = prior[i] + x[1 + i] * x[1 + i]
         P[i, i] = choose(restarted & (P[i, i] < doubt), doubt, P[i, i])
+    f.restarts = choose(restarted, f.restarts + 1.0, f.restarts)
 
 
 @compiled
-def remember(
-    f: Record, position: Array, quaternion: Array, with_position: bool, with_attitude: bool
-) -> None:
-    """Keep the pose that was believed last, and note that it was now. Refused ones are done with,
-    unless what jumped in them was not measured now: an attitude alone says nothing of a position.
+def remember(f: Record, pose: Array, with_position: bool, with_attitude: bool) -> None:
+    """Keep the parts of a pose that are believed now. Refused poses are done with, unless what
+    jumped in them was not measured now: an attitude alone says nothing of a position.
     """
-    seen, gap, jumps = f.seen, f.gap, f.jumps
+    m, done = f.poses, with_position | with_attitude
     for i in range(3):
-        seen[i] = choose(with_position, position[i], seen[i])
+        m.seen[i] = choose(with_position, pose[i], m.seen[i])
     for i in range(4):
-        seen[3 + i] = choose(with_attitude, quaternion[i], seen[3 + i])
-    gap[0] = choose(with_position, 0.0, gap[0])
-    gap[1] = choose(with_attitude, 0.0, gap[1])
-    away = choose(with_position, 0.0, 0.0)
+        m.seen[3 + i] = choose(with_attitude, pose[3 + i], m.seen[3 + i])
+    m.position_age = choose(with_position, 0.0, m.position_age)
+    m.attitude_age = choose(with_attitude, 0.0, m.attitude_age)
     if f.gated > 0:
         for i in range(6):
-            unmeasured = choose(with_attitude if i < 3 else with_position, 0.0, 1.0) > 0.5
-            away += choose(unmeasured & (abs(jumps[0, i]) > jumps[1, i]), 1.0, 0.0)
-    f.refused = choose((with_position | with_attitude) & (away < 0.5), 0.0, f.refused)
+            away = abs(m.jump[i]) > m.blur[i]
+            done = done & ((with_attitude if i < 3 else with_position) | opposite(away))
+        m.phase = choose(done, BELIEVING, m.phase)
 
 
 @compiled
@@ -527,13 +606,16 @@ def doubted_variance(f: Record, out: Array) -> None:
     grows to one: a restart there would move the pose to the refused one, and leave twist and wrench
     a prior's variance.
     """
-    x, doubted, weight = f.x, f.doubted, choose(f.refused > 0.5, 1.0 / f.patience, 0.0)
-    attitude_error(doubted[3:7], x[3:7], out[0:3])
+    x, m, patience = f.x, f.poses, f.patience
+    weight = choose(m.phase > BELIEVING, 1.0 / patience, 0.0)
+    attitude_error(m.doubted[3:7], x[3:7], out[0:3])
     # a part is in doubt where it was refused since it was believed last
-    at_position = weight * choose(f.gap[2] < f.gap[0], min(f.gap[0], f.patience), 0.0)
-    at_attitude = weight * choose(f.gap[3] < f.gap[1], min(f.gap[1], f.patience), 0.0)
+    waited = choose(m.doubted_position_age < m.position_age, min(m.position_age, patience), 0.0)
+    at_position = weight * waited
+    waited = choose(m.doubted_attitude_age < m.attitude_age, min(m.attitude_age, patience), 0.0)
+    at_attitude = weight * waited
     for i in range(3):
-        away = doubted[i] - x[i]
+        away = m.doubted[i] - x[i]
         out[i] = at_attitude * min(out[i] * out[i], f.prior[i])
         out[6 + i] = at_position * min(away * away, f.prior[6 + i])
         out[3 + i] = at_attitude * f.prior[3 + i]

@@ -13,7 +13,6 @@ import struct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import compiled
 from ..runtime.errors import InputError
 from .estimate import (
@@ -30,8 +29,6 @@ from .estimate import (
 from .filter_record import N
 from .model_uncertainty import follow_back, variances
 from .rauch_tung_striebel import LINK, step_back, step_with_link
-from .recovery import Recovery
-from .tuning import UKFTuning
 from .ukf import WrenchUKF, step
 
 _BLOCK = 1024  # steps in memory at a time: 10 MB
@@ -93,26 +90,14 @@ class RecordingUKF(WrenchUKF):
     ``events`` counts the calls that were kept; after a call, its estimate is that of event
     ``events - 1``.
 
-    Args:
-        vehicle: as of ``WrenchUKF``, and so is the rest.
-        tuning: noise of model and measurement.
-        period: s.
-        gate: a probability, or None. A pose that it refuses counts as not measured for the
-            smoother, too.
-        recovery: how gaps, outliers and restarts are dealt with.
+    Arguments are those of ``WrenchUKF``. A pose that the gate refuses counts as not measured for
+    the smoother, too.
     """
 
     _no_imu = "the smoother takes no inertial measurements"
 
-    def __init__(
-        self,
-        vehicle: Vehicle,
-        tuning: UKFTuning | None = None,
-        period: float = 0.005,
-        gate: float | None = None,
-        recovery: Recovery | None = None,
-    ) -> None:
-        super().__init__(vehicle, tuning, period, gate, recovery)
+    def _prepare(self) -> None:
+        """Keep nothing yet."""
         self._kept = bytearray()  # of ``_EVENT``
         self._starts: dict[int, np.ndarray] = {}  # event: the memory (1,) after a reset
 

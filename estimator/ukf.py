@@ -62,7 +62,6 @@ from .estimate import (
     QUATERNION,
     RATE,
     STATE_SIZE,
-    TRACKING,
     VELOCITY,
     WITHOUT_COVARIANCE,
     Array,
@@ -81,7 +80,7 @@ from .filter_record import (
 )
 from .imu import take_in_imu
 from .model_uncertainty import follow_loads
-from .recovery import NOISE, Recovery, after_prediction, doubted_variance, judge, remember
+from .recovery import BELIEVING, NOISE, Recovery, after_prediction, believable, doubted_variance
 from .sample import Sample, check_sample, undo_first_pose, undo_sensing
 from .sigma_points import PAIRS, errors_of_points, halve_pairs, propagate_points, spread_points
 from .tuning import UKFTuning
@@ -217,16 +216,14 @@ def _gather(f: Record, dt: float) -> None:
 
 
 @compiled
-def innovate(
-    f: Record, position: Array, quaternion: Array, with_position: bool, with_attitude: bool
-) -> float:
+def innovate(f: Record, pose: Array, with_position: bool, with_attitude: bool) -> float:
     """Leave the root of the innovation's covariance in ``f.L`` and the whitened innovation of what
-    was measured of a pose, (rho, x), in ``f.innovation``; return the NIS.
+    was measured of a pose (7,), (rho, x), in ``f.innovation``; return the NIS.
     """
     x, P, L, scales, y = f.x, f.P, f.L, f.scales, f.innovation
-    attitude_error(quaternion, x[3:7], y[0:3])
+    attitude_error(pose[3:7], x[3:7], y[0:3])
     for i in range(3):
-        y[3 + i] = position[i] - x[i]
+        y[3 + i] = pose[i] - x[i]
     # y becomes the whitened innovation; whatever stands there of what was not measured, it becomes
     # zero
     nis = 0.0
@@ -253,31 +250,6 @@ def innovate(
 
 
 @compiled
-def believable(
-    f: Record,
-    position: Array,
-    quaternion: Array,
-    with_position: bool,
-    with_attitude: bool,
-    nis: float,
-) -> bool:
-    """Return whether a measured pose, or a part of it, of which ``innovate`` was called, is taken
-    in by a linear correction; refuse it or restart there if not.
-    """
-    taken = with_position | with_attitude
-    f.x[NIS] = choose(taken, nis, math.nan)
-    alarm, gap = f.alarm, f.gap
-    at = choose(with_position & with_attitude, alarm[1], alarm[0])
-    alarming = taken & (choose(nis <= at, 0.0, 1.0) > 0.5)  # so does what is no number
-    late = (with_position & (gap[0] > f.patience)) | (with_attitude & (gap[1] > f.patience))
-    if any_of(alarming | late | (f.refused > 0.5)):
-        taken = judge(f, position, quaternion, with_position, with_attitude, nis, alarming)
-    f.status = choose(taken, TRACKING, f.status)
-    remember(f, position, quaternion, taken & with_position, taken & with_attitude)
-    return taken
-
-
-@compiled
 def take_in(f: Record) -> None:
     """Correct with the innovation that ``innovate`` left, whatever its size: (29)-(37)."""
     whiten(f)
@@ -288,13 +260,11 @@ def take_in(f: Record) -> None:
 
 
 @compiled
-def correct(
-    f: Record, position: Array, quaternion: Array, with_position: bool, with_attitude: bool
-) -> None:
-    """Take in what was measured of a pose, (rho, x), unless it is not to be believed."""
+def correct(f: Record, pose: Array, with_position: bool, with_attitude: bool) -> None:
+    """Take in what was measured of a pose (7,), (rho, x), unless it is not to be believed."""
     x, scales, y = f.x, f.scales, f.innovation
-    nis = innovate(f, position, quaternion, with_position, with_attitude)
-    taken = believable(f, position, quaternion, with_position, with_attitude, nis)
+    nis = innovate(f, pose, with_position, with_attitude)
+    taken = believable(f, pose, with_position, with_attitude, nis)
     if not all_of(taken):
         if not any_of(taken):
             return
@@ -310,7 +280,7 @@ def correct(
 def correct_parts(f: Record, z: Array, parts: int) -> None:
     """Correct with the checked ``parts`` of ``z`` (11,): 1 position, 2 attitude, 3 both."""
     if parts != 0:
-        correct(f, z[4:7], z[7:11], parts & 1 != 0, parts & 2 != 0)
+        correct(f, z[4:11], parts & 1 != 0, parts & 2 != 0)
 
 
 @compiled_inline
@@ -446,6 +416,10 @@ class WrenchUKF:
         load_imu(self.record[0], self.tuning, gate)
         self._voltage = vehicle.voltage_ref
         self._bind()
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Do what a kind of filter adds to ``__init__``."""
 
     def __repr__(self) -> str:
         return (
@@ -458,14 +432,14 @@ class WrenchUKF:
         self._sample = Sample(self.record["z"][0])
         self._now: Array = np.ndarray(ESTIMATE_SIZE, buffer=self.record, offset=ESTIMATE)
         # read at a third of an array's cost
-        self._refused = memoryview(np.asarray(self.record["refused"]))  # type: ignore[arg-type]
+        self._phase = memoryview(np.asarray(self.record["poses"]["phase"]))  # type: ignore[arg-type]
         self._call: Callable[..., int] | None = None
 
     def __getstate__(self) -> dict[str, object]:
         return {
             name: value
             for name, value in self.__dict__.items()
-            if name not in ("_sample", "_now", "_refused", "_call")
+            if name not in ("_sample", "_now", "_phase", "_call")
         } | {"record": without_addresses(self.record)}
 
     def __setstate__(self, state: dict[str, object]) -> None:
@@ -532,10 +506,10 @@ class WrenchUKF:
         reset_imu(self.record)
         reset_model(f)
         undo_first_pose(self.record)
-        for name in (*fields_between("status", "model"), *fields_between("gap", "load")):
+        for name in (*fields_between("status", "model"), "poses", "load"):
             f[name] = 0.0
         f["predicted"] = np.diag(f["P"])[12:]
-        f["seen"] = f["x"][:7]
+        f["poses"]["seen"] = f["x"][:7]
         self._begin()
 
     def _begin(self) -> None:
@@ -567,7 +541,8 @@ class WrenchUKF:
     @property
     def dead_reckoning(self) -> float:
         """How long, s, the wrench has been a prediction: since a whole pose was taken in."""
-        return float(np.max(self.record[0]["gap"][:2]))
+        poses = self.record[0]["poses"]
+        return float(max(poses["position_age"], poses["attitude_age"]))
 
     @property
     def covariance_with_biases(self) -> Array:
@@ -605,7 +580,7 @@ class WrenchUKF:
     def estimate(self) -> WrenchEstimate:
         """What the filter believes now. While poses are refused, its covariance widens."""
         numbers = self._now.copy()
-        if self._refused[0] > 0.0:
+        if self._phase[0] > BELIEVING:
             _add_doubt(self.record, numbers[WITHOUT_COVARIANCE :: N + 1])
         return WrenchEstimate(numbers)
 

@@ -19,16 +19,19 @@ from ..runtime.compiled import Record, compiled, compiled_without_gil
 from ..runtime.vector_lanes import WIDTH, LaneRecord, choose
 from .estimate import STATE_SIZE, Array
 from .filter_record import FILTER, NUMBERS, fields_between
+from .recovery import MEMORY
 from .ukf import carry, correct
 
 # what a filter must not forget from one step to the next; first in both layouts
 _KEPT = fields_between("x", "last_speeds")
+_MEMORY = {"poses": LaneRecord(MEMORY, MEMORY.names or ())}
 _WORK = LaneRecord(
     FILTER,
     (*_KEPT, "rotor_wrench", *fields_between("z", "innovation")),
     ("body", "effect_wrench", *fields_between("gated", "period")),
+    _MEMORY,
 )
-_BLOCK = LaneRecord(FILTER, _KEPT)
+_BLOCK = LaneRecord(FILTER, _KEPT, nested=_MEMORY)
 BLOCK_SIZE, STATE = _BLOCK.dtype.itemsize, _BLOCK.offset("x")  # bytes; where the estimates lie
 _NUMBERS = BLOCK_SIZE // 8
 
@@ -58,13 +61,8 @@ def _step_work(address: int) -> None:
     quaternion_to_matrix(f.x[3:7], f.rotation)
     carry(f, f.period)
     s = f.z
-    correct(
-        f,
-        s[4:7],
-        s[7:11],
-        math.isfinite(s[4] + s[5] + s[6]),
-        math.isfinite(s[7] + s[8] + s[9] + s[10]),
-    )
+    with_position = math.isfinite(s[4] + s[5] + s[6])
+    correct(f, s[4:11], with_position, math.isfinite(s[7] + s[8] + s[9] + s[10]))
 
 
 def step_address() -> int:

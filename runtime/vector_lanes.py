@@ -212,14 +212,22 @@ for _extreme, _sign in _extremes:
 
 @intrinsic
 def _select(_context: Any, condition: Any, a: Any, b: Any) -> Any:
+    truths = all(kind == ANSWERS or isinstance(kind, types.Boolean) for kind in (a, b))
+    result = ANSWERS if truths else LANES
+
     def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
         values = [
-            context.cast(builder, value, kind, LANES)
+            context.cast(builder, value, kind, result)
             for value, kind in zip(arguments[1:], given.args[1:], strict=True)
         ]
         return builder.select(arguments[0], *values)
 
-    return LANES(condition, a, b), generate
+    return result(condition, a, b), generate
+
+
+@intrinsic
+def _not(_context: Any, answers: Any) -> Any:
+    return answers(answers), lambda _context, builder, _signature, given: builder.not_(given[0])
 
 
 @intrinsic
@@ -233,6 +241,11 @@ def _bits(_context: Any, answers: Any) -> Any:
 def choose(condition: Any, a: Any, b: Any) -> Any:
     """Return ``a`` where the condition holds, else ``b``."""
     return a if condition else b
+
+
+def opposite(condition: Any) -> Any:
+    """Return whether a condition does not hold, for each lane."""
+    return not condition
 
 
 def all_of(condition: Any) -> bool:
@@ -250,6 +263,13 @@ def _choose(condition: Any, a: Any, b: Any) -> Any:
     if condition == ANSWERS:
         return lambda condition, a, b: _select(condition, a, b)
     return lambda condition, a, b: a if condition else b
+
+
+@overload(opposite, strict=False)
+def _opposite(condition: Any) -> Any:
+    if condition == ANSWERS:
+        return lambda condition: _not(condition)
+    return lambda condition: not condition
 
 
 @overload(all_of, strict=False)

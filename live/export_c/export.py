@@ -7,9 +7,9 @@ each. ``tests/live/test_export_c.py`` holds C and Python together, flight by fli
 """
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -52,13 +52,6 @@ _TITLES = {
     "ekf": "The extended Kalman filter",
     "ukf": "The unscented Kalman filter",
 }
-# templates of what libm has too, and how each is called; those that call others first
-_FUNCTIONS = (
-    ("power", "ww_power("),
-    ("logarithm", "ww_log("),
-    ("exponential", "ww_exp("),
-    ("arctangent", "ww_atan2("),
-)
 # constants of the Python filters
 _KNOWN = {
     "N": N,
@@ -141,7 +134,6 @@ def export_c(
         "title": f"{_TITLES[estimator]}, for the vehicle {_one_line(vehicle.name)}.",
         "estimator": estimator,
         "precision": precision,
-        "functions": ", ".join(f if precision == "double" else f"{f}f" for f in FUNCTIONS),
         "imu": estimator != "constant-gain",
         "gated": gate is not None,
         "gate": 0.0 if gate is None else gate,
@@ -172,8 +164,6 @@ def export_c(
         "state_size": STATE_SIZE,
         "effect_code": effect_code,
         "policy": policy,
-        "uses_exp": "ww_exp(" in effect_code,
-        "uses_log": "ww_log(" in effect_code,
         "voltage": "WW_ROTOR_VOLTAGE]" in effect_code,
     }
     environment = Environment(
@@ -193,7 +183,9 @@ def export_c(
     source = environment.get_template(FILES["windwrench_filter.c"]).render(context)
     context["filter_code"] = filter_code(f, source)
     source += context["filter_code"]
+    called = [name for name in FUNCTIONS if re.search(rf"\b{name}f\(", source)]
     context |= {"constants": constants(f, source), "fields": fields(source)}
+    context["functions"] = ", ".join(n if precision == "double" else f"{n}f" for n in called)
     files = {
         name: in_precision(environment.get_template(template).render(context), precision)
         for name, template in FILES.items()
@@ -234,11 +226,4 @@ def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], list[Effect]
         found[effect.kind].append(effect)
     found["wrench"].sort(key=lambda effect: not effect.sets_wind)
     code = "\n".join([*([parts.code()] if parts.done else []), *models.values()])
-    if not code:
-        return [], [], [], ""
-    functions: list[str] = []
-    for name, called in _FUNCTIONS:  # a function stands before what calls it
-        if any(called in other for other in (code, *functions)):
-            file = Path(__file__).parent / "templates" / f"{name}.c.j2"
-            functions.insert(0, file.read_text(encoding="utf-8"))
-    return found["wrench"], found["rotor input"], found["sensing"], "\n".join([*functions, code])
+    return found["wrench"], found["rotor input"], found["sensing"], code

@@ -8,12 +8,21 @@ import numpy as np
 
 from ...dynamics.motion import rotor_wrench
 from ...dynamics.rotation import attitude_error, normalise
-from ...estimator import recovery
 from ...estimator.bias_states import bound_biases
-from ...estimator.error_state import displace, error_from, fold
-from ...estimator.filter_record import FILTER, IMU, fields_between, propagate
+from ...estimator.ekf import model_jacobian
+from ...estimator.error_state import bound_variance, displace, error_from, fold
+from ...estimator.filter_record import FILTER, IMU, N, fields_between, propagate
+from ...estimator.hover_covariance import heading, turn_vectors, turn_world
 from ...estimator.imu import _believed, expected_imu
-from ...estimator.ukf import believable, innovate
+from ...estimator.recovery import (
+    MEMORY,
+    after_prediction,
+    believable,
+    doubted_variance,
+    grow_older,
+    remember,
+)
+from ...estimator.ukf import innovate
 from .c_numbers import literal, shape, table
 from .c_values import Array, Fields, Value
 from .translate import Library
@@ -24,35 +33,41 @@ _CALLED: dict[Any, tuple[Value | None, ...]] = {
     rotor_wrench: (Fields(("body",)), None, None),
     **dict.fromkeys((attitude_error, normalise, propagate, expected_imu), ()),
     **dict.fromkeys((displace, error_from, fold), ()),
-    **dict.fromkeys((recovery.after_prediction, recovery.judge, recovery.remember), ()),
-    **dict.fromkeys((recovery.doubted_variance, innovate, believable, bound_biases), ()),
+    **dict.fromkeys((after_prediction, believable, remember, grow_older, doubted_variance), ()),
+    **dict.fromkeys((innovate, bound_biases, heading, turn_vectors, turn_world), ()),
+    bound_variance: (Array("", ("WW_STATES", "WW_STATES"), root="matrix"), None, None),
+    model_jacobian: (None, None, Array("", ("12", str(N)), root="matrix"), None),
     _believed: (None, Array("", ("6", "6"), root="matrix"), None, None, None),
 }
 # functions of templates that these call, and which of their arguments they write
+# steps of difference quotients that single precision can still tell apart
+_STEPS = {"EFFECT_TURN": 4e-3, "EFFECT_STEP": 1e-2}
 _BY_HAND = dict.fromkeys(("_nis", "_is_push", "restore_bias_prior"), "")
-_MEMORY = (
-    *("rotors", "rotor_wrench", "effect_wrench"),
-    *fields_between("x", "last_speeds"),
-    *fields_between("z", "rows"),
-)
+# fields of the filter's record that change in flight: by their names in C, their types
+_KEPT = {
+    **{f"poses_{name}": MEMORY[name] for name in MEMORY.names or ()},
+    **{name: FILTER[name] for name in ("rotors", "rotor_wrench", "effect_wrench")},
+    **{name: FILTER[name] for name in fields_between("x", "last_speeds")},
+    **{name: FILTER[name] for name in fields_between("z", "rows")},
+}
+# those that templates declare
+_OF_IMU = {
+    f"imu_{name}": IMU[name] for name in ("used", "known", "refused", "in_row", "doubt", "mean")
+}
 
 
 def filter_code(record: np.void, source: str) -> str:
     """Return the functions of a filter that C code calls, with what its record says decided."""
-    memory = {}
-    for name in _MEMORY:
-        if name == "effect_wrench" and record["wrench_count"] == 0:
-            continue  # zeros
-        kind = FILTER.fields[name][0]  # type: ignore[index]
-        whole = kind.base.kind == "i"
-        memory[name] = "int" if whole else "float", tuple(map(str, kind.shape))
-    for name in IMU.names or ():
-        if name in ("used", "known", "refused", "in_row", "doubt", "mean"):
-            kind = IMU.fields[name][0]  # type: ignore[index]
-            whole = kind.base.kind == "i"
-            memory[f"imu_{name}"] = "int" if whole else "float", tuple(map(str, kind.shape))
-    by_hand = _BY_HAND | ({"apply_effects": ""} if record["wrench_count"] else {})
-    library = Library(constants=record, memory=memory, by_hand=by_hand)
+    memory = {
+        name: ("int" if kind.base.kind == "i" else "float", tuple(map(str, kind.shape)))
+        for name, kind in (_KEPT | _OF_IMU).items()
+    }
+    by_hand = dict(_BY_HAND)
+    if record["wrench_count"]:
+        by_hand["apply_effects"] = ""
+    else:
+        del memory["effect_wrench"]  # zeros
+    library = Library(constants=record, memory=memory, by_hand=by_hand, numbers=_STEPS)
     for function, known in _CALLED.items():
         if re.search(rf"\b{function.__name__.lstrip('_')}\(", source):
             library.get(function, known)
@@ -61,9 +76,10 @@ def filter_code(record: np.void, source: str) -> str:
 
 def fields(code: str) -> str:
     """Return the declarations of the fields of ``ww_filter`` that C code uses."""
-    used = (name for name in _MEMORY if name != "P" and re.search(rf"\bf->{name}\b", code))
     return "\n".join(
-        f"    float {name}{''.join(f'[{n}]' for n in FILTER[name].shape)};" for name in used
+        f"    float {name}{''.join(f'[{n}]' for n in kind.shape)};"
+        for name, kind in _KEPT.items()
+        if name != "P" and re.search(rf"\bf->{name}\b", code)
     )
 
 

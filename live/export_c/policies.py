@@ -98,6 +98,5 @@ def exportable_policy(name: str, path: Path | None) -> Mapping[str, Any]:
         "widest": widest,
         "activation": activation,
         "squash": squash,
-        "tanh": squash or activation == "tanh",
         "last": last,
     }

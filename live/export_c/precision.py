@@ -13,7 +13,8 @@ PRECISIONS = ("single", "double")
 _COMMENT = re.compile(r"(/\*.*?\*/)", re.S)
 _NUMBER = r"(?<![\w.])((?:\d+\.\d*|\d+(?=[eE]))(?:[eE][-+]?\d+)?)"
 _FROM_PYTHON, _ANY = re.compile(_NUMBER + r"F\b"), re.compile(_NUMBER + r"[fF]\b")
-FUNCTIONS = ("sqrt", "sin", "cos", "fabs")  # all of libm that the source calls; with f in single
+# all of libm that a source may call; with f in single
+FUNCTIONS = ("sqrt", "sin", "cos", "fabs", "exp", "log", "pow", "atan2", "tanh")
 _CALL = re.compile(rf"\b({'|'.join(FUNCTIONS)})f\b")
 
 

@@ -35,9 +35,9 @@ _MATHS = {
     "sqrt": "sqrtf",
     "sin": "sinf",
     "cos": "cosf",
-    "exp": "ww_exp",
+    "exp": "expf",
     "fabs": "fabsf",
-    "atan2": "ww_atan2",
+    "atan2": "atan2f",
     "isfinite": "finite_number",
 }
 _FUNCTIONS = {"abs": "fabsf", "min": "smaller", "max": "larger"}
@@ -56,6 +56,7 @@ class Library:
         covariance: rows and columns of P, which is a parameter of its own.
         by_hand: functions that templates have, by their names: which of their arguments they write.
         refused: functions that are not translated, and why.
+        numbers: constants of files that are others in C.
         prefix: of the names of functions.
     """
 
@@ -64,12 +65,20 @@ class Library:
     covariance: str = "WW_STATES"
     by_hand: Mapping[str, str] = field(default_factory=dict)
     refused: Mapping[Any, str] = field(default_factory=dict)
+    numbers: Mapping[str, float] = field(default_factory=dict)
     prefix: str = ""
     done: dict[tuple[Any, ...], "Function"] = field(default_factory=dict)
     counter: int = 0  # of names
 
     def get(self, function: Callable[..., Any], bound: tuple[Value | None, ...] = ()) -> "Function":
         """Return a compiled function, translated for arguments that are known (``bound``)."""
+        if "len" not in python_of(function).__code__.co_names:  # any number of rows will do
+            bound = tuple(
+                replace(one, shape=("", *one.shape[1:]))
+                if isinstance(one, Array) and one.root
+                else one
+                for one in bound
+            )
         key = function, bound or (None,) * len(inspect.signature(function).parameters)
         if key not in self.done:
             made = Function(function, self, bound=key[1])
@@ -145,10 +154,11 @@ class Function:
         """Return the value of a condition on an export's constants alone, or None."""
         for node in ast.walk(test):
             match node:
-                case ast.Call() | ast.Subscript():
+                case ast.Call():
                     return None
-                case ast.Name(id=name) if not isinstance(self.names.get(name), Fields):
-                    if not isinstance(self.globals.get(name), int | float):
+                case ast.Name(id=name):
+                    given = self.names.get(name, self.globals.get(name))
+                    if not isinstance(given, Fields | int | float):
                         return None
         used = set(self.used)
         value = self.number(test).known
@@ -439,11 +449,11 @@ class Function:
         return array.at(self.number(place))
 
     def power(self, base: str, exponent: ast.expr) -> Number:
-        """Return a positive number raised to any power, or any number to a small whole one."""
+        """Return a number raised to any power; a small whole one is written out."""
         match exponent:
             case ast.Constant(value=int() as times) if 2 <= times <= 4:
                 return Number(f"({' * '.join([base] * times)})")
-        return Number(f"ww_power({base}, {self.number(exponent).as_float()})")
+        return Number(f"powf({base}, {self.number(exponent).as_float()})")
 
     def name_of(self, name: str) -> Value:
         """Return what a name is: a parameter, a variable, or a constant of the file."""
@@ -451,7 +461,7 @@ class Function:
             if not (self.suffix or isinstance(self.names[name], Fields)):
                 self.used.add(name)
             return self.names[name]
-        value = self.globals.get(name)
+        value = self.library.numbers.get(name, self.globals.get(name))
         if isinstance(value, int) and getattr(base, name, None) == value:
             return Number(f"WW_{name}", "int", value)
         if isinstance(value, bool | int | float):
@@ -472,6 +482,8 @@ class Function:
                 return self.choice(test, body, orelse)
             case ast.Call(func=ast.Name(id=name), args=[one]) if name in _PASSED_ON:
                 return self.number(one)
+            case ast.Call(func=ast.Name(id="opposite"), args=[one]):
+                return Number(f"(!{self.number(one).text})", "truth")
             case ast.Call(func=ast.Name(id="len"), args=[of]):
                 size = cast(Array, self.evaluated(of)).shape[0]
                 return Number(size, "int", int(size) if size.isdigit() else None)

@@ -35,7 +35,7 @@ def one_step(record, speeds, dt, x, out):
 def jacobian(record, speeds, dt, out, A):
     drive(record[0], speeds, dt, 11.1)
     propagate(record[0], record[0].x, dt, out)
-    model_jacobian(record[0], dt, A)
+    model_jacobian(record[0], dt, A, True)
 
 
 def boxplus(x, error):

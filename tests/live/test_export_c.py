@@ -29,6 +29,7 @@ from windwrench.dynamics.effects import compile_effects, get, parse_setting
 from windwrench.dynamics.effects.base import ROTORS_SIZE, SAMPLE_SIZE, STATE_SIZE
 from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
 from windwrench.live.export_c.effect_code import exportable_effects
+from windwrench.live.export_c.precision import FUNCTIONS
 from windwrench.runtime.errors import InputError
 
 LARGEST = 0.01  # of a standard deviation
@@ -183,7 +184,7 @@ def test_only_the_allowed_functions_of_libm_are_called(tmp_path):
     needs("gcc", "nm")
     model = load_vehicle("ardrone2")
     model = model.with_effects(*(parse_setting(e, model) for e in exportable_effects()))
-    allowed = {"sqrtf", "sinf", "cosf", "fabsf", "memcpy", "memset"}
+    allowed = {*(f"{name}f" for name in FUNCTIONS), "memcpy", "memset"}
     for estimator in ("ekf", "ukf"):
         exported = export_c(model, estimator, policy=exportable_policy("sac-0", POLICY))
         folder = write(exported, tmp_path / estimator)

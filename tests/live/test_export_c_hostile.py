@@ -1,0 +1,44 @@
+"""The same hostile sequences through the Python filter and the exported C: one recovery, two
+languages.
+"""
+
+import pytest
+
+from tests.support.exported_c.compiled import PARTS, CompiledFilter, compare, missing
+from tests.support.exported_c.hostile import PERIOD, hostile
+from windwrench.dynamics import load_vehicle
+from windwrench.live.export_c import export_c
+
+SEEDS = range(8)
+# of a standard deviation, by which estimates may differ: rounding
+LARGEST = {"single": 0.05, "double": 1e-6}
+
+
+@pytest.mark.parametrize("precision", LARGEST)
+@pytest.mark.parametrize(
+    ("estimator", "gate", "imu"),
+    [
+        ("constant-gain", None, False),
+        ("constant-gain", 0.9999, False),
+        ("ekf", None, False),
+        ("ekf", 0.9999, True),
+        ("ukf", None, True),
+        ("ukf", 0.9999, False),
+    ],
+)
+def test_c_and_python_agree_along_hostile_sequences(estimator, gate, imu, precision, tmp_path):
+    """Statuses and counts of restarts at every step, estimates within rounding."""
+    if lacking := missing("gcc"):
+        pytest.skip(f"not installed: {', '.join(lacking)}")
+    vehicle = load_vehicle("ardrone2")
+    exported = export_c(vehicle, estimator, rate=1.0 / PERIOD, gate=gate, precision=precision)
+    c, restarts = CompiledFilter(exported, tmp_path), 0.0
+    for seed in SEEDS:
+        flown = hostile(vehicle, seed)
+        if not imu:
+            del flown["gyro"], flown["accelerometer"]
+        worst = compare(c, exported.filter, flown)
+        assert worst["status"] == 0.0, seed
+        assert max(worst[part] for part in PARTS) < LARGEST[precision], (seed, worst)
+        restarts += worst["restarts"]
+    assert restarts > 0
