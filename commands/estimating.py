@@ -26,7 +26,11 @@ if TYPE_CHECKING:
     from ..identification.logs.flight_log import FlightLog
 
 # endings of the wrench's file, with the library that writes it and the extra that brings it
-_TRACKS = {".csv": (), ".mcap": ("rosbags", "logs"), ".rrd": ("rerun", "rerun")}
+_TRACKS: dict[str, tuple[str, str] | None] = {
+    ".csv": None,
+    ".mcap": ("rosbags", "logs"),
+    ".rrd": ("rerun", "rerun"),
+}
 # what innovations that agree within a second say, of a given and of a fitted tuning
 _TOO_SLOW = (
     "warning: innovations agree with each other within a second: the wrench changes faster than "
