@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import InputError
+from ..runtime.extras import need
 from .flight_logs import log_notes, read_flights
 from .terminal import (
     console,
@@ -24,7 +25,12 @@ if TYPE_CHECKING:
     from ..estimator.consistency import Consistency
     from ..identification.logs.flight_log import FlightLog
 
-_TRACKS = (".csv", ".mcap", ".rrd")  # endings of the wrench's file
+# endings of the wrench's file, with the library that writes it and the extra that brings it
+_TRACKS: dict[str, tuple[str, str] | None] = {
+    ".csv": None,
+    ".mcap": ("rosbags", "logs"),
+    ".rrd": ("rerun", "rerun"),
+}
 # what innovations that agree within a second say, of a given and of a fitted tuning
 _TOO_SLOW = (
     "warning: innovations agree with each other within a second: the wrench changes faster than "
@@ -78,6 +84,8 @@ def estimate(
     (flight,), model = read_flights([log], reader, vehicle, map, piece)
     rows = shown_rows(flight, log, film_from, film_seconds) if kinds or view else None
     track = result_file(out, "wrench.csv", _TRACKS)
+    if needed := _TRACKS[track.suffix]:
+        need(*needed, f"--out {out}")
     folder = results_folder(track.parent)
     begin = f"{track.stem}." if track == out else ""  # of the names of what lies beside it
     run.record = folder / f"{begin}run.json"

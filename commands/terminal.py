@@ -4,7 +4,7 @@ import os
 import shlex
 import sys
 import webbrowser
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -114,7 +114,7 @@ def film_kinds(view: bool, video: bool, gif: bool) -> list[str]:
     return kinds
 
 
-def result_file(out: Path, usual: str, endings: Sequence[str] = ()) -> Path:
+def result_file(out: Path, usual: str, endings: Collection[str] = ()) -> Path:
     """Return the main result's file: ``--out`` itself where it has one of the ``endings``, or any
     where none is given; else that of the ``usual`` name in the folder that ``--out`` names.
     """
