@@ -119,7 +119,7 @@ def result_file(out: Path, usual: str, endings: Collection[str] = ()) -> Path:
     where none is given; else that of the ``usual`` name in the folder that ``--out`` names.
     """
     named = out.suffix in endings if endings else out.suffix
-    return out if named and not out.is_dir() else out / usual
+    return out if named and not os.path.isdir(out) else out / usual
 
 
 def results_folder(out: Path, **plan: object) -> Path:

@@ -24,7 +24,7 @@ from .effect_settings import effect_of
 from .estimates import Intervals, estimates_of, thrust_of
 from .geometry import SPIN, USUAL, Geometry
 from .motors import motor_response
-from .parameters import FORCE_BIAS, OPTIONAL, POSITIVE, first_model
+from .parameters import ANSWERED, FORCE_BIAS, OPTIONAL, POSITIVE, first_model
 from .result import IDENTIFIED, NOTHING, WIDEST, Estimate, Identified, told
 from .solve import VehicleFit, fall_with, lag_with, solve
 from .spectra import SPECTRUM
@@ -96,7 +96,7 @@ def identify(
             "only what is slower was used"
         )
     report(0.5, "asking what else shows")
-    fit, kept = _with_optional(pieces, fit, step / math.sqrt(12.0))
+    fit, kept = _with_optional(pieces, fit, sources, step / math.sqrt(12.0))
     if "answered torque" in kept:
         shares = ", ".join(f"{100 * fit.values[f'answered {a}']:.0f} %" for a in "xyz")
         notes.append(
@@ -253,7 +253,7 @@ def _frequencies(fit: VehicleFit) -> float:
 
 
 def _with_optional(
-    pieces: list[MotionPiece], fit: VehicleFit, noise: float
+    pieces: list[MotionPiece], fit: VehicleFit, sources: Sources, noise: float
 ) -> tuple[VehicleFit, list[str]]:
     """Return a fit with those further effects that make the logs much likelier, and which."""
     kept: list[str] = []
@@ -262,6 +262,9 @@ def _with_optional(
         air |= {"rotor drag x"} & {"rotor drag x" for p in parameters if p == "flapping"}
         of_speeds = name in ("rotor drag", "inflow", "flapping")
         if not air <= set(fit.balance.names) or (fit.drive.commands and of_speeds):
+            continue
+        # the noise of a pose goes round the loop: quick torques then follow it, and say nothing
+        if parameters == ANSWERED and sources.rate != "gyro":
             continue
         model, start = fit.model.with_more(fit.theta, *parameters)
         least = IDENTIFY.penalty * len(parameters) * math.log(_frequencies(fit))

@@ -36,8 +36,11 @@ BASE = (
 )
 BIASES = ("force bias x", "force bias y", "force bias z")
 # of these a negative value is no physics, but another fault of the model
-_LOSSES = ("rotor drag", "linear drag", "quadratic drag", "damping")
-POSITIVE = (*(f"{kind} {a}" for kind in _LOSSES for a in "xyz"), "flapping")
+ANSWERED = ("answered x", "answered y", "answered z")
+POSITIVE = (
+    *(f"{kind} {a}" for kind in ("rotor drag", "linear drag", "damping") for a in "xyz"),
+    *("flapping", *ANSWERED),
+)
 # each is added where it makes the logs much likelier
 OPTIONAL: dict[str, tuple[str, ...]] = {
     "rotor drag": ("rotor drag x", "rotor drag y"),
@@ -46,7 +49,7 @@ OPTIONAL: dict[str, tuple[str, ...]] = {
     "vertical drag": ("linear drag z",),
     "inflow": ("rotor drag z",),
     "lift": ("lift",),
-    "answered torque": ("answered x", "answered y", "answered z"),
+    "answered torque": ANSWERED,
     "flapping": ("flapping",),
     "damping x": ("damping x",),
     "damping y": ("damping y",),

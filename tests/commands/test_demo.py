@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.paths import ROOT
 from windwrench.commands.example import confronted
 from windwrench.identification.logs.example import example_flight
 from windwrench.identification.logs.reading import read_log
@@ -75,7 +76,6 @@ def test_the_example_of_a_comparison_has_the_known_answer(call):
 
 
 def test_the_example_of_a_comparison_has_logs_of_its_own(call):
-    Path("flight.csv").write_text("t")
-    code, _, err = call("compare", "--example", "flight.csv")
+    code, _, err = call("compare", "--example", ROOT / "README.md")
     assert code == 2
     assert "--example: has logs of its own" in err

@@ -44,6 +44,7 @@ def test_stable_baselines_checker_finds_nothing():
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", ".*-v0 is out of date", DeprecationWarning)
         checker.check_env(gym.make(NAME), warn=True)
 
 

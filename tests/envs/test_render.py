@@ -75,6 +75,7 @@ for kind in KINDS:
         pass
 env.close()
 warnings.simplefilter("error")
+warnings.filterwarnings("ignore", ".*-v0 is out of date", DeprecationWarning)
 check_env(gym.make("windwrench/FanTracking-v0", render_mode="rgb_array").unwrapped)
 import mujoco  # after the kit, which tells MuJoCo how to draw
 def broken(*arguments):
