@@ -22,7 +22,6 @@ from ..identification.findings import Diagnosis
 from ..identification.logs.flight_log import FlightLog, write_log
 from ..identification.report.files import write_report
 from ..identification.report.headline import headline
-from ..identification.report.words import name_in_words
 from ..runtime.page_files import write_png
 from .steps import Step
 
@@ -161,20 +160,12 @@ def find(
     )
     found = diagnose([log], request.vehicle, (), (), stage)
     written = write_report(found, folder, command)
-    named = "; ".join(
-        f"{name_in_words(effect)}: "
-        + ", ".join(
-            f"{name} = {value:.4g} ± {effect.std[name]:.2g} {effect.units[name]}"
-            for name, value in effect.coefficients.items()
-        )
-        for effect in found.effects
-    )
     return (
         Step(
             "Diagnose it",
             (
+                "The diagnosis sees the log and the declared vehicle.",
                 headline(found),
-                *([f"Found: {named}."] if named else ["Nothing was named."]),
                 f"True: {request.effect_words}.",
             ),
             command,
