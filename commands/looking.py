@@ -162,7 +162,9 @@ def _what_acts(result: Mapping[str, Any]) -> tuple[str, list[str]]:
 
 
 def _what_lacks(result: Mapping[str, Any]) -> tuple[str, list[str]]:
-    """Return the first sentence of a diagnosis with a number, and the advice."""
+    """Return the first sentence of a diagnosis, and what is left of the force: in that sentence
+    where it has no number of its own, else as a further one.
+    """
     headline, error = result["headline"], result["error"]
     before, after = (1e3 * error[when]["force_rms_N"] for when in ("before", "after"))
     told = (

@@ -24,7 +24,7 @@ _STEP = {"lag": 1e-3, "gamma": 0.05}  # of finite differences
 # Hz: slower moments that nothing measures are answered by the flight loop with rotor torque, so
 # that part of a torque turns nothing. From 3 to 15 Hz regression finds nearly all of the torque,
 # below a fifth to a half (13 flights of a Crazyflie)
-_ANSWERED_HZ = 3.0
+ANSWERED_HZ = 3.0
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ def _with_delay(
     late[:, :, :rotors] = -turn * blocks[0][:, :, :rotors]
     others = iter(blocks[1:])
     ordered = [late if name == "delay" else next(others) for name in nonlinear]
-    share = 1.0 / (1.0 + (s.frequency / _ANSWERED_HZ) ** 4)[None, :, None]
+    share = 1.0 / (1.0 + (s.frequency / ANSWERED_HZ) ** 4)[None, :, None]
     every = [x for block in (blocks[0], *ordered) for x in (block, share * block[:, :, torques])]
     return replace(s, columns=np.concatenate([measured, *every], axis=2))
 

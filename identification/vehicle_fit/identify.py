@@ -19,7 +19,7 @@ from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from .assemble import advice_of, vehicle_of
 from .channels import MotionPiece, Sources, pieces_of, rounding_step
-from .columns import Drive
+from .columns import ANSWERED_HZ, Drive
 from .effect_settings import effect_of
 from .estimates import Intervals, estimates_of, thrust_of
 from .geometry import SPIN, USUAL, Geometry
@@ -100,8 +100,9 @@ def identify(
     if "answered torque" in kept:
         shares = ", ".join(f"{100 * fit.values[f'answered {a}']:.0f} %" for a in "xyz")
         notes.append(
-            f"below 3 Hz {shares} of the rotors' torque about x, y and z turn nothing: the flight "
-            "loop answers moments that nothing measures. Inertia is told by what is quicker"
+            f"below {ANSWERED_HZ:g} Hz {shares} of the rotors' torque about x, y and z turn "
+            "nothing: the flight loop answers moments that nothing measures. Inertia is told by "
+            "what is quicker"
         )
     report(0.8, "asking what can be told")
     reasons, instead = _not_told(fit, geometry)

@@ -35,8 +35,9 @@ BASE = (
     *("turn bias x", "turn bias y", "turn bias z"),
 )
 BIASES = ("force bias x", "force bias y", "force bias z")
-# of these a negative value is no physics, but another fault of the model
+# shares of slow torques that turn nothing, since the flight loop answers with them
 ANSWERED = ("answered x", "answered y", "answered z")
+# of these a negative value is no physics, but another fault of the model
 POSITIVE = (
     *(f"{kind} {a}" for kind in ("rotor drag", "linear drag", "damping") for a in "xyz"),
     *("flapping", *ANSWERED),
