@@ -12,7 +12,7 @@ demo: $(VENV)/.installed
 # processes that share the tests; 0: none beside the first
 WORKERS ?= auto
 # one thread of linear algebra for each worker, or they wait for one another
-PYTEST = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
+PYTEST = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --max-worker-restart 0
 COVERAGE = --cov --cov-report=term-missing:skip-covered --cov-fail-under=88
 # folders that neither diagnose, train, draw, nor start programs
 FAST = tests/controllers tests/dynamics tests/estimator tests/identification/logs tests/identification/motion \

@@ -100,6 +100,9 @@ class _Local:
         )
         return future
 
+    def wait(self, running: Iterable[Future[Any]], seconds: float | None) -> set[Future[Any]]:
+        return wait(running, seconds, FIRST_COMPLETED).done
+
     def end(self) -> None:
         """End the processes at once, whatever they do."""
         self._pool.stop()
@@ -125,7 +128,7 @@ class _OnCluster:
         cores = int(ray.cluster_resources().get("CPU", 1))
         self.count = min(jobs or cores, cores)
         self._ray, self._address, self._most_seconds = ray, address, most_seconds
-        self._over = threading.Event()
+        self._running: dict[Any, tuple[Future[Any], float]] = {}  # by Ray's reference, until when
 
         def task_of_windwrench(task: Any) -> Any:  # Ray takes no partial function
             return work(task)
@@ -134,32 +137,38 @@ class _OnCluster:
         self._work = ray.remote(num_cpus=1, max_retries=0)(task_of_windwrench)
 
     def start(self, task: Any) -> Future[Any]:
-        reference, late = self._work.remote(task), Future[Any]()
-        inner = reference.future()
+        future: Future[Any] = Future()
         until = math.inf if self._most_seconds is None else time.monotonic() + self._most_seconds
+        self._running[self._work.remote(task)] = future, until
+        return future
 
-        def watch() -> None:
-            while not inner.done() and time.monotonic() < until:
-                if self._over.wait(_LOOK):
-                    return
-            if not inner.done():
-                self._ray.cancel(reference, force=True)
-                late.set_exception(TimeoutError("Task timeout"))
-            elif (error := inner.exception()) is None:
-                late.set_result(inner.result())
-            elif isinstance(error, self._ray.exceptions.RayTaskError):
+    def wait(self, running: Iterable[Future[Any]], seconds: float | None) -> set[Future[Any]]:
+        """Ask Ray, always from this thread: a thread that asks while Ray is shut down, or that
+        drops a reference then, ends the whole process.
+        """
+        first = min(until for _, until in self._running.values()) - time.monotonic()
+        left = max(min(first, math.inf if seconds is None else seconds), 0.0)
+        done, _ = self._ray.wait(list(self._running), timeout=None if math.isinf(left) else left)
+        for reference in done:
+            future, _ = self._running.pop(reference)
+            try:
+                future.set_result(self._ray.get(reference))
+            except self._ray.exceptions.RayTaskError as error:
                 reason = str(error.cause).partition("\n")[0]
                 words = f"--cluster {self._address}: a task failed: {reason}"
-                late.set_exception(InputError(words))
-            else:
-                late.set_exception(error)
-
-        threading.Thread(target=watch, daemon=True).start()
-        return late
+                future.set_exception(InputError(words))
+            except self._ray.exceptions.RayError as error:
+                future.set_exception(error)
+        for reference, (future, until) in list(self._running.items()):
+            if time.monotonic() >= until:
+                del self._running[reference]
+                self._ray.cancel(reference, force=True)
+                future.set_exception(TimeoutError("Task timeout"))
+        return {future for future in running if future.done()}
 
     def end(self) -> None:
         """Leave the rest to Ray, which ends a task with the program that asked for it."""
-        self._over.set()
+        self._running.clear()
 
 
 def each(
@@ -235,7 +244,7 @@ def _each(
                     return
                 task, attempt = again.popleft()
                 running[crew.start(task)] = task, attempt + 1
-            for future in wait(running, _LOOK if idle else None, FIRST_COMPLETED).done:
+            for future in crew.wait(running, _LOOK if idle else None):
                 task, attempt = running.pop(future)
                 error = future.exception()
                 if error is None:
