@@ -35,6 +35,7 @@ def identify(
     map: str | None = None,
     begin: float = 0.0,
     end: float | None = None,
+    test: list[str] | None = None,
     export: str | None = None,
     out: Path = Path("results/vehicle.yaml"),
 ) -> dict[str, Any]:
@@ -42,8 +43,11 @@ def identify(
     inertia, motor lag, centre of mass and drag, each with a 95 % interval; what the flights do not
     tell is said. Write the vehicle file, the intervals beside it and a picture.
 
+    With --test, say how well the vehicle predicts flights that it was not fitted to.
+
     Example: windwrench identify flight.csv --mass 0.465 --geometry 0.126 --out my_drone.yaml
     """
+    from ..identification.prediction import QUANTITIES, prediction_errors
     from ..identification.vehicle_fit.exports import EXPORTS
     from ..identification.vehicle_fit.geometry import parse_geometry
     from ..identification.vehicle_fit.identify import identify as fit
@@ -58,13 +62,18 @@ def identify(
     common = (begin, math.inf if end is None else end)
     if not common[0] < common[1]:
         raise InputError(f"--to {end:g}: expected a time after --from {begin:g}")
-    parts = [parse_window(text) for text in logs]
+    parts = [parse_window(text) for text in (*logs, *(test or ()))]
     flights = read_logs([path for path, _ in parts], reader, None, map)
+    flights, unseen = flights[: len(logs)], flights[len(logs) :]
     windows = [w if math.isfinite(w[1]) else common for _, w in parts]
     with working("identifying") as progress:
-        found = fit(flights, mass, where, windows, out.stem, report=progress)
+        found = fit(flights, mass, where, windows[: len(logs)], out.stem, report=progress)
+    errors = None
+    if unseen:
+        with working("predicting"):
+            errors = prediction_errors(unseen, found.vehicle, windows=windows[len(logs) :])
     run.record = out.with_name(f"{out.stem}.run.json")
-    written = write_identified(found, out)
+    written = write_identified(found, out, errors)
     log_notes([*(text for flight in flights for text in flight.notes), *found.notes])
     console.print(
         f"{found.seconds:.0f} s of flight, mass {mass:g} kg: {headline(found)}.",
@@ -87,7 +96,14 @@ def identify(
             console.print(f"{e.name}: {e.status}: {e.how}")
     for line in found.advice:
         console.print(line)
-    result = identified_data(found)
+    if errors is not None:
+        ends = zip(QUANTITIES.items(), errors.model[:, -1], errors.still[:, -1], strict=True)
+        console.print(f"predicted from {errors.starts} starts, {errors.horizon[-1]:.2g} s later:")
+        show_table(
+            ("mean error", "of the vehicle", "if nothing changes", "unit"),
+            [(name, f"{x:.3g}", f"{y:.3g}", unit) for (name, unit), x, y in ends],
+        )
+    result = identified_data(found, errors)
     if export is not None:
         text = EXPORTS[export](found)
         console.print(text, soft_wrap=True)

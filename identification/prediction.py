@@ -10,7 +10,7 @@ explain the motion with.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -47,7 +47,7 @@ class PredictionSettings:
     # s at an end of unbroken pose, where a low-pass has but one side to go by
     start_margin: float = 0.5
     end_margin: float = 0.1  # s, the same for the position that a prediction is compared with
-    horizon: float = 1.0  # s, of an error's predictions
+    horizon: float = 1.0  # s, of ``rollout_error``
     start_every: float = 0.25  # s, of an error's predictions
     most_starts: int = 2000  # of an error's predictions in a piece, spread over it
     longest_gap: float = 2.0  # s without a pose, after which the filter starts anew (estimate_log)
@@ -129,22 +129,96 @@ def rollout_error(log: FlightLog, vehicle: Vehicle, segments: Segments) -> float
     Raises:
         InputError: the vehicle has more effects than a model holds.
     """
-    log = undo_log_sensing(log, vehicle)
     try:
-        pieces = log_signals(log)
+        parts = list(_predictions(log, vehicle, segments, PREDICTION.horizon))
     except InputError:
         return math.nan
-    squares = []
-    for piece in pieces:
-        ahead = max(1, round(PREDICTION.horizon / piece.period))
-        starts = _start_samples(piece, segments)
+    off = [path[:, -1, :3] - states[rows[:, -1], :3] for _, states, rows, path in parts]
+    squares = [np.sum(np.square(x), axis=1) for x in off]
+    return math.sqrt(float(np.mean(np.concatenate(squares)))) if squares else math.nan
+
+
+QUANTITIES = {"position": "m", "velocity": "m/s", "attitude": "rad", "body rate": "rad/s"}
+
+
+@dataclass(frozen=True, eq=False)
+class PredictionErrors:
+    """How far predictions are from a flight, on average over their starts: a row for each of
+    ``QUANTITIES``, a column for each of m samples after the start.
+    """
+
+    starts: int
+    horizon: Array  # (m,) s after the start
+    model: Array  # (4, m)
+    still: Array  # (4, m) where velocity and body rate stay as they are at the start
+
+
+def prediction_errors(
+    logs: Sequence[FlightLog],
+    vehicle: Vehicle,
+    horizon_s: float = 0.5,
+    windows: Segments | None = None,
+) -> PredictionErrors:
+    """Return how well a model predicts flights, beside the guess that nothing changes.
+
+    A prediction starts every 0.25 s, as ``predict`` makes it. The flight that it is compared with
+    is the pose below 5 Hz; the angle between two attitudes is their distance.
+
+    Args:
+        logs: with a pose; flights that the model was not fitted to, or its errors mean little.
+        vehicle: whose model predicts, with its declared effects.
+        horizon_s: s.
+        windows: for each log, from and to in s after its start; None: all of it.
+
+    Raises:
+        InputError: no stretch of pose is long enough, or poses come at different rates.
+    """
+    model, still = [], []
+    for log, (begin, end) in zip(logs, windows or [(0.0, math.inf)] * len(logs), strict=True):
+        ends = [(float(log.t[0]) + begin, min(float(log.t[0]) + end, float(log.t[-1])))]
+        for piece, states, rows, path in _predictions(log, vehicle, ends, horizon_s):
+            begun = rows[:, 0] - 1
+            ahead = piece.period * np.arange(1, rows.shape[1] + 1)[:, None]
+            seen = Rotation.from_matrix(piece.rotation)
+            guess = np.zeros_like(path)
+            guess[..., 7:13] = states[begun, None, 7:13]
+            guess[..., :3] = states[begun, None, :3] + ahead * guess[..., 7:10]
+            turn = Rotation.from_rotvec((ahead * guess[..., 10:13]).reshape(-1, 3))
+            at = np.repeat(states[begun, 3:7], rows.shape[1], axis=0)
+            turned = Rotation.from_quat(at, scalar_first=True) * turn
+            guess[..., 3:7] = turned.as_quat(scalar_first=True).reshape(*rows.shape, 4)
+            for out, x in ((model, path), (still, guess)):
+                attitude = Rotation.from_quat(x[..., 3:7].reshape(-1, 4), scalar_first=True)
+                angle = (seen[rows.ravel()].inv() * attitude).magnitude().reshape(rows.shape)
+                off = [
+                    np.linalg.norm(x[..., :3] - piece.position[rows], axis=2),
+                    np.linalg.norm(x[..., 7:10] - piece.velocity[rows], axis=2),
+                    angle,
+                    np.linalg.norm(x[..., 10:13] - piece.angular_velocity[rows], axis=2),
+                ]
+                out.append(np.stack(off, axis=1))
+    if len({x.shape[2] for x in model}) != 1:
+        names = ", ".join(log.name for log in logs)
+        raise InputError(f"{names}: expected poses at one rate, unbroken for {horizon_s + 1:g} s")
+    both = np.concatenate(model), np.concatenate(still)
+    return PredictionErrors(len(both[0]), ahead[:, 0], *(x.mean(axis=0) for x in both))
+
+
+def _predictions(
+    log: FlightLog, vehicle: Vehicle, segments: Segments, horizon: float
+) -> Iterator[tuple[Signals, Array, NDArray[np.intp], Array]]:
+    """Yield for each unbroken piece of a log its signals and states (n, STATE_SIZE), the samples
+    (starts, m) that predictions come to, and the states (starts, m, STATE_SIZE) that they say.
+    """
+    log = undo_log_sensing(log, vehicle)
+    for piece in log_signals(log):
+        ahead = max(1, round(horizon / piece.period))
+        starts = _start_samples(piece, segments, horizon)
         starts = starts[starts + ahead < len(piece.t)]
         if starts.size:
             starts = starts[:: math.ceil(len(starts) / PREDICTION.most_starts)]
             states, path = _rolled_out(piece, vehicle, starts, ahead, float(log.t[0]))
-            off = path[:, -1, :3] - states[starts + ahead, :3]
-            squares.append(np.sum(np.square(off), axis=1))
-    return math.sqrt(float(np.mean(np.concatenate(squares)))) if squares else math.nan
+            yield piece, states, starts[:, None] + np.arange(1, ahead + 1), path
 
 
 def _rolled_out(
@@ -172,14 +246,14 @@ def _rolled_out(
     return states, path
 
 
-def _start_samples(signals: Signals, segments: Segments) -> NDArray[np.intp]:
+def _start_samples(signals: Signals, segments: Segments, horizon: float) -> NDArray[np.intp]:
     """Return the samples at which predictions start that lie in a segment and well inside this
     piece.
     """
     use = PREDICTION
     first = signals.t[0] + use.start_margin
-    last = signals.t[-1] - max(use.horizon + use.end_margin, use.start_margin)
-    each = (np.arange(t0, t1 - use.horizon + 1e-9, use.start_every) for t0, t1 in segments)
+    last = signals.t[-1] - max(horizon + use.end_margin, use.start_margin)
+    each = (np.arange(t0, t1 - horizon + 1e-9, use.start_every) for t0, t1 in segments)
     times = np.concatenate([np.empty(0), *each])
     times = times[(times >= first) & (times <= last)]
     return np.unique(np.round((times - signals.t[0]) / signals.period).astype(np.intp))

@@ -13,6 +13,7 @@ from ...dynamics.vehicle_file import save_vehicle
 from ...runtime.page_files import write_png, write_text
 from ...runtime.plain_values import plain
 from ..motion.smoothing import low_pass
+from ..prediction import QUANTITIES, PredictionErrors
 from .channels import MotionPiece
 from .columns import air_columns, rotor_columns
 from .model import coefficients
@@ -28,8 +29,13 @@ _LEAST_HZ = 0.4  # of the shares: what is slower holds the mean, such as the wei
 _SHOWN_SECONDS = 10.0
 
 
-def identified_data(found: Identified) -> dict[str, Any]:
-    """Return the dictionary of ``identify.json``; None for what is not known."""
+def identified_data(found: Identified, errors: PredictionErrors | None = None) -> dict[str, Any]:
+    """Return the dictionary of ``identify.json``; None for what is not known.
+
+    Args:
+        found: the vehicle.
+        errors: of its predictions, where they were asked for.
+    """
     data: dict[str, Any] = {
         "vehicle": found.vehicle.name,
         "mass_kg": found.vehicle.mass,
@@ -50,6 +56,17 @@ def identified_data(found: Identified) -> dict[str, Any]:
         "notes": found.notes,
         "advice": found.advice,
     }
+    if errors is not None:
+        data["prediction"] = {
+            "starts": errors.starts,
+            "horizon_s": errors.horizon,
+            **{
+                name.replace(" ", "_"): {"unit": unit, "model": model, "if_nothing_changes": still}
+                for (name, unit), model, still in zip(
+                    QUANTITIES.items(), errors.model, errors.still, strict=True
+                )
+            },
+        }
     told: dict[str, Any] = plain(data)
     return told
 
@@ -64,9 +81,11 @@ def headline(found: Identified) -> str:
     return f"{told} is identified; assumed, since these logs do not tell: {', '.join(open_ones)}"
 
 
-def write_identified(found: Identified, path: Path) -> tuple[Path, Path, Path]:
-    """Write the vehicle to a YAML file, and beside it ``NAME.identify.json`` and
-    ``NAME.identify.png``; return the three.
+def write_identified(
+    found: Identified, path: Path, errors: PredictionErrors | None = None
+) -> list[Path]:
+    """Write the vehicle to a YAML file, and beside it ``NAME.identify.json``,
+    ``NAME.identify.png`` and, with errors of its predictions, ``NAME.prediction.png``; return them.
 
     Raises:
         InputError: a file cannot be written.
@@ -82,9 +101,13 @@ def write_identified(found: Identified, path: Path) -> tuple[Path, Path, Path]:
     }
     save_vehicle(found.vehicle, path, std)
     data, picture = (path.with_name(f"{path.stem}.identify.{end}") for end in ("json", "png"))
-    write_text(json.dumps(identified_data(found), indent=1) + "\n", data)
+    write_text(json.dumps(identified_data(found, errors), indent=1) + "\n", data)
     write_png(_picture(found), picture)
-    return path, data, picture
+    written = [path, data, picture]
+    if errors is not None:
+        written.append(path.with_name(f"{path.stem}.prediction.png"))
+        write_png(_prediction_picture(errors), written[-1])
+    return written
 
 
 def fitted(found: Identified, piece: MotionPiece) -> tuple[Array, Array]:
@@ -152,4 +175,18 @@ def _picture(found: Identified) -> "Figure":
         f"drawn: up to {min(_SHOWN_HZ, band):g} Hz",
         fontsize=9,
     )
+    return figure
+
+
+def _prediction_picture(errors: PredictionErrors) -> "Figure":
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11, 3), layout="constrained")
+    rows = zip(figure.subplots(1, 4), QUANTITIES.items(), errors.model, errors.still, strict=True)
+    for axes, (name, unit), model, still in rows:
+        axes.plot(errors.horizon, still, color="0.6", label="if nothing changes")
+        axes.plot(errors.horizon, model, label="of the vehicle")
+        axes.set(title=f"{name} ({unit})", xlabel="time after the start (s)", ylim=(0.0, None))
+    axes.legend(fontsize=9)
+    figure.suptitle(f"mean error of predictions, {errors.starts} starts", fontsize=10)
     return figure

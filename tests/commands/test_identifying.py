@@ -9,7 +9,8 @@ import pytest
 from tests.identification.vehicle_fit.flown import ARM, MASS, inertial_flights
 from windwrench.commands.identifying import parse_window
 from windwrench.dynamics import load_vehicle
-from windwrench.identification.logs.flight_log import write_log
+from windwrench.envs.recording import record_flight
+from windwrench.identification.logs.flight_log import FlightLog, write_log
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +37,26 @@ def test_identify_writes_a_vehicle_that_loads(call, log, tmp_path):
     assert (tmp_path / "mine.identify.png").read_bytes()[:4] == b"\x89PNG"
     assert "<motorConstant>" in text
     assert "95 % interval" in text
+
+
+def test_the_vehicle_predicts_flights_that_it_was_not_fitted_to(call, log, tmp_path):
+    known = load_vehicle("ardrone2")
+    for seed in (1, 2):
+        flown = FlightLog(**record_flight(known, trajectory="excite", seconds=12.0, seed=seed))
+        write_log(flown, tmp_path / f"{seed}.csv")
+    asked = ("identify", "1.csv", "--mass", known.mass, "--geometry", known.arm_l)
+    code, text, _ = call(*asked, "--test", "2.csv:2-11", "--out", "mine.yaml")
+    assert code == 0
+    assert "if nothing changes" in text
+    errors = json.loads((tmp_path / "mine.identify.json").read_text())["prediction"]
+    assert errors["starts"] > 20
+    for name in ("position", "velocity", "attitude", "body_rate"):
+        assert errors[name]["model"][-1] < 0.3 * errors[name]["if_nothing_changes"][-1]
+    assert (tmp_path / "mine.prediction.png").read_bytes()[:4] == b"\x89PNG"
+    code, _, error = call(*asked, "--test", log, "--out", "other.yaml")
+    assert code == 2
+    assert "flight: no unbroken piece of pose is longer than 3 s" in error
+    assert not (tmp_path / "other.yaml").exists()
 
 
 def test_a_part_of_a_log():

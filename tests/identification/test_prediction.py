@@ -16,7 +16,12 @@ from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.sensing_effects import undo_log_sensing
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass
-from windwrench.identification.prediction import nis_without_wrench_state, rollout_error
+from windwrench.identification.prediction import (
+    nis_without_wrench_state,
+    prediction_errors,
+    rollout_error,
+)
+from windwrench.runtime.errors import InputError
 
 VEHICLE = load_vehicle("ardrone2")
 QUIET = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0)
@@ -155,3 +160,31 @@ def test_only_whole_predictions_inside_a_segment_count(clean):
     assert rollout_error(push, VEHICLE, [(19.2, 20.7)]) > 0.3
     assert math.isnan(rollout_error(clean, VEHICLE, [(4.0, 4.9)]))
     assert math.isnan(rollout_error(clean, VEHICLE, []))
+
+
+def test_errors_of_predictions_are_those_of_the_motion():
+    """In hover 0.04 kg too little is g dm / m of acceleration, and nothing changes."""
+    log = fly(EffectSetting("mass", {"dm": 0.04}), trajectory="hover", seconds=12.0)
+    found = prediction_errors([log, log], VEHICLE, 0.5, [(2.0, 11.0), (2.0, math.inf)])
+    fall = VEHICLE.gravity * 0.04 / VEHICLE.mass
+    assert found.horizon[[0, -1]] == pytest.approx([0.005, 0.5])
+    assert found.starts == 35 + 38  # up to 10.5 s, and to 0.6 s before the end
+    position, velocity, attitude, _ = found.model
+    assert velocity[-1] == pytest.approx(0.5 * fall, rel=0.1)
+    assert position[-1] == pytest.approx(0.125 * fall, rel=0.1)
+    assert attitude[-1] < 0.02
+    assert found.still[0, -1] < 0.2 * position[-1]
+    assert found.still[1, -1] < 0.2 * velocity[-1]
+
+
+def test_a_turn_at_one_rate_is_no_change():
+    t = np.arange(1500) * 0.005
+    half = 0.4 * t
+    turned = np.column_stack([np.cos(half), 0.0 * t, 0.0 * t, np.sin(half)])
+    speeds = np.full((1500, 4), VEHICLE.hover_rate)
+    log = FlightLog(t, np.outer(t, [1.0, -0.5, 0.2]), turned, speeds)
+    found = prediction_errors([log], VEHICLE)
+    assert np.all(found.still < 2e-3)
+    assert np.all(found.model < 2e-3)
+    with pytest.raises(InputError, match=r"flight: expected poses at one rate, unbroken for 4 s"):
+        prediction_errors([replace(log, name="flight")], VEHICLE, 3.0, [(0.0, 2.0)])
