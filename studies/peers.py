@@ -30,7 +30,7 @@ Step = Callable[[Array], tuple[State, Array]]  # rotor speeds asked for -> state
 
 VEHICLE = load_vehicle("hummingbird")
 SECONDS, PERIOD, SEEDS = 40.0, 0.01, range(5)
-HEIGHT = 4.0  # m, of the path's centre: far from the ground
+CENTRE = np.array([0.0, 0.0, 4.0])  # m, of the path: far from the ground
 RESULTS = "results/peers.json"
 _SUBSTEPS = 5  # of PyBullet in a period
 _FREQUENCIES = 2.0 * np.pi * np.array([[0.11, 0.13, 0.17], [0.29, 0.23, 0.31]])  # rad/s
@@ -45,7 +45,7 @@ def in_pybullet(damping: bool) -> Step:
     world = BulletClient(pybullet.DIRECT)
     world.setGravity(0.0, 0.0, -VEHICLE.gravity)
     world.setTimeStep(PERIOD / _SUBSTEPS)
-    body = world.createMultiBody(VEHICLE.mass, -1, -1, [0.0, 0.0, HEIGHT])
+    body = world.createMultiBody(VEHICLE.mass, -1, -1, CENTRE.tolist())
     world.changeDynamics(body, -1, localInertiaDiagonal=np.diagonal(VEHICLE.inertia).tolist())
     if not damping:
         world.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0)
@@ -92,7 +92,7 @@ def in_rotorpy() -> Step:
         control_abstraction="cmd_motor_speeds",
     )
     now = {
-        "x": np.array([0.0, 0.0, HEIGHT]),
+        "x": CENTRE,
         "q": np.array([0.0, 0.0, 0.0, 1.0]),
         "rotor_speeds": np.full(4, VEHICLE.hover_rate),
         **{name: np.zeros(3) for name in ("v", "w", "wind")},
@@ -113,7 +113,7 @@ def flight(step: Step, seed: int) -> FlightLog:
     generator = np.random.default_rng(seed)
     phase = generator.uniform(0.0, 2.0 * np.pi, (2, 3))
     loop = flight_record(VEHICLE)[0]
-    p, q = np.array([0.0, 0.0, HEIGHT]), np.array([1.0, 0.0, 0.0, 0.0])
+    p, q = CENTRE, np.array([1.0, 0.0, 0.0, 0.0])
     state: State = p, q, np.zeros(3), np.zeros(3)
     rows = []
     for i in range(round(SECONDS / PERIOD)):
@@ -122,7 +122,7 @@ def flight(step: Step, seed: int) -> FlightLog:
         angle = _FREQUENCIES * t + phase
         way = np.array(
             [
-                (_SIZES * np.sin(angle)).sum(axis=0) + [0.0, 0.0, HEIGHT],
+                (_SIZES * np.sin(angle)).sum(axis=0) + CENTRE,
                 (_SIZES * _FREQUENCIES * np.cos(angle)).sum(axis=0),
                 (-_SIZES * _FREQUENCIES**2 * np.sin(angle)).sum(axis=0),
             ]

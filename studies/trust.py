@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from windwrench.studies import measured_flights
+from windwrench.studies import measured_flights, peers
 from windwrench.studies.kept_results import kept
 from windwrench.studies.probabilities import calibration
 
@@ -12,5 +12,6 @@ def page() -> dict[str, Any]:
     return {
         "benchmark": kept("identify/nanodrone.json"),
         "flights": measured_flights.shown(),
+        "peers": peers.shown(),
         "probabilities": calibration.shown(),
     }
