@@ -117,9 +117,9 @@ def flight(step: Step, seed: int) -> FlightLog:
     state: State = p, q, np.zeros(3), np.zeros(3)
     rows = []
     for i in range(round(SECONDS / PERIOD)):
-        t = i * PERIOD
-        begun = min(t / 3.0, 1.0)  # the path grows from the start's place
-        angle = _FREQUENCIES * t + phase
+        now = i * PERIOD
+        begun = min(now / 3.0, 1.0)  # the path grows from the start's place
+        angle = _FREQUENCIES * now + phase
         way = np.array(
             [
                 (_SIZES * np.sin(angle)).sum(axis=0) + CENTRE,
@@ -129,10 +129,10 @@ def flight(step: Step, seed: int) -> FlightLog:
         )
         way[0] = p + begun * (way[0] - p)
         loop["setpoint"][:9] = (way * [[1.0], [begun], [begun]]).ravel()
-        loop["setpoint"][9:] = 0.6 * np.sin(0.44 * t), 0.264 * np.cos(0.44 * t)
+        loop["setpoint"][9:] = 0.6 * np.sin(0.44 * now), 0.264 * np.cos(0.44 * now)
         fly(loop, np.concatenate(state), PERIOD)
         state, speeds = step(loop["command"].copy())
-        rows.append(np.concatenate([[t + PERIOD], state[0], state[1], speeds]))
+        rows.append(np.concatenate([[now + PERIOD], state[0], state[1], speeds]))
     t, position, quaternion, speeds = np.split(np.array(rows), [1, 4, 8], axis=1)
     noise = generator.normal(size=(2, len(t), 3))
     seen = Rotation.from_quat(quaternion, scalar_first=True) * Rotation.from_rotvec(
