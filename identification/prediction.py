@@ -173,7 +173,8 @@ def prediction_errors(
     Raises:
         InputError: no stretch of pose is long enough, or poses come at different rates.
     """
-    model, still = [], []
+    model: list[Array] = []
+    still: list[Array] = []
     for log, (begin, end) in zip(logs, windows or [(0.0, math.inf)] * len(logs), strict=True):
         ends = [(float(log.t[0]) + begin, min(float(log.t[0]) + end, float(log.t[-1])))]
         for piece, states, rows, path in _predictions(log, vehicle, ends, horizon_s):
