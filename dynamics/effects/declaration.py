@@ -54,6 +54,7 @@ class Role(StrEnum):
     MASS = "mass"  # added mass, kg or relative
     INERTIA = "inertia"  # relative change of the moments of inertia about x, y and z
     CENTRE_OF_MASS = "centre of mass"  # its place along x, y and z, m
+    MARKER = "marker"  # the place of the point whose position is logged, along x, y and z, m
     SUSPENDED_LOAD = "suspended load"  # its mass, kg
     THRUST = "thrust"  # relative change of what all rotors deliver
     ROTOR_THRUSTS = "thrust of each rotor"  # relative change of each rotor's, 1 to 4
@@ -81,6 +82,7 @@ _UNITS: dict[Role, tuple[tuple[str, ...], ...]] = {
     Role.MASS: (("kg", "1"),),
     Role.INERTIA: (_RELATIVE,) * 3,
     Role.CENTRE_OF_MASS: (("m",),) * 3,
+    Role.MARKER: (("m",),) * 3,
     Role.SUSPENDED_LOAD: (("kg",),),
     Role.THRUST: (_RELATIVE,),
     Role.ROTOR_THRUSTS: (_RELATIVE,) * 4,

@@ -16,7 +16,7 @@ from .base import (
     Coefficient,
     Effect,
 )
-from .declaration import Family
+from .declaration import Family, Role
 
 
 @cfunc(EFFECT_MODEL, cache=True)
@@ -45,4 +45,5 @@ EFFECT = Effect(
     "the centre. An offset centre of mass also makes a torque in hover; this does not",
     model=effect_model,
     family=Family.RIGID_BODY,
+    role=Role.MARKER,
 )

@@ -367,6 +367,8 @@ class Likelihood:
                 moved[c] = self._moved(c)
             elif (slope := self._slope(c)) is not None:
                 acting[c] = slope
+                if get(c[0]).role == Role.CENTRE_OF_MASS:
+                    self._swing(c)
         return self._products(acting, moved)
 
     def _add_what_any_flight_may_have(self) -> None:
@@ -414,6 +416,22 @@ class Likelihood:
         out = self._products(acting, moved)
         self.noise, self.tracks = noise, tracks
         return out
+
+    def _swing(self, column: Column) -> None:
+        """Have a centre of mass move the measured point as a marker does that lies as far on the
+        other side; its torque alone acts.
+
+        That the point swings about the centre would else be two columns, of the model's angular
+        acceleration and of the filter's attitude, and their difference, which is noise, would fit
+        the poses' own noise: of equal offsets of both only the torque of the thrust is left.
+        """
+        acting, moved = self._columns
+        for slope in acting[column]:
+            slope[:, :3] = 0.0
+        axis = [c.name for c in get(column[0]).coefficients].index(column[1])
+        (marker,) = playing(Role.MARKER)
+        place = self._moved((marker, get(marker).coefficients[axis].name))
+        moved[column] = [-x for x in place]
 
     def _model_errors(self) -> dict[str, list[Array]]:
         parts: dict[str, list[Array]] = {}
@@ -464,7 +482,7 @@ class Likelihood:
         gains, jumps, jump_state = self._jumps()
         own = len(STATES) * len(DRIVEN)  # what the rotors say of other axes stays as it was fitted
         gains, jump_state, jumps = gains[:own], jump_state[:own], [x[:, :, :own] for x in jumps]
-        names = (*acting, *moved, *gains)
+        names = (*(c for c in acting if c not in moved), *moved, *gains)
         count = len(names)
         gain = np.array([x.gain for x in self.noise])
         keep = np.exp(-self.period / np.array([x.time for x in self.noise]))
@@ -486,10 +504,11 @@ class Likelihood:
             for begin in range(0, len(track.position), length):
                 at = slice(begin, min(begin + length, len(track.position)))
                 rows = at.stop - at.start
-                a, b = len(acting), len(moved)
-                x, y = np.zeros((rows, 6, a + b)), np.zeros((rows, 6, b))
-                for j, column in enumerate(acting.values()):
-                    x[:, :, j] = column[i][at]
+                asked = names[: count - len(gains)]
+                x, y = np.zeros((rows, 6, len(asked))), np.zeros((rows, 6, len(moved)))
+                for j, c in enumerate(asked):
+                    if c in acting:
+                        x[:, :, j] = acting[c][i][at]
                 for j, column in enumerate(moved.values()):
                     y[:, :, j] = column[i][at]
                 out = np.empty((rows, 6, count + 1))
