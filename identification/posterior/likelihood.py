@@ -6,6 +6,7 @@ innovations are white, and the log-likelihood of any set of coefficients near th
 from sums of products alone.
 """
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -52,6 +53,7 @@ STATES = (0, 1, 2)  # of an axis: pose, rate, disturbance
 # rad of tilt for a rad/s2 of roll or pitch: the unit of gains of sideways states
 SIDEWAYS = 0.01
 MODEL_ERROR, GAIN, UNKNOWN, NUISANCE = "model error", "rotor gain of", "unknown ", "nuisance "
+ROUNDED = "rounding of torque "
 
 
 @dataclass(frozen=True)
@@ -154,12 +156,34 @@ class Likelihood:
             out.append(steady_noise(pose, size, AXIS.first_time, white, self.period))
         return tuple(out)
 
+    @property
+    def _rounding_std(self) -> float:
+        """Standard deviation of the rounding of a rotor speed, rad/s."""
+        known = self.vehicle.omega_source == "measured"
+        return self.vehicle.omega_lsb / math.sqrt(12.0) if known else 0.0
+
+    def _rounded_torques(self) -> list[list[Array]]:
+        """Return for each axis what another rounding of the rotor speeds would add to the angular
+        acceleration (n, 6) of each piece.
+        """
+        generator = np.random.default_rng(0)
+        out: list[list[Array]] = [[], [], []]
+        for s in self.signals:
+            off = self._rounding_std * math.sqrt(3.0) * generator.uniform(-1.0, 1.0, (len(s.t), 4))
+            off = 0.5 * (off + np.vstack([off[1:], off[-1:]]))  # as the speeds between samples
+            wrench = self.vehicle.rotor_wrench
+            torque = (wrench(s.rotor_speeds + off) - wrench(s.rotor_speeds))[:, 1:]
+            for i in range(3):
+                column = np.zeros((len(s.t), 6))
+                column[:, 3 + i] = torque[:, i] / self.inertias[3 + i]
+                out[i].append(column)
+        return out
+
     def _rounding(self) -> Array:
         """Return the standard deviation of the accelerations (6,) that the rotor speeds' rounding
         makes: m/s2 and rad/s2.
         """
-        vehicle = self.vehicle
-        std = vehicle.omega_lsb / np.sqrt(12.0) if vehicle.omega_source == "measured" else 0.0
+        vehicle, std = self.vehicle, self._rounding_std
         speeds = np.concatenate([p.rotor_speeds for p in self.pieces]).mean(axis=0)
         base = vehicle.rotor_wrench(speeds[None])[0]
         steps = [
@@ -380,6 +404,9 @@ class Likelihood:
             acting[LAG_ASYMMETRY] = self._uneven_lag()
         for name, column in self._model_errors().items():
             acting["", f"{MODEL_ERROR} {name}"] = column
+        if self._rounding_std > 0.0:
+            for axis, column in zip("xyz", self._rounded_torques(), strict=True):
+                acting["", ROUNDED + axis] = column
         moved[ATTITUDE_TIME_OFFSET] = []
         for track in self.tracks:
             # the rate before the sample is read: after it, it knows that sample's noise

@@ -24,7 +24,16 @@ from ..inference.regression import (
 )
 from ..inference.time_offsets import timing_of
 from .evidence import Index
-from .likelihood import BETWEEN, GAIN, LIKELIHOOD, MODEL_ERROR, UNKNOWN, WHOLE_PREFIX, Sums
+from .likelihood import (
+    BETWEEN,
+    GAIN,
+    LIKELIHOOD,
+    MODEL_ERROR,
+    ROUNDED,
+    UNKNOWN,
+    WHOLE_PREFIX,
+    Sums,
+)
 
 Array = NDArray[np.float64]
 Setting = dict[str, dict[str, float]]
@@ -137,6 +146,38 @@ def _bounds(column: Column, flights: Flights) -> tuple[float, float]:
     return min(low - own, 0.0), max(high - own, 0.0)
 
 
+def _errors_of_torques(total: Array, columns: Mapping[Column, int], size: Array) -> Array:
+    """Return by what factor (c,) the model's error of each torque is larger than that of a model of
+    exact rotor speeds.
+
+    A torque's gain is biased low by the share of its column that is the rounding of rotor speeds
+    (errors in variables). What counts is the share of what nuisances leave of the column: a hover
+    holds little torque, and the rotors' innovations stand for most of it. Another rounding shows
+    it: by how much it would add to what the column says.
+    """
+    factor = np.ones(len(size))
+    torque = f"{MODEL_ERROR} of torque "
+    others = np.array(
+        [
+            i
+            for (e, name), i in columns.items()
+            if not e and not name.startswith((torque, ROUNDED, UNKNOWN))
+        ]
+    )
+    inner = total[np.ix_(others, others)] + np.eye(len(others))
+
+    def left(i: int) -> float:
+        cross = total[others, i]
+        return float(total[i, i] - cross @ np.linalg.solve(inner, cross))
+
+    for axis in "xyz":
+        rounded, own = columns.get(("", ROUNDED + axis)), columns["", torque + axis]
+        if rounded is not None:
+            share = left(rounded) / max(left(own) / size[own] ** 2, 1e-30)
+            factor[own] = math.hypot(1.0, share / size[own])
+    return factor
+
+
 def in_prior_units(
     flights: Flights,
     sums: Sums,
@@ -157,6 +198,14 @@ def in_prior_units(
     blocks[:, -1, :] = whole
     blocks[:, -1, -1] = np.einsum("c,bc->b", back, whole)
     columns = {c: i for i, c in enumerate(sums.columns)}
+    factor = _errors_of_torques(blocks.sum(axis=0), columns, size)
+    size *= factor
+    scale = np.append(factor, 1.0)
+    blocks *= scale[:, None] * scale
+    kept = np.array([i for c, i in columns.items() if not c[1].startswith(ROUNDED)])
+    size, bounds = size[kept], bounds[kept]
+    blocks = blocks[:, np.append(kept, -1)][:, :, np.append(kept, -1)]
+    columns = {list(columns)[i]: k for k, i in enumerate(kept)}
     plain = [i for c, i in columns.items() if not c[0] and not c[1].startswith(UNKNOWN)]
     dictionary = [i for c, i in columns.items() if not c[0] and c[1].startswith(UNKNOWN)]
     return Base(
@@ -168,7 +217,7 @@ def in_prior_units(
         sums.penalty,
         frozenset(k for k in setting if k),
         np.array(plain, dtype=np.intp),
-        np.array([_typical(c, flights) for c in sums.columns]) / size,
+        np.array([_typical(c, flights) for c in columns]) / size,
         np.array(dictionary, dtype=np.intp),
         starts,
     )
