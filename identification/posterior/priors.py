@@ -171,8 +171,8 @@ def _errors_of_torques(total: Array, columns: Mapping[Column, int], size: Array)
         return float(total[i, i] - cross @ np.linalg.solve(inner, cross))
 
     for axis in "xyz":
-        rounded, own = columns.get(("", ROUNDED + axis)), columns["", torque + axis]
-        if rounded is not None:
+        if (rounded := columns.get(("", ROUNDED + axis))) is not None:
+            own = columns["", torque + axis]
             share = left(rounded) / max(left(own) / size[own] ** 2, 1e-30)
             factor[own] = math.hypot(1.0, share / size[own])
     return factor
