@@ -130,9 +130,14 @@ class Running:
             self.failed.append(str(error))
 
     def until(self, so):
-        """Wait until it is so, or the stream has ended."""
-        while not so() and self.thread.is_alive():
+        """Wait until it is so, or the stream has ended. A datagram that is lost, as where another
+        program takes the same port, would be waited for in vain: ten minutes are enough.
+        """
+        for _ in range(300_000):
+            if so() or not self.thread.is_alive():
+                return
             self.thread.join(0.002)
+        raise AssertionError("the stream has not taken what was sent")
 
     def count(self, kind):
         """How many messages of a kind were taken."""
