@@ -6,12 +6,15 @@
 import json
 from dataclasses import asdict
 
+import numpy as np
 import pytest
 
 from tests.support.alike import assert_alike
 from tests.support.paths import ROOT
 from tests.support.searches import DRAG, VEHICLE, settings
 from windwrench.identification.inference.regression import Flights
+from windwrench.identification.posterior.likelihood import LIKELIHOOD, Likelihood
+from windwrench.identification.posterior.priors import in_prior_units
 from windwrench.identification.posterior.ranking import rank
 from windwrench.studies.trials.practice_flights import fly_practice
 
@@ -68,6 +71,29 @@ def test_what_another_search_proposes_is_asked_too():
     assert best.coefficients["wind"]["wx"] == pytest.approx(2.0, rel=0.1)
     # what lies outside the library is no proposal
     assert rank(flights, ("mass",), WIND).sets == rank(flights, ("mass",)).sets
+
+
+def test_equal_offsets_of_mass_and_marker_are_told_by_the_thrust_alone():
+    """Both at one place: the measured point is the centre of mass again, and nothing but the
+    thrust's arm is left; along z it has none.
+    """
+    likelihood = Likelihood(flown(), {})
+    wanted = [("com_offset", "cz"), ("marker_offset", "mz")]
+    sums = likelihood.sums(wanted, {}, unknown=False)
+    at = [sums.columns.index(c) for c in wanted]
+    (a, b), (_, d) = sums.blocks.sum(axis=0)[np.ix_(at, at)]
+    assert a + 2.0 * b + d < 1e-5 * (a - 2.0 * b + d)
+
+
+def test_the_gain_of_a_torque_is_known_where_rotors_leave_their_rounding():
+    sizes = {}
+    for trajectory in ("hover", "excite"):
+        log = fly_practice(VEHICLE, settings({}), trajectory, 12.0, seed=5)
+        flights = Flights([log], VEHICLE)
+        base = in_prior_units(flights, Likelihood(flights, {}).sums([], {}, False), {}, {})
+        sizes[trajectory] = base.size[base.columns["", "model error of torque x"]]
+    assert LIKELIHOOD.model_error <= sizes["excite"] < 0.02
+    assert sizes["hover"] > 5.0 * sizes["excite"]
 
 
 if __name__ == "__main__":
