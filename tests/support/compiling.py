@@ -11,6 +11,7 @@ import windwrench  # noqa: F401  registers the environments
 from windwrench.dynamics import load_vehicle
 from windwrench.envs.recording import record_flight
 from windwrench.estimator import WrenchEKF, ukf_lanes
+from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.prediction import nis_without_wrench_state, rollout_error
 from windwrench.identification.wrench_series import estimate_log
@@ -56,7 +57,7 @@ def step_many(**given):
 
 def compile_estimates():
     """Estimate with a pose, with an IMU beside it, smoothed with it and without, and with a pose
-    five times a second; fly a model along.
+    five times a second; fly a model along; diagnose.
     """
     vehicle = load_vehicle("ardrone2")
     log = FlightLog(**record_flight(vehicle, (), "hover", 12.0, seed=0, imu=True))
@@ -68,6 +69,7 @@ def compile_estimates():
     flown = ((2.0, 10.0),)
     nis_without_wrench_state(alone, vehicle, flown)
     rollout_error(alone, vehicle, flown)
+    diagnose([alone], vehicle, probabilities=True)
     rows = np.arange(len(log.t))
     for seen in (rows % 40 == 0, rows < 0):
         position = np.where(seen[:, None], log.position, np.nan)
