@@ -146,7 +146,7 @@ def _screened(
         same = _repeated(log)
         hear(_held_pose(log, same))
         log = replace(log, valid=log.valid & ~same)
-        hear(_pose(log, least or 0.0))
+        hear(_pose_rate(log))
     notes += stuck_notes(log, vehicle)
     others: list[Reading] = []
     if by_imu or _pieces(log):
@@ -306,14 +306,8 @@ def _held_pose(log: FlightLog, same: Mask) -> Findings:
         )
 
 
-def _runs(log: FlightLog) -> list[tuple[float, Rows]]:
-    """Return the length in s and the rows of each unbroken run of poses."""
-    runs = unbroken(log.t, np.flatnonzero(log.valid), max(0.1, 3.5 * log.period))
-    return [(float(log.t[run[-1]] - log.t[run[0]]), run) for run in runs]
-
-
-def _pose(log: FlightLog, least: float) -> Findings:
-    """Check the rate of the poses, and that a run of them is long enough to say something."""
+def _pose_rate(log: FlightLog) -> Findings:
+    """Check the rate of the poses."""
     times = log.t[log.valid]
     period = float(np.median(np.diff(times))) if len(times) > 1 else np.inf
     if period * _LEAST_RATE_HZ > _SLACK:
@@ -322,17 +316,12 @@ def _pose(log: FlightLog, least: float) -> Findings:
             "accelerations come from differences of poses that are low-passed at 15 Hz, and a "
             "quadrotor turns within a tenth of a second"
         )
-    if not _pieces(log):
-        longest = max(length for length, _ in _runs(log))
-        yield Needed(
-            f"{_lost_words(log)}the longest unbroken run of poses is {longest:.3g} s; expected at "
-            f"least {least:g} s in flight, in runs of more than {_LEAST_PIECE:g} s"
-        )
 
 
 def _pieces(log: FlightLog) -> list[Rows]:
     """Return the rows of each unbroken run of poses that is long enough to say something."""
-    return [run for length, run in _runs(log) if len(run) > 8 and length > _LEAST_PIECE]
+    runs = unbroken(log.t, np.flatnonzero(log.valid), max(0.1, 3.5 * log.period))
+    return [r for r in runs if len(r) > 8 and log.t[r[-1]] - log.t[r[0]] > _LEAST_PIECE]
 
 
 def _uneven_steps(log: FlightLog) -> Findings:
@@ -382,29 +371,22 @@ def _length(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
     aloft = thrust > 0.5 * usual_thrust(thrust)
     step = np.minimum(np.diff(log.t, append=log.t[-1] + log.period), max(0.1, 3.5 * log.period))
     step = np.where(aloft, step, 0.0)
-    left = sum(float(step[piece[0] : piece[-1] + 1].sum()) for piece in _pieces(log))
-    whole = float(step.sum())
-    if left < least - 1e-9:
-        yield Refused(
-            f"{_lost_words(log)}{left:.3g} s of flight in unbroken runs of poses; expected at "
-            f"least {least:g} s, in runs of more than {_LEAST_PIECE:g} s"
-        )
+    pieces = _pieces(log)
+    left = sum(float(step[piece[0] : piece[-1] + 1].sum()) for piece in pieces)
+    whole, runs = float(step.sum()), len(runs_of(~log.valid))
+    lost = f"the pose is lost in {runs} run(s), {int(np.sum(~log.valid))} of {len(log.t)} rows; "
+    words = f"{lost if runs else ''}{left:.3g} of {whole:.3g} s of flight lie in unbroken runs of "
+    words += f"poses of more than {_LEAST_PIECE:g} s"
+    if not pieces or left < least - 1e-9:
+        yield Refused(f"{words}; expected at least {least:g} s")
     if left < (1.0 - _LOST_SHARE) * whole:
-        yield Note(
-            f"{_lost_words(log)}{left:.3g} of {whole:.3g} s of flight lie in runs of poses long "
-            "enough to use"
-        )
+        yield Note(words)
 
 
 def _carrying(log: FlightLog) -> Mask:
     """Return in which rows (N,) the fastest rotors turn as in flight."""
     fastest = np.square(log.rotor_speeds).max(axis=1)
     return np.asarray(fastest > 0.5 * usual_thrust(fastest))
-
-
-def _lost_words(log: FlightLog) -> str:
-    runs, lost = len(runs_of(~log.valid)), int(np.sum(~log.valid))
-    return f"the pose is lost in {runs} run(s), {lost} of {len(log.t)} rows; " if runs else ""
 
 
 def _jumps(t: Array, position: Array, way: Array, angle: Array) -> Findings:
