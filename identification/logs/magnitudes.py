@@ -51,33 +51,22 @@ def within(value: float, limits: tuple[float, float]) -> bool:
     return limits[0] <= value <= limits[1]
 
 
-def time_unit(step: float) -> tuple[str, bool]:
-    """Return the unit in which a median step (in the column's unit) is a flight's, and whether
-    that is certain.
+def likely_unit(section: str, size: float) -> tuple[str, bool]:
+    """Return the first unit of a section's column in which a size is likely, or the first of all,
+    and whether that is certain: of a battery, a median voltage; of the time, a median step.
     """
-    rates = {unit: 1.0 / max(step * UNITS["time"][unit], 1e-300) for unit in _TIMES}
-    return _likely_unit(rates, MAGNITUDES.rates, MAGNITUDES.sure_rates)
-
-
-def voltage_unit(median: float) -> tuple[str, bool]:
-    """Return the unit in which a median voltage is a battery's, and whether that is certain."""
-    volts = {unit: median * size for unit, size in UNITS["battery"].items()}
-    return _likely_unit(volts, MAGNITUDES.voltages, MAGNITUDES.sure_voltages)
-
-
-def _likely_unit(
-    sizes: dict[str, float], likely: tuple[float, float], sure: tuple[float, float]
-) -> tuple[str, bool]:
-    """Return the first unit in which a size is likely, or the first of all, and whether the size is
-    sure to be in it.
-    """
+    sizes = {unit: size * one for unit, one in UNITS[section].items() if unit != "min"}
+    likely, sure = MAGNITUDES.voltages, MAGNITUDES.sure_voltages
+    if section == "time":
+        sizes = {unit: 1.0 / max(step, 1e-300) for unit, step in sizes.items()}
+        likely, sure = MAGNITUDES.rates, MAGNITUDES.sure_rates
     unit = next((unit for unit in sizes if within(sizes[unit], likely)), next(iter(sizes)))
     return unit, within(sizes[unit], sure)
 
 
 def time_doubt(step: float) -> str:
     """Return what a median step (s) says against its unit, or nothing."""
-    unit, is_sure = time_unit(step)
+    unit, is_sure = likely_unit("time", step)
     if unit == "s" or not is_sure:
         return ""
     return (

@@ -25,7 +25,7 @@ from ..motion.smoothing import CUTOFFS, low_pass, runs_of, unbroken
 from .evidence import Evidence, departures
 from .excerpt import excerpt
 from .flight_log import FlightLog
-from .flight_phases import flying, usual_thrust
+from .flight_phases import carrying, flying
 from .inertial import INERTIAL, gravity_doubt, is_stuck
 from .magnitudes import MAGNITUDES, rotor_doubt, thrust_by_weight, time_doubt, within
 from .readings import Reading
@@ -137,13 +137,20 @@ def _screened(
 
     hear(_channels(log, vehicle, by_imu))
     hear(_rotors(log, vehicle, by_imu))
-    log = _without_racing(log, vehicle)
+    above = log.rotor_speeds > _most_rad_s(log, vehicle)
+    if above.any():
+        speeds = log.rotor_speeds.copy()
+        for column, bad in zip(speeds.T, above.T, strict=True):
+            column[bad] = np.interp(log.t[bad], log.t[~bad], column[~bad])
+        log = replace(log, rotor_speeds=speeds)
     if by_imu:
         hear(_imu(log, vehicle, least or 0.0))
     else:
         if least is not None:  # a filter predicts over steps of any length
             hear(_uneven_steps(log))
-        same = _repeated(log)
+        seen, same = np.flatnonzero(log.valid), np.zeros(len(log.t), np.bool_)
+        pose = np.column_stack([log.position, log.quaternion])[seen]
+        same[seen[1:]] = np.all(pose[1:] == pose[:-1], axis=1)
         hear(_held_pose(log, same))
         log = replace(log, valid=log.valid & ~same)
         hear(_pose_rate(log))
@@ -217,7 +224,9 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
     if doubt := time_doubt(float(np.median(np.diff(times)))):
         yield Refused(doubt)
     for i, column in enumerate(speeds.T):
-        if stopped := stretches((column == 0.0) & _carrying(log), log.t, _STOPPED):
+        if stopped := stretches(
+            (column == 0.0) & carrying(np.square(speeds).max(axis=1)), log.t, _STOPPED
+        ):
             yield Fault(f"omega{i + 1} {zero}, for {stopped}; {all_four}")
     most = _most_rad_s(log, vehicle)
     if (above := np.argwhere(speeds > most)).size:
@@ -237,17 +246,6 @@ def _most_rad_s(log: FlightLog, vehicle: Vehicle) -> float:
     """Return a rotor speed in rad/s that no rotor reaches."""
     middle = float(np.median(log.rotor_speeds[log.rotor_speeds.max(axis=1) > 0.0]))
     return min(_ABOVE_MOST * vehicle.omega_max, _BEYOND * max(middle, vehicle.hover_rate))
-
-
-def _without_racing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
-    """Return a log whose rotor speeds are interpolated where no rotor reaches them."""
-    above = log.rotor_speeds > _most_rad_s(log, vehicle)
-    if not above.any():
-        return log
-    speeds = log.rotor_speeds.copy()
-    for column, bad in zip(speeds.T, above.T, strict=True):
-        column[bad] = np.interp(log.t[bad], log.t[~bad], column[~bad])
-    return replace(log, rotor_speeds=speeds)
 
 
 def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
@@ -285,21 +283,13 @@ def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
         yield Refused(f"ax, ay, az {doubt}")
 
 
-def _repeated(log: FlightLog) -> Mask:
-    """Return in which rows (N,) a pose is the one before, to the last digit."""
-    seen = np.flatnonzero(log.valid)
-    pose = np.column_stack([log.position, log.quaternion])[seen]
-    same: Mask = np.zeros(len(log.t), np.bool_)
-    same[seen[1:]] = np.all(pose[1:] == pose[:-1], axis=1)
-    return same
-
-
 def _held_pose(log: FlightLog, same: Mask) -> Findings:
-    """Check that the pose changes; ``same`` (N,) as of ``_repeated``."""
+    """Check that the pose changes; ``same`` (N,): the pose is the one before, to the last digit."""
     seen = np.flatnonzero(log.valid)
     if log.t[seen[-1]] - log.t[seen[0]] > _NEVER and np.all(same[seen[1:]]):
         yield Refused("the pose never changes, to the last digit; expected the poses of a flight")
-    if held := stretches((same & _carrying(log))[seen], log.t[seen], _HELD):
+    fastest = np.square(log.rotor_speeds).max(axis=1)
+    if held := stretches((same & carrying(fastest))[seen], log.t[seen], _HELD):
         yield Note(
             f"warning: the pose is frozen for {held}: it repeats to the last digit while the "
             "rotors turn. These rows count as without a pose"
@@ -368,9 +358,8 @@ def _length(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
     """Check that enough is left in unbroken runs in flight, and note where much is not."""
     thrust = np.square(log.rotor_speeds) @ vehicle.k
     thrust = low_pass(thrust, CUTOFFS.flying_hz, log.period)
-    aloft = thrust > 0.5 * usual_thrust(thrust)
     step = np.minimum(np.diff(log.t, append=log.t[-1] + log.period), max(0.1, 3.5 * log.period))
-    step = np.where(aloft, step, 0.0)
+    step = np.where(carrying(thrust), step, 0.0)
     pieces = _pieces(log)
     left = sum(float(step[piece[0] : piece[-1] + 1].sum()) for piece in pieces)
     whole, runs = float(step.sum()), len(runs_of(~log.valid))
@@ -381,12 +370,6 @@ def _length(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
         yield Refused(f"{words}; expected at least {least:g} s")
     if left < (1.0 - _LOST_SHARE) * whole:
         yield Note(words)
-
-
-def _carrying(log: FlightLog) -> Mask:
-    """Return in which rows (N,) the fastest rotors turn as in flight."""
-    fastest = np.square(log.rotor_speeds).max(axis=1)
-    return np.asarray(fastest > 0.5 * usual_thrust(fastest))
 
 
 def _jumps(t: Array, position: Array, way: Array, angle: Array) -> Findings:

@@ -158,34 +158,35 @@ def outputs_of(
         functions = [int(parameters.get(f"{prefix}{i + 1}", 0.0)) for i in range(_OUTPUTS)]
         if found := slots_of_motors(functions, MOTOR1):
             bank, slots = name, found
+    used = next((fields for fields in sent if _of_motors(fields, slots) is not None), None)
+    if used is None:
+        return _range(path, parameters, bank, slots, np.zeros((0, 4))), None
     names = [f"output[{i}]" for i in range(_OUTPUTS)]
-    tables = [np.column_stack([fields[n] for n in names if n in fields]) for fields in sent]
-    # where all outputs of motors change: no servos, and no bank that is not in use
-    tables = [x for x in tables if x.shape[1] > max(slots) and _move(x[:, slots])]
-    motors = tables[0][:, slots] if tables else np.zeros((0, 4))
-    outputs = _range(path, parameters, bank, slots, motors)
-    if not tables:
-        return outputs, None
-    return outputs, running(tables[0], slots, float(outputs.low.min()), float(outputs.high.max()))
-
-
-def _move(outputs: Array) -> bool:
-    """Return whether all outputs (N, 4) change."""
-    return bool(np.all(np.ptp(np.nan_to_num(outputs), axis=0) > 0.0))
+    table = np.column_stack([used[name] for name in names if name in used])
+    outputs = _range(path, parameters, bank, slots, table[:, slots])
+    return outputs, running(table, slots, float(outputs.low.min()), float(outputs.high.max()))
 
 
 def shares_of_motors(columns: Mapping[str, Array], outputs: Outputs) -> dict[str, Array]:
     """Return what was sent to motors 1 to 4 (N,) as 0 to 1, in their order; nothing, where one of
     the outputs never changes.
     """
-    names = [f"output[{slot}]" for slot in outputs.slots]
-    if not set(names) <= set(columns):
-        return {}
-    sent = np.nan_to_num(np.column_stack([columns[name] for name in names]), nan=0.0)
-    if not _move(sent):
+    sent = _of_motors(columns, outputs.slots)
+    if sent is None:
         return {}
     shares = np.clip((sent - outputs.low) / (outputs.high - outputs.low), 0.0, 1.0)
     return {f"output[{motor}]": share for motor, share in enumerate(shares.T)}
+
+
+def _of_motors(columns: Mapping[str, Array], slots: Sequence[int]) -> Array | None:
+    """Return what was sent to the outputs of the motors (N, 4); None where one of them is not there
+    or never changes: that of a servo, or of a bank that is not in use.
+    """
+    names = [f"output[{slot}]" for slot in slots]
+    if not set(names) <= set(columns):
+        return None
+    sent = np.nan_to_num(np.column_stack([columns[name] for name in names]))
+    return sent if np.all(np.ptp(sent, axis=0) > 0.0) else None
 
 
 def _range(
@@ -201,10 +202,14 @@ def _range(
     most = float(np.nanmax(motors)) if np.isfinite(motors).any() else 0.0
     turning = motors[motors > 0.5 * most]  # not what stops them
     usual = float(np.median(turning)) if turning.size else _LEAST_PULSE
-    lows, highs = (
-        _ends(parameters, bank, slots, end, default)
-        for end, default in (("MIN", 1000.0), ("MAX", 2000.0))
-    )
+
+    def pulses(end: str, default: float) -> Array:
+        """Return one end (4,) of the outputs' ranges of pulses, us."""
+        names = [(f"PWM_{bank}_{end}{s + 1}", f"PWM_{bank}_{end}", f"PWM_{end}") for s in slots]
+        given = ([parameters.get(name, 0.0) for name in one] for one in names)
+        return np.array([next((x for x in one if x > 0.0), default) for one in given])
+
+    lows, highs = pulses("MIN", 1000.0), pulses("MAX", 2000.0)
     # a bus for sensors alone leaves the motors to pulses, which stay long when they stand still
     has_bus = parameters.get("UAVCAN_ENABLE", 0.0) >= 3.0 and bool(np.any(motors < _LEAST_PULSE))
     timers = [parameters.get(f"PWM_{bank}_TIM{i}", 0.0) for i in range(_OUTPUTS)]
@@ -231,10 +236,3 @@ def _range(
     why = "as parameters state" if stated else "since no pulses are like that"
     words = f"{protocol}, {low:g} to {high:g}, {why}"
     return Outputs(slots, np.full(4, low), np.full(4, high), words)
-
-
-def _ends(parameters: Parameters, bank: str, slots: list[int], end: str, default: float) -> Array:
-    """Return one end (4,) of the outputs' ranges of pulses, us."""
-    names = [(f"PWM_{bank}_{end}{s + 1}", f"PWM_{bank}_{end}", f"PWM_{end}") for s in slots]
-    given = [[parameters.get(name, 0.0) for name in one] for one in names]
-    return np.array([next((x for x in one if x > 0.0), default) for one in given])

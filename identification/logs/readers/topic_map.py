@@ -120,10 +120,10 @@ def topic_map(path: Path, option: str) -> tuple[dict[str, Setting], str]:
         if part not in KEYS:
             raise unknown_name("key", str(part), KEYS, str(file))
         where, given = f"{file}: {part}", {"topic": value} if isinstance(value, str) else value
-        for key in given if isinstance(given, dict) else ():
+        settings[part] = found = checked(Setting, given, where, ", ".join(KEYS[part]))
+        for key in given:
             if key not in KEYS[part]:
                 raise unknown_name("key", str(key), KEYS[part], where)
-        settings[part] = found = checked(Setting, given, where, ", ".join(KEYS[part]))
         if found.unit and found.unit not in UNITS[part]:
             raise unknown_name("unit", found.unit, UNITS[part], where)
     return settings, str(file)
@@ -275,6 +275,10 @@ def _topic(
     Raises:
         InputError: it is not there, is of a type that cannot be the part, or several may be it.
     """
+
+    def named_by(topic: str, words: str) -> bool:
+        return any(word in topic.lower() for word in stated()[words])
+
     named = setting.topic
     if named and named not in types:
         raise unknown_name("topic", named, types, f"{path}: {part} (named in {where})")
@@ -282,11 +286,11 @@ def _topic(
     fitting = [kind for kind in kinds(part) if kind not in stated()["arrays"] or setting.unit]
     several = sorted(topic for topic, kind in types.items() if kind in fitting)
     if part in ("pose", "rotors"):
-        flown = [topic for topic in several if not _has_word(topic, "setpoint_words")]
+        flown = [topic for topic in several if not named_by(topic, "setpoint_words")]
         several = flown or (several if part == "rotors" else [])
     found = [named] if named else several
     if part == "pose" and len(found) > 1:
-        measured = [topic for topic in several if _has_word(topic, "measured_words")]
+        measured = [topic for topic in several if named_by(topic, "measured_words")]
         found = measured if len(measured) == 1 else several
     elif part == "imu" and len(found) > 1:
         found = [t for t in several if not t.endswith("_raw")] or several
@@ -301,10 +305,6 @@ def _topic(
     why = f", chosen by its name before {', '.join(others)}; a topic map says another"
     places = str(path), where
     return topic_of(part, found[0], types[found[0]], setting, places, why if others else "")
-
-
-def _has_word(topic: str, words: str) -> bool:
-    return any(word in topic.lower() for word in stated()[words])
 
 
 def _missing(path: Path, types: Mapping[str, str], part: str, where: str) -> InputError:
