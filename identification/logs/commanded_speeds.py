@@ -88,15 +88,15 @@ def _speeds(
             "motor_curve; state it to turn commands into thrust"
         ]
     scale = _scale(log, total, felt, vehicle)
-    balance = "the mean vertical thrust in flight is the weight of "
-    balance += f"{vehicle.name} ({vehicle.weight:.4g} N)"
-    if felt is not None:
-        balance = (
-            f"the thrust in flight is, on the median, the mass of {vehicle.name} "
-            f"({vehicle.mass:.4g} kg) times the accelerometer along the rotors' axis"
-        )
     if scale is None:
         return None, [f"no rotor speeds: the motor commands are 0 wherever there is {where}"]
+    balance = (
+        f"the mean vertical thrust in flight is the weight of {vehicle.name} ({vehicle.weight:.4g} "
+        "N)"
+        if felt is None
+        else f"the thrust in flight is, on the median, the mass of {vehicle.name} "
+        f"({vehicle.mass:.4g} kg) times the accelerometer along the rotors' axis"
+    )
     return np.sqrt(scale * relative / vehicle.k), [
         "thrust model: no rotor speeds in the log; the relative thrust of a motor command u is "
         f"assumed to be {_words(model)}, and its unknown scale is set so that {balance}: "

@@ -135,23 +135,21 @@ def check_magnitudes(log: FlightLog) -> None:
     step = np.diff(log.t)
     if not len(step):
         return
+    where, longest = f"{log.source}: column", int(np.argmax(step))
     if not log.period >= MAGNITUDES.shortest_period:
         raise InputError(
-            f"{log.source}: column t: the median time step is {log.period:.3g} s; expected at "
-            f"least {MAGNITUDES.shortest_period:g} s"
+            f"{where} t: the median time step is {log.period:.3g} s; expected at least "
+            f"{MAGNITUDES.shortest_period:g} s"
         )
-    longest = int(np.argmax(step))
     if not step[longest] <= MAGNITUDES.longest_step:
         raise InputError(
-            f"{log.source}: column t, row {longest + 2}: {step[longest]:.3g} s after the row "
-            f"before; expected at most {MAGNITUDES.longest_step:g} s"
+            f"{where} t, row {longest + 2}: {step[longest]:.3g} s after the row before; expected "
+            f"at most {MAGNITUDES.longest_step:g} s"
         )
     for names, values in parts_of(log)[1:]:
         values = values.reshape(len(log.t), -1)
-        beyond = np.argwhere(np.abs(values) > MAGNITUDES.largest)  # False where NaN
-        if beyond.size:
-            row, column = beyond[0]
+        for row, column in np.argwhere(np.abs(values) > MAGNITUDES.largest)[:1]:  # False where NaN
             raise InputError(
-                f"{log.source}: column {names[column]}, row {row + 1}: "
-                f"{values[row, column]:.3g}; expected a number within {MAGNITUDES.largest:g}"
+                f"{where} {names[column]}, row {row + 1}: {values[row, column]:.3g}; expected a "
+                f"number within {MAGNITUDES.largest:g}"
             )

@@ -244,25 +244,24 @@ class _Guessing:
             lack("time", "time", 1, why, "column")
         pose, imu, has = ("position", "attitude"), ("accelerometer", "gyro"), set(self.sections)
         if "position" not in has and not has.issuperset(imu):
-            firsts = {part: self.ranked[part][0] for part in pose if self.ranked.get(part)}
-            firsts = {part: first for part, first in firsts.items() if first.score > 0.0}
+            likely = {p: c[0] for p in pose if (c := self.ranked.get(p)) and c[0].score > 0.0}
             # what is nearest to be whole: half a pose, half an IMU, else a pose
-            for part in pose if firsts or not has.intersection(imu) else imu:
-                if part not in has and part not in firsts:
+            for part in pose if likely or not has.intersection(imu) else imu:
+                if part not in has and part not in likely:
                     why = f"no columns look like one (such as {_EXAMPLES[part]})"
                     lack(part, part, 4 if part == "attitude" else 3, why)
-            for part, first in firsts.items():
+            for part, first in likely.items():
                 self.say(part, "columns", False, first.why)
-                group, euler = first.group, "zyx" if len(first.group.columns) == 3 else ""
-                self.sections[part] = (
-                    Columns(group.columns, group.unit or "m")
-                    if part == "position"
-                    else Attitude(group.columns, euler and (group.unit or "rad"), euler=euler)
-                )
+                columns, unit = first.group.columns, first.group.unit
+                made: Columns = Columns(columns, unit or "m")
+                if part == "attitude":
+                    euler = "zyx" if len(columns) == 3 else ""
+                    made = Attitude(columns, euler and (unit or "rad"), euler=euler)
+                self.sections[part] = made
         for part in self.further:
             why = rotors_said(self.parts[part].columns, self.further[part])
             lack(part, "rotors", 4, why)
-        if "rotors" not in self.sections and "commands" not in self.sections and not self.further:
+        if not {"rotors", "commands"} & set(self.sections) and not self.further:
             why = "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
             lack("motors", "rotors", 4, why)
         return out

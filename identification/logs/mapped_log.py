@@ -178,7 +178,7 @@ def _pose(
         turned: of the attitude; None: there is none.
 
     Raises:
-        InputError: a quaternion is none, or no position has an attitude.
+        InputError: a quaternion's length is not 1, or no position has an attitude.
     """
     place, turn, notes = log_map.position, log_map.attitude, []
     assert place is not None
@@ -204,7 +204,21 @@ def _pose(
     if turn is None or turned is None:
         pose[:, :3] = position
         return Stream(place.label, t, pose), notes
-    attitude = _attitude(path, log_map, turn, turned)
+    measured = turned.cut(turned.there(turn))
+    turns = quaternions(turn, measured.values(turn))
+    with np.errstate(over="ignore"):
+        length = np.linalg.norm(turns, axis=1)
+    there = length > (-1.0 if log_map.rows == "whole" else NO_QUATERNION)
+    off = np.flatnonzero(there & ~(np.abs(length - 1.0) <= NORM_TOLERANCE))
+    if off.size:
+        what = turn.topic or f"columns {', '.join(turn.columns)}"
+        raise InputError(
+            f"{path}: {what}, {measured.place(off[0])}: a quaternion of length "
+            f"{length[off[0]]:.4g}; expected 1 within {NORM_TOLERANCE:g}"
+        )
+    if there.any():
+        turns = in_kit_axes(log_map, turn, turns[there])
+    attitude = Stream(turn.label, measured.t[there], turns)
     steps = np.diff(attitude.t)
     longest = max(_ATTITUDE_GAP, LONGEST_STEPS * float(np.median(steps))) if len(steps) else 0.0
     pose[placed] = np.column_stack([position[placed], slerp(t[placed], attitude, longest)])
@@ -226,30 +240,6 @@ def _pose(
                 f"{name[1:]}: forces along the axis that it tilts are wrong by as much"
             )
     return Stream(place.label, t, pose), notes
-
-
-def _attitude(path: Path, log_map: LogMap, part: Attitude, samples: Samples) -> Stream:
-    """Return the attitudes (N, 4) that were measured, in the kit's frames.
-
-    Raises:
-        InputError: a quaternion's length is not 1.
-    """
-    samples = samples.cut(samples.there(part))
-    turns = quaternions(part, samples.values(part))
-    with np.errstate(over="ignore"):
-        length = np.linalg.norm(turns, axis=1)
-    there = length > (-1.0 if log_map.rows == "whole" else NO_QUATERNION)
-    off = np.flatnonzero(there & ~(np.abs(length - 1.0) <= NORM_TOLERANCE))
-    if off.size:
-        what = part.topic or f"columns {', '.join(part.columns)}"
-        raise InputError(
-            f"{path}: {what}, {samples.place(off[0])}: a quaternion of length "
-            f"{length[off[0]]:.4g}; expected 1 within {NORM_TOLERANCE:g}"
-        )
-    raw = Stream(part.label, samples.t[there], turns[there])
-    if not len(raw.t):
-        return raw
-    return replace(raw, values=in_kit_axes(log_map, part, raw.values))
 
 
 def _kept_rows(samples: Samples, log_map: LogMap, part: Columns) -> Mask:

@@ -21,9 +21,9 @@ from .magnitudes import check_magnitudes, unit_doubts
 from .mapped_log import map_table
 from .readers import (
     find_reader,
-    looked_for_columns,
     reader_by_columns,
     reader_by_content,
+    table_readers,
     unknown_content,
 )
 from .table import Table
@@ -133,26 +133,20 @@ def _read(
     chosen = chosen or reader_by_columns(path, table.header)
     if chosen is not None:
         return chosen.read(table, vehicle=vehicle)
-    if (guessed := _certainly(table, vehicle)) is not None:
-        return guessed
+    from .map_guess import guess_map  # the guess is dear, and few logs need it
+
+    guess = guess_map(table, vehicle)
+    if not guess.missing and not guess.doubts:
+        log = map_table(table, guess.log_map, vehicle)
+        said = "columns: by a map that was guessed without a doubt; windwrench check shows it"
+        return replace(log, notes=(said, *log.notes))
+    known = ", ".join(f"{r.name} ({r.signature[0]} ...)" for r in table_readers())
     has_imu = {*ACCELEROMETER, *GYRO} <= set(table.header)
     needed = ("t", *ROTORS) if has_imu else REQUIRED
     missing = ", ".join(name for name in needed if name not in table.header)
     raise InputError(
         f"{path}: missing column(s) {missing}; expected {', '.join(REQUIRED)}, or the "
-        f"columns of {looked_for_columns()}, found {', '.join(table.header[:_SHOWN])}. A table of "
+        f"columns of {known}, found {', '.join(table.header[:_SHOWN])}. A table of "
         f"other columns is read with a map: windwrench check {path.name} --write-map map.yaml "
         "proposes one"
     )
-
-
-def _certainly(table: Table, vehicle: Vehicle | None) -> FlightLog | None:
-    """Return the log that a table of unknown columns holds, where a guess leaves no doubt."""
-    from .map_guess import guess_map  # the guess is dear, and few logs need it
-
-    guess = guess_map(table, vehicle)
-    if guess.missing or guess.doubts:
-        return None
-    log = map_table(table, guess.log_map, vehicle)
-    said = "columns: by a map that was guessed without a doubt; windwrench check shows it"
-    return replace(log, notes=(said, *log.notes))

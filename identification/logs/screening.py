@@ -31,7 +31,7 @@ from .magnitudes import MAGNITUDES, rotor_doubt, thrust_by_weight, time_doubt, w
 from .readings import Reading
 from .source_rates import MOTOR_RATES
 from .stuck_channels import stretches, stuck_notes
-from .table import Array, Mask, Rows
+from .table import Mask, Rows
 
 LEAST_SECONDS = 10.0  # of unbroken pose in flight
 _LEAST_PIECE = SIGNALS.shortest_piece  # s; a shorter piece is all edge to the filters
@@ -335,23 +335,39 @@ def _steps(log: FlightLog) -> Findings:
     does not jump.
     """
     seen = np.flatnonzero(log.valid)
-    step = np.diff(log.t[seen])
-    way = np.linalg.norm(np.diff(log.position[seen], axis=0), axis=1)
-    q = log.quaternion[seen]
+    t, position, q = log.t[seen], log.position[seen], log.quaternion[seen]
+    step = np.diff(t)
+    way = np.linalg.norm(np.diff(position, axis=0), axis=1)
     angle = 2.0 * np.arccos(np.clip(np.abs(np.sum(q[1:] * q[:-1], axis=1)), 0.0, 1.0))
     far, turned = way > _LEAP[0] + _LEAP[1] * step, angle > _TURN[0] + _TURN[1] * step
     leaps = far | turned
     if leaps.any():
-        i = int(np.argmax(leaps))
-        what = f"{way[i]:.3g} m" if far[i] else f"{np.degrees(angle[i]):.0f} degrees"
+        first = int(np.argmax(leaps))
+        what = f"{way[first]:.3g} m" if far[first] else f"{np.degrees(angle[first]):.0f} degrees"
         units = ": are px, py, pz in metres?" if far.mean() > 0.05 else ""
         kind = Refused if leaps.mean() > _MOST_LEAPS else Fault
         yield kind(
-            f"the pose leaps by {what} within {step[i]:.3g} s at t = {log.t[seen[i + 1]]:.6g} s, "
+            f"the pose leaps by {what} within {step[first]:.3g} s at t = {t[first + 1]:.6g} s, "
             f"which no quadrotor flies ({int(leaps.sum())} such step(s)){units}; expected poses of "
             "one vehicle on one clock: leave the bad rows' pose empty, or cut the log there"
         )
-    yield from _jumps(log.t[seen], log.position[seen], way, angle)
+    # two poses that follow one another as if no time had passed, by velocities over 10 on each side
+    span = 10
+    for i in np.flatnonzero(step > _JUMP):
+        a, b = i - span, i + 1 + span
+        if a < 0 or b >= len(t) or t[i] - t[a] > _JUMP or t[b] - t[i + 1] > _JUMP:
+            continue
+        before = (position[i] - position[a]) / (t[i] - t[a])
+        after = (position[b] - position[i + 1]) / (t[b] - t[i + 1])
+        speed = min(float(np.linalg.norm(before)), float(np.linalg.norm(after)))
+        is_alike = float(np.linalg.norm(after - before)) < 0.15 * speed + 0.05 and angle[i] < 0.05
+        if speed > _MOVING and is_alike and way[i] < _SAME * speed * 0.5 * float(step[i]):
+            yield Fault(
+                f"column t jumps by {step[i]:.3g} s at t = {t[i]:.6g} s, but the pose goes on from "
+                f"where it was ({1e3 * way[i]:.0f} mm on at {speed:.2g} m/s); expected one clock "
+                "for the whole log: set the clock's jump back, or cut the log there"
+            )
+            return
 
 
 def _length(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
@@ -370,31 +386,3 @@ def _length(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
         yield Refused(f"{words}; expected at least {least:g} s")
     if left < (1.0 - _LOST_SHARE) * whole:
         yield Note(words)
-
-
-def _jumps(t: Array, position: Array, way: Array, angle: Array) -> Findings:
-    """Find a long step in time between two poses that follow one another as if no time had passed.
-
-    Args:
-        t: (n,) s, of the poses.
-        position: (n, 3) m.
-        way: (n - 1,) m from each to the next.
-        angle: (n - 1,) rad, the same.
-    """
-    span = 10  # poses on either side, over which velocities are taken
-    step = np.diff(t)
-    for i in np.flatnonzero(step > _JUMP):
-        a, b = i - span, i + 1 + span
-        if a < 0 or b >= len(t) or t[i] - t[a] > _JUMP or t[b] - t[i + 1] > _JUMP:
-            continue
-        before = (position[i] - position[a]) / (t[i] - t[a])
-        after = (position[b] - position[i + 1]) / (t[b] - t[i + 1])
-        speed = min(float(np.linalg.norm(before)), float(np.linalg.norm(after)))
-        is_alike = float(np.linalg.norm(after - before)) < 0.15 * speed + 0.05 and angle[i] < 0.05
-        if speed > _MOVING and is_alike and way[i] < _SAME * speed * 0.5 * float(step[i]):
-            yield Fault(
-                f"column t jumps by {step[i]:.3g} s at t = {t[i]:.6g} s, but the pose goes on from "
-                f"where it was ({1e3 * way[i]:.0f} mm on at {speed:.2g} m/s); expected one clock "
-                "for the whole log: set the clock's jump back, or cut the log there"
-            )
-            return

@@ -131,16 +131,16 @@ class Recording:
         made, words = _cleaned(path, self.streams)
         notes = (*self.notes, *words)
         sensors = {name: made[name] for name in ("gyro", "accelerometer") if name in made}
-        of_motors = [name for name in _MOTORS if name in made]
-        motors = made[of_motors[0]].whole()
+        kind = next(name for name in _MOTORS if name in made)
+        motors = made[kind].whole()
         t, pose, words = _rows(path, made.get("position"), motors, [*sensors.values()])
         notes += words
         after = np.searchsorted(motors.t, t)  # rows lie within the motors' span
         steps = np.diff(motors.t)[after[motors.t[after] != t] - 1]
         if (longest := float(steps.max(initial=0.0))) > _ROTOR_GAP:
             notes += (
-                f"{motors.name}: up to {longest:.2g} s between messages; the "
-                f"{_MOTORS[of_motors[0]]} there are interpolated",
+                f"{motors.name}: up to {longest:.2g} s between messages; the {_MOTORS[kind]} there "
+                "are interpolated",
             )
         valid: Mask = np.asarray(np.isfinite(pose).all(axis=1))
         if np.isfinite(pose[:, 3:]).any():  # else positions without an attitude, which are kept
@@ -164,13 +164,11 @@ class Recording:
             first = times[np.argmin(valid)]
             notes += (f"{without} of {len(t)} rows without a pose, the first at t = {first:.6g} s",)
         log = FlightLog(
-            t=times,
-            position=pose[:, :3],
-            quaternion=pose[:, 3:],
-            rotor_speeds=speeds,
+            times,
+            pose[:, :3],
+            pose[:, 3:],
+            speeds,
             voltage=made["battery"].at(t)[:, 0] if "battery" in made else None,
-            accelerometer=measured.get("accelerometer"),
-            gyro=measured.get("gyro"),
             name=Path(path.name.removesuffix(".gz")).stem if path.is_file() else path.name,
             source=f"{path} (reader {reader})" if reader else str(path),
             notes=notes,
@@ -181,6 +179,7 @@ class Recording:
             vehicle=log_map.vehicle,
             flown=self.flown,
             rates={name: source_rate(s.t, s.values) for name, s in made.items()},
+            **measured,
             **truth,
         )
         return with_commanded_speeds(log, vehicle, log_map.commands)

@@ -152,18 +152,13 @@ def unknown_content(path: Path) -> InputError:
     )
 
 
-def _table_readers() -> list[Reader]:
-    """Return the readers of tables that are known by their columns."""
-    return [*map(find_reader, TABLES), READERS["betaflight_csv"]]
-
-
 def reader_by_columns(path: Path, header: Sequence[str]) -> Reader | None:
     """Return the reader whose columns a table has; None where it has those of none.
 
     Raises:
         InputError: it has those of several.
     """
-    found = [reader for reader in _table_readers() if set(header).issuperset(reader.signature)]
+    found = [reader for reader in table_readers() if set(header).issuperset(reader.signature)]
     if len(found) > 1:
         raise InputError(
             f"{path}: its columns are those of {' and of '.join(r.what for r in found)}; expected "
@@ -172,6 +167,6 @@ def reader_by_columns(path: Path, header: Sequence[str]) -> Reader | None:
     return found[0] if found else None
 
 
-def looked_for_columns() -> str:
-    """Return the words for the tables that are recognised, each with a column that tells it."""
-    return ", ".join(f"{r.name} ({r.signature[0]} ...)" for r in _table_readers())
+def table_readers() -> list[Reader]:
+    """Return the readers of tables that are known by their columns."""
+    return [*map(find_reader, TABLES), READERS["betaflight_csv"]]

@@ -32,7 +32,7 @@ so that nothing in a file decides what code runs; a bag whose definitions differ
 
 import os
 from array import array
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -246,14 +246,8 @@ def _decoded_topic(
         doubt = "its time stamps are of another clock than the bag's"
     times = received_at if doubt else sampled_at
     doubt = f"{topic.name}: {doubt}; the times of recording were taken" if doubt else ""
-    return times, columns, doubt, _running(every, topic)
-
-
-def _running(every: Sequence[Array], topic: Topic) -> int | None:
-    """Return how many of the elements of commands (K,) run as motors do; None where there are no
-    more than four, or not the same in each message.
-    """
-    if len({len(values) for values in every}) != 1 or len(every[0]) <= 4:
-        return None
-    motors = [element - 1 for element in topic.elements]
-    return running(np.array(every), motors, *topic.kind.range)
+    running_outputs = None
+    if len({len(one) for one in every}) == 1 and len(every[0]) > 4:
+        motors = [element - 1 for element in topic.elements]
+        running_outputs = running(np.array(every), motors, *topic.kind.range)
+    return times, columns, doubt, running_outputs
