@@ -103,7 +103,6 @@ class Missing:
 
     section: str
     field: str
-    count: int  # of columns
     why: str
     candidates: tuple[str, ...] = ()  # the likeliest first
 
@@ -235,13 +234,13 @@ class _Guessing:
         """Return what the map lacks for a flight log."""
         out = []
 
-        def lack(part: str, section: str, count: int, why: str, field: str = "columns") -> None:
+        def lack(part: str, section: str, why: str, field: str = "columns") -> None:
             found = self.ranked.get(part, [])[: PARTS.shown]
-            out.append(Missing(section, field, count, why, tuple(map(str, found))))
+            out.append(Missing(section, field, why, tuple(map(str, found))))
 
         if self.clock is None:
             why = "no column looks like a time; expected one such as t, time or timestamp"
-            lack("time", "time", 1, why, "column")
+            lack("time", "time", why, "column")
         pose, imu, has = ("position", "attitude"), ("accelerometer", "gyro"), set(self.sections)
         if "position" not in has and not has.issuperset(imu):
             likely = {p: c[0] for p in pose if (c := self.ranked.get(p)) and c[0].score > 0.0}
@@ -249,7 +248,7 @@ class _Guessing:
             for part in pose if likely or not has.intersection(imu) else imu:
                 if part not in has and part not in likely:
                     why = f"no columns look like one (such as {_EXAMPLES[part]})"
-                    lack(part, part, 4 if part == "attitude" else 3, why)
+                    lack(part, part, why)
             for part, first in likely.items():
                 self.say(part, "columns", False, first.why)
                 columns, unit = first.group.columns, first.group.unit
@@ -260,10 +259,10 @@ class _Guessing:
                 self.sections[part] = made
         for part in self.further:
             why = rotors_said(self.parts[part].columns, self.further[part])
-            lack(part, "rotors", 4, why)
+            lack(part, "rotors", why)
         if not {"rotors", "commands"} & set(self.sections) and not self.further:
             why = "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
-            lack("motors", "rotors", 4, why)
+            lack("motors", "rotors", why)
         return out
 
     def say(self, section: str, name: str, certain: bool, why: str) -> None:
@@ -566,8 +565,8 @@ def map_yaml(guess: Guess) -> str:
     if guess.missing:
         lines.append(f"# {UNKNOWN}: choose, and write it here. Still missing: {guess.lacks}")
     for lack in guess.missing:
-        several = lack.field == "columns"
-        sections[lack.section] = {lack.field: [UNKNOWN] * lack.count if several else UNKNOWN}
+        several = [UNKNOWN] * (4 if lack.section in ("attitude", "rotors") else 3)
+        sections[lack.section] = {lack.field: several if lack.field == "columns" else UNKNOWN}
     for name, value in sections.items():
         for r in (r for r in guess.reasons if r.section == name):
             mark = "certain" if r.certain else "GUESS"

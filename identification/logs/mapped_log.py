@@ -313,11 +313,6 @@ def fitted(table: Table, log_map: LogMap, vehicle: Vehicle | None, reader: str) 
         else:
             whose = f"{section} (all or none)" if part.optional else section
             missing += [(name, whose) for name in absent]
-    if missing and reader:
-        names = ", ".join(name for name, _ in missing)
-        raise InputError(
-            f"{table.path}: missing column(s) {names}; expected those of {log_map.about}"
-        )
     if missing:
         lower, parts = {name.lower(): name for name in table.header}, []
         for name, section in missing[:8]:

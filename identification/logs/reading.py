@@ -132,6 +132,10 @@ def _read(
         return map_table(table, load_map(OWN_MAP), vehicle)
     chosen = chosen or reader_by_columns(path, table.header)
     if chosen is not None:
+        if missing := [name for name in chosen.signature if name not in table.header]:
+            raise InputError(
+                f"{path}: missing column(s) {', '.join(missing)}; expected those of {chosen.what}"
+            )
         return chosen.read(table, vehicle=vehicle)
     from .map_guess import guess_map  # the guess is dear, and few logs need it
 
@@ -143,9 +147,9 @@ def _read(
     known = ", ".join(f"{r.name} ({r.signature[0]} ...)" for r in table_readers())
     has_imu = {*ACCELEROMETER, *GYRO} <= set(table.header)
     needed = ("t", *ROTORS) if has_imu else REQUIRED
-    missing = ", ".join(name for name in needed if name not in table.header)
+    missing = [name for name in needed if name not in table.header]
     raise InputError(
-        f"{path}: missing column(s) {missing}; expected {', '.join(REQUIRED)}, or the "
+        f"{path}: missing column(s) {', '.join(missing)}; expected {', '.join(REQUIRED)}, or the "
         f"columns of {known}, found {', '.join(table.header[:_SHOWN])}. A table of "
         f"other columns is read with a map: windwrench check {path.name} --write-map map.yaml "
         "proposes one"

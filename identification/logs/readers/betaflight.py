@@ -63,14 +63,9 @@ def read_table(table: Table, vehicle: Vehicle | None = None, option: str = "") -
     """Read a table of blackbox_decode; ``option``: number of the motors' magnet poles, for eRPM.
 
     Raises:
-        InputError: the table lacks a column.
+        InputError: the numbers are none of a blackbox.
     """
     path = table.path
-    missing = [name for name in SIGNATURE if name not in table.header]
-    if missing:
-        raise InputError(
-            f"{path}: missing column(s) {', '.join(missing)}; expected those of blackbox_decode"
-        )
     wanted = {*recording_map("betaflight").wanted, *_MORE_MOTORS}
     scales, names = {}, {"time": "time (us)"}
     for name in table.header:

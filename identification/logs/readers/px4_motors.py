@@ -56,26 +56,21 @@ def what_flew(parameters: Parameters, statuses: Sequence[Mapping[str, Array]]) -
         statuses: of the topic vehicle_status.
     """
     known = airframes()
-    count = int(parameters.get("CA_ROTOR_COUNT", 0)) or None
-    by_count = "parameter CA_ROTOR_COUNT" if count else ""
-    frame, start = int(parameters.get("CA_AIRFRAME", 0)), int(parameters.get("SYS_AUTOSTART", 0))
+    count, frame, kind, start = (
+        int(parameters.get(name, 0))
+        for name in ("CA_ROTOR_COUNT", "CA_AIRFRAME", "MAV_TYPE", "SYS_AUTOSTART")
+    )
     if frame in known["px4_airframe"]:
         return WhatFlew(known["px4_airframe"][frame], f"parameter CA_AIRFRAME = {frame}")
     if any(np.any(fields.get("is_vtol", 0)) for fields in statuses):
         return WhatFlew("a VTOL plane", "vehicle_status.is_vtol")
-    kinds = [("parameter MAV_TYPE", int(parameters.get("MAV_TYPE", 0)))]
-    kinds += [
-        ("vehicle_status.system_type", int(fields["system_type"][-1]))
-        for fields in statuses
-        if "system_type" in fields and len(fields["system_type"])
-    ]
-    for by, kind in kinds:
-        if kind in known["mav_type"]:
-            return WhatFlew(known["mav_type"][kind], by_count or f"{by} = {kind}", count)
-    if start // 1000 in known["px4_start"]:
-        by = by_count or f"parameter SYS_AUTOSTART = {start}"
-        return WhatFlew(known["px4_start"][start // 1000], by, count)
-    return WhatFlew(QUADROTOR if count == 4 else "", by_count, count)
+    claims = [("mav_type", kind, f"parameter MAV_TYPE = {kind}")]
+    for kind in (int(x) for fields in statuses for x in fields.get("system_type", ())[-1:]):
+        claims.append(("mav_type", kind, f"vehicle_status.system_type = {kind}"))
+    claims.append(("px4_start", start // 1000, f"parameter SYS_AUTOSTART = {start}"))
+    said = ((known[table][key], by) for table, key, by in claims if key in known[table])
+    airframe, by = next(said, (QUADROTOR if count == 4 else "", ""))
+    return WhatFlew(airframe, "parameter CA_ROTOR_COUNT" if count else by, count or None)
 
 
 def motor_order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> tuple[Order, str]:

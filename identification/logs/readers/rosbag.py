@@ -74,14 +74,13 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
             ambiguous or of another type, or a message cannot be used.
     """
     settings, where = topic_map(path, option)
-    times: dict[str, NDArray[np.int64]] = {}
-    flown = UNSTATED
-    columns: dict[str, dict[str, Array]] = {}
+    flown, decoded = UNSTATED, []
     with _opened(path) as (types, messages):
         topics, doubts = chosen_topics(path, types, settings, where)
         for part, topic in list(topics.items()):
             try:
-                times[part], columns[part], doubt, count = _decoded_topic(path, topic, messages)
+                times, columns, doubt, count = _decoded_topic(path, topic, messages)
+                decoded.append((times, columns, topic.name))
                 doubts += [doubt] if doubt else []
                 flown = flown if count is None else WhatFlew(running=count)
             except InputError as error:
@@ -92,10 +91,10 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
     if not topics:
         raise InputError(f"{path}: {doubts[0] if doubts else 'nothing in it can be read'}")
     notes = [note for topic in topics.values() for note in _notes(topic, types[topic.name])]
-    origin = min(int(nanoseconds[0]) for nanoseconds in times.values())
+    origin = min(int(times[0]) for times, _, _ in decoded)
     recorded = [
-        Samples(_NANOSECOND * (times[part] - origin).astype(float), columns[part], topic.name)
-        for part, topic in topics.items()
+        Samples(_NANOSECOND * (times - origin).astype(float), columns, name)
+        for times, columns, name in decoded
     ]
     found = recording_of(path, recorded, joined(topics), "rosbag", (*notes, *doubts), flown=flown)
     return found.log(vehicle)
