@@ -54,6 +54,7 @@ def read(
         InputError: the file cannot be read, is no blackbox, is damaged from its start, or has no
             motors or inertial sensors.
     """
+    _magnet_poles(path, option, "")  # a wrong option is said before a wrong file
     wanted = [*recording_map("betaflight").wanted, *_MORE_MOTORS]
     headers, fields, notes = read_blackbox(path, wanted, piece)
     return _log(path, "betaflight", fields, set(), headers, option, vehicle, notes)
