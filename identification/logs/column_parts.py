@@ -17,7 +17,6 @@ from itertools import takewhile
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from ..motion.smoothing import resampled
 from .column_names import Group, Name, groups_of, named_alone, side_by_side, words
 from .log_map import UNITS
 from .magnitudes import MAGNITUDES, within
@@ -54,6 +53,11 @@ PARTS = PartSettings()
 def correlation(x: Array, y: Array) -> float:
     """Return the correlation of two series (n,); 0 where one is constant."""
     return float(np.nan_to_num(np.corrcoef(x, y)[0, 1]))
+
+
+def resampled(t: Array, times: Array, values: Array) -> Array:
+    """Return values (m, k) of times (m,) at times (n,), on the lines between them."""
+    return np.column_stack([np.interp(t, times, x) for x in values.T])
 
 
 class Numbers:
