@@ -48,10 +48,15 @@ def on_one_clock(
         InputError: there is no such piece.
     """
     notes: list[str] = []
-    rolled = [_unrolled(samples.t) for samples in recorded]
-    if any(over for _, over in rolled):
+    over = [np.abs(np.diff(s.t) + CLOCK.rollover) < CLOCK.jitter for s in recorded]
+    if any(map(np.any, over)):
         notes.append("the clock of 32 bits rolled over in the log; later times go on behind it")
-    groups = [replace(s, t=t) for s, (t, _) in zip(recorded, rolled, strict=True)]
+    groups = [
+        replace(s, t=s.t + CLOCK.rollover * np.append(0, np.cumsum(x))[: len(s.t)])
+        if x.any()
+        else s
+        for s, x in zip(recorded, over, strict=True)
+    ]
     groups, said = _of_piece(path, groups, piece)
     notes += said
     out = []
@@ -67,14 +72,6 @@ def on_one_clock(
             )
         out.append(samples if left == 0 and late == 0 else samples.cut(rows))
     return out, list(dict.fromkeys(notes))
-
-
-def _unrolled(t: Array) -> tuple[Array, bool]:
-    """Return times (N,) that go on where a counter of 32 bits rolled over, and whether it did."""
-    over = np.abs(np.diff(t) + CLOCK.rollover) < CLOCK.jitter
-    if not over.any():
-        return t, False
-    return t + CLOCK.rollover * np.concatenate([[0], np.cumsum(over)]), True
 
 
 def _of_piece(
@@ -141,7 +138,11 @@ def in_order(t: Array) -> tuple[Rows, int]:
     its time is, if a row is missing there. All others have a wrong time, or one that was there.
     """
     increases = len(t) < 2 or bool(np.all(np.diff(t) > 0.0))
-    rows = _without_lonely_ends(t, np.arange(len(t)) if increases else _longest_increase(t))
+    rows: Rows = np.arange(len(t)) if increases else _longest_increase(t)
+    if len(rows) > 3:  # a first or a last one far off all others is left out
+        steps = np.diff(t[rows])
+        far = max(CLOCK.alone * float(np.median(steps)), CLOCK.jitter)
+        rows = rows[int(steps[0] > far) : len(rows) - int(steps[-1] > far)]
     if increases:
         return rows, 0
     others: Mask = np.ones(len(t), dtype=np.bool_)
@@ -156,16 +157,6 @@ def in_order(t: Array) -> tuple[Rows, int]:
     late = late[(steps[after - 1] > hole) & (t[rows[after]] != t[late])]
     together = np.concatenate([rows, late])
     return together[np.argsort(t[together], kind="stable")], len(late)
-
-
-def _without_lonely_ends(t: Array, rows: Rows) -> Rows:
-    """Return rows of increasing times without a first or a last one far off all others."""
-    if len(rows) < 4:
-        return rows
-    far = max(CLOCK.alone * float(np.median(np.diff(t[rows]))), CLOCK.jitter)
-    first = int(t[rows[1]] - t[rows[0]] > far)
-    last = int(t[rows[-1]] - t[rows[-2]] > far)
-    return rows[first : len(rows) - last]
 
 
 def _longest_increase(t: Array) -> Rows:

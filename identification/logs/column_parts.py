@@ -3,7 +3,7 @@ their names, which may be anyone's.
 
 A quaternion has length 1. An accelerometer reads gravity, 9.81 m/s2 or 1 g. The size of a gyro is
 that of the attitude's rate, and the horizontal acceleration of a position follows the tilt, in
-whatever frames; the rate of a position stands in the columns of a velocity. Rotors or commands are
+whatever frames. Rotors or commands are
 four columns of one size that move together with the specific force. Columns whose names say nothing
 are looked at by threes and fours that stand side by side.
 """
@@ -12,6 +12,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import takewhile
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -40,7 +41,6 @@ class PartSettings:
     follows: float = 0.7  # correlation from which on one follows the other
     same_size: float = 1.3  # up to which rates in one unit are of one size
     alike: float = 1.6  # ratio of medians of four rotors
-    is_rate: float = 0.9  # the same, of a rate that a column states
     felt: float = 0.5  # correlation of rotors with the specific force
     left: float = 0.5  # share of a further rotor's variance that the four leave, at most
     rotor_sizes: tuple[float, float] = (0.5, 2.0)  # of its median by theirs
@@ -53,6 +53,11 @@ PARTS = PartSettings()
 def correlation(x: Array, y: Array) -> float:
     """Return the correlation of two series (n,); 0 where one is constant."""
     return float(np.nan_to_num(np.corrcoef(x, y)[0, 1]))
+
+
+def resampled(t: Array, times: Array, values: Array) -> Array:
+    """Return values (m, k) of times (m,) at times (n,), on the lines between them."""
+    return np.column_stack([np.interp(t, times, x) for x in values.T])
 
 
 class Numbers:
@@ -96,9 +101,9 @@ class Numbers:
     def between(self, t: Array, columns: Sequence[str]) -> Array:
         """Return values (n, k) at times (n,), of lines between the rows."""
         times, values = self.rows(columns)
-        if not len(times):
-            return np.full((len(t), len(columns)), np.nan)
-        return np.column_stack([np.interp(t, times, x) for x in values.T])
+        return (
+            resampled(t, times, values) if len(times) else np.full((len(t), len(columns)), np.nan)
+        )
 
     def _bend(self, t: Array, columns: Sequence[str]) -> Array:
         """Return the second differences (n, k) around times (n,)."""
@@ -125,11 +130,10 @@ class Numbers:
         if len(t) < PARTS.fewest:
             return
         step = max(1, len(t) // PARTS.samples)
-        ends = np.searchsorted(t, t + PARTS.window)[::step]
+        ends = np.minimum(np.searchsorted(t, t + PARTS.window)[::step], len(t) - 1)
         begins = np.arange(len(t))[::step]
-        begins, ends = begins[ends < len(t)], ends[ends < len(t)]
-        apart = t[ends] - t[begins]
-        keep = (apart > 0.0) & (apart < 2.0 * PARTS.window)
+        keep = t[ends] - t[begins] < 2.0 * PARTS.window
+        keep &= t[ends] >= t[begins] + PARTS.window
         begins, ends = begins[keep], ends[keep]
         with np.errstate(invalid="ignore", divide="ignore"):
             q = q / np.linalg.norm(q, axis=1, keepdims=True)
@@ -145,18 +149,14 @@ class Numbers:
         if len(self.rate) < PARTS.fewest or len(t) < PARTS.fewest:
             return "", 0.0
         turned = cumulative_trapezoid(values - np.median(values, axis=0), t, axis=0, initial=0.0)
-        mean = [
-            (np.interp(self.ends, t, x) - np.interp(self.begins, t, x)) / (self.ends - self.begins)
-            for x in turned.T
-        ]
-        size = np.linalg.norm(mean, axis=0)
+        turned = resampled(self.ends, t, turned) - resampled(self.begins, t, turned)
+        size = np.linalg.norm(turned, axis=1) / (self.ends - self.begins)
         good = np.isfinite(size) & np.isfinite(self.rate)
         alike = correlation(size[good], self.rate[good])
         ratio = float(np.mean(size[good]) / max(float(np.mean(self.rate[good])), 1e-12))
         one = 1.0 / PARTS.same_size, PARTS.same_size
-        units = ("rad/s", "deg/s")
-        unit = next((unit for unit in units if within(ratio * UNITS["gyro"][unit], one)), "")
-        return (unit, alike) if alike > PARTS.follows else ("", 0.0)
+        units = (unit for unit in ("rad/s", "deg/s") if within(ratio * UNITS["gyro"][unit], one))
+        return (next(units, ""), alike) if alike > PARTS.follows else ("", 0.0)
 
     def gravity_unit(self, columns: Sequence[str]) -> tuple[str, float]:
         """Return the unit in which three columns have the size of gravity, and 1, or less where it
@@ -186,29 +186,6 @@ class Numbers:
                 found = [abs(correlation(f, d)) for f, d in zip(force.T, tilt, strict=False)]
                 best = max(best, min(found))
         return best if best > PARTS.follows else 0.0
-
-    @cached_property
-    def _series(self) -> tuple[list[str], Array]:
-        """The columns that change, and each at ``self.clock`` without its mean, of length 1."""
-        names = [name for name in self.data if len(self.rows([name])[0]) >= PARTS.fewest]
-        series = np.array([self.between(self.clock, [name])[:, 0] for name in names])
-        series -= series.mean(axis=1, keepdims=True) if len(names) else 0.0
-        size = np.linalg.norm(series, axis=1) if len(names) else np.empty(0)
-        moving = size > 0.0
-        names = [name for name, moves in zip(names, moving, strict=True) if moves]
-        return names, series[moving] / size[moving, None]
-
-    def has_rate(self, columns: Sequence[str]) -> bool:
-        """Return whether three columns have their rates in three others."""
-        names, series = self._series
-        if len(self.rows(columns)[0]) < PARTS.fewest or not names:
-            return False
-        ahead = self.between(self.clock + 0.5 * PARTS.window, columns)
-        speed = ahead - self.between(self.clock - 0.5 * PARTS.window, columns)
-        speed -= speed.mean(axis=0)
-        alike = series @ (speed / np.maximum(np.linalg.norm(speed, axis=0), 1e-300))
-        alike[[name in columns for name in names]] = 0.0
-        return bool(alike.max(axis=0).min() > PARTS.is_rate)
 
     def moves_together(self, columns: Sequence[str]) -> bool:
         """Return whether four columns are of one size and move with the specific force."""
@@ -258,16 +235,21 @@ class Candidate:
         return f"[{', '.join(self.group.columns)}] ({self.why})"
 
 
+def _named(group: Group, part: str = "") -> bool:
+    """Return whether the names of a group speak for a part, but ``part``."""
+    return any(
+        re.fullmatch(word, group.key)
+        for other, ways in words()["parts"].items()
+        for way in ways
+        if other != part and list(group.endings) in way["endings"]
+        for word in way["words"]
+    )
+
+
 def named_columns(names: Sequence[Name]) -> set[str]:
     """Return the columns whose names speak for a part."""
-    groups = [
-        group
-        for ways in words()["parts"].values()
-        for way in ways
-        for endings in way["endings"]
-        for group in groups_of(names, endings)
-        if _is_named(group, "")
-    ]
+    endings = [e for ways in words()["parts"].values() for way in ways for e in way["endings"]]
+    groups = [group for ending in endings for group in groups_of(names, ending) if _named(group)]
     alone = [name.column for part in ("time", "battery") for name in named_alone(names, part)]
     return {*alone, *(column for group in groups for column in group.columns)}
 
@@ -308,16 +290,16 @@ def _candidates(part: str, names: Sequence[Name], numbers: Numbers) -> Iterator[
     """Yield the candidates of a part, with a score by their names and numbers."""
     named = {column for way in _TRIPLES for g in groups_of(names, way) for column in g.columns}
     fours = (group for ending in _FOURS for group in groups_of(names, ending))
-    commanded = part == "motors" and any(_is_named(group, part) for group in fours)
+    commanded = part == "motors" and any(_named(group, part) for group in fours)
     for number, way in enumerate(words()["parts"][part]):
         for group in (group for endings in way["endings"] for group in groups_of(names, endings)):
-            i = _place_of(group.key, way["words"])
-            if i is None and (commanded or _is_named(group, part)):
+            places = (i for i, word in enumerate(way["words"]) if re.fullmatch(word, group.key))
+            by_name, why = -1.0, "their names go together"
+            if (i := next(places, None)) is not None:
+                by_name, why = PARTS.numbers - 0.3 * i - 0.5 * number, "by the columns' names"
+            elif commanded or _named(group, part):
                 continue
             named |= set(group.columns)
-            by_name, why = -1.0, "their names go together"
-            if i is not None:
-                by_name, why = PARTS.numbers - 0.3 * i - 0.5 * number, "by the columns' names"
             yield from _judged(part, group, by_name, why, numbers)
     width = 4 if part in ("attitude", "motors") else 3
     if part == "commands" or commanded:
@@ -325,20 +307,6 @@ def _candidates(part: str, names: Sequence[Name], numbers: Numbers) -> Iterator[
     loose = [name for name in names if name.column not in named and numbers.varies(name.column)]
     for group in side_by_side(loose, width):
         yield from (one for one in _judged(part, group, 0.0, "", numbers) if one.why)
-
-
-def _is_named(group: Group, part: str) -> bool:
-    """Return whether the names of a group speak for another part."""
-    return any(
-        _place_of(group.key, way["words"]) is not None
-        for other, ways in words()["parts"].items()
-        for way in ways
-        if other != part and list(group.endings) in way["endings"]
-    )
-
-
-def _place_of(key: str, patterns: Sequence[str]) -> int | None:
-    return next((i for i, word in enumerate(patterns) if re.fullmatch(word, key)), None)
 
 
 def _judged(
@@ -363,7 +331,6 @@ def _judged(
         unit, strength = numbers.gyro_unit(columns)
         strengths[f"they turn as the attitude does, in {unit}"] = strength if unit else 0.0
     elif part == "position":
-        strengths["their rates stand in other columns"] = float(numbers.has_rate(columns))
         strengths["their acceleration follows the tilt"] = numbers.follows_tilt(columns)
     elif part in ("motors", "commands"):
         together = float(numbers.moves_together(columns))
@@ -405,18 +372,10 @@ def rotors_said(columns: Sequence[str], further: Sequence[str]) -> str:
 
 def numbered_alike(columns: Sequence[str], others: Sequence[str]) -> list[str]:
     """Return which other columns differ from four in a number alone, the next ones up."""
-    pattern = re.compile(r"\d+")
-    for found in zip(*(pattern.finditer(name) for name in columns), strict=False):
-        if len({match[0] for match in found}) != len(columns):
-            continue
-        first, name = found[0], columns[0]
-        before, behind = name[: first.start()], name[first.end() :]
-        last = max(int(match[0]) for match in found)
-        following = (f"{before}{n:0{len(first[0])}d}{behind}" for n in range(last + 1, 16))
-        run = []
-        for other in following:
-            if other not in others:
-                break
-            run.append(other)
-        return run
+    for found in zip(*(re.finditer(r"\d+", name) for name in columns), strict=False):
+        if len({match[0] for match in found}) == len(columns):
+            first, last = found[0], max(int(match[0]) for match in found)
+            before, behind = first.string[: first.start()], first.string[first.end() :]
+            following = (f"{before}{n:0{len(first[0])}d}{behind}" for n in range(last + 1, 16))
+            return list(takewhile(others.__contains__, following))
     return []

@@ -20,13 +20,14 @@ from ...dynamics.vehicle_file import load_vehicle, preset_names
 from .flight_log import FlightLog
 from .flight_phases import flying
 from .log_map import Commands
-from .table import Array, Mask
+from .magnitudes import within
+from .table import Array
 
 # s, up to which less is a dip in flight: without thrust a vehicle falls 5 m meanwhile. Without the
 # dips high thrusts alone would remain, whose mean is above the weight
 _DIP = 1.0
 _SATURATED = 0.9995  # of the full command
-_SPECIFIC_FORCE = 6.0, 16.0  # m/s2: the median of most flights; outside a unit may be another
+_FELT = 6.0, 16.0  # m/s2: the median of most flights; outside a unit may be another
 
 
 def flown_vehicle(vehicle: Vehicle | None, name: str) -> Vehicle | None:
@@ -87,15 +88,15 @@ def _speeds(
             "motor_curve; state it to turn commands into thrust"
         ]
     scale = _scale(log, total, felt, vehicle)
-    balance = "the mean vertical thrust in flight is the weight of "
-    balance += f"{vehicle.name} ({vehicle.weight:.4g} N)"
-    if felt is not None:
-        balance = (
-            f"the thrust in flight is, on the median, the mass of {vehicle.name} "
-            f"({vehicle.mass:.4g} kg) times the accelerometer along the rotors' axis"
-        )
     if scale is None:
         return None, [f"no rotor speeds: the motor commands are 0 wherever there is {where}"]
+    balance = (
+        f"the mean vertical thrust in flight is the weight of {vehicle.name} ({vehicle.weight:.4g} "
+        "N)"
+        if felt is None
+        else f"the thrust in flight is, on the median, the mass of {vehicle.name} "
+        f"({vehicle.mass:.4g} kg) times the accelerometer along the rotors' axis"
+    )
     return np.sqrt(scale * relative / vehicle.k), [
         "thrust model: no rotor speeds in the log; the relative thrust of a motor command u is "
         f"assumed to be {_words(model)}, and its unknown scale is set so that {balance}: "
@@ -165,20 +166,24 @@ def _felt(log: FlightLog) -> Array | None:
     """Return the accelerometer's readings (N,) in m/s2 along the rotors' axis, NaN where there is
     none; None where it has none, or a pose is there and its size is not usual in flight.
     """
-    if log.accelerometer is None:
-        return None
-    size = float(np.nanmedian(np.linalg.norm(log.accelerometer, axis=1)))
-    is_usual = _SPECIFIC_FORCE[0] <= size <= _SPECIFIC_FORCE[1]
-    return log.accelerometer[:, 2] if is_usual or not log.has_pose else None
+    x = log.accelerometer
+    usual = x is not None and within(float(np.nanmedian(np.linalg.norm(x, axis=1))), _FELT)
+    return x[:, 2] if x is not None and (usual or not log.has_pose) else None
 
 
 def _scale(log: FlightLog, total: Array, felt: Array | None, vehicle: Vehicle) -> float | None:
     """Return N of a motor at full command, or None where no motor runs in flight: by what is felt
-    (N,) along the rotors' axis in m/s2, else by the weight.
+    (N,) along the rotors' axis in m/s2, else by the weight. In flight are samples of high thrust,
+    and of low for a moment between high ones.
     """
     rows = log.valid if felt is None else np.isfinite(felt)
-    total = total[rows]
-    aloft = _aloft(log.t[rows], total)
+    t, total = log.t[rows], total[rows]
+    aloft = flying(total)
+    if len(high := np.flatnonzero(aloft)):
+        after = np.searchsorted(high, np.arange(len(t)))  # the next high one
+        inside = (after > 0) & (after < len(high))
+        before = high[np.maximum(after - 1, 0)]
+        aloft |= inside & (t[high[np.minimum(after, len(high) - 1)]] - t[before] <= _DIP)
     if felt is not None:
         felt = felt[rows]
         usable = aloft & (total > 0.0) & (felt > 0.0)
@@ -188,17 +193,3 @@ def _scale(log: FlightLog, total: Array, felt: Array | None, vehicle: Vehicle) -
     vertical = (total * (1.0 - 2.0 * (x * x + y * y)))[aloft]
     mean = float(np.mean(vertical)) if len(vertical) else 0.0
     return vehicle.weight / mean if mean > 0.0 else None
-
-
-def _aloft(t: Array, total: Array) -> Mask:
-    """Return which samples (N,) are in flight, by a relative thrust: those of high thrust, and of
-    low for a moment between high ones.
-    """
-    high = flying(total)
-    rows = np.flatnonzero(high)
-    if not len(rows):
-        return high
-    later = np.searchsorted(rows, np.arange(len(t)))  # the next high one
-    inside = (later > 0) & (later < len(rows))
-    sooner, later = rows[np.maximum(later - 1, 0)], rows[np.minimum(later, len(rows) - 1)]
-    return np.asarray(high | (inside & (t[later] - t[sooner] <= _DIP)))

@@ -26,7 +26,7 @@ from scipy.spatial.transform import Rotation
 from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import CUTOFFS, continuous, derivative, low_pass, resampled, unbroken
 from .flight_log import FlightLog
-from .flight_phases import usual_thrust
+from .flight_phases import carrying
 from .log_map import UNITS
 from .readings import DECLARED, Reading, as_written, log_readings
 from .table import Array, Mask, Rows
@@ -208,10 +208,11 @@ class Evidence:
                     totals.append(total)
         if not pieces:
             return []
-        least = 0.5 * usual_thrust(np.concatenate(totals))
+        ends = np.cumsum([len(x) for x in totals])[:-1]
+        aloft = np.split(carrying(np.concatenate(totals)), ends)
         return [
-            replace(p, compared=p.compared[x[p.compared] > least])
-            for p, x in zip(pieces, totals, strict=True)
+            replace(p, compared=p.compared[x[p.compared]])
+            for p, x in zip(pieces, aloft, strict=True)
         ]
 
     @property

@@ -15,7 +15,7 @@ _TURNING = 0.1  # of the weight: less thrust is a rotor at rest
 _CLEARANCE = 0.05  # m above the place of rest: the vehicle is off the ground
 _WELL_ABOVE = 0.2  # of the typical height
 _CLIMB = 0.1  # m/s: slower is not climbing or sinking
-_CLIMB_WINDOW = 0.25  # s, either side, over which the climb rate is taken
+_CLIMB_WINDOW = 0.25  # s, either side, over which the mean climb rate is taken
 
 
 def flying(total: Array) -> Mask:
@@ -31,6 +31,13 @@ def usual_thrust(total: Array) -> float:
     """
     turning = total[total > 0.3 * np.quantile(total, 0.95)]
     return float(np.median(turning)) if turning.size else np.inf
+
+
+def carrying(total: Array) -> Mask:
+    """Return at which samples (N,) the rotors carry a vehicle that hovers most of the time, by
+    their thrust (N,) in any unit: above half of the usual one.
+    """
+    return np.asarray(total > 0.5 * usual_thrust(total))
 
 
 class Phase(NamedTuple):
@@ -69,7 +76,8 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
 
     # well above the ground, so that a bounce on landing is no flight
     typical = float(np.median(height[clear]))
-    climb = _climb_rate(t, height)
+    window = _CLIMB_WINDOW
+    climb = (np.interp(t + window, t, height) - np.interp(t - window, t, height)) / (2 * window)
     lift_off, cruise, descent, touch_down = 0, 0, last, last
     if starts:
         up = int(np.argmax(clear & (height >= before + _WELL_ABOVE * (typical - before))))
@@ -91,12 +99,6 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
         for name, a, b in zip(names, edges, edges[1:], strict=False)
         if b > a
     ]
-
-
-def _climb_rate(t: Array, height: Array) -> Array:
-    """Return the mean climb rate (N,) in m/s around each time."""
-    later, sooner = np.interp(t + _CLIMB_WINDOW, t, height), np.interp(t - _CLIMB_WINDOW, t, height)
-    return np.asarray((later - sooner) / (2 * _CLIMB_WINDOW))
 
 
 def _run(true: Mask) -> int:

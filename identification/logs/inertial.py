@@ -54,7 +54,8 @@ def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, tu
         values = getattr(log, field)
         if values is None:
             continue
-        t, measured = (x[np.isfinite(values[:, 0])] for x in (log.t, values))
+        read = np.isfinite(values[:, 0])
+        t, measured = log.t[read], values[read]
         if is_stuck(measured):
             doubt = f"never change: the {field} was not read"
         elif field == "gyro":
@@ -62,16 +63,15 @@ def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, tu
             shares = gyro_shares(t, measured, *pose, turns)
             doubt = sensor_doubt(shares, GYRO_READINGS, "contradict the attitude's rate")
         else:
-            turned = _from_world(t, measured, *pose, log.position[seen], gravity)
+            shares, turned = _force_shares(t, measured, *pose, log.position[seen], gravity)
             if turned is not None:
                 values = np.full_like(values, np.nan)
-                values[np.isin(log.t, t)] = turned
-                log, measured = replace(log, accelerometer=values), turned
+                values[read] = turned
+                log = replace(log, accelerometer=values)
                 notes.append(
                     f"{', '.join(names)} are an acceleration in world axes, by the position's own: "
                     "they were turned into body axes by the attitude"
                 )
-            shares = _force_shares(t, measured, *pose, log.position[seen], gravity)
             otherwise = "contradict the position's acceleration and gravity"
             doubt = sensor_doubt(shares, ACCELEROMETER_READINGS, otherwise)
         if doubt:
@@ -141,67 +141,45 @@ def _force_shares(
     attitude: Rotation,
     position: Array,
     gravity: float,
-) -> list[float] | None:
+) -> tuple[list[float] | None, Array | None]:
     """Return which share of acceleration and gravity an accelerometer leaves, as declared and by
-    each reading; None where too little is measured.
-    """
-    middles = _windows(pose_times, t, before=INERTIAL.window)
-    if len(middles) < INERTIAL.fewest:
-        return None
-    t, measured, turned = _beside_pose(t, measured, pose_times, attitude)
-    g = np.array([0.0, 0.0, gravity])
-    needed = _second_difference(middles, pose_times, position) + g
-    size = _middle(needed)
-    return [
-        _middle(
-            needed
-            - _mean(middles, t, turned.apply(measured @ reading.turn.T))
-            - reading.lacks_gravity * g
-        )
-        / size
-        for reading in (AS_DECLARED, *ACCELEROMETER_READINGS)
-    ]
-
-
-def _from_world(
-    t: Array,
-    measured: Array,
-    pose_times: Array,
-    attitude: Rotation,
-    position: Array,
-    gravity: float,
-) -> Array | None:
-    """Return the specific force in body axes (N, 3) where an accelerometer's columns hold an
-    acceleration in world axes; None where they do not.
+    each reading, None where too little is measured; and the specific force in body axes (N, 3)
+    where its columns hold an acceleration in world axes, else None.
 
     Gravity hides the axes: along z both look alike. The horizontal acceleration of the position
     tells them.
     """
     middles = _windows(pose_times, t, before=INERTIAL.window)
     if len(middles) < INERTIAL.fewest:
-        return None
-    inside, values, turned = _beside_pose(t, measured, pose_times, attitude)
-    needed = _second_difference(middles, pose_times, position)[:, :2]
-    moves = np.linalg.norm(needed, axis=1) > INERTIAL.moving
-    if np.count_nonzero(moves) < INERTIAL.fewest:
-        return None
-    body, world = (
-        _middle((needed - _mean(middles, inside, x)[:, :2])[moves]) / _middle(needed[moves])
-        for x in (turned.apply(values), values)
-    )
-    if world > EVIDENCE.good or likelihood([world] * 2) - likelihood([body] * 2) < OTHER:
-        return None
-    lacks = gravity if np.median(values[:, 2]) < 0.5 * gravity else 0.0
-    at = Slerp(pose_times, attitude)(np.clip(t, pose_times[0], pose_times[-1]))
-    return np.asarray(at.inv().apply(measured + np.array([0.0, 0.0, lacks])))
-
-
-def _beside_pose(
-    t: Array, measured: Array, pose_times: Array, attitude: Rotation
-) -> tuple[Array, Array, Rotation]:
-    """Return times, readings and attitude of those samples that have poses around them."""
+        return None, None
     inside = (t >= pose_times[0]) & (t <= pose_times[-1])
-    return t[inside], measured[inside], Slerp(pose_times, attitude)(t[inside])
+    body = Slerp(pose_times, attitude)(np.clip(t, pose_times[0], pose_times[-1]))
+
+    def mean(force: Array) -> Array:
+        """Return a force's (N, 3) mean over two windows, as a second difference weighs it."""
+        sums, times = force[inside], t[inside]
+        for _ in range(2):
+            sums = cumulative_trapezoid(sums, times, axis=0, initial=0.0)
+        return _second_difference(middles, times, sums)
+
+    needed, up, turned = _second_difference(middles, pose_times, position), np.zeros(3), None
+    moves = np.linalg.norm(needed[:, :2], axis=1) > INERTIAL.moving
+    if np.count_nonzero(moves) >= INERTIAL.fewest:
+        in_body, in_world = (
+            _middle((needed - mean(x))[moves, :2]) / _middle(needed[moves, :2])
+            for x in (body.apply(measured), measured)
+        )
+        lead = likelihood([in_world] * 2) - likelihood([in_body] * 2)
+        if in_world <= EVIDENCE.good and lead >= OTHER:
+            up[2] = gravity if np.median(measured[inside, 2]) < 0.5 * gravity else 0.0
+            turned = measured = np.asarray(body.inv().apply(measured + up))
+    up[2] = gravity
+    needed += up
+    return [
+        _middle(needed - mean(body.apply(measured @ r.turn.T)) - r.lacks_gravity * up)
+        / _middle(needed)
+        for r in (AS_DECLARED, *ACCELEROMETER_READINGS)
+    ], turned
 
 
 def _second_difference(middles: Array, times: Array, values: Array) -> Array:
@@ -209,14 +187,6 @@ def _second_difference(middles: Array, times: Array, values: Array) -> Array:
         resampled(middles + k * INERTIAL.window, times, values) for k in (-1, 0, 1)
     )
     return np.asarray((after - 2.0 * at + before) / INERTIAL.window**2)
-
-
-def _mean(middles: Array, t: Array, force: Array) -> Array:
-    """Return the mean (n, 3) of a force (N, 3) over two windows, as a position's second difference
-    weighs it.
-    """
-    speed = cumulative_trapezoid(force, t, axis=0, initial=0.0)
-    return _second_difference(middles, t, cumulative_trapezoid(speed, t, axis=0, initial=0.0))
 
 
 def gravity_doubt(force: Array, gravity: float) -> str:

@@ -370,8 +370,8 @@ def load_map(name: str | Path) -> LogMap:
     """Return a map: one that ships with the kit, by its name, or that of a YAML file.
 
     Raises:
-        InputError: there is none of that name, or it is no map; the message says where and what was
-            expected.
+        InputError: there is none of that name, it is no map, or leaves a field open; the message
+            says where and what was expected.
     """
     path = Path(name)
     if str(name) in map_names():
@@ -379,23 +379,17 @@ def load_map(name: str | Path) -> LogMap:
     if path.suffix.lower() not in (".yaml", ".yml") and not path.exists():
         raise unknown_name("map", str(name), [*map_names(), "the path of a YAML file"])
     found = read_yaml(path, "a map file")
-    _check_chosen(found, path)
-    return parse_map(found, str(path), str(path))
-
-
-def _check_chosen(found: Any, path: Path) -> None:
-    """Raise InputError where a map leaves a field open; the message has the candidates that stand
-    in a comment beside it.
-    """
     for section, part in found.items() if isinstance(found, Mapping) else ():
-        for name, value in part.items() if isinstance(part, Mapping) else ():
+        for field_name, value in part.items() if isinstance(part, Mapping) else ():
             if UNKNOWN in (value if isinstance(value, list) else [value]):
+                # the candidates stand in a comment beside it
                 text = path.read_text(encoding="utf-8-sig")
-                noted = re.search(rf"^# choose {section}\.{name}: (.*)$", text, re.MULTILINE)
+                noted = re.search(rf"^# choose {section}\.{field_name}: (.*)$", text, re.MULTILINE)
                 raise InputError(
-                    f"{path}: {section}.{name} is still {UNKNOWN}; expected "
+                    f"{path}: {section}.{field_name} is still {UNKNOWN}; expected "
                     f"{noted[1] if noted else 'columns of the table'}"
                 )
+    return parse_map(found, str(path), str(path))
 
 
 def recording_map(name: str) -> LogMap:

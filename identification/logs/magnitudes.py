@@ -51,33 +51,22 @@ def within(value: float, limits: tuple[float, float]) -> bool:
     return limits[0] <= value <= limits[1]
 
 
-def time_unit(step: float) -> tuple[str, bool]:
-    """Return the unit in which a median step (in the column's unit) is a flight's, and whether
-    that is certain.
+def likely_unit(section: str, size: float) -> tuple[str, bool]:
+    """Return the first unit of a section's column in which a size is likely, or the first of all,
+    and whether that is certain: of a battery, a median voltage; of the time, a median step.
     """
-    rates = {unit: 1.0 / max(step * UNITS["time"][unit], 1e-300) for unit in _TIMES}
-    return _likely_unit(rates, MAGNITUDES.rates, MAGNITUDES.sure_rates)
-
-
-def voltage_unit(median: float) -> tuple[str, bool]:
-    """Return the unit in which a median voltage is a battery's, and whether that is certain."""
-    volts = {unit: median * size for unit, size in UNITS["battery"].items()}
-    return _likely_unit(volts, MAGNITUDES.voltages, MAGNITUDES.sure_voltages)
-
-
-def _likely_unit(
-    sizes: dict[str, float], likely: tuple[float, float], sure: tuple[float, float]
-) -> tuple[str, bool]:
-    """Return the first unit in which a size is likely, or the first of all, and whether the size is
-    sure to be in it.
-    """
+    sizes = {unit: size * one for unit, one in UNITS[section].items() if unit != "min"}
+    likely, sure = MAGNITUDES.voltages, MAGNITUDES.sure_voltages
+    if section == "time":
+        sizes = {unit: 1.0 / max(step, 1e-300) for unit, step in sizes.items()}
+        likely, sure = MAGNITUDES.rates, MAGNITUDES.sure_rates
     unit = next((unit for unit in sizes if within(sizes[unit], likely)), next(iter(sizes)))
     return unit, within(sizes[unit], sure)
 
 
 def time_doubt(step: float) -> str:
     """Return what a median step (s) says against its unit, or nothing."""
-    unit, is_sure = time_unit(step)
+    unit, is_sure = likely_unit("time", step)
     if unit == "s" or not is_sure:
         return ""
     return (
@@ -146,23 +135,21 @@ def check_magnitudes(log: FlightLog) -> None:
     step = np.diff(log.t)
     if not len(step):
         return
+    where, longest = f"{log.source}: column", int(np.argmax(step))
     if not log.period >= MAGNITUDES.shortest_period:
         raise InputError(
-            f"{log.source}: column t: the median time step is {log.period:.3g} s; expected at "
-            f"least {MAGNITUDES.shortest_period:g} s"
+            f"{where} t: the median time step is {log.period:.3g} s; expected at least "
+            f"{MAGNITUDES.shortest_period:g} s"
         )
-    longest = int(np.argmax(step))
     if not step[longest] <= MAGNITUDES.longest_step:
         raise InputError(
-            f"{log.source}: column t, row {longest + 2}: {step[longest]:.3g} s after the row "
-            f"before; expected at most {MAGNITUDES.longest_step:g} s"
+            f"{where} t, row {longest + 2}: {step[longest]:.3g} s after the row before; expected "
+            f"at most {MAGNITUDES.longest_step:g} s"
         )
     for names, values in parts_of(log)[1:]:
         values = values.reshape(len(log.t), -1)
-        beyond = np.argwhere(np.abs(values) > MAGNITUDES.largest)  # False where NaN
-        if beyond.size:
-            row, column = beyond[0]
+        for row, column in np.argwhere(np.abs(values) > MAGNITUDES.largest)[:1]:  # False where NaN
             raise InputError(
-                f"{log.source}: column {names[column]}, row {row + 1}: "
-                f"{values[row, column]:.3g}; expected a number within {MAGNITUDES.largest:g}"
+                f"{where} {names[column]}, row {row + 1}: {values[row, column]:.3g}; expected a "
+                f"number within {MAGNITUDES.largest:g}"
             )

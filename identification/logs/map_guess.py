@@ -51,9 +51,8 @@ from .log_map import (
 from .magnitudes import (
     MAGNITUDES,
     carrying_units,
+    likely_unit,
     thrust_by_weight,
-    time_unit,
-    voltage_unit,
     within,
 )
 from .readings import DECLARED, OTHER, ROTORS, rotations, table_readings
@@ -79,6 +78,7 @@ class GuessSettings:
 GUESS = GuessSettings()
 _Choice = tuple[str, bool, str]  # what is taken, whether it is certain, and why
 _G = UNITS["accelerometer"]["g"]
+_TURNS = ("world", "body", "sense", "order", "pitch_sign", "unit")  # what shows how a body turns
 _EXAMPLES = {
     "position": "x, y, z",
     "attitude": "qw, qx, qy, qz or roll, pitch, yaw",
@@ -103,7 +103,6 @@ class Missing:
 
     section: str
     field: str
-    count: int  # of columns
     why: str
     candidates: tuple[str, ...] = ()  # the likeliest first
 
@@ -235,36 +234,35 @@ class _Guessing:
         """Return what the map lacks for a flight log."""
         out = []
 
-        def lack(part: str, section: str, count: int, why: str, field: str = "columns") -> None:
+        def lack(part: str, section: str, why: str, field: str = "columns") -> None:
             found = self.ranked.get(part, [])[: PARTS.shown]
-            out.append(Missing(section, field, count, why, tuple(map(str, found))))
+            out.append(Missing(section, field, why, tuple(map(str, found))))
 
         if self.clock is None:
             why = "no column looks like a time; expected one such as t, time or timestamp"
-            lack("time", "time", 1, why, "column")
+            lack("time", "time", why, "column")
         pose, imu, has = ("position", "attitude"), ("accelerometer", "gyro"), set(self.sections)
         if "position" not in has and not has.issuperset(imu):
-            firsts = {part: self.ranked[part][0] for part in pose if self.ranked.get(part)}
-            firsts = {part: first for part, first in firsts.items() if first.score > 0.0}
+            likely = {p: c[0] for p in pose if (c := self.ranked.get(p)) and c[0].score > 0.0}
             # what is nearest to be whole: half a pose, half an IMU, else a pose
-            for part in pose if firsts or not has.intersection(imu) else imu:
-                if part not in has and part not in firsts:
+            for part in pose if likely or not has.intersection(imu) else imu:
+                if part not in has and part not in likely:
                     why = f"no columns look like one (such as {_EXAMPLES[part]})"
-                    lack(part, part, 4 if part == "attitude" else 3, why)
-            for part, first in firsts.items():
+                    lack(part, part, why)
+            for part, first in likely.items():
                 self.say(part, "columns", False, first.why)
-                group, euler = first.group, "zyx" if len(first.group.columns) == 3 else ""
-                self.sections[part] = (
-                    Columns(group.columns, group.unit or "m")
-                    if part == "position"
-                    else Attitude(group.columns, euler and (group.unit or "rad"), euler=euler)
-                )
+                columns, unit = first.group.columns, first.group.unit
+                made: Columns = Columns(columns, unit or "m")
+                if part == "attitude":
+                    euler = "zyx" if len(columns) == 3 else ""
+                    made = Attitude(columns, euler and (unit or "rad"), euler=euler)
+                self.sections[part] = made
         for part in self.further:
             why = rotors_said(self.parts[part].columns, self.further[part])
-            lack(part, "rotors", 4, why)
-        if "rotors" not in self.sections and "commands" not in self.sections and not self.further:
+            lack(part, "rotors", why)
+        if not {"rotors", "commands"} & set(self.sections) and not self.further:
             why = "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
-            lack("motors", "rotors", 4, why)
+            lack("motors", "rotors", why)
         return out
 
     def say(self, section: str, name: str, certain: bool, why: str) -> None:
@@ -296,7 +294,7 @@ class _Guessing:
         raw = data[clock.column]
         steps = np.diff(raw[np.isfinite(raw)])
         step = float(np.median(steps[steps > 0.0]))
-        guessed, sure = time_unit(step)
+        guessed, sure = likely_unit("time", step)
         rate = f"{1.0 / max(step * UNITS['time'][guessed], 1e-300):.4g} rows a second"
         if clock.unit in UNITS["time"]:  # an unusual rate is no reason to doubt a name
             sure &= not within(1.0 / max(step * UNITS["time"][clock.unit], 1e-300), GUESS.rates)
@@ -362,12 +360,6 @@ class _Guessing:
         self.sections |= {"world": best.world, "body": best.body}
         self.sections |= {"position": position, "attitude": made}
 
-    @property
-    def turning_known(self) -> bool:
-        """Whether a pose shows how the body turns."""
-        names = ("world", "body", "sense", "order", "pitch_sign", "unit")
-        return self.ranking is not None and self.ranking.certain(*names)
-
     def accelerometer(self, part: str) -> None:
         """Find unit and axes of the accelerometer by gravity."""
         group, values = self.parts[part], self.values[part]
@@ -394,44 +386,39 @@ class _Guessing:
             self.sections["body"] = axes
 
     def gyro(self, part: str) -> None:
-        """Find unit and axes of the gyro: by the pose's turns, or by size and accelerometer."""
+        """Find unit and axes of the gyro: by the pose's turns, or by size and accelerometer. A unit
+        that is named is kept where another one fits hardly better.
+        """
         group, values = self.parts[part], self.values[part]
         if self.ranking is None:
             axes = self.sections.get("body", "flu")
             told = {(r.section, r.field) for r in self.reasons if r.certain}
-            sure = ("accelerometer", "body") in told
-            self.say("gyro", "body", sure, "as the accelerometer's")
+            self.say("gyro", "body", ("accelerometer", "body") in told, "as the accelerometer's")
             high = float(np.nanquantile(np.abs(values), 0.995))
             unit = "deg/s" if high > GUESS.slow_gyro else "rad/s"
-            guessed = unit, high > GUESS.fast_gyro, f"its fast values are {high:.3g}"
+            sure, why = high > GUESS.fast_gyro, f"its fast values are {high:.3g}"
         else:
-            axes, guessed = self.gyro_by_pose(values, ("rad/s", "deg/s"), group.unit)
-            self.take("gyro", "body", (axes, *guessed[1:]))
-        unit = self.unit("gyro", group.unit, guessed)
+            good, rotation = rotations(self.values["attitude"], self.ranking.best)
+            times, units = self.t[good], ("rad/s", "deg/s")
+            seen = np.isfinite(times)
+            ways = list(product(units, BODY_TURNS))
+            turns = [UNITS["gyro"][unit] * BODY_TURNS[body] for unit, body in ways]
+            shares = gyro_shares(self.t, values, times[seen], rotation[seen], turns)
+            (unit, axes), sure, why = ways[0], False, "the log is too short"
+            if shares is not None:
+                fits = dict(zip(ways, shares, strict=True))
+                kept = {way: left for way, left in fits.items() if way[0] == group.unit}
+                if kept and (min(kept.values()) <= EVIDENCE.good or min(shares) > EVIDENCE.good):
+                    fits = kept
+                first, second = sorted(fits, key=lambda way: fits[way])[:2]
+                (unit, axes), left = first, fits[first]
+                lead = likelihood([left] * 3) - likelihood([fits[second]] * 3)
+                sure = left <= EVIDENCE.good and lead >= EVIDENCE.certain
+                sure &= self.ranking.certain(*_TURNS)
+                why = f"{left:.0%} of the attitude's rate is left unexplained"
+            self.take("gyro", "body", (axes, sure, why))
+        unit = self.unit("gyro", group.unit, (unit, sure, why))
         self.sections["gyro"] = Sensor(group.columns, unit, body=axes)
-
-    def gyro_by_pose(self, values: Array, units: Sequence[str], named: str) -> tuple[str, _Choice]:
-        """Return a gyro's body axes and unit, whether they are sure, and why. A unit that is named
-        is kept where another one fits hardly better.
-        """
-        assert self.ranking is not None
-        good, rotation = rotations(self.values["attitude"], self.ranking.best)
-        times = self.t[good]
-        seen = np.isfinite(times)
-        ways = list(product(units, BODY_TURNS))
-        turns = [UNITS["gyro"][unit] * BODY_TURNS[body] for unit, body in ways]
-        shares = gyro_shares(self.t, values, times[seen], rotation[seen], turns)
-        if shares is None:
-            return ways[0][1], (ways[0][0], False, "the log is too short")
-        if named in units:
-            kept = [k for k, (unit, _) in enumerate(ways) if unit == named]
-            if min(shares[k] for k in kept) <= EVIDENCE.good or min(shares) > EVIDENCE.good:
-                ways, shares = [ways[k] for k in kept], [shares[k] for k in kept]
-        first, second = np.argsort(shares)[:2]
-        lead = likelihood([shares[first]] * 3) - likelihood([shares[second]] * 3)
-        sure = shares[first] <= EVIDENCE.good and lead >= EVIDENCE.certain and self.turning_known
-        why = f"{shares[first]:.0%} of the attitude's rate is left unexplained"
-        return ways[first][1], (ways[first][0], sure, why)
 
     def motors(self, part: str) -> None:
         """Find unit and order of rotor speeds or commands, where the map has none of the kind."""
@@ -469,7 +456,7 @@ class _Guessing:
             sensor = self.sections["gyro"]
             rates = self.values["gyro"] * UNITS["gyro"][sensor.unit] @ BODY_TURNS[sensor.body]
             evidence = Evidence(self.t, np.square(values), gyro=rates)
-        elif self.ranking is not None and self.turning_known:
+        elif self.ranking is not None and self.ranking.certain(*_TURNS):
             best = self.ranking.best
             pose = self.values["position"], self.values["attitude"]
             evidence = Evidence(self.t, np.square(values), *pose)
@@ -498,7 +485,7 @@ class _Guessing:
         if not values.size:
             return
         group, middle = self.parts[part], float(np.median(values))
-        guessed = *voltage_unit(middle), f"its median is {middle:.4g}"
+        guessed = *likely_unit("battery", middle), f"its median is {middle:.4g}"
         unit = self.unit("battery", group.unit, guessed)
         self.sections["battery"] = Battery(group.columns, unit)
 
@@ -578,8 +565,8 @@ def map_yaml(guess: Guess) -> str:
     if guess.missing:
         lines.append(f"# {UNKNOWN}: choose, and write it here. Still missing: {guess.lacks}")
     for lack in guess.missing:
-        several = lack.field == "columns"
-        sections[lack.section] = {lack.field: [UNKNOWN] * lack.count if several else UNKNOWN}
+        several = [UNKNOWN] * (4 if lack.section in ("attitude", "rotors") else 3)
+        sections[lack.section] = {lack.field: several if lack.field == "columns" else UNKNOWN}
     for name, value in sections.items():
         for r in (r for r in guess.reasons if r.section == name):
             mark = "certain" if r.certain else "GUESS"

@@ -115,9 +115,10 @@ def recording_of(
     log_map, sources = chosen(recorded, log_map)
     if not (log_map.rotors or log_map.commands or log_map.wrench):
         names = [s.topic for s in recorded if s.topic] or [x for s in recorded for x in s.columns]
+        wanted = [f"{w.topic + ' with ' if w.topic else ''}{w.columns[0]} ..." for w in motors]
         raise InputError(
-            f"{path}: no motors that turn; expected {' or '.join(map(_wanted, motors))}, "
-            f"found {', '.join(dict.fromkeys(names[:20])) or 'nothing'}"
+            f"{path}: no motors that turn; expected {' or '.join(wanted)}, found "
+            f"{', '.join(dict.fromkeys(names[:20])) or 'nothing'}"
         )
     said = [*notes, *of_clock, *(part.note for part in log_map.sections.values() if part.note)]
     streams: dict[str, Stream] = {}
@@ -164,10 +165,6 @@ def recording_of(
     return Recording(path, reader, log_map, streams, said, extra, flown)
 
 
-def _wanted(way: Columns) -> str:
-    return f"{way.topic} with {way.columns[0]} ..." if way.topic else way.label
-
-
 def _pose(
     path: Path, log_map: LogMap, samples: Samples, turned: Samples | None
 ) -> tuple[Stream, list[str]]:
@@ -181,7 +178,7 @@ def _pose(
         turned: of the attitude; None: there is none.
 
     Raises:
-        InputError: a quaternion is none, or no position has an attitude.
+        InputError: a quaternion's length is not 1, or no position has an attitude.
     """
     place, turn, notes = log_map.position, log_map.attitude, []
     assert place is not None
@@ -207,7 +204,21 @@ def _pose(
     if turn is None or turned is None:
         pose[:, :3] = position
         return Stream(place.label, t, pose), notes
-    attitude = _attitude(path, log_map, turn, turned)
+    measured = turned.cut(turned.there(turn))
+    turns = quaternions(turn, measured.values(turn))
+    with np.errstate(over="ignore"):
+        length = np.linalg.norm(turns, axis=1)
+    there = length > (-1.0 if log_map.rows == "whole" else NO_QUATERNION)
+    off = np.flatnonzero(there & ~(np.abs(length - 1.0) <= NORM_TOLERANCE))
+    if off.size:
+        what = turn.topic or f"columns {', '.join(turn.columns)}"
+        raise InputError(
+            f"{path}: {what}, {measured.place(off[0])}: a quaternion of length "
+            f"{length[off[0]]:.4g}; expected 1 within {NORM_TOLERANCE:g}"
+        )
+    if there.any():
+        turns = in_kit_axes(log_map, turn, turns[there])
+    attitude = Stream(turn.label, measured.t[there], turns)
     steps = np.diff(attitude.t)
     longest = max(_ATTITUDE_GAP, LONGEST_STEPS * float(np.median(steps))) if len(steps) else 0.0
     pose[placed] = np.column_stack([position[placed], slerp(t[placed], attitude, longest)])
@@ -229,30 +240,6 @@ def _pose(
                 f"{name[1:]}: forces along the axis that it tilts are wrong by as much"
             )
     return Stream(place.label, t, pose), notes
-
-
-def _attitude(path: Path, log_map: LogMap, part: Attitude, samples: Samples) -> Stream:
-    """Return the attitudes (N, 4) that were measured, in the kit's frames.
-
-    Raises:
-        InputError: a quaternion's length is not 1.
-    """
-    samples = samples.cut(samples.there(part))
-    turns = quaternions(part, samples.values(part))
-    with np.errstate(over="ignore"):
-        length = np.linalg.norm(turns, axis=1)
-    there = length > (-1.0 if log_map.rows == "whole" else NO_QUATERNION)
-    off = np.flatnonzero(there & ~(np.abs(length - 1.0) <= NORM_TOLERANCE))
-    if off.size:
-        what = part.topic or f"columns {', '.join(part.columns)}"
-        raise InputError(
-            f"{path}: {what}, {samples.place(off[0])}: a quaternion of length "
-            f"{length[off[0]]:.4g}; expected 1 within {NORM_TOLERANCE:g}"
-        )
-    raw = Stream(part.label, samples.t[there], turns[there])
-    if not len(raw.t):
-        return raw
-    return replace(raw, values=in_kit_axes(log_map, part, raw.values))
 
 
 def _kept_rows(samples: Samples, log_map: LogMap, part: Columns) -> Mask:
@@ -326,13 +313,15 @@ def fitted(table: Table, log_map: LogMap, vehicle: Vehicle | None, reader: str) 
         else:
             whose = f"{section} (all or none)" if part.optional else section
             missing += [(name, whose) for name in absent]
-    if missing and reader:
-        names = ", ".join(name for name, _ in missing)
-        raise InputError(
-            f"{table.path}: missing column(s) {names}; expected those of {log_map.about}"
-        )
     if missing:
-        raise InputError(f"{where} does not fit: {_missing_words(missing, table.header)}")
+        lower, parts = {name.lower(): name for name in table.header}, []
+        for name, section in missing[:8]:
+            near = get_close_matches(name.lower(), lower, n=2, cutoff=0.6)
+            hint = f" (like {' or '.join(lower[x] for x in near)})" if near else ""
+            parts.append(f"{name!r} of {section}{hint}")
+        more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
+        found = ", ".join(table.header[:_SHOWN]) + (", ..." if table.header[_SHOWN:] else "")
+        raise InputError(f"{where} does not fit: no column {', '.join(parts)}{more}; found {found}")
     log_map = replace(log_map, **kept, alternatives=others)
     check_whole(log_map, f"{where} does not fit")
     extra = {name: part for name, part in log_map.extra.items() if set(part.named) <= header}
@@ -359,24 +348,18 @@ def with_range(log_map: LogMap, vehicle: Vehicle | None, where: str) -> LogMap:
     return replace(log_map, commands=replace(commands, range=curve.command))
 
 
-def _missing_words(missing: list[tuple[str, str]], header: tuple[str, ...]) -> str:
-    lower = {name.lower(): name for name in header}
-    parts = []
-    for name, section in missing[:8]:
-        near = get_close_matches(name.lower(), lower, n=2, cutoff=0.6)
-        hint = f" (like {' or '.join(lower[x] for x in near)})" if near else ""
-        parts.append(f"{name!r} of {section}{hint}")
-    more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
-    found = ", ".join(header[:_SHOWN]) + (", ..." if len(header) > _SHOWN else "")
-    return f"no column {', '.join(parts)}{more}; found {found}"
-
-
 def chosen(recorded: Sequence[Samples], log_map: LogMap) -> tuple[LogMap, dict[str, Samples]]:
     """Return a map with one way to fill each section, and the samples in which its columns stand:
     the first way whose columns are there, and hold measurements; a position with an attitude that
     goes with it. Optional sections of which there are none are left out.
     """
-    usable = {section: _usable(recorded, log_map, section) for section in log_map.sections}
+    stated, usable = log_map.rows == "whole" or log_map.is_own, {}
+    for section in log_map.sections:
+        ways = [(way, s) for way in log_map.ways(section) for s in recorded if s.has(way)]
+        # the only way that is there fills a section that must be filled
+        if len(ways) != 1 or not (stated or not ways[0][0].optional):
+            ways = [one for one in ways if _is_measured(section, *one, log_map.rows)]
+        usable[section] = ways
     places, turns = usable.get("position", []), usable.get("attitude", [])
     pairs = [
         ([place], [turn])
@@ -384,30 +367,11 @@ def chosen(recorded: Sequence[Samples], log_map: LogMap) -> tuple[LogMap, dict[s
         for turn in turns
         if not turn[0].of or place[0].topic in turn[0].of
     ]
-    if pairs:
-        usable["position"], usable["attitude"] = pairs[0]
-    elif not (log_map.is_own and places):
-        usable["position"], usable["attitude"] = [], []
-    found: dict[str, Any] = {
-        section: ways[0][0] if ways else None for section, ways in usable.items()
-    }
+    if pairs or not (log_map.is_own and places):
+        usable["position"], usable["attitude"] = pairs[0] if pairs else ([], [])
+    found: dict[str, Any] = {name: ways[0][0] if ways else None for name, ways in usable.items()}
     samples = {section: ways[0][1] for section, ways in usable.items() if ways}
     return replace(log_map, alternatives={}, **found), samples
-
-
-def _usable(
-    recorded: Sequence[Samples], log_map: LogMap, section: str
-) -> list[tuple[Any, Samples]]:
-    """Return the ways to fill a section that hold measurements, each with its samples; the only
-    way that is there, where the section must be filled.
-    """
-    there = [
-        (way, samples) for way in log_map.ways(section) for samples in recorded if samples.has(way)
-    ]
-    stated = log_map.rows == "whole" or log_map.is_own
-    if len(there) == 1 and (stated or not there[0][0].optional):
-        return there
-    return [one for one in there if _is_measured(section, *one, log_map.rows)]
 
 
 def _is_measured(section: str, way: Columns, samples: Samples, rows: str) -> bool:
@@ -418,10 +382,8 @@ def _is_measured(section: str, way: Columns, samples: Samples, rows: str) -> boo
     values = values[np.isfinite(values).all(axis=1)]
     if isinstance(way, Attitude) and not way.euler:
         return bool(np.any(np.linalg.norm(values, axis=1) > NO_QUATERNION))
-    if section == "rotors":
-        return bool(np.any(values != 0.0))
-    if section == "battery":
-        return bool(np.any(values > 0.0))
+    if section in ("rotors", "battery"):
+        return bool(np.any(values > 0.0 if section == "battery" else values != 0.0))
     if section == "position" and rows != "messages" and len(values):
         return bool(np.any(np.ptp(values, axis=0) > 0.0))
     return len(values) > 1

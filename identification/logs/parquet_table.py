@@ -4,7 +4,7 @@
 A dictionary of one text may stand for any number of its copies, so columns must be numbers.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,21 +38,18 @@ def open_parquet(path: Path) -> Table:
             thrift_container_size_limit=LIMITS.parquet_footer,
         )
         rows = int(file.metadata.num_rows)
-        columns: dict[str, Any] = {}  # by name: an array of its own, or the file's field
-        header: list[str] = []
+        columns: list[tuple[str, Any]] = []  # names, and arrays of their own or the file's fields
         for field in file.schema_arrow:
-            found = {field.name: field}
             if pyarrow.types.is_nested(field.type):
-                found = dict(_within(path, field.name, _column(path, file, field.name)))
-            header += found
-            columns |= found
+                columns += _within(path, field.name, _column(path, file, field.name))
+            else:
+                columns.append((field.name, field))
     except (OSError, pyarrow.ArrowException) as error:
         raise InputError(f"{path}: cannot be read as Parquet: {error}") from error
 
     def fill(table: Table, where: Sequence[int], out: Array) -> None:
         for i, column in zip(where, out, strict=True):
-            name = header[i]
-            values = columns[name]
+            name, values = columns[i]
             if not _is_numeric(values.type):
                 raise InputError(
                     f"{path}: column {name} cannot be read: it holds {values.type}; expected "
@@ -67,19 +64,30 @@ def open_parquet(path: Path) -> Table:
                 )
             column[:] = values.cast(pyarrow.float64()).to_numpy(zero_copy_only=False)
 
-    numeric = tuple(name for name in header if _is_numeric(columns[name].type))
-    return Table(path, tuple(header), rows, fill, numeric=numeric)
+    numeric = tuple(name for name, column in columns if _is_numeric(column.type))
+    return Table(path, tuple(name for name, _ in columns), rows, fill, numeric=numeric)
 
 
 def _column(path: Path, file: Any, name: str) -> Any:
     """Return a whole column, in one piece.
 
     Raises:
-        InputError: it cannot be read, or is more than ``FileLimits`` allows.
+        InputError: it cannot be read, or is more than ``FileLimits`` allows, by what the file says
+            of it.
     """
     import pyarrow
 
-    _check_size(path, file, name)
+    metadata = file.metadata
+    chunks = [
+        metadata.row_group(group).column(i)
+        for group in range(metadata.num_row_groups)
+        for i in range(metadata.num_columns)
+    ]
+    chunks = [chunk for chunk in chunks if chunk.path_in_schema.split(".")[0] == name]
+    size = sum(max(chunk.total_uncompressed_size, 0) for chunk in chunks)
+    most = max((chunk.num_values for chunk in chunks), default=0)
+    check_count(path, size, LIMITS.table_text, f"bytes in column {name}")
+    check_count(path, most, LIMITS.table_numbers, f"numbers in column {name}")
     try:
         return file.read(columns=[name]).column(0).combine_chunks()
     except (OSError, pyarrow.ArrowException) as error:
@@ -127,30 +135,3 @@ def _is_numeric(kind: Any) -> bool:
     value = kind.value_type if types.is_dictionary(kind) else kind
     tests = (types.is_integer, types.is_floating, types.is_boolean, types.is_null, types.is_decimal)
     return any(test(value) for test in tests)
-
-
-def write_parquet(columns: Mapping[str, Array], path: Path, temporary: Path) -> None:
-    """Write columns (rows,) to the file that is to become ``path``; NaN as no value.
-
-    Raises:
-        InputError: pyarrow is not installed.
-    """
-    need("pyarrow", "parquet", path)
-    import pyarrow
-    from pyarrow import parquet
-
-    arrays = {name: pyarrow.array(column, from_pandas=True) for name, column in columns.items()}
-    parquet.write_table(pyarrow.table(arrays), temporary)
-
-
-def _check_size(path: Path, file: Any, root: str) -> None:
-    """Raise InputError where a column unpacks to too much, by what the file says of it."""
-    metadata, size, values = file.metadata, 0, 0
-    for group in range(metadata.num_row_groups):
-        for i in range(metadata.num_columns):
-            chunk = metadata.row_group(group).column(i)
-            if chunk.path_in_schema.split(".")[0] == root:
-                size += max(chunk.total_uncompressed_size, 0)
-                values = max(values, chunk.num_values)
-    check_count(path, size, LIMITS.table_text, f"bytes in column {root}")
-    check_count(path, values, LIMITS.table_numbers, f"numbers in column {root}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import replace
 from inspect import signature
 from pathlib import Path
@@ -20,9 +21,9 @@ from .magnitudes import check_magnitudes, unit_doubts
 from .mapped_log import map_table
 from .readers import (
     find_reader,
-    looked_for_columns,
     reader_by_columns,
     reader_by_content,
+    table_readers,
     unknown_content,
 )
 from .table import Table
@@ -83,21 +84,13 @@ def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
     return replace(log, notes=(*log.notes, *(f"warning: {doubt}" for doubt in doubts)))
 
 
-def missing_columns(table: Table) -> list[str]:
-    """Return the columns that a table of the kit's format lacks: of pose and rotor speeds, unless
-    it has none of the one (or a position without an attitude) but an inertial sensor, or none of
-    the other but motor commands.
+def is_own(header: Sequence[str]) -> bool:
+    """Return whether a table has this kit's own columns: a time; a pose, or an inertial sensor; and
+    rotor speeds or motor commands. The map says what else must come together.
     """
-    there = set(table.header)
-    pose: tuple[str, ...] = POSE
-    if {*ACCELEROMETER, *GYRO} <= there:
-        if not there & set(POSE):
-            pose = ()
-        elif not there & set(POSE[3:]):
-            pose = POSE[:3]
-    no_rotors = not there & set(ROTORS) and set(COMMANDS) <= there
-    needed = ("t", *pose, *(() if no_rotors else ROTORS))
-    return [name for name in needed if name not in there]
+    there = set(header)
+    moves = set(POSE) <= there or {*ACCELEROMETER, *GYRO} <= there
+    return "t" in there and moves and (set(ROTORS) <= there or set(COMMANDS) <= there)
 
 
 def unknown_table(path: Path) -> Table | None:
@@ -110,7 +103,7 @@ def unknown_table(path: Path) -> Table | None:
     if not is_table(path) or reader_by_content(path) is not None:
         return None
     table = open_table(path)
-    known = not missing_columns(table) or reader_by_columns(path, table.header) is not None
+    known = is_own(table.header) or reader_by_columns(path, table.header) is not None
     return None if known else table
 
 
@@ -135,29 +128,29 @@ def _read(
     if chosen is None and not is_table(path):
         raise unknown_content(path)
     table = open_table(path)
-    missing = missing_columns(table)
-    if chosen is None and not missing:
+    if chosen is None and is_own(table.header):
         return map_table(table, load_map(OWN_MAP), vehicle)
     chosen = chosen or reader_by_columns(path, table.header)
     if chosen is not None:
+        if missing := [name for name in chosen.signature if name not in table.header]:
+            raise InputError(
+                f"{path}: missing column(s) {', '.join(missing)}; expected those of {chosen.what}"
+            )
         return chosen.read(table, vehicle=vehicle)
-    if (guessed := _certainly(table, vehicle)) is not None:
-        return guessed
-    raise InputError(
-        f"{path}: missing column(s) {', '.join(missing)}; expected {', '.join(REQUIRED)}, or the "
-        f"columns of {looked_for_columns()}, found {', '.join(table.header[:_SHOWN])}. A table of "
-        f"other columns is read with a map: windwrench check {path.name} --write-map map.yaml "
-        "proposes one"
-    )
-
-
-def _certainly(table: Table, vehicle: Vehicle | None) -> FlightLog | None:
-    """Return the log that a table of unknown columns holds, where a guess leaves no doubt."""
     from .map_guess import guess_map  # the guess is dear, and few logs need it
 
     guess = guess_map(table, vehicle)
-    if guess.missing or guess.doubts:
-        return None
-    log = map_table(table, guess.log_map, vehicle)
-    said = "columns: by a map that was guessed without a doubt; windwrench check shows it"
-    return replace(log, notes=(said, *log.notes))
+    if not guess.missing and not guess.doubts:
+        log = map_table(table, guess.log_map, vehicle)
+        said = "columns: by a map that was guessed without a doubt; windwrench check shows it"
+        return replace(log, notes=(said, *log.notes))
+    known = ", ".join(f"{r.name} ({r.signature[0]} ...)" for r in table_readers())
+    has_imu = {*ACCELEROMETER, *GYRO} <= set(table.header)
+    needed = ("t", *ROTORS) if has_imu else REQUIRED
+    missing = [name for name in needed if name not in table.header]
+    raise InputError(
+        f"{path}: missing column(s) {', '.join(missing)}; expected {', '.join(REQUIRED)}, or the "
+        f"columns of {known}, found {', '.join(table.header[:_SHOWN])}. A table of "
+        f"other columns is read with a map: windwrench check {path.name} --write-map map.yaml "
+        "proposes one"
+    )

@@ -4,7 +4,7 @@ A reading assigns frames, the order and sense of the attitude, a unit of length,
 to columns. ``evidence`` says how well a flight agrees with each.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import permutations, product
 from pathlib import Path
@@ -14,13 +14,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...runtime.yaml_file import read_yaml
-from .channels import WORLD_TURNS
 from .log_map import SENSES, UNITS
 from .rotor_orders import ORDERS, Order, order_names
 from .table import Array, Mask
 
 _I = np.eye(3)
-_DOWN = WORLD_TURNS["ned"]
 _STATED: dict[str, Any] = read_yaml(Path(__file__).with_name("conventions.yaml"), "conventions")
 _PLACE, _QUATERNION = ("px", "py", "pz"), ("qw", "qx", "qy", "qz")
 
@@ -57,16 +55,19 @@ MAP_FRAMES = tuple(frames for frames in _USUAL_FRAMES if frames.names[0])  # tha
 PLAIN = MAP_FRAMES[0]
 
 
-def _positions() -> Iterator[Frames]:
-    """Yield the 47 other ways in which px, py, pz may lie along axes of the attitude's world."""
-    other = "px, py, pz lie along other axes than the attitude's world"
-    for axes, signs in product(permutations("xyz"), product(("", "-"), repeat=3)):
-        text = " ".join(sign + axis for sign, axis in zip(signs, axes, strict=True))
-        fact = _STATED["positions"].get(text, "")
-        if text != "x y z":
-            yield Frames(fact or other, _axes(text), unusual=not fact)
-
-
+_FACTS: dict[str, str] = _STATED["positions"]
+_ALONG = [  # the 47 other ways in which px, py, pz may lie along axes of the attitude's world
+    " ".join(map("".join, zip(signs, axes, strict=True)))
+    for axes, signs in product(permutations("xyz"), product(("", "-"), repeat=3))
+][1:]
+_POSITIONS = tuple(
+    Frames(
+        _FACTS.get(text, "px, py, pz lie along other axes than the attitude's world"),
+        _axes(text),
+        unusual=text not in _FACTS,
+    )
+    for text in _ALONG
+)
 ROTORS: Order = ORDERS["windwrench"]
 
 
@@ -80,34 +81,14 @@ class SensorReading:
 
 
 AS_DECLARED = SensorReading()
-_FRD = "those of body axes forward, right, down; expected forward, left, up: negate y and z"
 
 
-def _sensor_readings(units: dict[str, float], inverted: str = "") -> tuple[SensorReading, ...]:
-    """Return the readings of a sensor in units of other sizes and in other axes."""
-    scaled = {f"look like {name}": size * _I for name, size in units.items()}
-    turned = {f"{says}, and like {_FRD}": turn @ _DOWN for says, turn in scaled.items()}
-    other = {f"look like {_FRD}": _DOWN, f"look inverted{inverted}: negate all three": -_I}
-    return tuple(SensorReading(says, turn) for says, turn in (scaled | turned | other).items())
+def _sensor(says: str, scale: float = 1.0, axes: str = "x y z", **more: bool) -> SensorReading:
+    return SensorReading(says, scale * _axes(axes), **more)
 
 
-GYRO_READINGS = _sensor_readings(
-    {"degrees per second; expected rad/s: multiply by 0.0174533": UNITS["attitude"]["deg"]}
-)
-ACCELEROMETER_READINGS = (
-    *_sensor_readings(
-        {
-            "g; expected m/s2: multiply by 9.80665": 9.80665,
-            "milli-g; expected m/s2: multiply by 0.00980665": 9.80665e-3,
-        },
-        " (gravity, not specific force)",
-    ),
-    SensorReading(
-        "look like an acceleration without gravity; expected the specific force that an "
-        "accelerometer measures, 9.81 m/s2 along z in a hover",
-        lacks_gravity=True,
-    ),
-)
+GYRO_READINGS = tuple(_sensor(**stated) for stated in _STATED["gyro"])
+ACCELEROMETER_READINGS = tuple(_sensor(**stated) for stated in _STATED["accelerometer"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,7 +263,7 @@ def log_readings(has_pose: bool) -> list[Reading]:
     if has_pose:
         others = _each(order=("wxyz", "xyzw", "zwxy"), sense=SENSES, frames=_USUAL_FRAMES)[1:]
         others.append(Reading(sense="world_to_body", frames=_frames(**_STATED["mirrored"])))
-        others += _each(frames=tuple(_positions())) + _each(length=("cm", "mm"))
+        others += _each(frames=_POSITIONS) + _each(length=("cm", "mm"))
     others += _each(mirrored=(False, True), rotors=tuple(permutations(ROTORS)))[1:]
     count = round(_LATEST / _OFFSET_STEP)
     offsets = _each(late=[_OFFSET_STEP * k for k in range(-count, count + 1) if k])

@@ -45,14 +45,12 @@ def rotor_order(value: object) -> Order:
     )
 
 
+def order_words(order: Order) -> str:
+    """Return an order in words."""
+    places = sorted(zip(order, PLACES, strict=True))
+    return f"motors {', '.join(f'{motor} {place}' for motor, place in places)}"
+
+
 def order_names(order: tuple[int, ...]) -> list[str]:
     """Return the names of an order; none where it has none."""
     return [name for name, known in ORDERS.items() if known == order]
-
-
-def order_words(order: Order) -> str:
-    """Return an order in words."""
-    places = ", ".join(
-        f"{motor} {place}" for motor, place in sorted(zip(order, PLACES, strict=True))
-    )
-    return f"motors {places}"

@@ -25,13 +25,13 @@ from ..motion.smoothing import CUTOFFS, low_pass, runs_of, unbroken
 from .evidence import Evidence, departures
 from .excerpt import excerpt
 from .flight_log import FlightLog
-from .flight_phases import flying, usual_thrust
+from .flight_phases import carrying, flying
 from .inertial import INERTIAL, gravity_doubt, is_stuck
 from .magnitudes import MAGNITUDES, rotor_doubt, thrust_by_weight, time_doubt, within
 from .readings import Reading
 from .source_rates import MOTOR_RATES
 from .stuck_channels import stretches, stuck_notes
-from .table import Array, Mask, Rows
+from .table import Mask, Rows
 
 LEAST_SECONDS = 10.0  # of unbroken pose in flight
 _LEAST_PIECE = SIGNALS.shortest_piece  # s; a shorter piece is all edge to the filters
@@ -137,16 +137,23 @@ def _screened(
 
     hear(_channels(log, vehicle, by_imu))
     hear(_rotors(log, vehicle, by_imu))
-    log = _without_racing(log, vehicle)
+    above = log.rotor_speeds > _most_rad_s(log, vehicle)
+    if above.any():
+        speeds = log.rotor_speeds.copy()
+        for column, bad in zip(speeds.T, above.T, strict=True):
+            column[bad] = np.interp(log.t[bad], log.t[~bad], column[~bad])
+        log = replace(log, rotor_speeds=speeds)
     if by_imu:
         hear(_imu(log, vehicle, least or 0.0))
     else:
         if least is not None:  # a filter predicts over steps of any length
             hear(_uneven_steps(log))
-        same = _repeated(log)
+        seen, same = np.flatnonzero(log.valid), np.zeros(len(log.t), np.bool_)
+        pose = np.column_stack([log.position, log.quaternion])[seen]
+        same[seen[1:]] = np.all(pose[1:] == pose[:-1], axis=1)
         hear(_held_pose(log, same))
         log = replace(log, valid=log.valid & ~same)
-        hear(_pose(log, least or 0.0))
+        hear(_pose_rate(log))
     notes += stuck_notes(log, vehicle)
     others: list[Reading] = []
     if by_imu or _pieces(log):
@@ -217,7 +224,9 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
     if doubt := time_doubt(float(np.median(np.diff(times)))):
         yield Refused(doubt)
     for i, column in enumerate(speeds.T):
-        if stopped := stretches((column == 0.0) & _carrying(log), log.t, _STOPPED):
+        if stopped := stretches(
+            (column == 0.0) & carrying(np.square(speeds).max(axis=1)), log.t, _STOPPED
+        ):
             yield Fault(f"omega{i + 1} {zero}, for {stopped}; {all_four}")
     most = _most_rad_s(log, vehicle)
     if (above := np.argwhere(speeds > most)).size:
@@ -237,17 +246,6 @@ def _most_rad_s(log: FlightLog, vehicle: Vehicle) -> float:
     """Return a rotor speed in rad/s that no rotor reaches."""
     middle = float(np.median(log.rotor_speeds[log.rotor_speeds.max(axis=1) > 0.0]))
     return min(_ABOVE_MOST * vehicle.omega_max, _BEYOND * max(middle, vehicle.hover_rate))
-
-
-def _without_racing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
-    """Return a log whose rotor speeds are interpolated where no rotor reaches them."""
-    above = log.rotor_speeds > _most_rad_s(log, vehicle)
-    if not above.any():
-        return log
-    speeds = log.rotor_speeds.copy()
-    for column, bad in zip(speeds.T, above.T, strict=True):
-        column[bad] = np.interp(log.t[bad], log.t[~bad], column[~bad])
-    return replace(log, rotor_speeds=speeds)
 
 
 def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
@@ -285,35 +283,21 @@ def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
         yield Refused(f"ax, ay, az {doubt}")
 
 
-def _repeated(log: FlightLog) -> Mask:
-    """Return in which rows (N,) a pose is the one before, to the last digit."""
-    seen = np.flatnonzero(log.valid)
-    pose = np.column_stack([log.position, log.quaternion])[seen]
-    same: Mask = np.zeros(len(log.t), np.bool_)
-    same[seen[1:]] = np.all(pose[1:] == pose[:-1], axis=1)
-    return same
-
-
 def _held_pose(log: FlightLog, same: Mask) -> Findings:
-    """Check that the pose changes; ``same`` (N,) as of ``_repeated``."""
+    """Check that the pose changes; ``same`` (N,): the pose is the one before, to the last digit."""
     seen = np.flatnonzero(log.valid)
     if log.t[seen[-1]] - log.t[seen[0]] > _NEVER and np.all(same[seen[1:]]):
         yield Refused("the pose never changes, to the last digit; expected the poses of a flight")
-    if held := stretches((same & _carrying(log))[seen], log.t[seen], _HELD):
+    fastest = np.square(log.rotor_speeds).max(axis=1)
+    if held := stretches((same & carrying(fastest))[seen], log.t[seen], _HELD):
         yield Note(
             f"warning: the pose is frozen for {held}: it repeats to the last digit while the "
             "rotors turn. These rows count as without a pose"
         )
 
 
-def _runs(log: FlightLog) -> list[tuple[float, Rows]]:
-    """Return the length in s and the rows of each unbroken run of poses."""
-    runs = unbroken(log.t, np.flatnonzero(log.valid), max(0.1, 3.5 * log.period))
-    return [(float(log.t[run[-1]] - log.t[run[0]]), run) for run in runs]
-
-
-def _pose(log: FlightLog, least: float) -> Findings:
-    """Check the rate of the poses, and that a run of them is long enough to say something."""
+def _pose_rate(log: FlightLog) -> Findings:
+    """Check the rate of the poses."""
     times = log.t[log.valid]
     period = float(np.median(np.diff(times))) if len(times) > 1 else np.inf
     if period * _LEAST_RATE_HZ > _SLACK:
@@ -322,17 +306,12 @@ def _pose(log: FlightLog, least: float) -> Findings:
             "accelerations come from differences of poses that are low-passed at 15 Hz, and a "
             "quadrotor turns within a tenth of a second"
         )
-    if not _pieces(log):
-        longest = max(length for length, _ in _runs(log))
-        yield Needed(
-            f"{_lost_words(log)}the longest unbroken run of poses is {longest:.3g} s; expected at "
-            f"least {least:g} s in flight, in runs of more than {_LEAST_PIECE:g} s"
-        )
 
 
 def _pieces(log: FlightLog) -> list[Rows]:
     """Return the rows of each unbroken run of poses that is long enough to say something."""
-    return [run for length, run in _runs(log) if len(run) > 8 and length > _LEAST_PIECE]
+    runs = unbroken(log.t, np.flatnonzero(log.valid), max(0.1, 3.5 * log.period))
+    return [r for r in runs if len(r) > 8 and log.t[r[-1]] - log.t[r[0]] > _LEAST_PIECE]
 
 
 def _uneven_steps(log: FlightLog) -> Findings:
@@ -356,68 +335,24 @@ def _steps(log: FlightLog) -> Findings:
     does not jump.
     """
     seen = np.flatnonzero(log.valid)
-    step = np.diff(log.t[seen])
-    way = np.linalg.norm(np.diff(log.position[seen], axis=0), axis=1)
-    q = log.quaternion[seen]
+    t, position, q = log.t[seen], log.position[seen], log.quaternion[seen]
+    step = np.diff(t)
+    way = np.linalg.norm(np.diff(position, axis=0), axis=1)
     angle = 2.0 * np.arccos(np.clip(np.abs(np.sum(q[1:] * q[:-1], axis=1)), 0.0, 1.0))
     far, turned = way > _LEAP[0] + _LEAP[1] * step, angle > _TURN[0] + _TURN[1] * step
     leaps = far | turned
     if leaps.any():
-        i = int(np.argmax(leaps))
-        what = f"{way[i]:.3g} m" if far[i] else f"{np.degrees(angle[i]):.0f} degrees"
+        first = int(np.argmax(leaps))
+        what = f"{way[first]:.3g} m" if far[first] else f"{np.degrees(angle[first]):.0f} degrees"
         units = ": are px, py, pz in metres?" if far.mean() > 0.05 else ""
         kind = Refused if leaps.mean() > _MOST_LEAPS else Fault
         yield kind(
-            f"the pose leaps by {what} within {step[i]:.3g} s at t = {log.t[seen[i + 1]]:.6g} s, "
+            f"the pose leaps by {what} within {step[first]:.3g} s at t = {t[first + 1]:.6g} s, "
             f"which no quadrotor flies ({int(leaps.sum())} such step(s)){units}; expected poses of "
             "one vehicle on one clock: leave the bad rows' pose empty, or cut the log there"
         )
-    yield from _jumps(log.t[seen], log.position[seen], way, angle)
-
-
-def _length(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
-    """Check that enough is left in unbroken runs in flight, and note where much is not."""
-    thrust = np.square(log.rotor_speeds) @ vehicle.k
-    thrust = low_pass(thrust, CUTOFFS.flying_hz, log.period)
-    aloft = thrust > 0.5 * usual_thrust(thrust)
-    step = np.minimum(np.diff(log.t, append=log.t[-1] + log.period), max(0.1, 3.5 * log.period))
-    step = np.where(aloft, step, 0.0)
-    left = sum(float(step[piece[0] : piece[-1] + 1].sum()) for piece in _pieces(log))
-    whole = float(step.sum())
-    if left < least - 1e-9:
-        yield Refused(
-            f"{_lost_words(log)}{left:.3g} s of flight in unbroken runs of poses; expected at "
-            f"least {least:g} s, in runs of more than {_LEAST_PIECE:g} s"
-        )
-    if left < (1.0 - _LOST_SHARE) * whole:
-        yield Note(
-            f"{_lost_words(log)}{left:.3g} of {whole:.3g} s of flight lie in runs of poses long "
-            "enough to use"
-        )
-
-
-def _carrying(log: FlightLog) -> Mask:
-    """Return in which rows (N,) the fastest rotors turn as in flight."""
-    fastest = np.square(log.rotor_speeds).max(axis=1)
-    return np.asarray(fastest > 0.5 * usual_thrust(fastest))
-
-
-def _lost_words(log: FlightLog) -> str:
-    runs, lost = len(runs_of(~log.valid)), int(np.sum(~log.valid))
-    return f"the pose is lost in {runs} run(s), {lost} of {len(log.t)} rows; " if runs else ""
-
-
-def _jumps(t: Array, position: Array, way: Array, angle: Array) -> Findings:
-    """Find a long step in time between two poses that follow one another as if no time had passed.
-
-    Args:
-        t: (n,) s, of the poses.
-        position: (n, 3) m.
-        way: (n - 1,) m from each to the next.
-        angle: (n - 1,) rad, the same.
-    """
-    span = 10  # poses on either side, over which velocities are taken
-    step = np.diff(t)
+    # two poses that follow one another as if no time had passed, by velocities over 10 on each side
+    span = 10
     for i in np.flatnonzero(step > _JUMP):
         a, b = i - span, i + 1 + span
         if a < 0 or b >= len(t) or t[i] - t[a] > _JUMP or t[b] - t[i + 1] > _JUMP:
@@ -433,3 +368,21 @@ def _jumps(t: Array, position: Array, way: Array, angle: Array) -> Findings:
                 "for the whole log: set the clock's jump back, or cut the log there"
             )
             return
+
+
+def _length(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
+    """Check that enough is left in unbroken runs in flight, and note where much is not."""
+    thrust = np.square(log.rotor_speeds) @ vehicle.k
+    thrust = low_pass(thrust, CUTOFFS.flying_hz, log.period)
+    step = np.minimum(np.diff(log.t, append=log.t[-1] + log.period), max(0.1, 3.5 * log.period))
+    step = np.where(carrying(thrust), step, 0.0)
+    pieces = _pieces(log)
+    left = sum(float(step[piece[0] : piece[-1] + 1].sum()) for piece in pieces)
+    whole, runs = float(step.sum()), len(runs_of(~log.valid))
+    lost = f"the pose is lost in {runs} run(s), {int(np.sum(~log.valid))} of {len(log.t)} rows; "
+    words = f"{lost if runs else ''}{left:.3g} of {whole:.3g} s of flight lie in unbroken runs of "
+    words += f"poses of more than {_LEAST_PIECE:g} s"
+    if not pieces or left < least - 1e-9:
+        yield Refused(f"{words}; expected at least {least:g} s")
+    if left < (1.0 - _LOST_SHARE) * whole:
+        yield Note(words)

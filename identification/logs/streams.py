@@ -131,16 +131,16 @@ class Recording:
         made, words = _cleaned(path, self.streams)
         notes = (*self.notes, *words)
         sensors = {name: made[name] for name in ("gyro", "accelerometer") if name in made}
-        of_motors = [name for name in _MOTORS if name in made]
-        motors = made[of_motors[0]].whole()
+        kind = next(name for name in _MOTORS if name in made)
+        motors = made[kind].whole()
         t, pose, words = _rows(path, made.get("position"), motors, [*sensors.values()])
         notes += words
         after = np.searchsorted(motors.t, t)  # rows lie within the motors' span
         steps = np.diff(motors.t)[after[motors.t[after] != t] - 1]
         if (longest := float(steps.max(initial=0.0))) > _ROTOR_GAP:
             notes += (
-                f"{motors.name}: up to {longest:.2g} s between messages; the "
-                f"{_MOTORS[of_motors[0]]} there are interpolated",
+                f"{motors.name}: up to {longest:.2g} s between messages; the {_MOTORS[kind]} there "
+                "are interpolated",
             )
         valid: Mask = np.asarray(np.isfinite(pose).all(axis=1))
         if np.isfinite(pose[:, 3:]).any():  # else positions without an attitude, which are kept
@@ -156,17 +156,22 @@ class Recording:
         truth = {name: made[name].at(t) for name in ("force", "torque") if name in made}
         kept = {name: stream.between(t) for name, stream in self.extra.items()}
         times = t - t[0] if log_map.time.offset is None else t
+        notes += time_notes(times)
+        without = int(np.sum(~valid)) if valid.any() else 0
+        if without and measured:  # the sensor may be faster than the pose
+            notes += tuple(f"of the pose: {text}" for text in time_notes(times[valid]))
+        elif without:
+            first = times[np.argmin(valid)]
+            notes += (f"{without} of {len(t)} rows without a pose, the first at t = {first:.6g} s",)
         log = FlightLog(
-            t=times,
-            position=pose[:, :3],
-            quaternion=pose[:, 3:],
-            rotor_speeds=speeds,
+            times,
+            pose[:, :3],
+            pose[:, 3:],
+            speeds,
             voltage=made["battery"].at(t)[:, 0] if "battery" in made else None,
-            accelerometer=measured.get("accelerometer"),
-            gyro=measured.get("gyro"),
             name=Path(path.name.removesuffix(".gz")).stem if path.is_file() else path.name,
             source=f"{path} (reader {reader})" if reader else str(path),
-            notes=(*notes, *_gap_notes(times, valid, bool(measured))),
+            notes=notes,
             valid=valid,
             extra={name: x[:, 0] if x.shape[1] == 1 else x for name, x in kept.items()},
             commanded="wrench" in made and "rotors" not in made,
@@ -174,6 +179,7 @@ class Recording:
             vehicle=log_map.vehicle,
             flown=self.flown,
             rates={name: source_rate(s.t, s.values) for name, s in made.items()},
+            **measured,
             **truth,
         )
         return with_commanded_speeds(log, vehicle, log_map.commands)
@@ -196,7 +202,20 @@ def _cleaned(
             )
         values = stream.values
         if name in _MOTORS:
-            notes += _check_motors(path, name, stream)
+            infinite = np.argwhere(np.isinf(values))
+            if infinite.size and name == "rotors":
+                row, rotor = infinite[0]
+                raise InputError(
+                    f"{path}: {stream.name}, message {row + 1}: the rotor speed of rotor "
+                    f"{rotor + 1} is {values[row, rotor]}; expected a finite number"
+                )
+            if len(stream.whole().t) < 2:
+                raise InputError(
+                    f"{path}: {stream.name}: no two samples have four finite {_MOTORS[name]}; "
+                    "expected some"
+                )
+            if name == "rotors" and np.any(values < 0.0):
+                notes += (f"{stream.name}: negative rotor speeds were taken as positive",)
             values = np.abs(values) if name == "rotors" else values
             values = np.clip(values, 0.0, 1.0) if name == "commands" else values
         elif name == "battery":
@@ -215,29 +234,6 @@ def _cleaned(
         elif name == "battery" and not np.any(values > 0.0):
             notes += (f"{stream.name}: no positive voltage; left out",)
     return made, notes
-
-
-def _check_motors(path: Path, name: str, motors: Stream) -> tuple[str, ...]:
-    """Return a note where rotor speeds are negative.
-
-    Raises:
-        InputError: a rotor speed is infinite, or fewer than two samples are finite numbers.
-    """
-    infinite = np.argwhere(np.isinf(motors.values))
-    if infinite.size and name == "rotors":
-        raise InputError(
-            f"{path}: {motors.name}, message {infinite[0][0] + 1}: the rotor speed of rotor "
-            f"{infinite[0][1] + 1} is {motors.values[tuple(infinite[0])]}; expected a finite number"
-        )
-    if len(motors.whole().t) < 2:
-        raise InputError(
-            f"{path}: {motors.name}: no two samples have four finite {_MOTORS[name]}; expected some"
-        )
-    if name == "rotors" and np.any(motors.values < 0.0):
-        return (
-            f"{motors.name}: negative rotor speeds (a sense of rotation) were taken as positive",
-        )
-    return ()
 
 
 def _rows(
@@ -289,19 +285,3 @@ def _rows(
 def _step(t: Array) -> float:
     """Return the median time step, s."""
     return float(np.median(np.diff(t)))
-
-
-def _gap_notes(t: Array, valid: Mask, inertial: bool) -> tuple[str, ...]:
-    """Return notes on gaps in time, and on rows without a pose; beside an inertial sensor, which
-    may be faster than the pose, on the pose's gaps alone.
-    """
-    notes = time_notes(t)
-    if not valid.any() or valid.all():
-        return notes
-    if inertial:
-        return notes + tuple(f"of the pose: {text}" for text in time_notes(t[valid]))
-    return (
-        *notes,
-        f"{int(np.sum(~valid))} of {len(t)} rows without a pose, the first at t = "
-        f"{t[np.flatnonzero(~valid)[0]]:.6g} s",
-    )

@@ -33,8 +33,7 @@ def stuck_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
     notes = []
     for i in range(4):
         others = np.delete(rotors, i, axis=1), "the other rotor speeds"
-        rows = aloft & turning[:, i]
-        notes += _note(f"omega{i + 1}", log.t, rows, rotors[:, [i]], *others)
+        notes += _note(f"omega{i + 1}", log.t, aloft & turning[:, i], rotors[:, [i]], *others)
     for i, axis in enumerate("xyz"):
         others = np.delete(place, i, axis=1), "the other coordinates"
         notes += _note(f"p{axis}", log.t[seen], flown, place[:, [i]], *others)

@@ -46,7 +46,7 @@ def rows_of(
         return Samples(t, columns, table=table, rows=rows), notes
     samples = Samples(columns[clock.column], columns, table=table, rows=rows)
     if is_whole:
-        _check_finite(samples, clock.column)
+        _refuse(samples, clock.column, samples.t, ~np.isfinite(samples.t))
     samples = samples.cut(np.isfinite(samples.t))
     if len(samples.t) < len(rows):
         notes.append(f"{len(rows) - len(samples.t)} row(s) without a time were left out")
@@ -78,7 +78,7 @@ def rows_of(
     samples = replace(samples, t=t)
     if is_whole:
         _check_whole(samples, log_map)
-        stray, words = _stray_rows(table, t, log_map.stray_rows)
+        stray, words = _stray_rows(t, log_map.stray_rows)
         return samples.cut(slice(stray, None)), notes + words
     first = np.flatnonzero(np.diff(raw, prepend=np.nan) != 0.0)
     if len(first) < len(t):
@@ -88,7 +88,7 @@ def rows_of(
     return samples, notes
 
 
-def _refuse(samples: Samples, name: str, column: Array, bad: Mask, expected: str) -> None:
+def _refuse(samples: Samples, name: str, column: Array, bad: Mask, expected: str = _FINITE) -> None:
     """Raise InputError at the first of a column's values (N,) that is ``bad`` (N,)."""
     if bad.any():
         i = int(np.argmax(bad))
@@ -99,42 +99,28 @@ def _refuse(samples: Samples, name: str, column: Array, bad: Mask, expected: str
         )
 
 
-def _check_finite(samples: Samples, name: str, where: Mask | None = None, more: str = "") -> None:
-    """Raise InputError at the first number of a column that is not finite, among the rows ``where``
-    (N,); ``more`` says what else may be empty.
-    """
-    column = samples.columns[name]
-    bad = ~np.isfinite(column) & (True if where is None else where)
-    _refuse(samples, name, column, bad, f"{_FINITE}{more}")
-
-
 def _check_whole(samples: Samples, log_map: LogMap) -> None:
     """Raise InputError where a row has a part of a pose, or of a sensor's three values, or lacks
     another number; ``check_rows`` looks at gaps of motors and of the voltage.
     """
-    pose: list[Columns] = [p for p in (log_map.position, log_map.attitude) if p is not None]
-    groups = [(pose, "only all {} pose columns together may be empty (pose lost)")]
-    groups += [
-        ([part], "only {} together may be empty (not measured)")
-        for part in (log_map.accelerometer, log_map.gyro)
-        if part is not None
-    ]
-    for parts, words in groups:
-        names = [name for part in parts for name in part.named]
-        if not names:
-            continue
-        count = {7: "seven", 6: "six", 3: "three"}.get(len(names), str(len(names)))
-        text = words.format(count if parts is pose else ", ".join(names))
-        there = ~np.all(np.isnan([samples.columns[name] for name in names]), axis=0)
+
+    def names_of(*parts: Columns | None) -> list[str]:
+        return [name for part in parts if part is not None for name in part.named]
+
+    def check(names: list[str], there: Mask | bool, expected: str) -> None:
         for name in names:
-            _check_finite(samples, name, there, f"; {text}")
-    others = (log_map.wrench, log_map.force, log_map.torque, *log_map.extra.values())
-    for name in [name for part in others if part is not None for name in part.named]:
-        if not any(name in part.named for part in pose):
-            _check_finite(samples, name)
+            column = samples.columns[name]
+            _refuse(samples, name, column, ~np.isfinite(column) & there, expected)
+
+    pose = names_of(log_map.position, log_map.attitude)
+    for names in (pose, names_of(log_map.accelerometer), names_of(log_map.gyro)):
+        there = np.any([~np.isnan(samples.columns[name]) for name in names], axis=0)
+        check(names, there, f"{_FINITE}; only {', '.join(names)} together may be empty")
+    others = names_of(log_map.wrench, log_map.force, log_map.torque, *log_map.extra.values())
+    check([name for name in others if name not in pose], True, _FINITE)
 
 
-def _stray_rows(table: Table, t: Array, most: int) -> tuple[int, list[str]]:
+def _stray_rows(t: Array, most: int) -> tuple[int, list[str]]:
     """Return the first row behind a gap that follows the first few, and a note where some are to be
     dropped.
     """
@@ -142,15 +128,8 @@ def _stray_rows(table: Table, t: Array, most: int) -> tuple[int, list[str]]:
     gaps = np.flatnonzero(step[:most] > _STRAY_GAP * np.median(step))
     if not gaps.size:
         return 0, []
-    first = int(gaps[-1]) + 1
-    if len(t) - first < 2:
-        raise InputError(
-            f"{table.path}: only one row after the gap behind the first sample(s); expected at "
-            "least two"
-        )
-    return first, [
-        f"dropped {first} stray sample(s) before a gap of {step[first - 1]:.2g} s at the start"
-    ]
+    gap, first = step[gaps[-1]], int(gaps[-1]) + 1
+    return first, [f"dropped {first} stray sample(s) before a gap of {gap:.2g} s at the start"]
 
 
 def _last_of(column: Array, first: Rows) -> Array:
@@ -190,12 +169,10 @@ def check_rows(samples: Samples, log_map: LogMap) -> list[str]:
     Raises:
         InputError: a number is none that a flight has, or a gap is long; the message names the row.
     """
-    whole_battery = log_map.battery if log_map.rows == "whole" else None
-    parts = (log_map.rotors, log_map.commands, whole_battery, log_map.force, log_map.torque)
+    is_whole, rotors, commands = log_map.rows == "whole", log_map.rotors, log_map.commands
+    battery = log_map.battery if is_whole else None
     filled, slow = [], []
-    for part in parts:
-        if part is None:
-            continue
+    for part in filter(None, (rotors, commands, battery, log_map.force, log_map.torque)):
         read = np.flatnonzero(np.isfinite(samples.values(part)).any(axis=1))
         inside = samples.cut(slice(read[0], read[-1] + 1)) if len(read) else samples
         for name, column in zip(part.columns, inside.values(part).T, strict=True):
@@ -205,16 +182,18 @@ def check_rows(samples: Samples, log_map: LogMap) -> list[str]:
                 slow.append(f"{name} {count} of {len(column)}")
             elif count < len(column):
                 filled.append(f"{name} {len(column) - count} (over up to {gap:.3g} s)")
-    if whole_battery is not None:
-        _check_range(samples, whole_battery, 0.0, np.inf, "a voltage of at least 0")
-    if log_map.is_own and log_map.rotors is not None:
+    limits: list[tuple[Columns, float, float, str]] = []
+    if battery is not None:
+        limits.append((battery, 0.0, np.inf, "a voltage of at least 0"))
+    if log_map.is_own and rotors is not None:
         words = "a rotor speed (its direction is the vehicle's spin) of at least 0"
-        _check_range(samples, log_map.rotors, 0.0, np.inf, words)
-    commands = log_map.commands
-    if log_map.rows == "whole" and commands is not None and commands.range and not commands.clip:
-        low, high = commands.range
-        words = f"a motor command from {low:g} to {high:g}"
-        _check_range(samples, commands, min(low, high), max(low, high), words)
+        limits.append((rotors, 0.0, np.inf, words))
+    if is_whole and commands is not None and commands.range and not commands.clip:
+        low, high = sorted(commands.range)
+        limits.append((commands, low, high, f"a motor command from {low:g} to {high:g}"))
+    for part, low, high, words in limits:
+        for name, column in zip(part.columns, samples.values(part).T, strict=True):
+            _refuse(samples, name, column, (column < low) | (column > high), words)
     notes = ["missing values interpolated: " + ", ".join(filled)] if filled else []
     if slow:
         notes.append(
@@ -230,7 +209,7 @@ def _longest_gap(samples: Samples, name: str, column: Array) -> float:
         InputError: one is infinite, or a gap is longer than 0.06 s and than 3.5 of the column's own
             steps.
     """
-    _refuse(samples, name, column, np.isinf(column), _FINITE)
+    _refuse(samples, name, column, np.isinf(column))
     read = np.flatnonzero(~np.isnan(column))
     if len(read) == len(column):
         return 0.0
@@ -248,9 +227,3 @@ def _longest_gap(samples: Samples, name: str, column: Array) -> float:
     bad: Mask = np.asarray(is_long & (np.arange(len(t)) == first))
     _refuse(samples, name, column, bad, f"{_FINITE}: {words}")
     return float(steps.max(initial=0.0))
-
-
-def _check_range(samples: Samples, part: Columns, low: float, high: float, expected: str) -> None:
-    """Raise InputError at the first value of a section that is below ``low`` or above ``high``."""
-    for name, column in zip(part.columns, samples.values(part).T, strict=True):
-        _refuse(samples, name, column, (column < low) | (column > high), expected)

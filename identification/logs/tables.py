@@ -7,10 +7,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from ...runtime.errors import InputError
+from ...runtime.extras import need
 from ...runtime.page_files import write_text
 from ...runtime.whole_files import replaced
 from .array_table import open_arrays
-from .parquet_table import open_parquet, write_parquet
+from .parquet_table import open_parquet
 from .table import ARRAY_SUFFIXES, SUFFIXES, TEXT_SUFFIXES, Array, Table, file_kind
 from .text_table import open_text
 
@@ -46,12 +47,18 @@ def write_table(columns: Mapping[str, Array], path: Path) -> None:
     as an empty field.
 
     Raises:
-        InputError: the name's ending is unknown or the file cannot be written.
+        InputError: the name's ending is unknown, the file cannot be written, or pyarrow is not
+            installed.
     """
     kind = file_kind(path)
     with replaced(path) as temporary:
         if kind == ".parquet":
-            write_parquet(columns, path, temporary)
+            need("pyarrow", "parquet", path)
+            import pyarrow
+            from pyarrow import parquet
+
+            arrays = {name: pyarrow.array(x, from_pandas=True) for name, x in columns.items()}
+            parquet.write_table(pyarrow.table(arrays), temporary)
             return
         data = _csv_text(columns).encode()
         # a fixed time stamp: the same table gives the same bytes

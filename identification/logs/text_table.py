@@ -123,7 +123,11 @@ def open_text(path: Path) -> Table:
     Raises:
         InputError: unreadable, no text, no table, or more than ``FileLimits`` allows.
     """
-    written = _first_lines(path)
+    written: list[str] = []
+    for line in islice(_lines(path), _LINES):
+        written.append(line)
+        if sum(map(len, written)) > _LOOKED_AT:
+            break
     head = [_LIST.sub("0", line) for line in written]
     layout, first = _layout(path, head)
     header, first = _header(path, head, layout, first)
@@ -224,18 +228,6 @@ def _lines(path: Path) -> Iterator[str]:
                 yield line.rstrip("\n")
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"{path}: cannot be read as {WHAT}: {error}") from error
-
-
-def _first_lines(path: Path) -> list[str]:
-    """Return the lines in which the layout is found."""
-    head: list[str] = []
-    size = 0
-    for line in islice(_lines(path), _LINES):
-        head.append(line)
-        size += len(line)
-        if size > _LOOKED_AT:
-            break
-    return head
 
 
 def _layout(path: Path, head: list[str]) -> tuple[TextLayout, int]:

@@ -102,13 +102,28 @@ def reader_by_content(path: Path) -> Reader | None:
     Raises:
         InputError: it is a folder, but no ROS 2 bag's.
     """
-    if os.path.isdir(path):  # False for a name that is too long
-        return _folder(path)
+    if not os.path.isdir(path):  # False for a name that is too long
+        try:
+            head = _head(path)
+        except InputError:
+            return None  # whoever reads it says what is wrong
+        return next((r for r in READERS.values() if head.startswith(r.begins)), None)
     try:
-        head = _head(path)
-    except InputError:
-        return None  # whoever reads it says what is wrong
-    return next((r for r in READERS.values() if head.startswith(r.begins)), None)
+        names = sorted(entry.name for entry in path.iterdir())
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read as a folder: {error.strerror}") from error
+    if any(name.lower().endswith(_BAG_FOLDER) for name in names):
+        return READERS["rosbag"]
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    raise InputError(
+        f"{path}: is a folder; expected a file, or the folder of a ROS 2 bag, which has one of "
+        f"{', '.join(_BAG_FOLDER)}; found {', '.join(names[:_LISTED]) or 'nothing in it'}{more}"
+    )
+
+
+def _head(path: Path) -> bytes:
+    with open_regular(path, "a flight log") as file:
+        return file.read(_HEAD)
 
 
 def binary_logs() -> str:
@@ -137,23 +152,13 @@ def unknown_content(path: Path) -> InputError:
     )
 
 
-def _head(path: Path) -> bytes:
-    with open_regular(path, "a flight log") as file:
-        return file.read(_HEAD)
-
-
-def _table_readers() -> list[Reader]:
-    """Return the readers of tables that are known by their columns."""
-    return [*map(find_reader, TABLES), READERS["betaflight_csv"]]
-
-
 def reader_by_columns(path: Path, header: Sequence[str]) -> Reader | None:
     """Return the reader whose columns a table has; None where it has those of none.
 
     Raises:
         InputError: it has those of several.
     """
-    found = [reader for reader in _table_readers() if set(header).issuperset(reader.signature)]
+    found = [reader for reader in table_readers() if set(header).issuperset(reader.signature)]
     if len(found) > 1:
         raise InputError(
             f"{path}: its columns are those of {' and of '.join(r.what for r in found)}; expected "
@@ -162,25 +167,6 @@ def reader_by_columns(path: Path, header: Sequence[str]) -> Reader | None:
     return found[0] if found else None
 
 
-def looked_for_columns() -> str:
-    """Return the words for the tables that are recognised, each with a column that tells it."""
-    return ", ".join(f"{r.name} ({r.signature[0]} ...)" for r in _table_readers())
-
-
-def _folder(path: Path) -> Reader:
-    """Return the reader of a folder.
-
-    Raises:
-        InputError: it is no ROS 2 bag's.
-    """
-    try:
-        names = sorted(entry.name for entry in path.iterdir())
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read as a folder: {error.strerror}") from error
-    if any(name.lower().endswith(_BAG_FOLDER) for name in names):
-        return READERS["rosbag"]
-    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
-    raise InputError(
-        f"{path}: is a folder; expected a file, or the folder of a ROS 2 bag, which has one of "
-        f"{', '.join(_BAG_FOLDER)}; found {', '.join(names[:_LISTED]) or 'nothing in it'}{more}"
-    )
+def table_readers() -> list[Reader]:
+    """Return the readers of tables that are known by their columns."""
+    return [*map(find_reader, TABLES), READERS["betaflight_csv"]]

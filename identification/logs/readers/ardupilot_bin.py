@@ -28,7 +28,7 @@ from ..log_map import Commands, LogMap, recording_map
 from ..mapped_log import recording_of
 from ..rotor_orders import ORDERS, Order, order_words
 from ..streams import Stream
-from ..table import Array, Mask
+from ..table import Array
 from ..what_flew import (
     PLUS,
     UNSTATED,
@@ -90,34 +90,24 @@ def _times(messages: Messages) -> Array:
     return np.asarray(1e-3 * messages.get("TimeMS", np.empty(0)))
 
 
-def _where(messages: Messages, mask: Mask) -> Messages:
-    """Return the messages of a mask (N,)."""
-    return {name: column[mask] for name, column in messages.items()}
-
-
 def _samples(name: str, messages: Messages, columns: set[str]) -> Samples | None:
-    """Return some columns of a type's messages, of the first core, sensor or battery; None where
-    there are less than two.
+    """Return some columns of a type's messages, of the first core, sensor or battery, places as
+    north, east, down in m from the first; None where there are less than two.
     """
     for number in _NUMBERS:
         if number in messages:
-            messages = _where(messages, messages[number] == messages[number].min())
+            first = messages[number] == messages[number].min()
+            messages = {name: column[first] for name, column in messages.items()}
     t = _times(messages)
     if len(t) < 2:
         return None
     found = {name: messages[name] for name in messages if name in columns}
     if set(_PLACE) <= set(found):
-        found |= _metres(*(found.pop(name) for name in _PLACE))
+        north, east, altitude = (found.pop(name) for name in _PLACE)  # degrees, and m
+        east = (east - east[0]) * np.cos(np.radians(north[0]))
+        found |= {"N": _EARTH * np.radians(north - north[0]), "E": _EARTH * np.radians(east)}
+        found["D"] = -altitude
     return Samples(t, found, name)
-
-
-def _metres(latitude: Array, longitude: Array, altitude: Array) -> dict[str, Array]:
-    """Return north, east, down (N,) in m from the first place of latitude and longitude (N,) in
-    degrees and altitude (N,) in m.
-    """
-    north = _EARTH * np.radians(latitude - latitude[0])
-    east = _EARTH * np.radians(longitude - longitude[0]) * np.cos(np.radians(latitude[0]))
-    return {"N": north, "E": east, "D": -altitude}
 
 
 def _texts(messages: Messages, column: str) -> list[str]:
@@ -164,6 +154,11 @@ def _running(pulses: Messages, log_map: LogMap) -> int | None:
     return running(outputs, [names.index(name) for name in sent.columns], *sent.range)
 
 
+def _functions(parameters: Parameters) -> list[int]:
+    """Return what each output does."""
+    return [int(parameters.get(f"SERVO{i}_FUNCTION", 0)) for i in range(1, _CHANNELS + 1)]
+
+
 def _order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> tuple[Order, str]:
     """Return which motor each of the vehicle's rotors is, and the note that says whence.
 
@@ -190,16 +185,6 @@ def _order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> tuple
     return order, f"{name} {kind}: {order_words(order)}"
 
 
-def _functions(parameters: Parameters) -> list[int]:
-    """Return what each output does."""
-    return [int(parameters.get(f"SERVO{i}_FUNCTION", 0)) for i in range(1, _CHANNELS + 1)]
-
-
-def _slots(parameters: Parameters) -> list[int]:
-    """Return the outputs, from 0, of motors 1 to 4."""
-    return slots_of_motors(_functions(parameters), _MOTOR1) or [0, 1, 2, 3]
-
-
 def _with_parameters(
     path: Path, log_map: LogMap, parameters: Parameters, vehicle: Vehicle | None, letter: str
 ) -> tuple[LogMap, list[str]]:
@@ -223,7 +208,8 @@ def _with_parameters(
     least, most = parameters.get("MOT_SPIN_MIN", 0.15), parameters.get("MOT_SPIN_MAX", 0.95)
     if not 0.0 <= least < most:
         least, most = 0.0, 1.0
-    outputs = [slot + 1 for slot in _slots(parameters)]
+    slots = slots_of_motors(_functions(parameters), _MOTOR1) or list(range(4))
+    outputs = [slot + 1 for slot in slots]
     assert log_map.rotors is not None
     assert log_map.commands is not None
     commands: Commands = replace(
@@ -249,11 +235,12 @@ def _telemetry(messages: Messages, parameters: Parameters) -> tuple[list[Samples
     """
     if not {"Instance", "RPM", "TimeUS"} <= set(messages):
         return [], []
-    slots, which = _slots(parameters), messages["Instance"]
-    slots = slots if set(slots) <= set(which.astype(int).tolist()) else [0, 1, 2, 3]
+    slots, which = slots_of_motors(_functions(parameters), _MOTOR1), messages["Instance"]
+    if not slots or not set(slots) <= set(which.astype(int).tolist()):
+        slots = list(range(4))
     each: list[Stream] = []
     for slot in slots:
-        one = _where(messages, which == slot)
+        one = {name: column[which == slot] for name, column in messages.items()}
         if len(one["RPM"]) < 2 or not np.any(one["RPM"] > 0.0):
             return [], ["ESC telemetry: not of all four motors, or without rpm; left out"]
         rows, _ = in_order(times := _times(one))

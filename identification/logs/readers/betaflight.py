@@ -54,25 +54,19 @@ def read(
         InputError: the file cannot be read, is no blackbox, is damaged from its start, or has no
             motors or inertial sensors.
     """
-    poles = _magnet_poles(option, path)
+    _magnet_poles(path, option, "")  # a wrong option is said before a wrong file
     wanted = [*recording_map("betaflight").wanted, *_MORE_MOTORS]
     headers, fields, notes = read_blackbox(path, wanted, piece)
-    return _log(path, "betaflight", fields, set(), headers, poles, vehicle, notes)
+    return _log(path, "betaflight", fields, set(), headers, option, vehicle, notes)
 
 
 def read_table(table: Table, vehicle: Vehicle | None = None, option: str = "") -> FlightLog:
     """Read a table of blackbox_decode; ``option``: number of the motors' magnet poles, for eRPM.
 
     Raises:
-        InputError: the table lacks a column.
+        InputError: the numbers are none of a blackbox.
     """
     path = table.path
-    poles = _magnet_poles(option, path)
-    missing = [name for name in SIGNATURE if name not in table.header]
-    if missing:
-        raise InputError(
-            f"{path}: missing column(s) {', '.join(missing)}; expected those of blackbox_decode"
-        )
     wanted = {*recording_map("betaflight").wanted, *_MORE_MOTORS}
     scales, names = {}, {"time": "time (us)"}
     for name in table.header:
@@ -83,23 +77,7 @@ def read_table(table: Table, vehicle: Vehicle | None = None, option: str = "") -
                 scales[field] = _UNITS[unit]
     read = table.read(list(names.values()))
     fields = {field: scales.get(field, 1.0) * read[name] for field, name in names.items()}
-    return _log(path, "betaflight_csv", fields, {*scales}, {}, poles, vehicle, [*table.notes])
-
-
-def _magnet_poles(option: str, path: Path) -> int | None:
-    """Return the number of magnet poles that a reader's option says; None: nothing.
-
-    Raises:
-        InputError: it is none.
-    """
-    if not option:
-        return None
-    if not (option.isdecimal() and len(option) < 4 and int(option) >= 2 and int(option) % 2 == 0):
-        raise InputError(
-            f"{path}: reader option {option!r}; expected the motors' number of magnet poles, even, "
-            "such as betaflight:14"
-        )
-    return int(option)
+    return _log(path, "betaflight_csv", fields, {*scales}, {}, option, vehicle, [*table.notes])
 
 
 def _log(
@@ -108,7 +86,7 @@ def _log(
     fields: dict[str, Array],
     stated: set[str],
     headers: Mapping[str, str],
-    poles: int | None,
+    option: str,
     vehicle: Vehicle | None,
     notes: list[str],
 ) -> FlightLog:
@@ -134,9 +112,10 @@ def _log(
         low, high, whence = _range(path, [fields[name] for name in groups["motor"]], headers)
         scales["motor"] = 1.0 / (high - low)
         said.append(f"commands: {low:g} to {high:g} ({whence}) taken as 0 to 1")
+    poles, whence = _magnet_poles(path, option, headers.get("motor_poles", ""))
     if any(np.any(fields[name] > 0.0) for name in groups["eRPM"]):
-        scales["eRPM"], words = _rpm(headers, poles)
-        said.append(words)
+        scales["eRPM"] = 200.0 / poles
+        said.append(f"eRPM: {poles} magnet poles ({whence})")
     if groups["acc"]:
         counts, words = _one_g(t, [fields[name] for name in groups["acc"]], headers)
         scales["acc"] = 1.0 / counts
@@ -165,13 +144,11 @@ def _range(path: Path, motors: list[Array], headers: Mapping[str, str]) -> tuple
     if stated:
         try:
             low, high = (float(x) for x in stated.split(","))
-        except ValueError as error:
-            raise InputError(
-                f"{path}: header motorOutput: {stated[:60]!r}; expected two numbers"
-            ) from error
+        except ValueError:
+            low = high = 0.0
         if not 0.0 <= low < high <= 1e5:
             raise InputError(
-                f"{path}: header motorOutput: {stated[:60]!r}; expected the lower number first"
+                f"{path}: header motorOutput: {stated[:60]!r}; expected two rising numbers"
             )
         return low, high, "motorOutput of the header"
     outside = any(np.any((x > _PWM[1]) | ((x < _PWM[0]) & (x > 0.0))) for x in motors)
@@ -179,15 +156,23 @@ def _range(path: Path, motors: list[Array], headers: Mapping[str, str]) -> tuple
     return low, high, f"assumed: {'DShot' if outside else 'pulses in us'}, no header says it"
 
 
-def _rpm(headers: Mapping[str, str], poles: int | None) -> tuple[float, str]:
-    """Return the rpm in one count of eRPM, and words on whence the number of poles is known."""
-    stated = headers.get("motor_poles", "")
-    whence = "as the reader's option says"
-    if poles is None:
-        known = stated.isdecimal() and 2 <= int(stated[:4]) <= 100
-        poles = int(stated) if known else _POLES
-        whence = "motor_poles of the header" if known else "assumed; betaflight:NUMBER says another"
-    return 200.0 / poles, f"eRPM: {poles} magnet poles ({whence})"
+def _magnet_poles(path: Path, option: str, stated: str) -> tuple[int, str]:
+    """Return the number of the motors' magnet poles, and whence it is known: by the reader's option
+    or the header.
+
+    Raises:
+        InputError: the option is none.
+    """
+    if option:
+        if option.isdecimal() and len(option) < 4 and int(option) >= 2 and int(option) % 2 == 0:
+            return int(option), "as the reader's option says"
+        raise InputError(
+            f"{path}: reader option {option!r}; expected the motors' number of magnet poles, even, "
+            "such as betaflight:14"
+        )
+    if stated.isdecimal() and 2 <= int(stated[:4]) <= 100:
+        return int(stated), "motor_poles of the header"
+    return _POLES, "assumed; betaflight:NUMBER says another"
 
 
 def _one_g(t: Array, force: list[Array], headers: Mapping[str, str]) -> tuple[float, str]:

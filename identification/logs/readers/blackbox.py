@@ -13,21 +13,19 @@ from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
 from ..clocks import check_piece
 from ..table import Array
-from .blackbox_frames import ENCODINGS, PREDICTORS, Layout, decode
+from .blackbox_frames import ENCODINGS, FRAMES, PREDICTORS, Layout, decode
 
 _START = b"H Product:Blackbox"
 BEGINS = (_START,)
 
 WHAT = "a blackbox of Betaflight or INAV"
 _HEADERS = re.compile(rb"(H [^\n]{0,20000}\n){0,2000}")
-_FRAMES = "IPSGH"
 
 
 def read_blackbox(
@@ -54,7 +52,13 @@ def read_blackbox(
     check_piece(path, piece, len(starts))
     longest = max(range(len(starts)), key=lambda i: ends[i] - starts[i])
     chosen = longest if piece is None else piece - 1
-    headers, begin = _headers(path, data, starts[chosen], ends[chosen])
+    block = _HEADERS.match(data, starts[chosen], ends[chosen])
+    begin = starts[chosen] if block is None else block.end()
+    if data[begin : begin + 2] == b"H ":
+        raise InputError(f"{path}: its headers do not end; expected frames behind them")
+    lines = data[starts[chosen] : begin].decode("ascii", "replace").split("\n")
+    pairs = (line.removeprefix("H ").partition(":") for line in lines)
+    headers = {key.strip(): value.strip() for key, _, value in pairs}
     version = headers.get("Data version", "2")
     if version != "2":
         raise InputError(f"{path}: header Data version: {version[:20]!r}; expected 2")
@@ -83,21 +87,6 @@ def read_blackbox(
     return headers, dict(zip(keep, rows.T.astype(np.float64), strict=True)), notes
 
 
-def _headers(path: Path, data: bytes, start: int, end: int) -> tuple[dict[str, str], int]:
-    """Return the headers of a log and where its frames begin.
-
-    Raises:
-        InputError: the headers do not end.
-    """
-    block = _HEADERS.match(data, start, end)
-    begin = start if block is None else block.end()
-    if data[begin : begin + 2] == b"H ":
-        raise InputError(f"{path}: its headers do not end; expected frames behind them")
-    lines = data[start:begin].decode("ascii", "replace").split("\n")
-    pairs = (line.removeprefix("H ").partition(":") for line in lines)
-    return {key.strip(): value.strip() for key, _, value in pairs}, begin
-
-
 def _layout(path: Path, headers: Mapping[str, str], names: list[str]) -> Layout:
     """Return what the headers say of the frames.
 
@@ -107,7 +96,7 @@ def _layout(path: Path, headers: Mapping[str, str], names: list[str]) -> Layout:
     check_count(path, len(names), LIMITS.log_fields, "fields")
     predictors = _frame_lists(path, headers, "predictor", PREDICTORS)
     encodings = _frame_lists(path, headers, "encoding", ENCODINGS)
-    for letter, one, other in zip(_FRAMES, predictors, encodings, strict=True):
+    for letter, one, other in zip(FRAMES, predictors, encodings, strict=True):
         sizes = {len(one), len(other)}
         if len(sizes) > 1 or (letter in "IP" and sizes != {len(names)}):
             raise InputError(
@@ -120,31 +109,24 @@ def _layout(path: Path, headers: Mapping[str, str], names: list[str]) -> Layout:
     ]
     if places[0] < 0 and any(6 in one for one in predictors):
         raise InputError(f"{path}: no field loopIteration, which its predictors count on")
-    every, share = _interval(headers.get("I interval", "32")), headers.get("P interval", "1/1")
-    top, _, bottom = share.partition("/")
-    above, below = (_interval(top), _interval(bottom)) if bottom else (1, _interval(top))
+
+    def number(text: str, default: int) -> int:
+        return int(text) if text.lstrip("-").isdecimal() and len(text) < 10 else default
+
+    top, _, bottom = headers.get("P interval", "1/1").rpartition("/")
+    every = headers.get("I interval", "32")
+    intervals = [max(1, number(text, 1)) for text in (every, top or "1", bottom)]
     least = headers.get("motorOutput", "").split(",")[0]
-    constants = [
-        int(text) if text.lstrip("-").isdecimal() and len(text) < 10 else default
-        for text, default in (
-            (headers.get("minthrottle", ""), 1150),
-            (headers.get("vbatref", ""), 4095),
-            (least, 0),
-        )
-    ]
-    return Layout(
-        _rows(encodings),
-        _rows(predictors),
-        np.array([len(one) for one in encodings], np.int64),
-        np.array([every, above, below], np.int64),
-        np.array(constants, np.int64),
-        np.array(places, np.int64),
+    constants = np.zeros(max(PREDICTORS) + 1, np.int64)
+    constants[4] = number(headers.get("minthrottle", ""), 1150)
+    constants[8], constants[9] = 1500, number(headers.get("vbatref", ""), 4095)
+    constants[11] = number(least, 0)
+    rows = (  # with zeros behind them
+        np.array(list(zip_longest(*lists, [0], fillvalue=0)), np.int64).T.copy()
+        for lists in (encodings, predictors)
     )
-
-
-def _interval(text: str) -> int:
-    """Return an interval of frames, at least 1."""
-    return max(1, int(text)) if text.isdecimal() and len(text) < 8 else 1
+    counts = [len(one) for one in encodings]
+    return Layout(*rows, *(np.array(x, np.int64) for x in (counts, intervals, constants, places)))
 
 
 def _frame_lists(
@@ -156,7 +138,7 @@ def _frame_lists(
         InputError: one is none that is known.
     """
     lists = []
-    for letter in _FRAMES:
+    for letter in FRAMES:
         key = f"Field {letter} {what}"
         texts = headers.get(key, "").split(",") if headers.get(key) else []
         for text in texts:
@@ -167,8 +149,3 @@ def _frame_lists(
                 )
         lists.append([int(text) for text in texts])
     return lists
-
-
-def _rows(lists: list[list[int]]) -> NDArray[np.int64]:
-    """Return lists as rows, with zeros behind them."""
-    return np.array(list(zip_longest(*lists, [0], fillvalue=0)), np.int64).T.copy()

@@ -22,6 +22,10 @@ ENCODINGS = (0, 1, 3, 6, 7, 8, 9, 10)
 PREDICTORS = (*range(12), 256)
 LONGEST = 1024  # bytes of a frame
 _TOO_DAMAGED = 1_000_000  # frames that cannot be decoded, after which a log is given up
+FRAMES = "IPSGH"
+_EVENT = len(FRAMES)  # kind of what begins with E
+_KINDS = np.full(256, -1)  # of frames, by their letters
+_KINDS[[ord(letter) for letter in FRAMES + "E"]] = np.arange(_EVENT + 1)
 # three fields together, by the first two bits: further bytes, lowest bits, widths in bits
 _EQUAL = np.array([[0, 4, 2, 0, 2, 2, 2], [1, 8, 4, 0, 4, 4, 4], [2, 16, 8, 0, 6, 6, 6]])
 _VARIABLE = np.array([[0, 4, 2, 0, 2, 2, 2], [1, 9, 4, 0, 5, 5, 4], [2, 14, 7, 0, 8, 7, 7]])
@@ -34,7 +38,7 @@ class Layout(NamedTuple):
     predictors: Ints  # (5, F)
     counts: Ints  # (5,) fields of each
     intervals: Ints  # (3,) of I frames, and numerator and denominator of P frames, in loops
-    constants: Ints  # (3,) minthrottle, vbatref, least motor output
+    constants: Ints  # (257,) what each predictor adds
     places: Ints  # (3,) fields loopIteration, time and motor[0]; -1: none
 
 
@@ -109,44 +113,33 @@ def _four(data: Bytes, at: Ints, out: Ints) -> None:
 
 @compiled
 def _fields(data: Bytes, at: Ints, encodings: Ints, count: int, out: Ints) -> None:
-    """Read the fields of a frame as they are coded."""
-    group = np.zeros(4, np.int64)
+    """Read the fields of a frame as they are coded, alone or in groups."""
+    group = np.zeros(8, np.int64)
     i = 0
     while i < count and at[0] <= len(data):
-        encoding = encodings[i]
+        encoding, size = encodings[i], 1
+        group[0] = 0  # where nothing was written
         if encoding == 0:
-            out[i] = _signed_vb(data, at)
-            i += 1
+            group[0] = _signed_vb(data, at)
         elif encoding == 1:
-            out[i] = _unsigned_vb(data, at)
-            i += 1
+            group[0] = _unsigned_vb(data, at)
         elif encoding == 3:
-            out[i] = -_signed(_unsigned_vb(data, at) & 0x3FFF, 14)
-            i += 1
+            group[0] = -_signed(_unsigned_vb(data, at) & 0x3FFF, 14)
         elif encoding == 6:
-            size = 1
             while size < 8 and i + size < count and encodings[i + size] == 6:
                 size += 1
-            if size == 1:
-                out[i] = _signed_vb(data, at)
-            else:
-                there = _byte(data, at)
-                for k in range(size):
-                    out[i + k] = _signed_vb(data, at) if there & (1 << k) else 0
-            i += size
+            there = _byte(data, at) if size > 1 else 1
+            for k in range(size):
+                group[k] = _signed_vb(data, at) if there & (1 << k) else 0
         elif encoding == 7 or encoding == 10:
             _three(data, at, group, _VARIABLE if encoding == 10 else _EQUAL)
-            for k in range(min(3, count - i)):
-                out[i + k] = group[k]
-            i += 3
+            size = 3
         elif encoding == 8:
             _four(data, at, group)
-            for k in range(min(4, count - i)):
-                out[i + k] = group[k]
-            i += 4
-        else:  # nothing was written
-            out[i] = 0
-            i += 1
+            size = 4
+        for k in range(min(size, count - i)):
+            out[i + k] = group[k]
+        i += size
 
 
 @compiled
@@ -176,18 +169,12 @@ def _predict(
             # a half is cut off towards zero, as in C
             total = before[i] + older[i]
             out[i] += total // 2 if total >= 0 else -(-total // 2)
-        elif kind == 4:
-            out[i] += layout.constants[0]
         elif kind == 5 and layout.places[2] >= 0:
             out[i] += out[layout.places[2]]
         elif kind == 6:
             out[i] = before[i] + 1 + _passed_over(before[layout.places[0]], layout.intervals)
-        elif kind == 8:
-            out[i] += 1500
-        elif kind == 9:
-            out[i] += layout.constants[1]
-        elif kind == 11:
-            out[i] += layout.constants[2]
+        else:
+            out[i] += layout.constants[kind]
 
 
 @compiled
@@ -231,14 +218,9 @@ def decode(data: Bytes, begin: int, layout: Layout, keep: Ints, rows: Ints) -> t
     at = np.zeros(1, np.int64)
     place, found, lost, based = begin, 0, 0, False
     while place < len(data) and found < len(rows) and lost < _TOO_DAMAGED:
-        letter = data[place]
-        kind = -1
-        for k, known in enumerate((73, 80, 83, 71, 72)):  # I P S G H
-            if letter == known:
-                kind = k
+        kind, said = _KINDS[data[place]], 0
         at[0] = place + 1
-        said = 0
-        if letter == 69:  # E
+        if kind == _EVENT:
             said = _event(data, at)
         elif kind >= 0 and layout.counts[kind] > 0:
             _fields(data, at, layout.encodings[kind], layout.counts[kind], out)
@@ -247,13 +229,13 @@ def decode(data: Bytes, begin: int, layout: Layout, keep: Ints, rows: Ints) -> t
         after = at[0]
         good = said != 2 and after <= len(data) and after - place <= LONGEST
         if good and said == 0 and after < len(data):  # another frame must follow
-            good = data[after] in (73, 80, 83, 71, 72, 69)
+            good = _KINDS[data[after]] >= 0
         if not good:
             lost += 1
             based = False
             place += 1
             # the next letter that may begin a frame
-            while place < len(data) and data[place] not in (73, 80, 83, 71, 72, 69):
+            while place < len(data) and _KINDS[data[place]] < 0:
                 place += 1
             continue
         if said == 1:

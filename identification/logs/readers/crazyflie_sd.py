@@ -75,14 +75,12 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
     there, _ = chosen(events, log_map)
     if there.position is None and (there.gyro is None or there.accelerometer is None):
         # as CrazyPAD's logs: rows of motor commands, which compare flights
-        there = replace(there, rows="whole", gyro=None, accelerometer=None, alternatives={})
+        log_map = replace(there, rows="whole", gyro=None, accelerometer=None)
         notes.append(
             "no pose, no gyro and no accelerometer in the log: it shows how the rotors share the "
             "work, and nothing else"
         )
-    else:
-        there = log_map
-    return recording_of(path, events, there, "crazyflie_sd", notes).log(vehicle)
+    return recording_of(path, events, log_map, "crazyflie_sd", notes).log(vehicle)
 
 
 def _header(path: Path, data: bytes) -> tuple[int, dict[int, Layout], int]:

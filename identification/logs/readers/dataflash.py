@@ -62,20 +62,30 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messa
         count = int(counts[number])
         check_count(f"{path}: {name}", count, LIMITS.table_rows, "messages")
         if count:
-            found[name] = _columns(_rows(data, places(number, count), layout), units)
+            found[name] = _rows(data, places(number, count), layout, units)
     if not kinds and not counts[_FMT]:
         raise InputError(f"{path}: cannot be read as {WHAT}: no FMT message; expected some")
     return found, len(data) - int(used)
 
 
-def _rows(data: Bytes, places: NDArray[np.int64], layout: np.dtype[Any]) -> NDArray[Any]:
-    """Return the messages (N,) that begin at places (N,), without their three first bytes."""
+def _rows(
+    data: Bytes, places: NDArray[np.int64], layout: np.dtype[Any], units: dict[str, float]
+) -> Messages:
+    """Return the columns of the messages (N,) that begin at places (N,): numbers in whole units, or
+    texts; lists of numbers are left out.
+    """
     block = np.empty((len(places), layout.itemsize), np.uint8)
     within = np.arange(3, 3 + layout.itemsize)
     for first in range(0, len(places), _GATHERED):
         part = places[first : first + _GATHERED]
         block[first : first + _GATHERED] = data[part[:, None] + within]
-    return block.view(layout)[:, 0]
+    rows = block.view(layout)[:, 0]
+    with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
+        return {
+            name: rows[name] if layout[name].kind == "S" else rows[name].astype(np.float64) * unit
+            for name, unit in units.items()
+            if rows[name].ndim == 1
+        }
 
 
 def _layout(
@@ -85,33 +95,18 @@ def _layout(
     is not wanted, or does not describe what it says.
     """
     number, length = message[3], message[4]
-    name = message[5:9].split(b"\0")[0].decode("ascii", "replace")
-    if name not in wanted:
-        return None
-    letters = message[9:25].split(b"\0")[0].decode("ascii", "replace")
-    columns = message[25:89].split(b"\0")[0].decode("ascii", "replace").split(",")
-    if len(letters) != len(columns) or len(set(columns)) < len(columns):
-        return None
-    if any(letter not in _TYPES for letter in letters) or not all(columns):
+    name, letters, joined = (
+        message[begin:end].split(b"\0")[0].decode("ascii", "replace")
+        for begin, end in ((5, 9), (9, 25), (25, 89))
+    )
+    columns = joined.split(",")
+    known = all(letter in _TYPES for letter in letters) and all(columns)
+    if name not in wanted or not known or not len(letters) == len(columns) == len(set(columns)):
         return None
     layout = np.dtype([(c, _TYPES[letter]) for c, letter in zip(columns, letters, strict=True)])
-    if layout.itemsize + 3 != length:
-        return None
     units = [_UNITS.get(letter, 1.0) for letter in letters]
-    return number, name, layout, dict(zip(columns, units, strict=True))
-
-
-def _columns(rows: NDArray[Any], units: dict[str, float]) -> Messages:
-    """Return the columns of messages: numbers in whole units, or texts; lists of numbers are left
-    out.
-    """
-    found = {}
-    with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
-        for name, unit in units.items():
-            is_text = rows[name].dtype.kind == "S"
-            if rows[name].ndim == 1:
-                found[name] = rows[name] if is_text else rows[name].astype(np.float64) * unit
-    return found
+    stated = number, name, layout, dict(zip(columns, units, strict=True))
+    return stated if layout.itemsize + 3 == length else None
 
 
 @compiled

@@ -56,26 +56,21 @@ def what_flew(parameters: Parameters, statuses: Sequence[Mapping[str, Array]]) -
         statuses: of the topic vehicle_status.
     """
     known = airframes()
-    count = int(parameters.get("CA_ROTOR_COUNT", 0)) or None
-    by_count = "parameter CA_ROTOR_COUNT" if count else ""
-    frame, start = int(parameters.get("CA_AIRFRAME", 0)), int(parameters.get("SYS_AUTOSTART", 0))
+    count, frame, kind, start = (
+        int(parameters.get(name, 0))
+        for name in ("CA_ROTOR_COUNT", "CA_AIRFRAME", "MAV_TYPE", "SYS_AUTOSTART")
+    )
     if frame in known["px4_airframe"]:
         return WhatFlew(known["px4_airframe"][frame], f"parameter CA_AIRFRAME = {frame}")
     if any(np.any(fields.get("is_vtol", 0)) for fields in statuses):
         return WhatFlew("a VTOL plane", "vehicle_status.is_vtol")
-    kinds = [("parameter MAV_TYPE", int(parameters.get("MAV_TYPE", 0)))]
-    kinds += [
-        ("vehicle_status.system_type", int(fields["system_type"][-1]))
-        for fields in statuses
-        if "system_type" in fields and len(fields["system_type"])
-    ]
-    for by, kind in kinds:
-        if kind in known["mav_type"]:
-            return WhatFlew(known["mav_type"][kind], by_count or f"{by} = {kind}", count)
-    if start // 1000 in known["px4_start"]:
-        by = by_count or f"parameter SYS_AUTOSTART = {start}"
-        return WhatFlew(known["px4_start"][start // 1000], by, count)
-    return WhatFlew(QUADROTOR if count == 4 else "", by_count, count)
+    claims = [("mav_type", kind, f"parameter MAV_TYPE = {kind}")]
+    for kind in (int(x) for fields in statuses for x in fields.get("system_type", ())[-1:]):
+        claims.append(("mav_type", kind, f"vehicle_status.system_type = {kind}"))
+    claims.append(("px4_start", start // 1000, f"parameter SYS_AUTOSTART = {start}"))
+    said = ((known[table][key], by) for table, key, by in claims if key in known[table])
+    airframe, by = next(said, (QUADROTOR if count == 4 else "", ""))
+    return WhatFlew(airframe, "parameter CA_ROTOR_COUNT" if count else by, count or None)
 
 
 def motor_order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> tuple[Order, str]:
@@ -158,34 +153,35 @@ def outputs_of(
         functions = [int(parameters.get(f"{prefix}{i + 1}", 0.0)) for i in range(_OUTPUTS)]
         if found := slots_of_motors(functions, MOTOR1):
             bank, slots = name, found
+    used = next((fields for fields in sent if _of_motors(fields, slots) is not None), None)
+    if used is None:
+        return _range(path, parameters, bank, slots, np.zeros((0, 4))), None
     names = [f"output[{i}]" for i in range(_OUTPUTS)]
-    tables = [np.column_stack([fields[n] for n in names if n in fields]) for fields in sent]
-    # where all outputs of motors change: no servos, and no bank that is not in use
-    tables = [x for x in tables if x.shape[1] > max(slots) and _move(x[:, slots])]
-    motors = tables[0][:, slots] if tables else np.zeros((0, 4))
-    outputs = _range(path, parameters, bank, slots, motors)
-    if not tables:
-        return outputs, None
-    return outputs, running(tables[0], slots, float(outputs.low.min()), float(outputs.high.max()))
-
-
-def _move(outputs: Array) -> bool:
-    """Return whether all outputs (N, 4) change."""
-    return bool(np.all(np.ptp(np.nan_to_num(outputs), axis=0) > 0.0))
+    table = np.column_stack([used[name] for name in names if name in used])
+    outputs = _range(path, parameters, bank, slots, table[:, slots])
+    return outputs, running(table, slots, float(outputs.low.min()), float(outputs.high.max()))
 
 
 def shares_of_motors(columns: Mapping[str, Array], outputs: Outputs) -> dict[str, Array]:
     """Return what was sent to motors 1 to 4 (N,) as 0 to 1, in their order; nothing, where one of
     the outputs never changes.
     """
-    names = [f"output[{slot}]" for slot in outputs.slots]
-    if not set(names) <= set(columns):
-        return {}
-    sent = np.nan_to_num(np.column_stack([columns[name] for name in names]), nan=0.0)
-    if not _move(sent):
+    sent = _of_motors(columns, outputs.slots)
+    if sent is None:
         return {}
     shares = np.clip((sent - outputs.low) / (outputs.high - outputs.low), 0.0, 1.0)
     return {f"output[{motor}]": share for motor, share in enumerate(shares.T)}
+
+
+def _of_motors(columns: Mapping[str, Array], slots: Sequence[int]) -> Array | None:
+    """Return what was sent to the outputs of the motors (N, 4); None where one of them is not there
+    or never changes: that of a servo, or of a bank that is not in use.
+    """
+    names = [f"output[{slot}]" for slot in slots]
+    if not set(names) <= set(columns):
+        return None
+    sent = np.nan_to_num(np.column_stack([columns[name] for name in names]))
+    return sent if np.all(np.ptp(sent, axis=0) > 0.0) else None
 
 
 def _range(
@@ -201,10 +197,14 @@ def _range(
     most = float(np.nanmax(motors)) if np.isfinite(motors).any() else 0.0
     turning = motors[motors > 0.5 * most]  # not what stops them
     usual = float(np.median(turning)) if turning.size else _LEAST_PULSE
-    lows, highs = (
-        _ends(parameters, bank, slots, end, default)
-        for end, default in (("MIN", 1000.0), ("MAX", 2000.0))
-    )
+
+    def pulses(end: str, default: float) -> Array:
+        """Return one end (4,) of the outputs' ranges of pulses, us."""
+        names = [(f"PWM_{bank}_{end}{s + 1}", f"PWM_{bank}_{end}", f"PWM_{end}") for s in slots]
+        given = ([parameters.get(name, 0.0) for name in one] for one in names)
+        return np.array([next((x for x in one if x > 0.0), default) for one in given])
+
+    lows, highs = pulses("MIN", 1000.0), pulses("MAX", 2000.0)
     # a bus for sensors alone leaves the motors to pulses, which stay long when they stand still
     has_bus = parameters.get("UAVCAN_ENABLE", 0.0) >= 3.0 and bool(np.any(motors < _LEAST_PULSE))
     timers = [parameters.get(f"PWM_{bank}_TIM{i}", 0.0) for i in range(_OUTPUTS)]
@@ -231,10 +231,3 @@ def _range(
     why = "as parameters state" if stated else "since no pulses are like that"
     words = f"{protocol}, {low:g} to {high:g}, {why}"
     return Outputs(slots, np.full(4, low), np.full(4, high), words)
-
-
-def _ends(parameters: Parameters, bank: str, slots: list[int], end: str, default: float) -> Array:
-    """Return one end (4,) of the outputs' ranges of pulses, us."""
-    names = [(f"PWM_{bank}_{end}{s + 1}", f"PWM_{bank}_{end}", f"PWM_{end}") for s in slots]
-    given = [[parameters.get(name, 0.0) for name in one] for one in names]
-    return np.array([next((x for x in one if x > 0.0), default) for one in given])

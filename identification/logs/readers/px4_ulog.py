@@ -132,11 +132,15 @@ def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bo
     wanted = recording_map("px4").topics | {_STATUS}
     check_regular(path, WHAT, LIMITS.ulog_file)
     try:
-        with open_regular(path, WHAT) as file:
-            # pyulog prints its doubts; the notes say them
-            with redirect_stdout(io.StringIO()):
-                parsed = counting(Parser)(file, sorted(wanted))
-            is_damaged = bool(parsed.file_corruption) or _is_cut(path)
+        # pyulog prints its doubts; the notes say them
+        with open_regular(path, WHAT) as file, redirect_stdout(io.StringIO()):
+            parsed = counting(Parser)(file, sorted(wanted))
+        with open_regular(path, WHAT) as file:  # each message states its length
+            size, place = file.seek(0, os.SEEK_END), _HEADER
+            while place + _MESSAGE <= size:
+                file.seek(place)
+                place += _MESSAGE + int.from_bytes(file.read(2), "little")
+        is_damaged = bool(parsed.file_corruption) or place != size
     except InputError:
         raise
     except Exception as error:  # whatever a parser makes of bytes that are no ULog
@@ -157,16 +161,6 @@ def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bo
         if isinstance(value, int | float) and np.isfinite(value)
     }
     return topics, parameters, is_damaged
-
-
-def _is_cut(path: Path) -> bool:
-    """Return whether a file ends within a message, each of which states its length."""
-    with open_regular(path, WHAT) as file:
-        size, place = file.seek(0, os.SEEK_END), _HEADER
-        while place + _MESSAGE <= size:
-            file.seek(place)
-            place += _MESSAGE + int.from_bytes(file.read(2), "little")
-    return place != size
 
 
 def _samples(topic: str, fields: Fields, outputs: Outputs) -> Iterator[Samples]:
@@ -195,7 +189,10 @@ def _samples(topic: str, fields: Fields, outputs: Outputs) -> Iterator[Samples]:
     elif topic == "actuator_outputs":
         columns = shares_of_motors(columns, outputs)
     elif topic.endswith("_odometry"):
-        if not _is_in_earth_frame(fields):
+        # in NED or in FRD fixed to the earth, both of which have z down: 1 and 2 since PX4 1.14,
+        # 0 and 1 before
+        known = (1, 2) if "pose_frame" in fields else (0, 1)
+        if not np.all(np.isin(fields.get("pose_frame", fields.get("local_frame", 0)), known)):
             return
         if "x" in columns:  # before PX4 1.14
             columns |= {f"position[{i}]": columns[name] for i, name in enumerate("xyz")}
@@ -208,15 +205,6 @@ def _samples(topic: str, fields: Fields, outputs: Outputs) -> Iterator[Samples]:
             yield _sensor(topic, t, fields, field, gained)
         return
     yield Samples(t, columns, topic)
-
-
-def _is_in_earth_frame(fields: Fields) -> bool:
-    """Return whether an odometry's pose is in NED or in FRD fixed to the earth, both of which have
-    z down.
-    """
-    if "pose_frame" in fields:  # since PX4 1.14: 0 unknown, 1 NED, 2 FRD
-        return bool(np.all(np.isin(fields["pose_frame"], (1, 2))))
-    return bool(np.all(np.isin(fields.get("local_frame", 0), (0, 1))))  # before: 0 NED, 1 FRD
 
 
 def _sensor(topic: str, t: Array, fields: Fields, field: str, gained: str) -> Samples:

@@ -32,7 +32,7 @@ so that nothing in a file decides what code runs; a bag whose definitions differ
 
 import os
 from array import array
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -74,14 +74,13 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
             ambiguous or of another type, or a message cannot be used.
     """
     settings, where = topic_map(path, option)
-    times: dict[str, NDArray[np.int64]] = {}
-    flown = UNSTATED
-    columns: dict[str, dict[str, Array]] = {}
+    flown, decoded = UNSTATED, []
     with _opened(path) as (types, messages):
         topics, doubts = chosen_topics(path, types, settings, where)
         for part, topic in list(topics.items()):
             try:
-                times[part], columns[part], doubt, count = _decoded_topic(path, topic, messages)
+                times, columns, doubt, count = _decoded_topic(path, topic, messages)
+                decoded.append((times, columns, topic.name))
                 doubts += [doubt] if doubt else []
                 flown = flown if count is None else WhatFlew(running=count)
             except InputError as error:
@@ -92,10 +91,10 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
     if not topics:
         raise InputError(f"{path}: {doubts[0] if doubts else 'nothing in it can be read'}")
     notes = [note for topic in topics.values() for note in _notes(topic, types[topic.name])]
-    origin = min(int(nanoseconds[0]) for nanoseconds in times.values())
+    origin = min(int(times[0]) for times, _, _ in decoded)
     recorded = [
-        Samples(_NANOSECOND * (times[part] - origin).astype(float), columns[part], topic.name)
-        for part, topic in topics.items()
+        Samples(_NANOSECOND * (times - origin).astype(float), columns, name)
+        for times, columns, name in decoded
     ]
     found = recording_of(path, recorded, joined(topics), "rosbag", (*notes, *doubts), flown=flown)
     return found.log(vehicle)
@@ -246,14 +245,8 @@ def _decoded_topic(
         doubt = "its time stamps are of another clock than the bag's"
     times = received_at if doubt else sampled_at
     doubt = f"{topic.name}: {doubt}; the times of recording were taken" if doubt else ""
-    return times, columns, doubt, _running(every, topic)
-
-
-def _running(every: Sequence[Array], topic: Topic) -> int | None:
-    """Return how many of the elements of commands (K,) run as motors do; None where there are no
-    more than four, or not the same in each message.
-    """
-    if len({len(values) for values in every}) != 1 or len(every[0]) <= 4:
-        return None
-    motors = [element - 1 for element in topic.elements]
-    return running(np.array(every), motors, *topic.kind.range)
+    running_outputs = None
+    if len({len(one) for one in every}) == 1 and len(every[0]) > 4:
+        motors = [element - 1 for element in topic.elements]
+        running_outputs = running(np.array(every), motors, *topic.kind.range)
+    return times, columns, doubt, running_outputs

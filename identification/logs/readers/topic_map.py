@@ -29,7 +29,7 @@ from ..log_map import (
     TimeColumn,
     one_of,
 )
-from ..rotor_orders import ORDERS, order_names
+from ..rotor_orders import ORDERS, order_names, rotor_order
 from ..table import Array
 from .ros_messages import MOTORS, PARTS, Kind, kinds, stated
 
@@ -61,9 +61,7 @@ _SECTIONS: Mapping[str, Mapping[str, Columns]] = {  # of a log map, that a part 
 def _elements(value: Any) -> tuple[int, ...]:
     """Return the elements of a message, from 1, that are the kit's rotors."""
     if isinstance(value, str):
-        if value not in ORDERS:
-            raise unknown_name("order", value, ORDERS)
-        return ORDERS[value]
+        return rotor_order(value)
     is_list = isinstance(value, list | tuple) and all(type(i) is int and i >= 1 for i in value)
     if not is_list or not len(set(value)) == 4 == len(value):
         raise InputError(
@@ -213,16 +211,17 @@ def topic_of(
             f"{source}: {part}: topic {name} is of type {kind}; expected {' or '.join(fitting)}"
         )
     usual = fitting[kind]
-    unit, order = setting.unit or usual.unit, setting.order or usual.order
-    if part in MOTORS and not unit:
+    said = {name: x for name, x in vars(setting).items() if x and name != "topic"}
+    found = replace(usual, **said)
+    if part in MOTORS and not found.unit:
         raise InputError(
             f"{source}: {part}: topic {name} is a {kind}, which states no unit; expected "
             f"unit: {', '.join(UNITS[part])} in {map_file}"
         )
-    limits = setting.range or COMMAND_UNITS.get(unit) or usual.range
-    frame = setting.frame or usual.frame
-    found = replace(usual, frame=frame, unit=unit, order=order, range=limits)
-    return Topic(name, part, found, why, "" if setting.order else "".join(order_names(order)[:1]))
+    if not setting.range:
+        found = replace(found, range=COMMAND_UNITS.get(found.unit) or usual.range)
+    assumed = "" if setting.order else "".join(order_names(found.order)[:1])
+    return Topic(name, part, found, why, assumed)
 
 
 def joined(topics: Mapping[str, Topic]) -> LogMap:
@@ -275,6 +274,10 @@ def _topic(
     Raises:
         InputError: it is not there, is of a type that cannot be the part, or several may be it.
     """
+
+    def named_by(topic: str, words: str) -> bool:
+        return any(word in topic.lower() for word in stated()[words])
+
     named = setting.topic
     if named and named not in types:
         raise unknown_name("topic", named, types, f"{path}: {part} (named in {where})")
@@ -282,11 +285,11 @@ def _topic(
     fitting = [kind for kind in kinds(part) if kind not in stated()["arrays"] or setting.unit]
     several = sorted(topic for topic, kind in types.items() if kind in fitting)
     if part in ("pose", "rotors"):
-        flown = [topic for topic in several if not _has_word(topic, "setpoint_words")]
+        flown = [topic for topic in several if not named_by(topic, "setpoint_words")]
         several = flown or (several if part == "rotors" else [])
     found = [named] if named else several
     if part == "pose" and len(found) > 1:
-        measured = [topic for topic in several if _has_word(topic, "measured_words")]
+        measured = [topic for topic in several if named_by(topic, "measured_words")]
         found = measured if len(measured) == 1 else several
     elif part == "imu" and len(found) > 1:
         found = [t for t in several if not t.endswith("_raw")] or several
@@ -303,30 +306,21 @@ def _topic(
     return topic_of(part, found[0], types[found[0]], setting, places, why if others else "")
 
 
-def _has_word(topic: str, words: str) -> bool:
-    return any(word in topic.lower() for word in stated()[words])
-
-
 def _missing(path: Path, types: Mapping[str, str], part: str, where: str) -> InputError:
     """Return the error for a bag without rotor speeds and commands, or without a pose and inertial
     sensors.
     """
     topics = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(types.items())) or "none"
+    every = [kind for one in (("pose",) if part == "pose" else MOTORS) for kind in kinds(one)]
     arrays = sorted(topic for topic, kind in types.items() if kind in stated()["arrays"])
-    if part == "rotors" and arrays:
-        return InputError(
-            f"{path}: rotors: {', '.join(arrays)} could be it, but a multi-array states no "
-            f"unit; expected in {where} the line rotors: {{topic: {arrays[0]}, unit: rad/s}} (or "
-            f"{', '.join(UNITS['rotors'][1:])}), or command: {{topic: {arrays[0]}, unit: us}} "
-            f"(or {UNITS['command'][0]}). The bag's topics: {topics}"
-        )
-    parts = ("pose",) if part == "pose" else MOTORS
-    every = (kind for one in parts for kind in kinds(one))
     known = dict.fromkeys(kind for kind in every if kind not in stated()["arrays"])
     left_out = sorted(topic for topic, kind in types.items() if kind in known)
-    names = f"but set-points by their names ({', '.join(left_out)})"
-    more = "" if part == "pose" else " or a multi-array of std_msgs with a unit"
-    return InputError(
-        f"{path}: {part}: no topic {names if left_out else 'of a type that fits'}; expected one of "
-        f"{' or '.join(known)}{more}, or its name in {where}. The bag's topics: {topics}"
-    )
+    found = "no topic of a type that fits"
+    found = f"no topic but set-points by their names ({', '.join(left_out)})" if left_out else found
+    wanted = f"one of {' or '.join(known)}, or its name in {where}"
+    if part == "rotors" and arrays:
+        found = f"{', '.join(arrays)} could be it, but a multi-array states no unit"
+        wanted = f"in {where} the line rotors: {{topic: {arrays[0]}, unit: rad/s}} (or "
+        wanted += f"{', '.join(UNITS['rotors'][1:])}), or command: {{topic: {arrays[0]}, unit: us}}"
+        wanted += f" (or {UNITS['command'][0]})"
+    return InputError(f"{path}: {part}: {found}; expected {wanted}. The bag's topics: {topics}")

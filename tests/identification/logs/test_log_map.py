@@ -134,17 +134,17 @@ def test_a_map_file_is_taken_by_read_log(tmp_path: Path) -> None:
         read_log(path, "nanobench", map=tmp_path / "map.yaml")
 
 
-def test_orders_are_what_their_names_say() -> None:
-    assert order_words(ORDERS["betaflight"]) == (
-        "motors 1 rear-right, 2 front-right, 3 rear-left, 4 front-left"
-    )
-    assert order_words(ORDERS["px4-x"]) == (
-        "motors 1 front-right, 2 rear-left, 3 front-left, 4 rear-right"
-    )
-    assert order_words(ORDERS["crazyflie"]) == (
-        "motors 1 front-right, 2 rear-right, 3 rear-left, 4 front-left"
-    )
-    assert rotor_order([4, 3, 2, 1]) == ORDERS["crazyflie"]
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("betaflight", "motors 1 rear-right, 2 front-right, 3 rear-left, 4 front-left"),
+        ("px4-x", "motors 1 front-right, 2 rear-left, 3 front-left, 4 rear-right"),
+        ("crazyflie", "motors 1 front-right, 2 rear-right, 3 rear-left, 4 front-left"),
+    ],
+)
+def test_orders_are_what_their_names_say(name: str, words: str) -> None:
+    assert order_words(ORDERS[name]) == words
+    assert rotor_order(list(ORDERS[name])) == ORDERS[name]
 
 
 def test_a_table_of_several_rates_has_the_rows_of_its_pose(tmp_path: Path) -> None:
@@ -152,15 +152,7 @@ def test_a_table_of_several_rates_has_the_rows_of_its_pose(tmp_path: Path) -> No
     count = 80
     pose = {
         name: [value if k % 2 == 0 else "" for k in range(count)]
-        for name, value in {
-            "x": "0",
-            "y": "0",
-            "z": "1",
-            "qx": "0",
-            "qy": "0",
-            "qz": "0",
-            "qw": "1",
-        }.items()
+        for name, value in zip(("x", "y", "z", "qx", "qy", "qz", "qw"), "0010001", strict=True)
     }
     rotors = {
         f"m{i}": [f"{3600 + k}" if k % 2 else "NaN" for k in range(count)] for i in (1, 2, 3, 4)
@@ -245,24 +237,21 @@ COMMANDED = {
 }
 
 
-def test_commands_without_a_curve_say_what_is_assumed(tmp_path: Path) -> None:
-    """Level at 1600 us: each rotor carries a quarter of the weight, and that is an assumption."""
+@pytest.mark.parametrize(("tilt", "needed"), [(0.0, 1.0), (np.pi / 3, 2.0)])
+def test_commands_without_a_curve_say_what_is_assumed(
+    tmp_path: Path, tilt: float, needed: float
+) -> None:
+    """At 1600 us each rotor carries a quarter of the weight, which is an assumption; at a tilt of
+    60 degrees twice the weight flies level.
+    """
     vehicle = load_vehicle("crazyflie")
-    path = table(tmp_path / "a.csv", dict.fromkeys(("m1", "m2", "m3", "m4"), 1600))
+    turn = {"qx": np.sin(tilt / 2), "qw": np.cos(tilt / 2)}
+    path = table(tmp_path / "a.csv", {**turn, **dict.fromkeys(("m1", "m2", "m3", "m4"), 1600)})
     log = read_log(path, vehicle=vehicle, map=_saved(tmp_path, COMMANDED))
     assert log.commanded
     assert thrust_is_assumed([log], vehicle)
-    np.testing.assert_allclose(log.rotor_speeds, vehicle.hover_rate)
+    np.testing.assert_allclose(log.rotor_speeds, np.sqrt(needed) * vehicle.hover_rate)
     assert any("cannot be found from this log" in note for note in log.notes)
-
-
-def test_a_tilted_flight_needs_more_than_its_weight(tmp_path: Path) -> None:
-    """At a tilt of 60 degrees twice the weight flies level."""
-    vehicle = load_vehicle("crazyflie")
-    tilted = {"qx": np.sin(np.pi / 6), "qw": np.cos(np.pi / 6)}
-    path = table(tmp_path / "a.csv", {**tilted, **dict.fromkeys(("m1", "m2", "m3", "m4"), 1600)})
-    log = read_log(path, vehicle=vehicle, map=_saved(tmp_path, COMMANDED))
-    np.testing.assert_allclose(log.rotor_speeds, np.sqrt(2.0) * vehicle.hover_rate)
 
 
 def test_a_stated_curve_turns_commands_into_speeds(tmp_path: Path) -> None:

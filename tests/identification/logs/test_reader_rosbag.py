@@ -330,7 +330,7 @@ def test_times_that_are_no_use_are_replaced_or_left_out(write, vehicle, topics, 
         ("rotors: {order: [1, 2, 3, 3]}", "order: expected four different elements"),
         ("rotors: {order: [0, 1, 2, 3]}", "order: expected four different elements"),
         ("rotors: {order: 5}", "order: expected four different elements"),
-        ("rotors: {order: wasp}", "unknown order 'wasp'"),
+        ("rotors: {order: wasp}", "rotors: order: unknown rotor order 'wasp'"),
         ("rotors: /n", "rotors: topic /n is .* states no unit; expected unit: rad/s, rpm, Hz"),
         (
             "command: {unit: us, range: [2, 1]}",

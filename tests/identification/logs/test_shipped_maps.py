@@ -104,7 +104,7 @@ def test_stray_samples_are_dropped(read, stray, left):
         ),
         ("crazypad", {"motor_m3_0to65535": None}, "motor_m3_0to65535; expected those of a Crazy"),
         ("crazypad", {"vbat_V": np.nan}, "vbat_V, row 1 .* is empty or NaN"),
-        ("crazyswarm2", {"pitch_rad": None}, "pitch_rad; expected those of a crazyswarm2 table"),
+        ("crazyswarm2", {"pitch_rad": None}, "does not fit: no column 'pitch_rad' of attitude"),
         ("crazyswarm2", {"thrust_cmd_N": np.nan}, "thrust_cmd_N, row 1 .line 2. is empty or NaN"),
         ("crazyswarm2", {"t_s": 0.0}, "column t_s, row 2 .line 3.: 0 s repeats"),
         (
