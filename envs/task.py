@@ -409,15 +409,6 @@ class Task(gym.Env[Frame, Frame], ABC):
         self._draw_normals(self._generators, 0, self._normals)
         self._fly(self._normals)
 
-    def _make_viewer(self) -> Any:
-        from .drawing import Viewer
-
-        return Viewer(self.render_mode or "", self.width, self.height)
-
-    def _scenery(self) -> Any:
-        """Return what the viewer draws beside the loop: where the fan is along y, m."""
-        return float(self.loop.record["fan"]["y"][0])
-
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture (height, width, 3) of vehicle, wind and wrench, or show it in a window.
 
@@ -430,8 +421,10 @@ class Task(gym.Env[Frame, Frame], ABC):
                 f"before it"
             )
         if self.viewer is None:
-            self.viewer = self._make_viewer()
-        picture: NDArray[np.uint8] | None = self.viewer.draw(self.loop, self._scenery())
+            from .drawing import Viewer
+
+            self.viewer = Viewer(self.render_mode, self.width, self.height)
+        picture: NDArray[np.uint8] | None = self.viewer.draw(self.loop)
         return picture
 
     def close(self) -> None:

@@ -208,7 +208,6 @@ class WindHoverEnv(Task):
         self.winds = None if winds is None else Sum(*winds, where=f"{self.name}: winds").winds
         self.model_in_loop, self.gains = bool(model_in_loop), gains
         self.fan = Fan(speed=0.0, height=HEIGHT)
-        self.blowing: Sequence[Wind] = []
 
     def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> ClosedLoop:
         """Return the closed loop of a true vehicle, with an accelerometer."""
@@ -225,12 +224,12 @@ class WindHoverEnv(Task):
         """Draw winds and reference, and let the vehicle hover at its start for ``settle`` ticks."""
         rng = self.np_random
         drawn = draw_winds(self.scenario, rng, EPISODE_SECONDS)
-        self.blowing = drawn if self.winds is None else self.winds
+        winds = drawn if self.winds is None else self.winds
         self.drawn_label, self.reference = draw_reference(
             rng, math.pi, EPISODE_SECONDS, self.moving
         )
         self.path = np.array([[0.0, HEIGHT]])
-        self.loop.reset(rng, START, math.pi, self.blowing, self.reference, settle=settle)
+        self.loop.reset(rng, START, math.pi, winds, self.reference, settle=settle)
 
     def _fly(self, noise: Array) -> None:
         self.loop.action[:] = self.command
@@ -245,22 +244,14 @@ class WindHoverEnv(Task):
         quaternion_to_matrix(loop.quaternion, R)
         moving = loop.velocity, loop.motion[1][3:6], loop.record[0]["plant"]["body"]["com"]
         ahead, (axial, radial) = np.empty((self.foresight, 6)), loop.jet_table
-        at, blowing = loop.time + 0.5 * WIND_PERIOD, Sum(*self.blowing)
+        at = loop.time + 0.5 * WIND_PERIOD
         for k in range(self.foresight):
-            fan["air"] = blowing.velocity(loop.points.T, at + k * WIND_PERIOD)
+            fan["air"] = loop.winds.velocity(loop.points.T, at + k * WIND_PERIOD)
             jet_wrench(fan, axial, radial, loop.position, R, *moving, wind, ahead[k])
         return super()._truth() | {
             "disturbance": loop.disturbance.copy(),
             "wrench_ahead": ahead,
         }
-
-    def _make_viewer(self) -> Any:
-        from .wind_drawing import WindViewer
-
-        return WindViewer(self.render_mode or "", self.width, self.height)
-
-    def _scenery(self) -> Any:
-        return self.blowing, self._table["reference"][0], self.loop.time
 
 
 class WindTrajectoryEnv(WindHoverEnv):
