@@ -229,7 +229,7 @@ class FanTrackingEnv(FanTask):
     def hover(self, settle: int = 0) -> None:
         """Draw an episode and let the vehicle hover at its start for ``settle`` ticks."""
         rng, scenario = self.np_random, self.scenario
-        self.drawn_label, _, fan_y = draw_fan_path(scenario, rng, FAN_TIMES)
+        self.drawn_label, fan_y = draw_fan_path(scenario, rng, FAN_TIMES)
         if self.fan_path is not None:
             self.drawn_label = "given"
             fan_y = np.asarray(self.fan_path(FAN_TIMES), dtype=np.float64)
