@@ -13,10 +13,9 @@ from ..controllers.wind_observation import (
     OBSERVATION_SCALES,
     WIND_PERIOD,
 )
-from ..dynamics.motion import Array
 from ..dynamics.rotation import quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
-from ..runtime.compiled import compiled, compiled_without_gil
+from ..runtime.compiled import compiled_without_gil
 from .closed_loop import ClosedLoop
 from .fan import STATIONS, Fan, jet_wrench
 from .observing import Episodes, Motion
@@ -41,19 +40,6 @@ ACCELEROMETER = (0.15, 0.05)
 _LIMITS = np.array(OBSERVATION_LIMITS)
 
 
-@compiled
-def see(
-    x: Array, reference: Array, specific: Array, thrust: Array, action: Array, frame: Frame
-) -> None:
-    """Write the frame (27,) of an estimated state (20,) and the reference (10,), within limits."""
-    for i in range(3):
-        frame[i], frame[3 + i] = reference[i] - x[i], x[7 + i]  # position error, velocity
-        frame[6 + i], frame[9 + i] = reference[3 + i], reference[6 + i]
-        frame[12 + i], frame[15 + i] = x[16 + i], x[13 + i]  # force, torque
-        frame[18 + i], frame[21 + i], frame[24 + i] = specific[i], thrust[i], action[i]
-    keep_within(frame, _LIMITS)
-
-
 @compiled_without_gil
 def look_at_reference(
     which: np.ndarray, episodes: Episodes, motion: Motion, frames: Frame, values: np.ndarray
@@ -63,13 +49,16 @@ def look_at_reference(
     for n in np.flatnonzero(which):
         b, lane = n // lanes, n % lanes
         p, v = motion.position[b, :, lane], motion.velocity[b, :, lane]
-        state, value = motion.state[b, :, lane].copy(), values[n]
+        x, value, frame = motion.state[b, :, lane].copy(), values[n], frames[n]
         rows = episodes.references[n]
         reference = rows[min(max(episodes.ticks[n], 0), len(rows) - 1)]
-        specific, thrust = motion.specific[b, :, lane].copy(), motion.thrust[b, :, lane].copy()
-        see(state, reference, specific, thrust, episodes.commands[n], frames[n])
         square, change = 0.0, 0.0
         for i in range(3):
+            frame[i], frame[3 + i] = reference[i] - x[i], x[7 + i]  # position error, velocity
+            frame[6 + i], frame[9 + i] = reference[3 + i], reference[6 + i]
+            frame[12 + i], frame[15 + i] = x[16 + i], x[13 + i]  # force, torque
+            frame[18 + i], frame[21 + i] = motion.specific[b, i, lane], motion.thrust[b, i, lane]
+            frame[24 + i] = episodes.commands[n, i]
             value.position[i], value.reference[i] = p[i], reference[i]
             value.force[i] = motion.wrench[b, i, lane]
             value.torque[i] = motion.wrench[b, 3 + i, lane]
@@ -79,12 +68,13 @@ def look_at_reference(
             value.wind[i] = wind / STATIONS
             square += (p[i] - reference[i]) * (p[i] - reference[i])
             change += episodes.changes[n, i] * episodes.changes[n, i]
+        keep_within(frame, _LIMITS)
         value.time, value.error = episodes.ticks[n] * TICK, math.sqrt(square)
         value.reward_tracking = 1.0 / (1.0 + square / (TRACKING_WIDTH * TRACKING_WIDTH))
         value.reward_change = -CHANGE_COST * change
         # written such that a number that is not finite counts as lost
         value.lost = episodes.broken[n] or not (
-            is_flying(state, p, v) and p[2] > 0.0 and value.error <= LOST_OFFSET
+            is_flying(x, p, v) and p[2] > 0.0 and value.error <= LOST_OFFSET
         )
 
 
@@ -230,10 +220,6 @@ class WindHoverEnv(Task):
         )
         self.path = np.array([[0.0, HEIGHT]])
         self.loop.reset(rng, START, math.pi, winds, self.reference, settle=settle)
-
-    def _fly(self, noise: Array) -> None:
-        self.loop.action[:] = self.command
-        self.loop.run(noise)
 
     def _truth(self) -> dict[str, Any]:
         """Return beside ``Task._truth`` the actuators' disturbance (6,) N and Nm, world, and the
