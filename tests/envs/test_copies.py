@@ -9,11 +9,10 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-import windwrench  # noqa: F401  registers the environments
+from tests.support.vector_flights import TASKS
 from windwrench.dynamics import EffectSetting, InputError
 from windwrench.envs import Copyable
 
-NAMES = ("FanTracking", "FanTracking2D", "WindHover", "WindTrajectory")
 LAG = [EffectSetting("motor_lag", {"tau": 0.03}), EffectSetting("rotor_drag", {"kdx": 1e-4})]
 COPIES = {"deepcopy": copy.deepcopy, "pickle": lambda env: pickle.loads(pickle.dumps(env))}
 
@@ -30,7 +29,7 @@ def fly(env, decisions=4):
 
 
 @pytest.mark.parametrize("how", COPIES)
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", TASKS)
 @pytest.mark.parametrize(
     "given",
     [{"scenario": "varied"}, {"scenario": "noisy", "effects": LAG, "estimator": "constant-gain"}],

@@ -4,12 +4,10 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-import windwrench  # noqa: F401  registers the environments
+from tests.support.vector_flights import TASKS, make
 from windwrench.dynamics import InputError
 from windwrench.envs import FanTrackingEnv, Stage
 from windwrench.envs.closed_loop import STAGES
-
-NAMES = ("FanTracking", "FanTracking2D", "WindHover", "WindTrajectory")
 
 
 def fly(name, decisions=4, **given):
@@ -22,7 +20,7 @@ def fly(name, decisions=4, **given):
     return rows[-1]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", TASKS)
 def test_stage_by_stage_the_flight_is_that_of_the_compiled_call_bit_for_bit(name):
     seen = []
     watch = Stage("watch", lambda loop: seen.append(loop.ticks), before="estimate")
@@ -36,9 +34,7 @@ def test_so_it_flies_in_a_vector_of_environments():
         loop.applied[2] = -0.2
 
     given = {"stages": [Stage("push", push, before="actuate")]}
-    envs = gym.make_vec(
-        "windwrench/FanTracking-v0", 2, vectorization_mode="vector_entry_point", **given
-    )
+    envs = make(2, **given)
     envs.reset(seed=[3, 4])
     for _ in range(4):
         frames, _, _, _, infos = envs.step(np.full((2, 1), 0.2, np.float32))
@@ -103,10 +99,4 @@ def test_what_is_no_stage_is_named(stages, words):
     with pytest.raises(InputError, match=words):
         FanTrackingEnv("static", stages=stages()).reset(seed=0)
     with pytest.raises(InputError, match=r"runs no stages of your own; plant='mujoco' does it"):
-        gym.make_vec(
-            "windwrench/FanTracking-v0",
-            num_envs=1,
-            vectorization_mode="vector_entry_point",
-            plant="lanes",
-            stages=[Stage("mine", print, before="sense")],
-        )
+        make(1, "lanes", stages=[Stage("mine", print, before="sense")])

@@ -1,19 +1,20 @@
-"""Vector environments of FanTracking and all that their flights return."""
+"""Vector environments of the tasks, and all that flights of FanTracking return."""
 
 import gymnasium as gym
 import numpy as np
 
 import windwrench  # noqa: F401  registers the environment
 
+TASKS = ("FanTracking", "FanTracking2D", "WindHover", "WindTrajectory")
 NUMBERS = (
     *("reward_tracking", "reward_change", "fan_y", "fan_velocity", "y", "offset"),
     *("force", "torque", "time", "lost"),
 )
 
 
-def make(num_envs, plant="mujoco", **kwargs):
+def make(num_envs, plant="mujoco", task="FanTracking", **kwargs):
     return gym.make_vec(
-        "windwrench/FanTracking-v0",
+        f"windwrench/{task}-v0",
         num_envs=num_envs,
         vectorization_mode="vector_entry_point",
         plant=plant,
