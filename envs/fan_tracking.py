@@ -253,9 +253,8 @@ def scenario_env(
     Raises:
         InputError: a name that does not exist.
     """
-    if not sources - TRUTH:
-        return FanTrackingEnv(scenario, estimator=estimator)
-    return SensingFanTracking(scenario, estimator=estimator)
+    kind = SensingFanTracking if sources - TRUTH else FanTrackingEnv
+    return kind(scenario, estimator=estimator)
 
 
 __all__ = ["DECISION_TICKS", "EPISODE_SECONDS", "LOST_OFFSET", "FanTrackingEnv"]
