@@ -1,4 +1,4 @@
-"""Vector environments of the tasks, and all that flights of FanTracking return."""
+"""Environments of the tasks, one or many, and what their flights return."""
 
 import gymnasium as gym
 import numpy as np
@@ -32,4 +32,19 @@ def fly(envs, decisions, seed=3, law=None):
         numbers = [infos[name].reshape(envs.num_envs, -1) for name in NUMBERS]
         rows.append(np.column_stack([seen, rewards, lost, over, *numbers]))
     envs.close()
+    return np.array(rows)
+
+
+def fly_alone(env, decisions=4, seed=None):
+    """Frame, reward, true position, force and torque (decisions, .) of random commands, after a
+    reset where there is a seed.
+    """
+    rng, rows = np.random.default_rng(1), []
+    if seed is not None:
+        env.reset(seed=seed)
+    for _ in range(decisions):
+        action = rng.uniform(-0.5, 0.5, env.action_space.shape).astype(np.float32)
+        frame, reward, _, _, info = env.step(action)
+        place = env.unwrapped.loop.position
+        rows.append(np.concatenate([frame, [reward], place, info["force"], info["torque"]]))
     return np.array(rows)
