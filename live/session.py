@@ -162,10 +162,8 @@ class Session:
         self.tallies.rates[sample.kind].add(sample.arrival)
         t = self.clocks.time(sample)
         row = None if t is None else self._joiner.take(sample, t)
-        if row is not None:
-            self._take_row(row)
-
-    def _take_row(self, row: Row) -> None:
+        if row is None:
+            return
         for output in self.filter.take(row):
             self._out(output)
             if output.row is row and self.source.paced:  # not one that was held back

@@ -48,23 +48,15 @@ _OF_ANNOTATION = {"float": "float", "int": "int", "bool": "truth"}
 
 @dataclass
 class Library:
-    """What translated functions may use, and those that are translated so far.
+    """What translated functions may use, and those that are translated so far."""
 
-    Attributes:
-        constants: the filter's record; its fields are constants unless they are in ``memory``.
-        memory: names and shapes of the fields that ``ww_filter`` has, int ones and float ones.
-        by_hand: names of functions that templates have; they write no arguments but the record.
-        refused: functions that are not translated, and why.
-        numbers: constants of files that are others in C.
-        prefix: of the names of functions.
-    """
-
-    constants: Any = None
+    constants: Any = None  # the filter's record, whose fields are constants but for those below
+    # fields that ``ww_filter`` has: int or float, and their shapes
     memory: Mapping[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
-    by_hand: Collection[str] = ()
-    refused: Mapping[Any, str] = field(default_factory=dict)
-    numbers: Mapping[str, float] = field(default_factory=dict)
-    prefix: str = ""
+    by_hand: Collection[str] = ()  # functions of templates, which write no argument but the record
+    refused: Mapping[Any, str] = field(default_factory=dict)  # not translated, and why
+    numbers: Mapping[str, float] = field(default_factory=dict)  # constants that are others in C
+    prefix: str = ""  # of the names of functions
     done: dict[tuple[Any, ...], "Function"] = field(default_factory=dict)
     counter: int = 0  # of names
 
