@@ -6,31 +6,16 @@ from typing import Any
 
 from ...controllers.fan_laws import Lead
 from ...controllers.features import QUANTITIES
-from ...controllers.observation import (
-    FORCE_X,
-    FORCE_Y,
-    FORCE_Z,
-    LAST_COMMAND,
-    TORQUE_X,
-    TORQUE_Y,
-    TORQUE_Z,
-    VELOCITY_Y,
-)
 from ...controllers.trained_policy import TrainedPolicy, cell_of, layers_of, load_policy
 from ...runtime.errors import InputError
 from .c_numbers import literal, table
 
 LAWS = ("lead", "tracker")
-_COLUMNS = {
-    FORCE_X: "e->force[0]",
-    FORCE_Y: "e->force[1]",
-    FORCE_Z: "e->force[2]",
-    TORQUE_X: "e->torque[0]",
-    TORQUE_Y: "e->torque[1]",
-    TORQUE_Z: "e->torque[2]",
-    VELOCITY_Y: "e->velocity[1]",
-    LAST_COMMAND: "m->command",
-}
+# where the C has the numbers of an observation, in its order
+_COLUMNS = (
+    *(f"e->{part}[{i}]" for part in ("force", "torque") for i in range(3)),
+    *("e->velocity[1]", "m->command"),
+)
 
 
 def exportable_policy(name: str, path: Path | None) -> Mapping[str, Any]:
