@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..envs.captions import Caption, with_caption
-from ..envs.drawing import SCALES
 from ..envs.video import FPS, Film, save_picture
-from ..envs.wind_drawing import WIND_SCALES
 
 SIZE = 960, 540  # pixels
 
@@ -52,7 +50,7 @@ def caption_of(
         float(external[5]),
         (*tally.lines(), *lines),
         viewer.pixels_per_metre(loop.position),
-        SCALES if wind is None else WIND_SCALES,
+        viewer.scales,
     )
 
 

@@ -125,7 +125,7 @@ def _watch(session: "Session") -> bool:
                     while not running.done():
                         _say(session)
                         if shown is not None:
-                            shown.update(page(session.snapshot(), session.source), refresh=True)
+                            shown.update(page(session), refresh=True)
                         wait([running], 1.0 / _PAGES)
             except Exception as error:
                 session.tallies.fail("not drawn", "the terminal", error)
@@ -136,7 +136,7 @@ def _watch(session: "Session") -> bool:
             session.stop()
         running.result()
     if draws and session.output is not None:
-        console.print(page(session.snapshot(), session.source))
+        console.print(page(session))
     return interrupted
 
 
@@ -152,23 +152,25 @@ def _summary(session: "Session") -> dict[str, Any]:
     from ..live.terminal_page import counts_words, tuning_words
 
     _say(session)
-    now = session.snapshot()
-    median, most = now.latency_ms
-    mean, deviation = session.tallies.wrench.mean, session.tallies.wrench.deviation
+    tallies, restarts = session.tallies, session.filter.restarts
+    median, most = tallies.latency.median_and_most
+    mean, deviation = tallies.wrench.mean, tallies.wrench.deviation
     result: dict[str, Any] = {
         "source": session.source.name,
         "vehicle": session.source.vehicle.name,
-        "seconds": now.seconds,
-        "estimates": now.estimates,
-        "messages": {kind: rate.count for kind, rate in session.tallies.rates.items()},
-        "counts": now.counts,
-        "restarts": now.restarts,
-        "consistency": now.consistency.as_dict() if now.consistency.seconds else None,
+        "seconds": session.seconds,
+        "estimates": session.estimates,
+        "messages": {kind: rate.count for kind, rate in tallies.rates.items()},
+        "counts": tallies.found,
+        "restarts": restarts,
+        "consistency": tallies.consistency.as_dict() if tallies.consistency.seconds else None,
         "period_s": session.filter.period,
-        "clock_drift_ppm": now.drift_ppm,
+        "clock_drift_ppm": session.clocks.drift,
         "latency_ms": {"median": median, "p99": most},
-        "processor_ms": dict(zip(("median", "p99"), now.processor_ms, strict=True)),
-        "recorded_rows": now.recorded,
+        "processor_ms": dict(
+            zip(("median", "p99"), tallies.processor.median_and_most, strict=True)
+        ),
+        "recorded_rows": session.recorded,
         "force_mean_N": mean[:3],
         "force_std_N": deviation[:3],
         "torque_mean_Nm": mean[3:],
@@ -176,13 +178,13 @@ def _summary(session: "Session") -> dict[str, Any]:
         "ended": session.ended,
     }
     messages = ", ".join(f"{n} {kind}" for kind, n in sorted(result["messages"].items()))
-    lines = [f"{now.estimates} estimates over {now.seconds:.1f} s, of {messages}"]
-    if now.counts:
-        lines.append(f"counted: {counts_words(now.counts)}")
-    if now.restarts:
-        lines.append(f"the filter restarted {now.restarts} time(s): after gaps or jumps")
-    if now.consistency.seconds:
-        lines.append(f"tuning: {tuning_words(now.consistency)}")
+    lines = [f"{session.estimates} estimates over {session.seconds:.1f} s, of {messages}"]
+    if tallies.found:
+        lines.append(f"counted: {counts_words(tallies.found)}")
+    if restarts:
+        lines.append(f"the filter restarted {restarts} time(s): after gaps or jumps")
+    if tallies.consistency.seconds:
+        lines.append(f"tuning: {tuning_words(tallies.consistency)}")
     if median == median:
         lines.append(f"latency: median {median:.2f} ms, 99 % within {most:.2f} ms")
     force, torque = (" ".join(f"{x:+.4g}" for x in part) for part in (mean[:3], mean[3:]))

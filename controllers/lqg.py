@@ -73,11 +73,9 @@ class LQG:
     vehicle: Vehicle = field(default_factory=standard_vehicle)
 
     def __post_init__(self) -> None:
-        numbers = {name: getattr(self, name) for name in ("effort", "force", "torque")}
-        times = {name: getattr(self, name) for name in ("force_time", "torque_time")}
-        for name, value in (numbers | times | {"estimate_lag": self.estimate_lag}).items():
-            if not value > 0.0:
-                raise InputError(f"LQG: {name} must be above 0, got {value!r}")
+        for name in ("effort", "force", "torque", "force_time", "torque_time", "estimate_lag"):
+            if not getattr(self, name) > 0.0:
+                raise InputError(f"LQG: {name} must be above 0, got {getattr(self, name)!r}")
         self._axes = [self._axis(axis) for axis in axis_models(self.vehicle)]
         self.reset()
 

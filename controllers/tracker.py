@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 from .axis_models import PLACE, SPEED
 from .briefing import Air, Briefing
-from .fan_motion import KINDS, place_after
+from .fan_motion import PLACES
 from .observation import DECISION_PERIOD, MAX_COMMAND
 from .preview import Oracle, lasting, preview, pushing
 from .sensor_model import Sensing, sensor_model
-from .tracker_filter import MEMORY, resample, respread
+from .tracker_filter import MEMORY
 
 Array = NDArray[np.float64]
 
@@ -34,6 +34,7 @@ FEW = 0.5  # share of effective particles below which they are drawn anew
 # take any other velocity
 STOP, TURN = 1 / 3, 1 / 2
 _FEWEST = 8  # particles of a kind of motion whose covariance means something
+_SMALLEST = 1e-12  # variance of particles of a kind
 
 
 @dataclass(eq=False, kw_only=True)
@@ -73,7 +74,6 @@ class _Belief(ABC):
         self._memory = np.zeros((n, MEMORY))
         self._weight = np.zeros(n)  # logarithm
         self._fresh = np.empty(n)
-        self._chosen = np.empty(n, dtype=np.int64)
         self._place = np.zeros(n)  # m, of the fan, from where the vehicle was at first
         self._velocity = np.zeros(n)  # m/s
         self.mean, self.deviation = (0.0, 0.0), float("nan")
@@ -110,9 +110,10 @@ class _Belief(ABC):
         self.deviation = float(np.sqrt(shares @ (self._place - place) ** 2))
         command = self._command(observation, shares)
         if shares @ shares > 1.0 / (FEW * len(shares)):
-            resample(shares, self._rng.random(), self._chosen)
+            n = len(shares)
+            even = (np.arange(n) + self._rng.random()) / n
             self._weight[:] = 0.0
-            self._choose(self._chosen)
+            self._choose(np.minimum(np.searchsorted(np.cumsum(shares), even), n - 1))
         return np.array([command], dtype=np.float32)
 
     def _command(self, observation: NDArray[np.floating[Any]], shares: Array) -> float:
@@ -193,7 +194,7 @@ class InformedTracker(_Belief):
 
     def _begin(self) -> None:
         rng, n, known = self._rng, self.particles, self._briefing.motions
-        names = np.array([KINDS.index(name) for name in known.motions])
+        names = np.array([list(PLACES).index(name) for name in known.motions])
         self._kind = names[rng.integers(len(names), size=n)]
         self._sign = rng.choice([-1.0, 1.0], n)
         side = rng.choice([-1.0, 1.0], n)
@@ -225,26 +226,31 @@ class InformedTracker(_Belief):
     def _place_at(self, time: float) -> Array:
         """Return where the particles that stay in the family are at a time (s), (n,) m."""
         speed, travel, offset = self._motion.T
-        moved = self._sign * place_after(self._kind, speed, travel, time)
-        place: Array = self._side * offset + moved
+        place: Array = self._side * offset
+        for kind, place_after in enumerate(PLACES.values()):
+            some = np.flatnonzero(self._kind == kind)
+            place[some] += self._sign[some] * place_after(speed[some], travel[some], time)
         return place
 
     def _choose(self, chosen: NDArray[np.int64]) -> None:
         super()._choose(chosen)
-        low, high = self._bounds
-        respread(
-            self._motion,
-            self._kind,
-            self._sign,
-            self._side,
-            self._free,
-            len(KINDS),
-            _FEWEST,
-            self.spread,
-            self._rng.standard_normal(self._motion.shape),
-            low,
-            high,
-        )
+        noise, keep = self._rng.standard_normal(self._motion.shape), np.sqrt(1.0 - self.spread**2)
+        # speed and offset count with the sign that they are flown with
+        motion = self._motion * np.column_stack([self._sign, np.ones(len(chosen)), self._side])
+        for kind in range(len(PLACES)):
+            some = np.flatnonzero((self._kind == kind) & ~self._free)
+            if len(some) >= _FEWEST:
+                mean = motion[some].mean(axis=0)
+                apart = motion[some] - mean
+                covariance = apart.T @ apart / len(some) + _SMALLEST * np.eye(3)
+                drawn = noise[some] @ np.linalg.cholesky(covariance).T
+                motion[some] = mean + keep * apart + self.spread * drawn
+        self._sign, _, self._side = np.where(motion < 0.0, -1.0, 1.0).T
+        motion[:, [0, 2]] = np.abs(motion[:, [0, 2]])
+        low, high = self._bounds  # at which they are reflected
+        motion = np.where(motion > high, 2.0 * high - motion, motion)
+        motion = np.where(motion < low, 2.0 * low - motion, motion)
+        self._motion = np.clip(motion, low, high)
 
 
 @dataclass(eq=False, kw_only=True)

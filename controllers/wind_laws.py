@@ -158,28 +158,25 @@ class INDI(WindLaw):
             raise InputError(
                 f"INDI: cutoff must lie between 0 and {0.5 / WIND_PERIOD:g} Hz, got {self.cutoff:g}"
             )
-        # bilinear transform, warped to the cut-off
-        w = math.tan(math.pi * self.cutoff * WIND_PERIOD)
-        scale = 1.0 / (1.0 + math.sqrt(2.0) * w + w * w)
-        self._b = w * w * scale
-        self._a1 = 2.0 * (w * w - 1.0) * scale
-        self._a2 = (1.0 - math.sqrt(2.0) * w + w * w) * scale
+        from scipy.signal import butter
+
+        self._filter = butter(2, self.cutoff, fs=1.0 / WIND_PERIOD)
         self.reset()
 
     def reset(self) -> None:
         """Forget the last episode."""
         super().reset()
-        self._states: tuple[Wide, Wide] | None = None
+        self._state: Wide | None = None
 
     def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
         """Return the low-passed difference of rotor model and accelerometer."""
+        from scipy.signal import lfilter, lfilter_zi
+
         x = o[ROTOR_FORCE] - o[SPECIFIC_FORCE]
-        if self._states is None:  # as if it had always been so
-            self._states = x * (1.0 - self._b), x * (self._b - self._a2)
-        one, two = self._states
-        y: Wide = self._b * x + one
-        self._states = 2.0 * self._b * x - self._a1 * y + two, self._b * x - self._a2 * y
-        return self.gain * y
+        if self._state is None:  # as if it had always been so
+            self._state = np.outer(lfilter_zi(*self._filter), x)
+        y, self._state = lfilter(*self._filter, x[np.newaxis], axis=0, zi=self._state)
+        return np.asarray(self.gain * y[0])
 
 
 @dataclass(eq=False)

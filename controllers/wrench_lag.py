@@ -6,7 +6,7 @@ a noise of its own drives the rate, and the place is measured. Its error ``e`` o
 C) (A e + b dw) - K v``, ``dw`` being the change of the true wrench and ``v`` the noise of the
 measurement: the estimate is the true wrench less the third part of ``e``. Whatever is not the jet's
 mean is a coloured noise with known covariance, told from decision to decision by an autoregression
-(Yule and Walker; Levinson and Durbin for the first decisions).
+(Yule and Walker).
 """
 
 from dataclasses import dataclass
@@ -99,18 +99,14 @@ def autoregressions(autocovariance: Array) -> tuple[Array, Array]:
     """Return coefficients (ORDER + 1, ORDER) and innovation variances (ORDER + 1,) of the
     autoregressions of order 0 to ORDER of a stationary process.
     """
+    from scipy.linalg import solve_toeplitz
+
     R = np.asarray(autocovariance, dtype=np.float64)
     order = len(R) - 1
-    coefficients, variances = np.zeros((order + 1, order)), np.zeros(order + 1)
-    variances[0] = R[0]
-    phi = np.zeros(order)
+    coefficients, variances = np.zeros((order + 1, order)), np.full(order + 1, R[0])
     for m in range(1, order + 1):
-        last = (R[m] - phi[: m - 1] @ R[m - 1 : 0 : -1]) / variances[m - 1]
-        before = phi.copy()
-        phi[m - 1] = last
-        phi[: m - 1] = before[: m - 1] - last * before[: m - 1][::-1]
-        coefficients[m, :] = phi
-        variances[m] = variances[m - 1] * (1.0 - last * last)
+        coefficients[m, :m] = solve_toeplitz(R[:m], R[1 : m + 1])
+        variances[m] -= coefficients[m, :m] @ R[1 : m + 1]
     return coefficients, variances
 
 

@@ -22,29 +22,17 @@ _WIDTHS = (8, 3)  # pixels of a line in the legend: true, estimated
 
 @dataclass(frozen=True)
 class Caption:
-    """What is said of one picture.
+    """What is said of one picture."""
 
-    Attributes:
-        title: of the film.
-        time: s.
-        force: (3,) N, estimated.
-        torque_z: Nm, estimated, about the vertical.
-        true_force: (3,) N, or None where nobody knows it.
-        true_torque_z: Nm, or None.
-        lines: what else is said, such as the offset and the score.
-        pixels_per_metre: at the vehicle.
-        scales: m that 1 N and 1 Nm are drawn as.
-    """
-
-    title: str
-    time: float
-    force: Array
-    torque_z: float
-    true_force: Array | None
-    true_torque_z: float | None
-    lines: tuple[str, ...]
-    pixels_per_metre: float
-    scales: tuple[float, float]
+    title: str  # of the film
+    time: float  # s
+    force: Array  # (3,) N, estimated
+    torque_z: float  # Nm, estimated, about the vertical
+    true_force: Array | None  # (3,) N; None: nobody knows it
+    true_torque_z: float | None  # Nm
+    lines: tuple[str, ...]  # what else is said, such as the offset and the score
+    pixels_per_metre: float  # at the vehicle
+    scales: tuple[float, float]  # m that 1 N and 1 Nm are drawn as
 
 
 @cache

@@ -439,7 +439,6 @@ class ClosedLoop:
         self.specific: Array = loop["specific"]
         self.thrust: Array = loop["thrust"]
         self.points: Array = loop["points"]
-        self.attitude_of_points: Array = loop["rotation"]
         self._ticks: np.ndarray = self.record["ticks"]
         self.stages = self._pipeline(self.own_stages)
         self._look_at_world()
@@ -500,12 +499,6 @@ class ClosedLoop:
     def battery(self) -> float:
         """Battery voltage, V; 0 where the vehicle states no reference."""
         return float(self.record[0]["plant"]["battery"])
-
-    @property
-    def wind(self) -> Array:
-        """Mean (3,) m/s, world, of the winds at the stations."""
-        mean: Array = np.add.reduce(self.air) / STATIONS
-        return mean
 
     @property
     def time(self) -> float:

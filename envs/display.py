@@ -25,24 +25,22 @@ def need_display() -> None:
     Raises:
         InputError: there is no display, or the library for windows does not find it.
     """
-    named = [f"{name}={os.environ[name]}" for name in _VARIABLES if os.environ.get(name)]
     if not sys.platform.startswith("linux"):
         return  # elsewhere there is a display, and windows belong to the main thread
-    if not named:
-        raise _no_window("DISPLAY and WAYLAND_DISPLAY are not set")
-    try:
-        import glfw
-    except ImportError as error:
-        raise _no_window(str(error)) from error
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # its errors come as warnings, too
-        found = glfw.init()
-    if not found:
-        raise _no_window(f"GLFW finds none at {', '.join(named)}")
-
-
-def _no_window(why: str) -> InputError:
-    return InputError(
+    named = [f"{name}={os.environ[name]}" for name in _VARIABLES if os.environ.get(name)]
+    why = "DISPLAY and WAYLAND_DISPLAY are not set"
+    if named:
+        try:
+            import glfw
+        except ImportError as error:
+            why = str(error)
+        else:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # its errors come as warnings, too
+                if glfw.init():
+                    return
+            why = f"GLFW finds none at {', '.join(named)}"
+    raise InputError(
         f"render: no window without a display ({why}); expected render_mode='rgb_array', --gif or "
         f"--video on a machine without one"
     )

@@ -1,5 +1,5 @@
-"""Drawing the world: the jet as drifting tracers, the wrench as arrows, the path flown, in a window
-or as a picture.
+"""Drawing the world: drops that drift with the air, fans, the reference, the wrench as arrows, and
+the path flown, in a window or as a picture.
 """
 
 import math
@@ -16,16 +16,27 @@ from .closed_loop import ClosedLoop
 from .display import need_display
 from .fan import jet_at
 from .scene_shapes import add_path, add_shadow, add_shape, add_wrench
+from .wind import FanWall
 
-_TRACERS = 220
+Array = NDArray[np.float64]
+
 _FIELD = (
     48.0  # degrees that a picture of 4:3 shows from top to bottom; a wider one shows less there
 )
 SCALES = (1.6, 25.0)  # m per N, m per Nm
+_WIND_SCALES = (0.5, 8.0)  # likewise, of the tasks in the wind
+_TRAIL = 120  # pictures back that the path is shown for
+_DROPS = 300
+# m: corners of the box of drops, from the fan; and of the tasks in the wind, in the world
+_BOX = np.array([[0.1, -0.6, -0.6], [3.6, 0.6, 0.6]])
+_WIND_BOX = np.array([[0.2, -1.6, 0.2], [4.4, 1.6, 2.8]])
+_STILL = 0.4  # m/s, of air whose drops are not shown
+_AWAY = (0.0, 0.0, -50.0)  # m, where a fan is that is not there
+_SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
 
 
 class Viewer:
-    """Draws a closed loop.
+    """Draws a closed loop; one that flies along a reference is one in the wind.
 
     Args:
         mode: ``"rgb_array"`` for pictures, ``"human"`` for a window.
@@ -37,10 +48,6 @@ class Viewer:
             has no way to do it.
     """
 
-    _close = True  # a wide picture shows as much from side to side as one of 4:3
-    _scales = SCALES
-    _trail = 0  # pictures back that the path is shown for; 0: all
-
     def __init__(self, mode: str, width: int = 640, height: int = 480) -> None:
         if mode == "human":
             need_display()
@@ -48,25 +55,17 @@ class Viewer:
         self._renderer: Any = None
         self._window: Any = None
         self._model: Any = None
-        self._path: list[NDArray[np.float64]] = []
+        self.scales = SCALES  # of the arrows drawn last
+        self._path: list[Array] = []
         self._last = math.inf  # s, of the loop's clock
         self._begun = 0.0  # s, of the wall's clock, at its start
-        # tracers drift with the jet; they only decorate, so their generator is their own
+        # drops only decorate, so their generator is their own
         self._rng = np.random.default_rng(0)
-        self._tracers = self._new_tracers(_TRACERS)
-        self._tracers[:, 0] = self._rng.uniform(0.2, 3.6, _TRACERS)
+        self._drops = np.full((_DROPS, 3), np.nan)  # m; drawn anew where they are in no box
 
-    def _new_tracers(self, count: int) -> NDArray[np.float64]:
-        radius, angle = (
-            0.45 * np.sqrt(self._rng.random(count)),
-            self._rng.uniform(0, 2 * math.pi, count),
-        )
-        return np.stack(
-            [np.full(count, 0.2), radius * np.cos(angle), radius * np.sin(angle)], axis=1
-        )
-
-    def open_world(self, model: Any, data: Any) -> None:
-        """Make ready to draw a model, unless it is the one that was drawn last.
+    def open_world(self, model: Any, data: Any, near: bool = False) -> None:
+        """Make ready to draw a model, unless it is the one that was drawn last; ``near``: a wide
+        picture shows as much from side to side as one of 4:3.
 
         Raises:
             InputError: this machine has no way to draw.
@@ -89,7 +88,7 @@ class Viewer:
                     -22,
                 )
             else:
-                if self._close:
+                if near:
                     up = math.tan(math.radians(_FIELD) / 2)
                     across = up * 4 / 3 * self.height / self.width
                     model.cam_fovy[:] = math.degrees(2 * math.atan(min(up, across)))
@@ -103,35 +102,61 @@ class Viewer:
                 "install Debian's libegl1 or libosmesa6"
             ) from error
 
-    def draw(self, loop: ClosedLoop, scenery: Any) -> NDArray[np.uint8] | None:
-        """Draw the loop as it is now, in a ``scenery``: where the fan is along y, m; return the
-        picture (height, width, 3) unless it went to a window.
+    def draw(self, loop: ClosedLoop) -> NDArray[np.uint8] | None:
+        """Draw the loop as it is now; return the picture (height, width, 3) unless it went to a
+        window.
         """
-        self.open_world(loop.model, loop.data)
-        self.begin_frame(loop)
-        self._drift(loop, scenery)
-        mujoco.mj_kinematics(loop.model, loop.data)
-
-        def mark(scene: Any) -> None:
-            self._mark(scene, loop, scenery)
-            at = loop.position
-            add_shadow(scene, at, 0.22)
-            add_path(scene, self._path[-self._trail :])
-            true, seen = loop.external, loop.state
-            add_wrench(scene, at, true[:3], true[5], self._scales, 0.22, true=True)
-            add_wrench(scene, at, seen[16:19], seen[15], self._scales, 0.22)
-
-        return self.show(loop.data, mark, "chase")
-
-    def begin_frame(self, loop: ClosedLoop) -> None:
-        """Wait for the loop's time where a window shows it, and remember where the vehicle is."""
-        if loop.time < self._last:  # another episode
+        in_wind = len(loop.reference) > 0
+        self.scales = _WIND_SCALES if in_wind else SCALES
+        self.open_world(loop.model, loop.data, not in_wind)
+        step = min(loop.time - self._last, 0.08)
+        if step < 0.0:  # another episode
             self._path.clear()
-            self._begun = time.perf_counter() - loop.time
+            self._begun, step = time.perf_counter() - loop.time, 0.0
         self._last = loop.time
         if self.mode == "human":  # not faster than life
             time.sleep(max(self._begun + loop.time - time.perf_counter(), 0.0))
         self._path.append(loop.position.copy())
+        air = self._drift(loop, step, in_wind)
+        mujoco.mj_kinematics(loop.model, loop.data)
+
+        def mark(scene: Any) -> None:
+            for drop, speed in zip(self._drops, np.linalg.norm(air, axis=1), strict=True):
+                colour = np.array([0.25, 0.55, 0.95, 0.08 + 0.1 * min(speed, 6.0)])
+                if speed > _STILL:
+                    add_shape(scene, _SPHERE, np.full(3, 0.013), drop, colour)
+            for wind in loop.winds.winds:
+                if isinstance(wind, FanWall):
+                    _add_wall(scene, wind, loop.time)
+            for row in loop.reference[max(loop.ticks, 0) :][:1]:
+                yellow = np.array([0.95, 0.75, 0.10, 0.6])
+                add_shape(scene, _SPHERE, np.full(3, 0.035), row[:3], yellow)
+            at = loop.position
+            add_shadow(scene, at, 0.22)
+            add_path(scene, self._path[-_TRAIL:])
+            true, seen = loop.external, loop.state
+            add_wrench(scene, at, true[:3], true[5], self.scales, 0.22, true=True)
+            add_wrench(scene, at, seen[16:19], seen[15], self.scales, 0.22)
+
+        return self.show(loop.data, mark, "chase")
+
+    def _drift(self, loop: ClosedLoop, step: float, in_wind: bool) -> Array:
+        """Place the fan, and carry the drops with the air for ``step`` s; return the air (n, 3)
+        m/s.
+        """
+        fan, drops, jet = loop.record["fan"].copy()[0], self._drops, np.empty(3)
+        axial, radial = loop.jet_table
+        place = np.array([0.0, fan["y"], fan["height"]])
+        loop.data.mocap_pos[0] = _AWAY if in_wind else place
+        low, high = _WIND_BOX if in_wind else place + _BOX
+        gone = ~np.all((drops >= low) & (drops <= high), axis=1) | (self._rng.random(_DROPS) < 0.01)
+        drops[gone] = self._rng.uniform(low, high, (int(gone.sum()), 3))
+        air = loop.winds.velocity(drops, max(loop.time, 0.0))
+        for drop, wind in zip(drops, air, strict=True):
+            jet_at(fan, axial, radial, drop[0], drop[1], drop[2], jet)
+            wind += jet
+        drops += step * air + 0.004 * self._rng.standard_normal(drops.shape)
+        return air
 
     def show(self, data: Any, mark: Callable[[Any], None], camera: Any) -> NDArray[np.uint8] | None:
         """Draw a world with the marks that ``mark`` adds; return the picture unless it went to a
@@ -153,7 +178,7 @@ class Viewer:
         picture: NDArray[np.uint8] = self._renderer.render()
         return picture
 
-    def pixels_per_metre(self, at: NDArray[np.float64]) -> float:
+    def pixels_per_metre(self, at: Array) -> float:
         """Return how many pixels of the last picture a metre across it takes at a place (3,) m."""
         view = self._renderer.scene.camera[0]
         ahead = np.asarray(at) - np.asarray(view.pos)
@@ -170,31 +195,27 @@ class Viewer:
             else self._renderer is not None
         )
 
-    def _drift(self, loop: ClosedLoop, scenery: Any) -> None:
-        """Place the fan, and carry the tracers with the mean wind for one frame."""
-        loop.data.mocap_pos[0] = (0.0, scenery, float(loop.record[0]["fan"]["height"]) or 1.2)
-        axial, radial = loop.jet_table
-        fan = loop.record["fan"][0:1].copy()
-        fan["y"] = 0.0
-        height, wind = float(fan["height"][0]), np.empty(3)
-        for tracer in self._tracers:
-            jet_at(fan[0], axial, radial, tracer[0], tracer[1], tracer[2] + height, wind)
-            tracer += 0.08 * wind + 0.012 * self._rng.standard_normal(3) * (wind[0] > 0)
-            tracer[0] += 0.003
-        gone = self._tracers[:, 0] > 3.6
-        self._tracers[gone] = self._new_tracers(int(gone.sum()))
-
-    def _mark(self, scene: Any, loop: ClosedLoop, scenery: Any) -> None:
-        """Add the tracers to a scene."""
-        height = float(loop.record[0]["fan"]["height"])
-        for tracer in self._tracers if float(loop.record[0]["fan"]["speed"]) > 0 else ():
-            colour = np.array([0.25, 0.55, 0.95, 0.55 * (1.0 - tracer[0] / 3.8)])
-            at = tracer + np.array([0.0, scenery, height])
-            add_shape(scene, mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, 0.014), at, colour)
-
     def close(self) -> None:
         """Close the window or free the renderer."""
         for thing in (self._window, self._renderer):
             if thing is not None:
                 thing.close()
         self._window = self._renderer = self._model = None
+
+
+def _add_wall(scene: Any, wall: FanWall, time: float) -> None:
+    """Append the fans of a wall, the brighter the faster they blow."""
+    speeds = wall.speeds[min(int(time / 0.02), len(wall.speeds) - 1)]
+    frame = np.column_stack([wall.axes[1], wall.axes[2], wall.axes[0]])
+    for place, speed in zip(wall.places[0], speeds, strict=True):
+        share = min(speed / 6.0, 1.0)
+        colour = np.array([0.20 + 0.1 * share, 0.30 + 0.4 * share, 0.40 + 0.55 * share, 1.0])
+        shape = add_shape(
+            scene,
+            mujoco.mjtGeom.mjGEOM_CYLINDER,
+            np.array([wall.radius, 0.03, 0.0]),
+            place,
+            colour,
+        )
+        if shape is not None:
+            shape.mat[:] = frame

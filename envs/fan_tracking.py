@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..dynamics.motion import Array
-from ..runtime.compiled import compiled, compiled_without_gil
+from ..runtime.compiled import compiled_without_gil
 from ..runtime.errors import InputError
 from .fan import Fan
 from .observing import LIMITS, SCALES, Episodes, Motion, View
@@ -33,24 +33,6 @@ CHANGE_COST = 0.05  # per (m/s)^2 of change of the command
 _LIMITS = np.array(LIMITS)
 AWAY = 1.0  # m, off its height or its distance, at which a vehicle is lost
 FAN_TIMES = TICK * np.arange(round(EPISODE_SECONDS / TICK) + 2, dtype=np.float64)
-
-
-@compiled
-def see(state: Array, command: float, frame: Frame) -> None:
-    """Write the frame (8,) of an estimated state (20,) and the last command in m/s: force, torque,
-    velocity along y and command, within their limits.
-    """
-    for i in range(3):
-        frame[i], frame[3 + i] = state[16 + i], state[13 + i]
-    frame[6], frame[7] = state[8], command
-    keep_within(frame, _LIMITS)
-
-
-@compiled
-def reward_terms(offset: float, change: float) -> tuple[float, float]:
-    """Return the rewards of tracking at an offset in m and of a change of the command in m/s."""
-    ratio = offset / TRACKING_WIDTH
-    return 1.0 / (1.0 + ratio * ratio), -CHANGE_COST * change * change
 
 
 class FanTask(Task):
@@ -83,11 +65,6 @@ class FanTask(Task):
             "fan_ahead": path[np.clip(rows, 0, len(path) - 1)],
         }
 
-    def _fly(self, noise: Array) -> None:
-        loop = self.loop
-        loop.setpoint[4 : 4 + self.action_size] = self.command
-        loop.run(noise, self.path[min(loop.ticks, len(self.path) - 1) :])
-
 
 @compiled_without_gil
 def look_along_y(
@@ -99,15 +76,19 @@ def look_along_y(
         b, lane = n // lanes, n % lanes
         p, v = motion.position[b, :, lane], motion.velocity[b, :, lane]
         state, path, value = motion.state[b, :, lane].copy(), episodes.paths[n], values[n]
-        see(state, episodes.commands[n, 0], frames[n])
+        frame = frames[n]
+        for i in range(3):
+            frame[i], frame[3 + i] = state[16 + i], state[13 + i]  # force, torque
+        frame[6], frame[7] = state[8], episodes.commands[n, 0]
+        keep_within(frame, _LIMITS)
         k = min(episodes.ticks[n], len(path) - 1)
         value.time, value.fan_y = episodes.ticks[n] * TICK, path[max(k - 1, 0), 0]
         value.fan_velocity = (path[k, 0] - value.fan_y) / TICK
         value.y, value.offset = p[1], p[1] - value.fan_y
         value.force[:], value.torque[:] = motion.wrench[b, :3, lane], motion.wrench[b, 3:, lane]
-        value.reward_tracking, value.reward_change = reward_terms(
-            value.offset, episodes.changes[n, 0]
-        )
+        ratio, change = value.offset / TRACKING_WIDTH, episodes.changes[n, 0]
+        value.reward_tracking = 1.0 / (1.0 + ratio * ratio)
+        value.reward_change = -CHANGE_COST * change * change
         # written such that a number that is not finite counts as lost
         value.lost = episodes.broken[n] or not (
             is_flying(state, p, v)
@@ -229,7 +210,7 @@ class FanTrackingEnv(FanTask):
     def hover(self, settle: int = 0) -> None:
         """Draw an episode and let the vehicle hover at its start for ``settle`` ticks."""
         rng, scenario = self.np_random, self.scenario
-        self.drawn_label, _, fan_y = draw_fan_path(scenario, rng, FAN_TIMES)
+        self.drawn_label, fan_y = draw_fan_path(scenario, rng, FAN_TIMES)
         if self.fan_path is not None:
             self.drawn_label = "given"
             fan_y = np.asarray(self.fan_path(FAN_TIMES), dtype=np.float64)
@@ -272,9 +253,8 @@ def scenario_env(
     Raises:
         InputError: a name that does not exist.
     """
-    if not sources - TRUTH:
-        return FanTrackingEnv(scenario, estimator=estimator)
-    return SensingFanTracking(scenario, estimator=estimator)
+    kind = SensingFanTracking if sources - TRUTH else FanTrackingEnv
+    return kind(scenario, estimator=estimator)
 
 
 __all__ = ["DECISION_TICKS", "EPISODE_SECONDS", "LOST_OFFSET", "FanTrackingEnv"]

@@ -158,8 +158,8 @@ class FanTracking2DEnv(FanTask):
     def hover(self, settle: int = 0) -> None:
         """Draw an episode and let the vehicle hover at its start for ``settle`` ticks."""
         rng, scenario = self.np_random, self.scenario
-        sideways, _, y = draw_fan_path(scenario, rng, FAN_TIMES)
-        upwards, _, z = draw_fan_path(scenario, rng, FAN_TIMES)
+        sideways, y = draw_fan_path(scenario, rng, FAN_TIMES)
+        upwards, z = draw_fan_path(scenario, rng, FAN_TIMES)
         self.drawn_label = f"{sideways} and {upwards}"
         path = np.column_stack([y, self.fan.height + _VERTICAL * z])
         offset, side = float(rng.uniform(*scenario.offset)), float(rng.uniform(-math.pi, math.pi))

@@ -9,19 +9,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..controllers.observation import (
-    DECISION_PERIOD,
-    FORCE_X,
-    LAST_COMMAND,
-    MAX_COMMAND,
-)
+from ..controllers.observation import FORCE_X, LAST_COMMAND, MAX_COMMAND
 from ..controllers.observation import VELOCITY_Y as _VELOCITY_Y
 from ..runtime.errors import unknown_name
 from .fan import STATIONS
-from .plant import TICK
 
 Frame = NDArray[np.float32]
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
 class Episodes(NamedTuple):
@@ -33,7 +28,23 @@ class Episodes(NamedTuple):
     distance: Array  # (n,) m, from the fan at the start
     commands: Array  # (n, actions) in SI units
     changes: Array  # (n, actions) of the commands
-    broken: NDArray[np.bool_]  # (n,) whether the physics started over on its own
+    broken: Flags  # (n,) whether the physics started over on its own
+
+    @classmethod
+    def alike(
+        cls, count: int, actions: int, path: Array, reference: Array, distance: float = 0.0
+    ) -> "Episodes":
+        """Return ``count`` episodes along the same path (m, 2) and reference (k, 10) that begin."""
+        commands, changes = np.zeros((2, count, actions))
+        return cls(
+            np.zeros(count, dtype=np.int64),
+            np.tile(path, (count, 1, 1)),
+            np.tile(reference, (count, 1, 1)),
+            np.full(count, distance),
+            commands,
+            changes,
+            np.zeros(count, dtype=np.bool_),
+        )
 
 
 class Motion(NamedTuple):
@@ -55,7 +66,6 @@ class Motion(NamedTuple):
 
 
 FRAMES = 25  # decisions of a history, 2 s
-_TICKS = round(DECISION_PERIOD / TICK)  # of a decision
 # largest size of a frame's numbers: N, Nm, m/s and m/s
 LIMITS = (10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 5.0, MAX_COMMAND)
 # sizes that become 1: N, Nm, m/s and m/s; what the jet does to the standard vehicle
@@ -67,13 +77,14 @@ OBSERVE = ("wrench", "wrench-without-fx", "history", "pose")
 
 
 class View:
-    """From the frame (n,) of the environment to what its agent sees.
+    """From the frames (n, size) of environments side by side to what their agents see.
 
     Args:
         observe: one of ``OBSERVE``; other than ``"wrench"`` of FanTracking alone.
         normalize: whether each number is divided by its scale.
-        limits: largest size (n,) of the frame's numbers.
-        scales: sizes (n,) that become 1.
+        limits: largest size (size,) of a frame's numbers.
+        scales: sizes (size,) that become 1.
+        count: n, how many environments.
 
     Raises:
         InputError: an unknown view.
@@ -85,81 +96,68 @@ class View:
         normalize: bool = False,
         limits: Sequence[float] = LIMITS,
         scales: Sequence[float] = SCALES,
+        count: int = 1,
     ) -> None:
         if observe not in OBSERVE:
             raise unknown_name("view", str(observe), OBSERVE, "FanTracking: observe")
-        self.observe, self.normalize = observe, normalize
+        self._given = observe, normalize, limits, scales
+        self.observe = observe
         if observe == "pose":
             limits, scales = _POSE_LIMITS, _POSE_SCALES
-        kept = [i for i in range(len(limits)) if observe != "wrench-without-fx" or i != FORCE_X]
-        self._kept = kept
+        kept = self._kept = slice(FORCE_X + 1 if observe == "wrench-without-fx" else 0, None)
         self._limits = np.array(limits, dtype=np.float32)[kept]
-        self._scales = (
-            np.array(scales, dtype=np.float32)[kept]
-            if self.normalize
-            else np.ones(len(kept), dtype=np.float32)
-        )
-        self.size = len(kept) * (FRAMES if observe == "history" else 1)
-        self._past = np.zeros((FRAMES, len(kept)), dtype=np.float32)
-        self._seen = -1  # ticks at which the history ends
-        self._start = np.zeros(3)
+        self._scales = np.array(scales if normalize else np.ones(len(scales)), dtype=np.float32)[
+            kept
+        ]
+        self.is_plain = observe == "wrench" and not normalize  # the frame is seen as it is
+        self._past = np.zeros((count, FRAMES, len(self._limits)), dtype=np.float32)
+        self._begins = np.ones(count, dtype=np.bool_)  # no frame of the episode was seen
+        self._start = np.zeros((count, 3))  # m
 
-    @property
-    def is_plain(self) -> bool:
-        """Whether the frame is seen as it is."""
-        return self.observe == "wrench" and not self.normalize
-
-    @property
-    def is_of_a_frame(self) -> bool:
-        """Whether a frame alone says what is seen, so that many can be turned at once."""
-        return self.observe in ("wrench", "wrench-without-fx")
+    def of_many(self, count: int) -> "View":
+        """Return the same view of ``count`` environments."""
+        return View(*self._given, count)
 
     def bound(self) -> Frame:
-        """Return the largest size (n,) of what is seen."""
-        largest: Frame = np.tile(self._limits / self._scales, self.size // len(self._kept))
+        """Return the largest size (m,) of what is seen."""
+        frames = FRAMES if self.observe == "history" else 1
+        largest: Frame = np.tile(self._limits / self._scales, frames)
         return largest
 
-    def restart(self, state: Array) -> None:
-        """Begin an episode at an estimated state (20,)."""
-        self._seen, self._start = -1, state[:3].copy()
+    def restart(self, which: Flags | slice, states: Array) -> None:
+        """Begin episodes in the environments ``which`` (n,) at estimated states (n, 20)."""
+        self._begins[which], self._start[which] = True, states[which, :3]
 
-    def of_frames(self, frames: Frame) -> Frame:
-        """Return what is seen of frames (n, size), where a frame alone says so."""
-        seen: Frame = frames[:, self._kept] / self._scales
-        return seen
-
-    def of(self, frame: Frame, state: Array, ticks: int) -> Frame:
-        """Return what is seen of a frame (8,) and the estimated state (20,), ``ticks`` after the
-        episode's start; the same ticks twice are one frame of the history.
+    def of(self, which: Flags | slice, frames: Frame, states: Array) -> Frame:
+        """Return what is seen (k, m) next of frames (n, size) and estimated states (n, 20) in the
+        environments ``which`` (n,).
         """
         if self.observe == "pose":
-            pose = np.clip(self._pose(frame, state), -self._limits, self._limits)
-            return (np.nan_to_num(pose).astype(np.float32) / self._scales).astype(np.float32)
-        one: Frame = frame[self._kept] / self._scales
+            pose = np.clip(self._pose(which, frames, states), -self._limits, self._limits)
+            seen: Frame = np.nan_to_num(pose).astype(np.float32) / self._scales
+            return seen
+        one: Frame = frames[which][:, self._kept] / self._scales
         if self.observe != "history":
             return one
-        if self._seen < 0 or ticks < self._seen:
-            self._past[:] = one
-        elif ticks > self._seen:
-            steps = min(-(-(ticks - self._seen) // _TICKS), FRAMES)
-            self._past[:-steps] = self._past[steps:]
-            self._past[-steps:] = one
-        self._seen = ticks
-        return self._past.ravel().copy()
+        before = np.concatenate([self._past[which, 1:], one[:, None]], axis=1)
+        after = np.where(self._begins[which, None, None], one[:, None], before)
+        self._past[which], self._begins[which] = after, False
+        return after.reshape(len(one), FRAMES * one.shape[1])
 
-    def _pose(self, frame: Frame, x: Array) -> Array:
+    def _pose(self, which: Flags | slice, frames: Frame, states: Array) -> Array:
+        x, frame = states[which].T, frames[which].T
         w, i, j, k = x[3:7]
-        yaw = math.atan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k)) - math.pi
-        return np.array(
+        yaw = np.arctan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k)) - math.pi
+        return np.column_stack(
             [
-                *(x[:3] - self._start),
+                x[:3].T - self._start[which],
                 frame[_VELOCITY_Y],
                 2.0 * (i * k + w * j),
                 2.0 * (j * k - w * i),
-                math.atan2(math.sin(yaw), math.cos(yaw)),
+                np.arctan2(np.sin(yaw), np.cos(yaw)),
                 frame[LAST_COMMAND],
             ]
         )
 
 
-__all__ = ["FRAMES", "OBSERVE", "SCALES", "Episodes", "Motion", "View"]
+__all__ = ["FRAMES", "OBSERVE", "SCALES", "Episodes", "Flags", "Motion", "View"]

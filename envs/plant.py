@@ -119,6 +119,8 @@ def plant_record(vehicle: Vehicle, settings: PlantSettings) -> tuple[np.ndarray,
     """Return the plant's memory (1,) for the true vehicle, and that vehicle with its body effects
     applied.
     """
+    from scipy.special import ndtri
+
     record = np.zeros(1, dtype=PLANT)
     p = record[0]
     # the effect library's ground is the plant's floor
@@ -160,17 +162,11 @@ def plant_record(vehicle: Vehicle, settings: PlantSettings) -> tuple[np.ndarray,
             TICK / settings.dropout_burst * share / leaves,
             TICK / settings.dropout_burst,
         )
-    p["dropout"], p["dropout_kept"] = _normal_quantile(share), _normal_quantile(1.0 - leaves)
+    p["dropout"], p["dropout_kept"] = ndtri(share), ndtri(1.0 - leaves)
     if settings.dropout_burst == 0.0:
         p["dropout_kept"] = p["dropout"]
     p["voltage_ref"], p["battery_life"] = vehicle.voltage_ref, settings.battery_life
     return record, amended
-
-
-def _normal_quantile(probability: float) -> float:
-    from scipy.special import ndtri
-
-    return float(ndtri(probability))
 
 
 def reset_plant(p: np.void, vehicle: Vehicle) -> None:

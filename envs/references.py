@@ -13,9 +13,7 @@ REFERENCE_FADE = 1.5  # s, over which a moving reference gets up to speed
 
 def hold(position: Array, yaw: float, seconds: float) -> Array:
     """Return a reference (n, 10) that stays at ``position`` (3,) m."""
-    rows = np.zeros((round(seconds / TICK) + 1, 10))
-    rows[:, :3], rows[:, 9] = position, yaw
-    return rows
+    return _rows(np.tile(position, (round(seconds / TICK) + 1, 1)), yaw)
 
 
 def _rows(position: Array, yaw: float) -> Array:

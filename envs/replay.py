@@ -40,6 +40,14 @@ class Flight:
     true_torque: Array | None = None  # (n, 3) Nm
     fan_y: Array | None = None  # (n,) m
 
+    @property
+    def wrenches(self) -> list[tuple[bool, Array, Array]]:
+        """Whether it is the truth, force and torque of what is known, the truth first."""
+        known = [(False, self.force, self.torque)]
+        if self.true_force is not None and self.true_torque is not None:
+            known.insert(0, (True, self.true_force, self.true_torque))
+        return known
+
     def part(self, rows: NDArray[np.integer[Any]]) -> "Flight":
         """Return some rows of it."""
         every = {f.name: getattr(self, f.name) for f in fields(self)}
@@ -117,19 +125,8 @@ def pictures(
         def mark(scene: object, k: int = k, at: Array = at, trail: list[Array] = trail) -> None:
             add_shadow(scene, at, 0.22 * size)
             add_path(scene, trail, size)
-            if flight.true_force is not None and flight.true_torque is not None:
-                add_wrench(
-                    scene,
-                    at,
-                    flight.true_force[k],
-                    flight.true_torque[k, 2],
-                    scales,
-                    0.22 * size,
-                    True,
-                    size,
-                )
-            add_wrench(
-                scene, at, flight.force[k], flight.torque[k, 2], scales, 0.22 * size, size=size
-            )
+            for true, force, torque in flight.wrenches:
+                reach = 0.22 * size
+                add_wrench(scene, at, force[k], torque[k, 2], scales, reach, true, size)
 
         yield int(k), viewer.show(data, mark, camera)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..dynamics.vehicle import Vehicle
-from ..runtime.errors import InputError
+from ..runtime.extras import need
 from ..runtime.whole_files import replaced
 from .replay import Flight, arrow_scales
 
@@ -20,12 +20,8 @@ def write_rrd(flight: Flight, vehicle: Vehicle, path: Path) -> None:
     Raises:
         InputError: the rerun extra is not installed, or the file cannot be written.
     """
-    try:
-        import rerun as rr
-    except ImportError as error:
-        raise InputError(
-            f"{path}: a Rerun recording needs the rerun extra: pip install 'windwrench[rerun]'"
-        ) from error
+    need("rerun", "rerun", path)
+    import rerun as rr
 
     recording = rr.RecordingStream("windwrench")
     with replaced(path) as partial:
@@ -49,12 +45,8 @@ def write_rrd(flight: Flight, vehicle: Vehicle, path: Path) -> None:
             rr.Transform3D.columns(translation=flight.position, quaternion=turned),
         )
         scale, _ = arrow_scales(flight, vehicle.arm_l)
-        for name, force, torque, colour in (
-            ("estimated", flight.force, flight.torque, _ESTIMATED),
-            ("true", flight.true_force, flight.true_torque, _TRUE),
-        ):
-            if force is None or torque is None:
-                continue
+        for is_true, force, torque in flight.wrenches:
+            name, colour = ("true", _TRUE) if is_true else ("estimated", _ESTIMATED)
             recording.log(
                 f"world/force/{name}", rr.Arrows3D.from_fields(colors=[colour]), static=True
             )

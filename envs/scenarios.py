@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
+from ..controllers.fan_motion import PLACES
 from ..dynamics.vehicle import NotNegative
 from ..runtime.errors import unknown_name
 from ..runtime.forms import STRICT, Positive, checked, expected
@@ -136,11 +136,8 @@ def find_scenario(name: str, known: Mapping[str, AnyScenario]) -> AnyScenario:
     return known[name]
 
 
-def draw_fan_path(
-    scenario: Scenario, rng: np.random.Generator, t: Array
-) -> tuple[str, float, Array]:
-    """Draw how the fan moves: name of the motion, its largest speed (m/s), and y (n,) m at times
-    ``t`` (n,) s.
+def draw_fan_path(scenario: Scenario, rng: np.random.Generator, t: Array) -> tuple[str, Array]:
+    """Draw how the fan moves: name of the motion, and y (n,) m at times ``t`` (n,) s.
 
     The path starts at 0. Sine and triangle swing 0.5-1.2 m to either side; a ramp stops after
     0.8-1.6 m.
@@ -149,12 +146,4 @@ def draw_fan_path(
     speed = float(rng.uniform(*scenario.speed))
     sign = float(rng.choice([-1.0, 1.0]))
     travel = float(rng.uniform(0.5, 1.2))
-    if motion == "sine":
-        y = travel * np.sin(speed / travel * t)
-    elif motion == "triangle":
-        y = travel * 2 / math.pi * np.arcsin(np.sin(math.pi / 2 * speed / travel * t))
-    elif motion == "ramp":
-        y = np.minimum(speed * t, 0.8 + (travel - 0.5) * 8 / 7)
-    else:
-        y, speed = np.zeros_like(t), 0.0
-    return motion, speed, sign * y
+    return motion, sign * PLACES[motion](speed, travel, t)

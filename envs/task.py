@@ -41,7 +41,7 @@ COMMON_VALUES: list[tuple[Any, ...]] = [
     ("time", "f8"),
     ("lost", "?"),
 ]
-_ONE = np.ones(1, dtype=np.bool_)
+_ONE, _ALL = np.ones(1, dtype=np.bool_), slice(None)
 _NO_REFERENCE = np.zeros((0, REFERENCE_SIZE))
 EPISODE_SECONDS = 20.0
 SETTLE_TICKS = 300  # the filter settles before an episode starts
@@ -194,15 +194,8 @@ class Task(gym.Env[Frame, Frame], ABC):
 
     def _lay_episode(self) -> None:
         """Let what is looked at be the episode that was drawn."""
-        commands, changes = np.zeros((2, 1, self.action_size))
-        self._episodes = Episodes(
-            np.zeros(1, dtype=np.int64),
-            self.path[np.newaxis],
-            self.reference[np.newaxis],
-            np.array([self.distance]),
-            commands,
-            changes,
-            np.zeros(1, dtype=np.bool_),
+        self._episodes = Episodes.alike(
+            1, self.action_size, self.path, self.reference, self.distance
         )
 
     def _look_around(self) -> None:
@@ -296,16 +289,15 @@ class Task(gym.Env[Frame, Frame], ABC):
     def hover(self, settle: int = 0) -> None:
         """Draw an episode and let the vehicle hover at its start for ``settle`` ticks."""
 
-    @abstractmethod
-    def _fly(self, noise: Array) -> None:
-        """Fly a decision at ``command`` with unit normals, a row a tick."""
-
     def _get_obs(self) -> Frame:
         """Return what the agent sees now."""
-        frame: Frame = self._frames[0]
-        if self.view.is_plain:
-            return np.array(frame)
-        return self.view.of(frame, self.loop.state, self.loop.ticks)
+        frames = self._frames
+        seen: Frame = (
+            frames[0].copy()
+            if self.view.is_plain
+            else self.view.of(_ALL, frames, self._motion.state[..., 0])[0]
+        )
+        return seen
 
     def _get_info(self) -> dict[str, Any]:
         """Return the terms of the reward, the truth that the agent does not see, and whether the
@@ -360,7 +352,7 @@ class Task(gym.Env[Frame, Frame], ABC):
         self._begin()
         self._in_flight = True
         self.command = np.zeros(self.action_size)
-        self.view.restart(self.loop.state)
+        self.view.restart(_ALL, self._motion.state[..., 0])
         if self.render_mode == "human":
             self.render()
         # rewards, and whether the vehicle is lost, are decided by steps
@@ -407,16 +399,12 @@ class Task(gym.Env[Frame, Frame], ABC):
             self._normals = np.empty((self.decision_ticks, self.loop.noise_size))
             self._draw_normals = specialised(draw_normals, self._generators, 0, self._normals)
         self._draw_normals(self._generators, 0, self._normals)
-        self._fly(self._normals)
-
-    def _make_viewer(self) -> Any:
-        from .drawing import Viewer
-
-        return Viewer(self.render_mode or "", self.width, self.height)
-
-    def _scenery(self) -> Any:
-        """Return what the viewer draws beside the loop: where the fan is along y, m."""
-        return float(self.loop.record["fan"]["y"][0])
+        loop = self.loop
+        if self.accelerates:
+            loop.action[:] = self.command
+        else:
+            loop.setpoint[4 : 4 + self.action_size] = self.command
+        loop.run(self._normals, self.path[min(loop.ticks, len(self.path) - 1) :])
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture (height, width, 3) of vehicle, wind and wrench, or show it in a window.
@@ -430,8 +418,10 @@ class Task(gym.Env[Frame, Frame], ABC):
                 f"before it"
             )
         if self.viewer is None:
-            self.viewer = self._make_viewer()
-        picture: NDArray[np.uint8] | None = self.viewer.draw(self.loop, self._scenery())
+            from .drawing import Viewer
+
+            self.viewer = Viewer(self.render_mode, self.width, self.height)
+        picture: NDArray[np.uint8] | None = self.viewer.draw(self.loop)
         return picture
 
     def close(self) -> None:

@@ -2,7 +2,6 @@
 and one writes what came of it.
 """
 
-import copy
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
@@ -16,14 +15,13 @@ from numpy.typing import NDArray
 from ..dynamics.motion import Array
 from ..runtime.compiled import compiled_without_gil, specialised
 from ..runtime.errors import InputError, unknown_name
-from .closed_loop import REFERENCE_SIZE, run_ticks, write_motion
+from .closed_loop import run_ticks, write_motion
 from .fan_tracking import FanTrackingEnv
 from .normals import draw_normals, generator_list
-from .observing import Episodes, Motion
+from .observing import Episodes, Flags, Motion
 from .task import Frame, Task
 from .untimed import Untimed
 
-Flags = NDArray[np.bool_]
 Infos = dict[str, Any]
 
 
@@ -87,19 +85,11 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         self._over = np.zeros(num_envs, dtype=np.bool_)  # episodes that ended at the last step
         # each environment's own; one that was not reset yet has another's
         self._generators = generator_list([np.random.default_rng(0)] * num_envs)
-        self._episodes = Episodes(
-            np.zeros(num_envs, dtype=np.int64),
-            np.zeros((num_envs, 1, 2)),
-            np.zeros((num_envs, 0, REFERENCE_SIZE)),
-            np.zeros(num_envs),
-            np.zeros((num_envs, task.action_size)),
-            np.zeros((num_envs, task.action_size)),
-            np.zeros(num_envs, dtype=np.bool_),
-        )
-        self._views = [copy.deepcopy(first.view) for _ in range(num_envs)]
+        self._episodes = Episodes.alike(num_envs, task.action_size, first.path, first.reference)
+        self._view = first.view.of_many(num_envs)
         self._frames = np.zeros(self.observation_space.shape or (), dtype=np.float32)
         self._whole = self._frames  # frames before a view is taken of them
-        if not first.view.is_plain:
+        if not self._view.is_plain:
             self._whole = np.zeros((num_envs, len(task.limits)), dtype=np.float32)
         self._table = np.zeros(num_envs, dtype=task.values)
         self._labels = np.zeros(num_envs, dtype=object)
@@ -118,7 +108,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a copy starts from: arguments, arrays, generators and environments."""
-        kept = ("_decisions", "_begun", "_over", "_episodes", "_views", "_frames", "_whole")
+        kept = ("_decisions", "_begun", "_over", "_episodes", "_view", "_frames", "_whole")
         names = *kept, "_table", "_labels", "envs", "_np_random", "_np_random_seed"
         state = {name: getattr(self, name) for name in names}
         return state | {"_given": self._given, "_generators": list(self._generators)}
@@ -126,7 +116,12 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
     def __setstate__(self, state: dict[str, Any]) -> None:
         count, steps, threads, mode, task, kwargs = state["_given"]
         type(self).__init__(self, count, steps, threads, mode, task, **kwargs)
-        self._restore(state)
+        for name in ("_decisions", "_begun", "_over", "_frames", "_whole", "_table", "_labels"):
+            getattr(self, name)[...] = state[name]
+        for name in ("_episodes", "_view", "_np_random", "_np_random_seed"):
+            setattr(self, name, state[name])
+        self._generators = generator_list(state["_generators"])
+        self._take_envs(state)
 
     def reset(
         self,
@@ -157,7 +152,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
             )
         self._start(mask, seeds)
         self._over[mask] = False
-        return self._frames.copy(), self._infos()
+        return self._frames.copy(), self._infos(self._all)
 
     def step(self, actions: Frame) -> tuple[Frame, NDArray[np.float64], Flags, Flags, Infos]:
         """Fly a decision in every environment with actions (num_envs, n) as ``action_space`` has
@@ -188,13 +183,13 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         over = lost | truncated
         if self.autoreset_mode is AutoresetMode.NEXT_STEP or not over.any():
             self._over = over
-            return self._frames.copy(), rewards, lost, truncated, self._infos()
-        ended, final = self._final_infos(over), np.full(self.num_envs, None, dtype=object)
+            return self._frames.copy(), rewards, lost, truncated, self._infos(self._all)
+        ended, final = self._infos(over), np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(over):
             final[i] = self._frames[i].copy()
         self._start(over)
         masks = {"_final_obs": over.copy(), "_final_info": over.copy()}
-        infos = self._infos() | {"final_obs": final, "final_info": ended} | masks
+        infos = self._infos(self._all) | {"final_obs": final, "final_info": ended} | masks
         return self._frames.copy(), rewards, lost, truncated, infos
 
     def _start(self, which: Flags, seeds: Sequence[int | None] | None = None) -> None:
@@ -205,8 +200,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         for numbers in (self._decisions, self._episodes.ticks, *moves):
             numbers[which] = 0
         self._hover(started, seeds or [None] * self.num_envs)
-        for i in started:
-            self._views[i].restart(self._state(i))
+        self._view.restart(which, self._states)
         self._look(which)
         for name in ("reward_tracking", "reward_change", "lost"):  # decided by steps
             self._table[name][which] = 0
@@ -225,15 +219,6 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         for _ in range(self.num_envs):
             self._flights.append(flight)
         return Motion.zeros(self.num_envs)
-
-    def _restore(self, state: dict[str, Any]) -> None:
-        """Go on from the state of another."""
-        for name in ("_decisions", "_begun", "_over", "_frames", "_whole", "_table", "_labels"):
-            getattr(self, name)[...] = state[name]
-        for name in ("_episodes", "_views", "_np_random", "_np_random_seed"):
-            setattr(self, name, state[name])
-        self._generators = generator_list(state["_generators"])
-        self._take_envs(state)
 
     def _take_envs(self, state: dict[str, Any]) -> None:
         """Take the environments of another, whose generators are those of ``_generators``."""
@@ -295,21 +280,20 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         with Untimed():
             self._spread(move, parts)
 
-    def _state(self, i: int) -> Array:
-        """Return the estimated state (20,) of an environment."""
-        states = self._motion.state
-        state: Array = states[i // states.shape[2], :, i % states.shape[2]]
-        return state
+    @property
+    def _states(self) -> Array:
+        """Estimated states (num_envs, 20)."""
+        states: Array = np.moveaxis(self._motion.state, 1, 2).reshape(
+            -1, self._motion.state.shape[1]
+        )
+        return states[: self.num_envs]
 
     def _look(self, which: Flags) -> None:
         """Write frames and values of some environments, as their task has them."""
-        env, frames, ticks = self.envs[0], self._whole, self._episodes.ticks
-        self._call(self.task.look, which, self._episodes, self._motion, frames, self._table)
-        if env.view.is_of_a_frame and not env.view.is_plain:
-            self._frames[which] = env.view.of_frames(frames[which])
-        elif not env.view.is_plain:
-            for i in np.flatnonzero(which).tolist():
-                self._frames[i] = self._views[i].of(frames[i], self._state(i), int(ticks[i]))
+        given = self._episodes, self._motion, self._whole, self._table
+        self._call(self.task.look, which, *given)
+        if not self._view.is_plain:
+            self._frames[which] = self._view.of(which, self._whole, self._states)
         if self.render_mode == "human":
             self.render()
 
@@ -345,20 +329,15 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         for other in others:
             other.result()
 
-    def _infos(self) -> Infos:
-        """Return what the environments say as Gymnasium's vector environments do: an array and a
-        mask for each entry.
+    def _infos(self, which: Flags) -> Infos:
+        """Return what some environments say as Gymnasium's vector environments do: an array and a
+        mask for each entry; zeros, or None, where the mask is not set.
         """
-        infos: Infos = {name: values.copy() for name, values in self._values.items()}
-        return infos | {f"_{name}": self._all.copy() for name in infos}
-
-    def _final_infos(self, over: Flags) -> Infos:
-        """Return the infos of the episodes that ended: zeros, and a mask, where none did."""
         infos: Infos = {}
         for name, values in self._values.items():
             kept = values.copy()
-            kept[~over] = None if kept.dtype == object else 0
-            infos[name], infos[f"_{name}"] = kept, over.copy()
+            kept[~which] = None if kept.dtype == object else 0
+            infos[name], infos[f"_{name}"] = kept, which.copy()
         return infos
 
     def render(self) -> tuple[Any, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.image import imsave
 from numpy.typing import NDArray
 
-from ..runtime.errors import InputError
+from ..runtime.extras import need
 from ..runtime.whole_files import replaced
 from .scene_shapes import MARKS
 
@@ -45,12 +45,9 @@ class Film:
         self._stream: Any = None
         self._pictures: list[Any] = []
         if path.suffix == ".mp4":
-            try:
-                import imageio_ffmpeg
-            except ImportError as error:
-                raise InputError(
-                    f"{path}: an mp4 needs the video extra: pip install 'windwrench[video]'"
-                ) from error
+            need("imageio_ffmpeg", "video", path)
+            import imageio_ffmpeg
+
             self._stream = imageio_ffmpeg.write_frames(
                 str(self._whole.enter_context(replaced(path))),
                 (width, height),

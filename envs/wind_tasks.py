@@ -13,10 +13,9 @@ from ..controllers.wind_observation import (
     OBSERVATION_SCALES,
     WIND_PERIOD,
 )
-from ..dynamics.motion import Array
 from ..dynamics.rotation import quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
-from ..runtime.compiled import compiled, compiled_without_gil
+from ..runtime.compiled import compiled_without_gil
 from .closed_loop import ClosedLoop
 from .fan import STATIONS, Fan, jet_wrench
 from .observing import Episodes, Motion
@@ -41,19 +40,6 @@ ACCELEROMETER = (0.15, 0.05)
 _LIMITS = np.array(OBSERVATION_LIMITS)
 
 
-@compiled
-def see(
-    x: Array, reference: Array, specific: Array, thrust: Array, action: Array, frame: Frame
-) -> None:
-    """Write the frame (27,) of an estimated state (20,) and the reference (10,), within limits."""
-    for i in range(3):
-        frame[i], frame[3 + i] = reference[i] - x[i], x[7 + i]  # position error, velocity
-        frame[6 + i], frame[9 + i] = reference[3 + i], reference[6 + i]
-        frame[12 + i], frame[15 + i] = x[16 + i], x[13 + i]  # force, torque
-        frame[18 + i], frame[21 + i], frame[24 + i] = specific[i], thrust[i], action[i]
-    keep_within(frame, _LIMITS)
-
-
 @compiled_without_gil
 def look_at_reference(
     which: np.ndarray, episodes: Episodes, motion: Motion, frames: Frame, values: np.ndarray
@@ -63,13 +49,16 @@ def look_at_reference(
     for n in np.flatnonzero(which):
         b, lane = n // lanes, n % lanes
         p, v = motion.position[b, :, lane], motion.velocity[b, :, lane]
-        state, value = motion.state[b, :, lane].copy(), values[n]
+        x, value, frame = motion.state[b, :, lane].copy(), values[n], frames[n]
         rows = episodes.references[n]
         reference = rows[min(max(episodes.ticks[n], 0), len(rows) - 1)]
-        specific, thrust = motion.specific[b, :, lane].copy(), motion.thrust[b, :, lane].copy()
-        see(state, reference, specific, thrust, episodes.commands[n], frames[n])
         square, change = 0.0, 0.0
         for i in range(3):
+            frame[i], frame[3 + i] = reference[i] - x[i], x[7 + i]  # position error, velocity
+            frame[6 + i], frame[9 + i] = reference[3 + i], reference[6 + i]
+            frame[12 + i], frame[15 + i] = x[16 + i], x[13 + i]  # force, torque
+            frame[18 + i], frame[21 + i] = motion.specific[b, i, lane], motion.thrust[b, i, lane]
+            frame[24 + i] = episodes.commands[n, i]
             value.position[i], value.reference[i] = p[i], reference[i]
             value.force[i] = motion.wrench[b, i, lane]
             value.torque[i] = motion.wrench[b, 3 + i, lane]
@@ -79,12 +68,13 @@ def look_at_reference(
             value.wind[i] = wind / STATIONS
             square += (p[i] - reference[i]) * (p[i] - reference[i])
             change += episodes.changes[n, i] * episodes.changes[n, i]
+        keep_within(frame, _LIMITS)
         value.time, value.error = episodes.ticks[n] * TICK, math.sqrt(square)
         value.reward_tracking = 1.0 / (1.0 + square / (TRACKING_WIDTH * TRACKING_WIDTH))
         value.reward_change = -CHANGE_COST * change
         # written such that a number that is not finite counts as lost
         value.lost = episodes.broken[n] or not (
-            is_flying(state, p, v) and p[2] > 0.0 and value.error <= LOST_OFFSET
+            is_flying(x, p, v) and p[2] > 0.0 and value.error <= LOST_OFFSET
         )
 
 
@@ -208,7 +198,6 @@ class WindHoverEnv(Task):
         self.winds = None if winds is None else Sum(*winds, where=f"{self.name}: winds").winds
         self.model_in_loop, self.gains = bool(model_in_loop), gains
         self.fan = Fan(speed=0.0, height=HEIGHT)
-        self.blowing: Sequence[Wind] = []
 
     def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> ClosedLoop:
         """Return the closed loop of a true vehicle, with an accelerometer."""
@@ -225,16 +214,12 @@ class WindHoverEnv(Task):
         """Draw winds and reference, and let the vehicle hover at its start for ``settle`` ticks."""
         rng = self.np_random
         drawn = draw_winds(self.scenario, rng, EPISODE_SECONDS)
-        self.blowing = drawn if self.winds is None else self.winds
+        winds = drawn if self.winds is None else self.winds
         self.drawn_label, self.reference = draw_reference(
             rng, math.pi, EPISODE_SECONDS, self.moving
         )
         self.path = np.array([[0.0, HEIGHT]])
-        self.loop.reset(rng, START, math.pi, self.blowing, self.reference, settle=settle)
-
-    def _fly(self, noise: Array) -> None:
-        self.loop.action[:] = self.command
-        self.loop.run(noise)
+        self.loop.reset(rng, START, math.pi, winds, self.reference, settle=settle)
 
     def _truth(self) -> dict[str, Any]:
         """Return beside ``Task._truth`` the actuators' disturbance (6,) N and Nm, world, and the
@@ -245,22 +230,14 @@ class WindHoverEnv(Task):
         quaternion_to_matrix(loop.quaternion, R)
         moving = loop.velocity, loop.motion[1][3:6], loop.record[0]["plant"]["body"]["com"]
         ahead, (axial, radial) = np.empty((self.foresight, 6)), loop.jet_table
-        at, blowing = loop.time + 0.5 * WIND_PERIOD, Sum(*self.blowing)
+        at = loop.time + 0.5 * WIND_PERIOD
         for k in range(self.foresight):
-            fan["air"] = blowing.velocity(loop.points.T, at + k * WIND_PERIOD)
+            fan["air"] = loop.winds.velocity(loop.points.T, at + k * WIND_PERIOD)
             jet_wrench(fan, axial, radial, loop.position, R, *moving, wind, ahead[k])
         return super()._truth() | {
             "disturbance": loop.disturbance.copy(),
             "wrench_ahead": ahead,
         }
-
-    def _make_viewer(self) -> Any:
-        from .wind_drawing import WindViewer
-
-        return WindViewer(self.render_mode or "", self.width, self.height)
-
-    def _scenery(self) -> Any:
-        return self.blowing, self._table["reference"][0], self.loop.time
 
 
 class WindTrajectoryEnv(WindHoverEnv):

@@ -5,7 +5,7 @@ which it was measured on the sender's clock and that at which it arrived here. A
 filter and the recording take: a row of a flight log, on the stream's own time.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,15 +42,10 @@ class Measured:
         return self.gyro is not None or self.accelerometer is not None
 
     @property
-    def has_any(self) -> bool:
-        """Whether anything was measured or commanded."""
-        quantities = (self.voltage, self.force, self.torque)
-        return (
-            self.has_pose
-            or self.has_imu
-            or self.has_motors
-            or any(q is not None for q in quantities)
-        )
+    def parts(self) -> list[Array | float]:
+        """All that was measured or commanded."""
+        values = (getattr(self, one.name) for one in fields(Measured))
+        return [value for value in values if value is not None]
 
     @property
     def has_motors(self) -> bool:

@@ -1,8 +1,8 @@
 """A stream from beginning to end: messages in, estimates out, a log beside it.
 
 Everything between a message's arrival and its estimate is done in one thread, one message after the
-other. Whoever records or tells does so behind an ``Outlet``, whoever shows looks at ``snapshot``
-from a thread of its own: that they fail or stall does not reach the stream.
+other. Whoever records or tells does so behind an ``Outlet``, whoever shows looks at it from a
+thread of its own: that they fail or stall does not reach the stream.
 """
 
 import gc
@@ -12,10 +12,8 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
-from ..estimator.consistency import Consistency
 from ..runtime.errors import InputError
 from .clocks import Clocks
 from .filtering import LiveFilter, LiveSettings, Output
@@ -30,25 +28,6 @@ VIEWED = 1500  # in all: of the last 30 s
 SILENT = 0.5  # s without a message after which a source has stopped
 _POLL = 0.1  # s between two looks at whether to end
 _TURN = 2e-4  # s after which Python's threads take turns: an arrival waits no longer for the page
-
-
-@dataclass
-class Snapshot:
-    """What there is to show, now."""
-
-    output: Output | None
-    rates: dict[str, float]  # Hz, by kind of message
-    counts: dict[str, int]
-    silence: float  # s since the last message
-    latency_ms: tuple[float, float]  # median and 99 % quantile
-    consistency: Consistency  # of the filter with its tuning
-    processor_ms: tuple[float, float]  # likewise, of a row's own processor time, but its recording
-    drift_ppm: float | None
-    clocks: int
-    estimates: int
-    restarts: int
-    recorded: int  # rows
-    seconds: float  # of the stream's time, since it began
 
 
 class Session:
@@ -73,7 +52,7 @@ class Session:
         self.recording, self.telling = recording, telling
         self.filter = LiveFilter(source.vehicle, tallies, settings)
         self._settings = self.filter.settings
-        self._clocks = Clocks(tallies, self._settings.horizon, source.paced)
+        self.clocks = Clocks(tallies, self._settings.horizon, source.paced)
         self._joiner = Joiner(source.vehicle, tallies)
         self._stop = threading.Event()
         self._first = self._last = time.monotonic_ns()  # of messages
@@ -90,6 +69,21 @@ class Session:
     def outlets(self) -> list[Outlet[Any]]:
         """Where rows and estimates go."""
         return [one for one in (self.recording, self.telling) if one is not None]
+
+    @property
+    def silence(self) -> float:
+        """Time since the last message, s."""
+        return 1e-9 * (time.monotonic_ns() - self._last)
+
+    @property
+    def seconds(self) -> float:
+        """The stream's time since the first estimate, s."""
+        return 0.0 if self.output is None else self.output.t - self._begun
+
+    @property
+    def recorded(self) -> int:
+        """How many rows were recorded."""
+        return 0 if self.recording is None else self.recording.sink.rows
 
     def since(self, t: float) -> list[Output]:
         """Return the estimates of the last 30 s that lie after ``t``, s, from any thread."""
@@ -166,12 +160,10 @@ class Session:
     def take(self, sample: Sample) -> None:
         """Deal with one message."""
         self.tallies.rates[sample.kind].add(sample.arrival)
-        t = self._clocks.time(sample)
+        t = self.clocks.time(sample)
         row = None if t is None else self._joiner.take(sample, t)
-        if row is not None:
-            self._take_row(row)
-
-    def _take_row(self, row: Row) -> None:
+        if row is None:
+            return
         for output in self.filter.take(row):
             self._out(output)
             if output.row is row and self.source.paced:  # not one that was held back
@@ -212,26 +204,6 @@ class Session:
         else:
             found = f"{came} came, which is no estimate yet"
         return InputError(f"{self.source.name}: {found} {when}; expected {self.source.expected()}")
-
-    def snapshot(self) -> Snapshot:
-        """Return what there is to show, from any thread."""
-        now = time.monotonic_ns()
-        latency, processor = self.tallies.latency, self.tallies.processor
-        return Snapshot(
-            output=self.output,
-            rates={kind: rate.hertz(now) for kind, rate in list(self.tallies.rates.items())},
-            counts={name: n for name, n in list(self.tallies.counts.items()) if n},
-            silence=1e-9 * (now - self._last),
-            latency_ms=(latency.quantile(0.5), latency.quantile(0.99)),
-            processor_ms=(processor.quantile(0.5), processor.quantile(0.99)),
-            consistency=self.tallies.consistency,
-            drift_ppm=self._clocks.drift,
-            clocks=self._clocks.count,
-            estimates=self.estimates,
-            restarts=self.filter.restarts,
-            recorded=0 if self.recording is None else self.recording.sink.rows,
-            seconds=0.0 if self.output is None else self.output.t - self._begun,
-        )
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 """What is counted while a stream runs, in memory that does not grow with it."""
 
 import math
+import time
 from bisect import bisect_left
 from collections import Counter, defaultdict, deque
 from collections.abc import Iterator
@@ -37,6 +38,11 @@ class Durations:
         counts = list(accumulate(count for _, count in bins))
         last, _ = bins[bisect_left(counts, share * counts[-1])]
         return 1e-6 * min(math.exp2((last + 1) / _BINS_PER_OCTAVE), self.longest)
+
+    @property
+    def median_and_most(self) -> tuple[float, float]:
+        """Median and 99 % quantile, ms; from any thread."""
+        return self.quantile(0.5), self.quantile(0.99)
 
 
 class Rate:
@@ -107,6 +113,17 @@ class Tallies:
         self.processor = Durations()
         self.wrench = Means()
         self.consistency = Consistency()
+
+    @property
+    def found(self) -> dict[str, int]:
+        """The counts that are not zero, from any thread."""
+        return {name: n for name, n in list(self.counts.items()) if n}
+
+    @property
+    def hertz(self) -> dict[str, float]:
+        """The rate of each kind of message, Hz, from any thread."""
+        now = time.monotonic_ns()
+        return {kind: rate.hertz(now) for kind, rate in list(self.rates.items())}
 
     def say(self, line: str) -> None:
         """Keep a line for people, once; from any thread."""

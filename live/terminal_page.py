@@ -8,8 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..estimator.consistency import Consistency
-from .session import SILENT, Snapshot
-from .sources.base import Source
+from .session import SILENT, Session
 
 _BAR = 20  # characters
 
@@ -17,13 +16,14 @@ _BAR = 20  # characters
 _HARMLESS = ("late", "doubled")
 
 
-def page(snapshot: Snapshot, source: Source) -> RenderableType:
+def page(session: Session) -> RenderableType:
     """Return the page of a stream; half of the vehicle's weight is a long bar."""
+    source = session.source
     weight, arm = source.vehicle.weight, source.vehicle.arm_l
     head = Text(f"{source.name}, {source.vehicle.name}", style="bold")
-    output = snapshot.output
+    output = session.output
     if output is None:
-        return Group(head, Text(f"waiting for messages ... {snapshot.silence:.0f} s", style="dim"))
+        return Group(head, Text(f"waiting for messages ... {session.silence:.0f} s", style="dim"))
     table = Table("", "x", "y", "z", "size", "", box=box.SIMPLE_HEAD)
     for name, values, std, unit, scale in (
         ("force", output.estimate.force, output.std[:3], "N", 0.5 * weight),
@@ -39,16 +39,17 @@ def page(snapshot: Snapshot, source: Source) -> RenderableType:
             Text("█" * length + "·" * (_BAR - length), style="cyan"),
         )
         table.add_row(f"  +- ({unit})", *(f"{factor * x:.3f}" for x in std), "", "", style="dim")
-    return Group(head, table, *_lines(snapshot))
+    return Group(head, table, *_lines(session))
 
 
-def _lines(snapshot: Snapshot) -> list[Text]:
-    output = snapshot.output
+def _lines(session: Session) -> list[Text]:
+    output, tallies = session.output, session.tallies
     assert output is not None
-    silent = snapshot.silence > SILENT
-    status = f"SILENT for {snapshot.silence:.1f} s" if silent else output.estimate.status
+    silence, counts, drift = session.silence, tallies.found, session.clocks.drift
+    silent = silence > SILENT
+    status = f"SILENT for {silence:.1f} s" if silent else output.estimate.status
     good = not silent and output.estimate.status == "tracking"
-    nis, rates = output.estimate.nis, sorted(snapshot.rates.items())
+    nis, rates = output.estimate.nis, sorted(tallies.hertz.items())
     lines = [
         Text.assemble(
             "status   ",
@@ -56,29 +57,27 @@ def _lines(snapshot: Snapshot) -> list[Text]:
             f"   t {output.t:.2f} s   NIS {nis:.1f} (6 on average)"
             if nis == nis
             else f"   t {output.t:.2f} s",
-            f"   restarts {snapshot.restarts}",
+            f"   restarts {session.filter.restarts}",
         ),
         Text("rates    " + ", ".join(f"{kind} {rate:.0f} Hz" for kind, rate in rates)),
     ]
-    if snapshot.consistency.seconds:
-        style = "yellow" if snapshot.consistency.too_slow else ""
-        lines.append(Text(f"tuning   {tuning_words(snapshot.consistency)}", style))
-    median, most = snapshot.latency_ms
+    if tallies.consistency.seconds:
+        style = "yellow" if tallies.consistency.too_slow else ""
+        lines.append(Text(f"tuning   {tuning_words(tallies.consistency)}", style))
+    median, most = tallies.latency.median_and_most
     timing = f"latency  {median:.2f} ms, 99 % within {most:.2f} ms" if median == median else ""
-    if snapshot.drift_ppm is not None:
-        timing += f"   vehicle's clock {snapshot.drift_ppm:+.0f} ppm"
-    if snapshot.clocks > 1:
-        timing += f"   {snapshot.clocks} clocks"
+    if drift is not None:
+        timing += f"   vehicle's clock {drift:+.0f} ppm"
+    if session.clocks.count > 1:
+        timing += f"   {session.clocks.count} clocks"
     if timing:
         lines.append(Text(timing))
-    trouble = {k: n for k, n in snapshot.counts.items() if k not in _HARMLESS}
+    trouble = {k: n for k, n in counts.items() if k not in _HARMLESS}
     lines.append(
-        Text(
-            "dropped  " + (counts_words(snapshot.counts) or "nothing"), "yellow" if trouble else ""
-        )
+        Text("dropped  " + (counts_words(counts) or "nothing"), "yellow" if trouble else "")
     )
-    if snapshot.recorded:
-        lines.append(Text(f"recorded {snapshot.recorded} rows"))
+    if session.recorded:
+        lines.append(Text(f"recorded {session.recorded} rows"))
     return lines
 
 

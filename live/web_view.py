@@ -157,21 +157,21 @@ class WebView:
             values = [one.t, *one.wrench, *one.std]
             point = [float(f"{x:.5g}") if i else round(x, 3) for i, x in enumerate(values)]
             self._points.append((one.t, json.dumps(point)))
-        now = self._session.snapshot()
+        session, tallies = self._session, self._session.tallies
         state: dict[str, Any] = {}
-        if now.output is not None:
-            estimate = now.output.estimate
+        if session.output is not None:
+            estimate = session.output.estimate
             state = {
                 "position": estimate.position.tolist(),
                 "quaternion": estimate.quaternion.tolist(),
-                "status": "silent" if now.silence > SILENT else estimate.status,
+                "status": "silent" if session.silence > SILENT else estimate.status,
             }
         state |= {
-            "rates": now.rates,
-            "counts": now.counts,
-            "restarts": now.restarts,
-            "recorded": now.recorded,
-            "latency": [x if x == x else None for x in now.latency_ms],
+            "rates": tallies.hertz,
+            "counts": tallies.found,
+            "restarts": session.filter.restarts,
+            "recorded": session.recorded,
+            "latency": [x if x == x else None for x in tallies.latency.median_and_most],
         }
         self._state = json.dumps(state)[1:-1]
 

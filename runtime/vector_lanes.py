@@ -35,46 +35,29 @@ _TRUTHS = ir.VectorType(ir.IntType(1), WIDTH)
 
 
 class _Lanes(types.Type):
-    """``WIDTH`` doubles."""
+    """``WIDTH`` doubles, or truth values of a comparison: a register of numbers of one type."""
 
-    bitwidth = 64 * WIDTH
+    bitwidth = 64 * WIDTH  # of doubles, which alone lie in memory
 
-    def __init__(self) -> None:
-        super().__init__(name=f"lanes{WIDTH}")
-
-    def can_convert_from(self, _context: Any, other: Any) -> Any:
-        return Conversion.safe if isinstance(other, types.Number) else None
-
-    def unify(self, _context: Any, other: Any) -> Any:
-        return self if isinstance(other, types.Number) else None
-
-
-class _Answers(types.Type):
-    """``WIDTH`` truth values, of a comparison."""
-
-    def __init__(self) -> None:
-        super().__init__(name=f"answers{WIDTH}")
+    def __init__(self, name: str, single: Any) -> None:
+        self.single = single
+        super().__init__(name=f"{name}{WIDTH}")
 
     def can_convert_from(self, _context: Any, other: Any) -> Any:
-        return Conversion.safe if isinstance(other, types.Boolean) else None
+        return Conversion.safe if isinstance(other, self.single) else None
 
     def unify(self, _context: Any, other: Any) -> Any:
-        return self if isinstance(other, types.Boolean) else None
+        return self if isinstance(other, self.single) else None
 
 
-LANES, ANSWERS = _Lanes(), _Answers()
+LANES, ANSWERS = _Lanes("lanes", types.Number), _Lanes("answers", types.Boolean)
+_REGISTERS = {LANES: _VECTOR, ANSWERS: _TRUTHS}
 
 
 @register_default(_Lanes)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, dmm: Any, kind: Any) -> None:
-        super().__init__(dmm, kind, _VECTOR)
-
-
-@register_default(_Answers)
-class _AnswersModel(models.PrimitiveModel):
-    def __init__(self, dmm: Any, kind: Any) -> None:
-        super().__init__(dmm, kind, _TRUTHS)
+        super().__init__(dmm, kind, _REGISTERS[kind])
 
 
 def _splat(builder: Any, value: Any, kind: Any) -> Any:
@@ -89,13 +72,10 @@ def _splat(builder: Any, value: Any, kind: Any) -> Any:
 
 
 @lower_cast(types.Number, _Lanes)
-def _number_to_lanes(context: Any, builder: Any, given: Any, _wanted: Any, value: Any) -> Any:
-    return _splat(builder, context.cast(builder, value, given, types.float64), _VECTOR)
-
-
-@lower_cast(types.Boolean, _Answers)
-def _truth_to_answers(context: Any, builder: Any, given: Any, _wanted: Any, value: Any) -> Any:
-    return _splat(builder, context.cast(builder, value, given, types.boolean), _TRUTHS)
+@lower_cast(types.Boolean, _Lanes)
+def _to_lanes(context: Any, builder: Any, given: Any, wanted: Any, value: Any) -> Any:
+    single = types.float64 if wanted == LANES else types.boolean
+    return _splat(builder, context.cast(builder, value, given, single), _REGISTERS[wanted])
 
 
 def _define(
@@ -114,29 +94,21 @@ def _define(
         return generate(builder, *arguments)
 
 
-for _names, _method in (
-    (("add", "iadd"), "fadd"),
-    (("sub", "isub"), "fsub"),
-    (("mul", "imul"), "fmul"),
-    (("truediv", "itruediv"), "fdiv"),
-):
-    for _name in _names:
+for _name, _method in (("add", "fadd"), ("sub", "fsub"), ("mul", "fmul"), ("truediv", "fdiv")):
+    for _operator in (_name, f"i{_name}"):
         _define(
-            getattr(operator, _name),
+            getattr(operator, _operator),
             LANES,
             (LANES, LANES),
             lambda builder, a, b, method=_method: getattr(builder, method)(a, b),
         )
-for _name, _sign in (("lt", "<"), ("le", "<="), ("gt", ">"), ("ge", ">=")):
+for _name, _sign in (("lt", "<"), ("le", "<="), ("gt", ">"), ("ge", ">="), ("eq", "==")):
     _define(
         getattr(operator, _name),
         ANSWERS,
         (LANES, LANES),
         lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b),
     )
-_define(
-    operator.eq, ANSWERS, (LANES, LANES), lambda builder, a, b: builder.fcmp_ordered("==", a, b)
-)
 _define(operator.and_, ANSWERS, (ANSWERS, ANSWERS), lambda builder, a, b: builder.and_(a, b))
 _define(operator.or_, ANSWERS, (ANSWERS, ANSWERS), lambda builder, a, b: builder.or_(a, b))
 _define(
@@ -147,17 +119,16 @@ _define(
 )
 
 
-def _intrinsic_of(builder: Any, name: str, kind: Any) -> Any:
-    return cgutils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind]), name)
-
-
 for _function, _name in ((math.sqrt, "sqrt"), (math.floor, "floor"), (abs, "fabs")):
     _define(
         _function,
         LANES,
         (LANES,),
-        lambda builder, a, name=_name: builder.call(
-            _intrinsic_of(builder, f"llvm.{name}.v{WIDTH}f64", _VECTOR), [a]
+        lambda builder, a, name=f"llvm.{_name}.v{WIDTH}f64": builder.call(
+            cgutils.get_or_insert_function(
+                builder.module, ir.FunctionType(_VECTOR, [_VECTOR]), name
+            ),
+            [a],
         ),
     )
 
@@ -391,12 +362,7 @@ def _shuffled(builder: Any, a: Any, b: Any, places: list[int]) -> Any:
 def _corners(table: Any, i: Any, j: Any) -> Any:
     if LANES in (i, j):
         return lambda table, i, j: _corners_in_lanes(table, i, j)
-
-    def singly(table: Any, i: Any, j: Any) -> Any:
-        k, m = int(i), int(j)
-        return table[k, m], table[k, m + 1], table[k + 1, m], table[k + 1, m + 1]
-
-    return singly
+    return corners
 
 
 class _LaneRecord(types.Record):

@@ -127,17 +127,15 @@ _loop_at = LOOPS.at
 
 
 class Drawn(NamedTuple):
-    """Fields of the blocks' records that ``fly_blocks`` reads and writes, (blocks, ..., WIDTH)."""
+    """Fields of the blocks' records that ``fly_blocks`` reads and writes beside their motion,
+    (blocks, ..., WIDTH).
+    """
 
     noise: Array
     fan_y: Array
     fan_height: Array
     setpoint: Array
     action: Array
-    specific: Array
-    thrust: Array
-    air: Array
-    qpos: Array
     stations: Array  # (blocks, STATIONS, 3)
 
 
@@ -212,6 +210,7 @@ def fly_blocks(
     step: int,
     jet: Array,
     drawn: Drawn,
+    motion: Motion,
     generators: Any,
     slots: np.ndarray,
     episodes: Episodes,
@@ -232,6 +231,7 @@ def fly_blocks(
         step: address of the step of a block of filters.
         jet: (2, COUNT_X, COUNT_R) of the jet's table.
         drawn: what this writes into the records.
+        motion: of the blocks.
         generators: (n,) of the environments; a typed list.
         slots: (lanes,) the environment in each lane; -1: none flies there, and none draws.
         episodes: of the environments; ticks are written.
@@ -250,7 +250,7 @@ def fly_blocks(
             continue
         loop, block = loops[0] + b * loops[1], kept[0] + b * kept[1]
         take_up(block, work)
-        drawn.specific[b], drawn.thrust[b] = 0.0, 0.0
+        motion.specific[b], motion.thrust[b] = 0.0, 0.0
         for lane in range(WIDTH):
             n = members[lane]
             for i in range(episodes.commands.shape[1] if n >= 0 else 0):
@@ -273,11 +273,11 @@ def fly_blocks(
                         drawn.setpoint[b, i, lane] = episodes.references[n, row, i]
                 if winds[n] > 0 and (first[n] + k) % WIND_EVERY == 0:
                     time[0] = now * TICK
-                    pose[:] = drawn.qpos[b, :, lane]
+                    pose[:] = motion.position[b, :, lane]
                     blow_at(
                         calls[n, : winds[n]], time, pose, drawn.stations[b], rotation, points, air
                     )
-                    drawn.air[b, :, :, lane] = air.T
+                    motion.air[b, :, :, lane] = air.T
                 generator = generators[n]
                 for i in range(noise_size):
                     drawn.noise[b, i, lane] = generator.standard_normal()
@@ -285,8 +285,8 @@ def fly_blocks(
         for n in members:
             if n >= 0:
                 first[n] += ticks
-        drawn.specific[b] /= ticks
-        drawn.thrust[b] /= ticks
+        motion.specific[b] /= ticks
+        motion.thrust[b] /= ticks
         put_down(block, work)
 
 
@@ -307,26 +307,22 @@ class Blocks:
             (int(records.ctypes.data), records.itemsize) for records in (self.loops, self.filters)
         )
         loops = self.loops
-        specific, thrust, fan = loops["specific"], loops["thrust"], loops["fan"]
+        fan, flight = loops["fan"], loops["flight"]
         self.motion = Motion(
             loops["qpos"],
             loops["qvel"],
             loops["plant"]["external"],
             self.filters["x"],
-            specific,
-            thrust,
+            loops["specific"],
+            loops["thrust"],
             fan["air"],
         )
         self.drawn = Drawn(
             loops["noise"],
             fan["y"],
             fan["height"],
-            loops["flight"]["setpoint"],
+            flight["setpoint"],
             loops["action"],
-            specific,
-            thrust,
-            fan["air"],
-            loops["qpos"],
             fan["stations"],
         )
 

@@ -16,9 +16,9 @@ from ...runtime.vector_lanes import WIDTH
 from ..closed_loop import ClosedLoop
 from ..fan_tracking import FanTrackingEnv
 from ..fan_tracking_2d import FanTracking2DEnv
-from ..observing import Motion
+from ..observing import Flags, Motion
 from ..task import SETTLE_TICKS, Task
-from ..vector import Flags, TaskVectorEnv
+from ..vector import TaskVectorEnv
 from ..wind.field import Sum
 from ..wind_tasks import WindHoverEnv, WindTrajectoryEnv
 from .flight import Blocks, fly_blocks
@@ -107,8 +107,9 @@ class TaskLanes(TaskVectorEnv):
             try:
                 first, last = part * count // parts, (part + 1) * count // parts
                 memory = *blocks.addresses, work.ctypes.data, self._step, self._like.jet_table
+                flown = blocks.drawn, blocks.motion, *given
                 kind = self._like.noise_size, self.task.accelerates
-                self._call(fly_blocks, first, last, *memory, blocks.drawn, *given, *kind)
+                self._call(fly_blocks, first, last, *memory, *flown, *kind)
             finally:
                 self._works.append(work)
 

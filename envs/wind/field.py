@@ -114,7 +114,11 @@ class Sum(CompiledWind):
 
     def __init__(self, *winds: Wind, where: str = "Sum") -> None:
         for wind in winds:
-            check_wind(wind, where)
+            if not isinstance(wind, Wind):
+                raise InputError(
+                    f"{where}: expected a wind of windwrench.envs.wind, or an object with "
+                    f"velocity(points (n, 3), time), got {type(wind).__name__}"
+                )
         self.winds = [part for wind in winds for part in winds_of(wind)]
         self.own = [wind for wind in self.winds if not isinstance(wind, CompiledWind)]
         self._bind()
@@ -134,19 +138,6 @@ class Sum(CompiledWind):
 def winds_of(wind: Wind) -> list[Wind]:
     """Return the parts of a sum, or the wind itself."""
     return wind.winds if isinstance(wind, Sum) else [wind]
-
-
-def check_wind(wind: object, where: str) -> None:
-    """Check that a wind can fly.
-
-    Raises:
-        InputError: the object has no ``velocity``.
-    """
-    if not isinstance(wind, Wind):
-        raise InputError(
-            f"{where}: expected a wind of windwrench.envs.wind, or an object with "
-            f"velocity(points (n, 3), time), got {type(wind).__name__}"
-        )
 
 
 def check_points(points: ArrayLike, time: float) -> Array:

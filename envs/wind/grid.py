@@ -9,6 +9,7 @@ without a time is steady.
 from __future__ import annotations
 
 import io
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from numpy.typing import ArrayLike
 from ...runtime.addresses import numbers_at, pointer_to
 from ...runtime.archives import check_archive
 from ...runtime.errors import InputError
+from ...runtime.extras import need
 from ...runtime.regular_files import read_bytes
 from ...runtime.whole_files import replaced
 from .field import CompiledWind, Wind
@@ -184,13 +186,8 @@ def _read_npz(file: Path) -> GridWind:
 
 
 def _xarray() -> Any:
-    try:
-        import xarray
-    except ImportError as error:
-        raise InputError(
-            "wind: netCDF needs xarray: pip install 'windwrench[wind]'; .npz files need nothing"
-        ) from error
-    return xarray
+    need("xarray", "wind", "wind: netCDF (.npz files need nothing)")
+    return import_module("xarray")
 
 
 def _read_netcdf(file: Path) -> GridWind:

@@ -105,10 +105,13 @@ class _Jets(CompiledWind):
         speeds: Array,
         radius: float,
         hub_radius: float,
-        turbulence: float,
-        gust_length: float,
-        seed: int | np.random.Generator,
+        gusts: tuple[float, float, int | np.random.Generator],
     ) -> None:
+        turbulence, gust_length, seed = gusts
+        if number(turbulence, "turbulence") < 0.0:
+            kind = type(self).__name__
+            raise InputError(f"wind: {kind}: turbulence must be at least 0, got {turbulence:g}")
+        number(gust_length, "gust_length", 0.0)
         table = np.zeros((0, 7))
         if turbulence > 0.0:
             rng = seed if isinstance(seed, np.random.Generator) else np.random.default_rng(seed)
@@ -179,12 +182,10 @@ class FanWall(_Jets):
                 f"wind: FanWall: speeds must be numbers from 0 on, shape ({rows * columns},) or "
                 f"(steps, {rows * columns}), got shape {table.shape}"
             )
-        for name, value in (("turbulence", turbulence), ("hub_radius", hub_radius)):
-            if number(value, name) < 0.0:
-                raise InputError(f"wind: FanWall: {name} must be at least 0, got {value:g}")
+        if number(hub_radius, "hub_radius") < 0.0:
+            raise InputError(f"wind: FanWall: hub_radius must be at least 0, got {hub_radius:g}")
         if number(radius, "radius", 0.0) <= hub_radius:
             raise InputError("wind: FanWall: radius must be above hub_radius")
-        number(gust_length, "gust_length", 0.0)
         number(pitch, "pitch", 0.0)
         axes = _axes(heading)
         right = pitch * (np.arange(columns) - 0.5 * (columns - 1))
@@ -192,16 +193,9 @@ class FanWall(_Jets):
         places = (
             vector(centre, "centre") - right[None, :, None] * axes[1] + up[:, None, None] * axes[2]
         )
-        super().__init__(
-            heading,
-            places.reshape(1, rows * columns, 3),
-            table,
-            radius,
-            hub_radius,
-            turbulence,
-            gust_length,
-            seed,
-        )
+        gusts = turbulence, gust_length, seed
+        places = places.reshape(1, rows * columns, 3)
+        super().__init__(heading, places, table, radius, hub_radius, gusts)
 
 
 def switching(
@@ -270,19 +264,11 @@ class VehicleWash(_Jets):
                 f"wind: VehicleWash: path must be finite numbers in m, shape (3,) or (steps, 3), "
                 f"got shape {places.shape}"
             )
-        if rotors < 1 or number(turbulence, "turbulence") < 0.0:
-            raise InputError("wind: VehicleWash: expected rotors, and a turbulence of at least 0")
-        number(gust_length, "gust_length", 0.0)
+        if rotors < 1:
+            raise InputError(f"wind: VehicleWash: expected rotors, got {rotors}")
         radius = number(rotor_radius, "rotor_radius", 0.0)
         area = rotors * math.pi * radius**2
         drawn = math.sqrt(number(thrust, "thrust", 0.0) / (2.0 * AIR_DENSITY * area))
-        super().__init__(
-            np.array([0.0, 0.0, -1.0]),
-            places[:, None, :],
-            np.array([[2.0 * drawn]]),
-            math.sqrt(0.5 * rotors) * radius,
-            0.0,
-            turbulence,
-            gust_length,
-            seed,
-        )
+        down, speeds = np.array([0.0, 0.0, -1.0]), np.array([[2.0 * drawn]])
+        wake, gusts = math.sqrt(0.5 * rotors) * radius, (turbulence, gust_length, seed)
+        super().__init__(down, places[:, None, :], speeds, wake, 0.0, gusts)

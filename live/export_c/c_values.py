@@ -8,36 +8,22 @@ from typing import Any, cast
 
 from .c_numbers import literal
 
-_OPERATORS: dict[type[ast.AST], str] = {
-    ast.Add: "+",
-    ast.Sub: "-",
-    ast.Mult: "*",
-    ast.Div: "/",
-    ast.FloorDiv: "/",
-    ast.Mod: "%",
-    ast.Lt: "<",
-    ast.LtE: "<=",
-    ast.Gt: ">",
-    ast.GtE: ">=",
-    ast.Eq: "==",
-    ast.NotEq: "!=",
-    ast.And: "&&",
-    ast.Or: "||",
-    ast.BitAnd: "&&",
-    ast.BitOr: "||",
-}
-_PYTHON: dict[str, Callable[[Any, Any], Any]] = {
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
-    "/": operator.truediv,
-    "%": operator.mod,
-    "<": operator.lt,
-    "<=": operator.le,
-    ">": operator.gt,
-    ">=": operator.ge,
-    "==": operator.eq,
-    "!=": operator.ne,
+# an operator in C, and what it makes of numbers that are known
+_OPERATORS: dict[type[ast.AST], tuple[str, Callable[[Any, Any], Any]]] = {
+    ast.Add: ("+", operator.add),
+    ast.Sub: ("-", operator.sub),
+    ast.Mult: ("*", operator.mul),
+    ast.Div: ("/", operator.truediv),
+    ast.FloorDiv: ("/", operator.truediv),
+    ast.Mod: ("%", operator.mod),
+    ast.Lt: ("<", operator.lt),
+    ast.LtE: ("<=", operator.le),
+    ast.Gt: (">", operator.gt),
+    ast.GtE: (">=", operator.ge),
+    ast.Eq: ("==", operator.eq),
+    ast.NotEq: ("!=", operator.ne),
+    **dict.fromkeys((ast.And, ast.BitAnd), ("&&", operator.and_)),
+    **dict.fromkeys((ast.Or, ast.BitOr), ("||", operator.or_)),
 }
 # words of C that may be names in Python
 _KEYWORDS = {
@@ -129,7 +115,7 @@ def combined(op: ast.AST, a: Number, b: Number) -> Number:
     kind = "truth" if isinstance(op, ast.cmpop) else "int" if whole else "float"
     known = None
     if a.known is not None and b.known is not None and not (sign == "/" and b.known == 0):
-        known = _PYTHON[sign](a.known, b.known)
+        known = _OPERATORS[type(op)][1](a.known, b.known)
         known = int(known) if whole and kind == "int" else known
     elif sign == "*" and 0 in (a.known, b.known):
         return constant(0) if whole else constant(0.0)
@@ -144,7 +130,7 @@ def operator_of(node: ast.AST) -> str:
     """Return an operator that is the same in C."""
     if type(node) not in _OPERATORS:
         raise UntranslatableError(f"has an operator {type(node).__name__}")
-    return _OPERATORS[type(node)]
+    return _OPERATORS[type(node)][0]
 
 
 def c_name(name: str) -> str:

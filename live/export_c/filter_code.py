@@ -39,10 +39,9 @@ _CALLED: dict[Any, tuple[Value | None, ...]] = {
     model_jacobian: (None, None, Array("", ("12", str(N)), root="matrix"), None),
     _believed: (None, Array("", ("6", "6"), root="matrix"), None, None, None),
 }
-# functions of templates that these call, and which of their arguments they write
 # steps of difference quotients that single precision can still tell apart
 _STEPS = {"EFFECT_TURN": 4e-3, "EFFECT_STEP": 1e-2}
-_BY_HAND = dict.fromkeys(("_nis", "_is_push", "restore_bias_prior"), "")
+_BY_HAND = {"_nis", "_is_push", "restore_bias_prior"}  # functions of templates that these call
 # fields of the filter's record that change in flight: by their names in C, their types
 _KEPT = {
     **{f"poses_{name}": MEMORY[name] for name in MEMORY.names or ()},
@@ -62,9 +61,9 @@ def filter_code(record: np.void, source: str) -> str:
         name: ("int" if kind.base.kind == "i" else "float", tuple(map(str, kind.shape)))
         for name, kind in (_KEPT | _OF_IMU).items()
     }
-    by_hand = dict(_BY_HAND)
+    by_hand = _BY_HAND
     if record["wrench_count"]:
-        by_hand["apply_effects"] = ""
+        by_hand = {*_BY_HAND, "apply_effects"}
     else:
         del memory["effect_wrench"]  # zeros
     library = Library(constants=record, memory=memory, by_hand=by_hand, numbers=_STEPS)

@@ -4,35 +4,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ...controllers.fan_laws import Lead
 from ...controllers.features import QUANTITIES
-from ...controllers.observation import (
-    FORCE_X,
-    FORCE_Y,
-    FORCE_Z,
-    LAST_COMMAND,
-    TORQUE_X,
-    TORQUE_Y,
-    TORQUE_Z,
-    VELOCITY_Y,
-)
 from ...controllers.trained_policy import TrainedPolicy, cell_of, layers_of, load_policy
 from ...runtime.errors import InputError
 from .c_numbers import literal, table
 
-# Fan tracking by the ratio of torque and force, with the lead that makes up for the filter's delay:
-# gains (1/s, 1) and the least force (N) fitted to what the trained policies command
-LEAD_GAIN, LEAD_RATE_GAIN, LEAD_LEAST_FORCE = 11.35, 2.79, 0.183
 LAWS = ("lead", "tracker")
-_COLUMNS = {
-    FORCE_X: "e->force[0]",
-    FORCE_Y: "e->force[1]",
-    FORCE_Z: "e->force[2]",
-    TORQUE_X: "e->torque[0]",
-    TORQUE_Y: "e->torque[1]",
-    TORQUE_Z: "e->torque[2]",
-    VELOCITY_Y: "e->velocity[1]",
-    LAST_COMMAND: "m->command",
-}
+# where the C has the numbers of an observation, in its order
+_COLUMNS = (
+    *(f"e->{part}[{i}]" for part in ("force", "torque") for i in range(3)),
+    *("e->velocity[1]", "m->command"),
+)
 
 
 def exportable_policy(name: str, path: Path | None) -> Mapping[str, Any]:
@@ -42,13 +25,14 @@ def exportable_policy(name: str, path: Path | None) -> Mapping[str, Any]:
         InputError: there is no such policy, or it is of a kind that is not exported.
     """
     if name == "lead":
+        law = Lead()
         return {
             "kind": "lead",
             "title": "Fan tracking with lead: u = -(gain x + rate_gain dx/dt), x = tau_z / f_x.",
-            "source": "live/export_c/policies.py",
-            "gain": literal(LEAD_GAIN),
-            "rate_gain": literal(LEAD_RATE_GAIN),
-            "least_force": literal(LEAD_LEAST_FORCE),
+            "source": "controllers/fan_laws.py",
+            "gain": literal(law.gain),
+            "rate_gain": literal(law.lead),
+            "least_force": literal(law.least_force),
         }
     if name == "tracker":
         return {"kind": "tracker"}  # the rest is the vehicle's: ``tracker.tracker_policy``

@@ -13,7 +13,7 @@ import inspect
 import math
 import re
 import textwrap
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
@@ -48,25 +48,15 @@ _OF_ANNOTATION = {"float": "float", "int": "int", "bool": "truth"}
 
 @dataclass
 class Library:
-    """What translated functions may use, and those that are translated so far.
+    """What translated functions may use, and those that are translated so far."""
 
-    Attributes:
-        constants: the filter's record; its fields are constants unless they are in ``memory``.
-        memory: names and shapes of the fields that ``ww_filter`` has, int ones and float ones.
-        covariance: rows and columns of P, which is a parameter of its own.
-        by_hand: functions that templates have, by their names: which of their arguments they write.
-        refused: functions that are not translated, and why.
-        numbers: constants of files that are others in C.
-        prefix: of the names of functions.
-    """
-
-    constants: Any = None
+    constants: Any = None  # the filter's record, whose fields are constants but for those below
+    # fields that ``ww_filter`` has: int or float, and their shapes
     memory: Mapping[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
-    covariance: str = "WW_STATES"
-    by_hand: Mapping[str, str] = field(default_factory=dict)
-    refused: Mapping[Any, str] = field(default_factory=dict)
-    numbers: Mapping[str, float] = field(default_factory=dict)
-    prefix: str = ""
+    by_hand: Collection[str] = ()  # functions of templates, which write no argument but the record
+    refused: Mapping[Any, str] = field(default_factory=dict)  # not translated, and why
+    numbers: Mapping[str, float] = field(default_factory=dict)  # constants that are others in C
+    prefix: str = ""  # of the names of functions
     done: dict[tuple[Any, ...], "Function"] = field(default_factory=dict)
     counter: int = 0  # of names
 
@@ -94,7 +84,7 @@ class Library:
         """Return a field of the filter's record."""
         name = "_".join(path)
         if name == "P":
-            return Array("P", (self.covariance, self.covariance), root="P")
+            return Array("P", ("WW_STATES", "WW_STATES"), root="P")
         if name in self.memory:
             kind, shape = self.memory[name]
             if shape:
@@ -186,8 +176,7 @@ class Function:
                 parameters.append(f"{const}ww_filter *f")
                 name = "f"
                 if "P" in self.used:
-                    size = f"[{self.library.covariance}]"
-                    parameters.append(f"float P{size}{size}")
+                    parameters.append("float P[WW_STATES][WW_STATES]")
             elif isinstance(value, Array) and len(value.shape) == 2:
                 parameters.append(f"float {value.text}[{value.shape[0]}][{value.shape[1]}]")
             elif isinstance(value, Array):
@@ -559,8 +548,7 @@ class Function:
             value = self.evaluated(argument)
             if isinstance(value, Array):
                 self.used.add(value.root)
-                name = made.arguments[i].arg if made else str(i)
-                if name in (made.written if made else self.library.by_hand[node.func.id]):
+                if made and made.arguments[i].arg in made.written:
                     self.written.add(value.root)
                 if value.root:
                     texts.append(value.pointer())

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from ...dynamics.vehicle import Vehicle
 from ...identification.logs.rotor_orders import ORDERS
-from ..messages import Array, Malformed, Measured, Sample
+from ..messages import Array, Malformed, Sample
 from .base import LARGEST_SHARE, command_of, unwrapped
 
 HALF_TURN = np.array([1.0, -1.0, -1.0])  # of a vector
@@ -72,7 +71,11 @@ class MessageReader:
             return None
         stamps = [ns * getattr(message, name) for name, ns in _STAMPS if hasattr(message, name)]
         sample = Sample(kind, stamps[0] if stamps else None, arrival)
-        return sample if reader(message, sample) and _check_finite(sample) else None
+        if not reader(message, sample):
+            return None
+        if not all(np.isfinite(part).all() for part in sample.parts):
+            raise Malformed("a number that is not finite")
+        return sample
 
     def _chosen(self, kind: str, arrival: int) -> bool:
         """Return whether poses of a kind are read: the best of those that come."""
@@ -166,15 +169,3 @@ class MessageReader:
 def _motors(values: Any) -> Array:
     """Return what belongs to the kit's rotors of motors 1 to 4."""
     return np.abs(np.array([values[i] for i in _ORDER], dtype=np.float64))
-
-
-def _check_finite(sample: Sample) -> bool:
-    """Return whether there is something in a sample.
-
-    Raises:
-        Malformed: a number is not finite.
-    """
-    parts = [getattr(sample, field.name) for field in fields(Measured)]
-    if not all(np.isfinite(part).all() for part in parts if part is not None):
-        raise Malformed("a number that is not finite")
-    return True

@@ -53,7 +53,7 @@ class TopicReader:
         except (IndexError, ValueError, AttributeError, TypeError) as error:
             raise Malformed(str(error)) from error
         found.stamp = found.stamp or None
-        if not found.has_any:
+        if not found.parts:
             raise Malformed("nothing")
         return found
 

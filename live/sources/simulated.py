@@ -43,7 +43,7 @@ class Simulated(Source):
         """Return where the fan stands (n,), m, at times (n,), s: drawn anew from the same numbers,
         so that a flight may last for as long as one watches.
         """
-        return draw_fan_path(self._scenario, np.random.default_rng(self._seed), t)[2]
+        return draw_fan_path(self._scenario, np.random.default_rng(self._seed), t)[1]
 
     def open(self) -> None:
         """Take off."""

@@ -91,7 +91,7 @@ def test_the_terminal_page_shows_what_there_is(watched):
     from rich.console import Console
 
     out = Console(file=StringIO(), width=100)
-    out.print(page(watched.snapshot(), watched.source))
+    out.print(page(watched))
     text = out.file.getvalue()
     for word in ("force (N)", "torque (mNm)", "+-", "status", "rates", "row", "dropped", "nothing"):
         assert word in text

@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
+from tests.support.vector_flights import TASKS, make
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.envs import SCENARIOS
 from windwrench.envs.closed_loop import ClosedLoop
@@ -70,7 +70,7 @@ def test_lost_poses_have_the_stated_share_and_come_in_runs_of_the_stated_length(
     assert 0.005 * lost.sum() / runs == pytest.approx(0.03, rel=0.1)
 
 
-@pytest.mark.parametrize("task", ["FanTracking", "FanTracking2D", "WindHover", "WindTrajectory"])
+@pytest.mark.parametrize("task", TASKS)
 def test_lanes_are_late_as_mujoco_is_with_delays_stated_and_drawn(task):
     kind = (SCENARIOS if task.startswith("Fan") else WIND_SCENARIOS)["varied"]
     drawn = replace(
@@ -83,13 +83,7 @@ def test_lanes_are_late_as_mujoco_is_with_delays_stated_and_drawn(task):
         ("at once", {}),
     ):
         for plant in ("mujoco", "lanes"):
-            envs = gym.make_vec(
-                f"windwrench:windwrench/{task}-v0",
-                num_envs=3,
-                vectorization_mode="vector_entry_point",
-                plant=plant,
-                **given,
-            )
+            envs = make(3, plant, task, **given)
             envs.reset(seed=7)
             pushed = np.full(envs.action_space.shape, 0.3, dtype=np.float32)
             flown[how, plant] = np.array([envs.step(pushed)[0] for _ in range(6)])

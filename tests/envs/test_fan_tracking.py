@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import windwrench
+from tests.support.vector_flights import fly_alone
 from windwrench.controllers import Admittance
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
@@ -17,24 +18,6 @@ from windwrench.envs.plant import NOISE
 from windwrench.evaluation.episodes import fly_episode
 
 NAME = "windwrench/FanTracking-v0"
-
-
-def commands(count, seed=0):
-    return np.random.default_rng(seed).uniform(-0.5, 0.5, (count, 1)).astype(np.float32)
-
-
-def fly(env, seed, count=15, between=None):
-    """Everything that an episode's first decisions return, as one array; ``between`` is called
-    before each.
-    """
-    observation, info = env.reset(seed=seed)
-    rows = [[*observation, 0.0, info["y"], info["fan_y"]]]
-    for action in commands(count):
-        if between is not None:
-            between()
-        observation, reward, _, _, info = env.step(action)
-        rows.append([*observation, reward, info["y"], info["fan_y"]])
-    return np.array(rows, dtype=np.float64)
 
 
 def test_stable_baselines_checker_finds_nothing():
@@ -72,17 +55,18 @@ def test_the_name_with_its_module_makes_it_without_an_import_from_any_folder(tmp
 
 def test_an_episode_and_numpy_s_global_random_state_leave_each_other_alone():
     env = FanTrackingEnv("varied")
-    first = fly(env, 5)
+    first = fly_alone(env, 15, 5)
     np.random.seed(123)  # noqa: NPY002
     expected = np.random.random(3)  # noqa: NPY002
     np.random.seed(123)  # noqa: NPY002
-    np.testing.assert_array_equal(fly(env, 5), first)
+    np.testing.assert_array_equal(fly_alone(env, 15, 5), first)
     np.testing.assert_array_equal(np.random.random(3), expected)  # noqa: NPY002
 
 
 def test_what_is_there_to_be_drawn_does_not_change_the_flight():
     np.testing.assert_array_equal(
-        fly(FanTrackingEnv(render_mode="rgb_array"), 3), fly(FanTrackingEnv(), 3)
+        fly_alone(FanTrackingEnv(render_mode="rgb_array"), 15, 3),
+        fly_alone(FanTrackingEnv(), 15, 3),
     )
 
 
@@ -99,13 +83,13 @@ def test_after_a_bad_fan_path_which_is_named_there_is_no_step(path):
 
 def test_the_constant_gain_flies_much_the_same():
     full, constant = (
-        fly(FanTrackingEnv(), 7, 25),
-        fly(FanTrackingEnv(estimator="constant-gain"), 7, 25),
+        fly_alone(FanTrackingEnv(), 25, 7),
+        fly_alone(FanTrackingEnv(estimator="constant-gain"), 25, 7),
     )
     assert not np.array_equal(full, constant)
     np.testing.assert_allclose(constant[:, :3], full[:, :3], atol=0.02)  # N
     np.testing.assert_allclose(constant[:, 3:6], full[:, 3:6], atol=0.003)  # Nm
-    np.testing.assert_allclose(constant[:, 9], full[:, 9], atol=0.005)  # m
+    np.testing.assert_allclose(constant[:, 9:12], full[:, 9:12], atol=0.005)  # m
 
 
 def test_a_filter_whose_state_is_no_number_starts_over():

@@ -19,6 +19,7 @@ from tests.support.golden_trajectories import (
     SEED_OF_TASKS,
     trajectory,
 )
+from tests.support.vector_flights import fly_alone
 from windwrench.envs import FanTrackingEnv
 from windwrench.evaluation.tasks import TASKS
 
@@ -30,23 +31,6 @@ KEPT["FanTracking"] = json.loads(GOLDEN.read_text(encoding="utf-8"))
 # precision. Random commands of the other tasks let differences grow further.
 TOLERANCE = {"observation": 1e-6, "wrench": 1e-7, "y": 1e-9, "reward": 1e-9}
 TOLERANCE_OF_TASKS = {"observation": 2e-5, "wrench": 1e-6, "error": 1e-8}
-COMMANDS = np.random.default_rng(0).uniform(-0.5, 0.5, (25, 1)).astype(np.float32)
-
-
-def flown(seed):
-    """Return what an episode shows, as bytes."""
-    env = FanTrackingEnv("base")
-    observation, _ = env.reset(seed=seed)
-    seen = [observation.tobytes()]
-    for command in COMMANDS:
-        observation, reward, _, _, info = env.step(command)
-        seen.append(
-            observation.tobytes()
-            + np.float64(reward).tobytes()
-            + info["force"].tobytes()
-            + info["torque"].tobytes()
-        )
-    return b"".join(seen)
 
 
 @pytest.mark.parametrize(
@@ -80,6 +64,9 @@ def test_the_golden_trajectories_are_of_this_version(task):
 
 
 def test_sixteen_threads_at_once_fly_the_same_trajectories():
+    def flown(seed):
+        return fly_alone(FanTrackingEnv("base"), 25, seed).tobytes()
+
     alone = [flown(seed) for seed in range(4)]
     ready = threading.Barrier(16)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-import windwrench  # noqa: F401  registers the environments
+from tests.support.vector_flights import make
 from windwrench.dynamics import InputError
 from windwrench.envs import SCENARIOS, FanTrackingEnv
 from windwrench.envs.observing import FRAMES, SCALES
@@ -72,14 +72,7 @@ def test_an_unknown_view_is_named():
 )
 def test_episodes_follow_each_other_as_gymnasium_s_own_vector_environment_has_it(mode, seen):
     given = {"scenario": "fast", **seen}
-    native = gym.make_vec(
-        NAME,
-        num_envs=2,
-        vectorization_mode="vector_entry_point",
-        autoreset_mode=mode,
-        max_episode_steps=4,
-        **given,
-    )
+    native = make(2, autoreset_mode=mode, max_episode_steps=4, **given)
     plain = gym.vector.SyncVectorEnv(
         [lambda: gym.make(NAME, max_episode_steps=4, **given)] * 2, autoreset_mode=mode
     )
@@ -106,9 +99,7 @@ def same(one, other):
 
 def test_another_mode_is_refused():
     with pytest.raises(InputError, match="autoreset_mode must be NEXT_STEP or SAME_STEP"):
-        gym.make_vec(
-            NAME, vectorization_mode="vector_entry_point", autoreset_mode=AutoresetMode.DISABLED
-        )
+        make(1, autoreset_mode=AutoresetMode.DISABLED)
 
 
 def test_the_stated_distribution_is_the_one_drawn_from():

@@ -49,7 +49,7 @@ env.reset(seed=0)
 env.step(np.zeros(1, np.float32))
 pictures = {"jet": env.render()}
 loop = env.loop
-loop.record["fan"]["speed"] = 0.0  # the jet's tracers drift from picture to picture
+loop.record["fan"]["speed"] = 0.0  # the drops in the jet drift from picture to picture
 pictures["still"], pictures["again"] = env.render(), env.render()
 for body in ("vehicle", "fan"):
     geoms = loop.model.geom_bodyid == loop.model.body(body).id

@@ -4,25 +4,17 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-import windwrench  # noqa: F401  registers the environments
+from tests.support.vector_flights import TASKS, fly_alone, make
 from windwrench.dynamics import InputError
 from windwrench.envs import FanTrackingEnv, Stage
 from windwrench.envs.closed_loop import STAGES
 
-NAMES = ("FanTracking", "FanTracking2D", "WindHover", "WindTrajectory")
+
+def fly(name, **given):
+    return fly_alone(gym.make(f"windwrench/{name}-v0", **given), seed=3)
 
 
-def fly(name, decisions=4, **given):
-    """Return what the first decisions show: frames and true wrenches."""
-    env = gym.make(f"windwrench/{name}-v0", **given)
-    rows = [env.reset(seed=3)[0]]
-    for _ in range(decisions):
-        frame, _, _, _, info = env.step(np.full(env.action_space.shape, 0.2, np.float32))
-        rows.append(np.concatenate([frame, info["force"], info["torque"]]))
-    return rows[-1]
-
-
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", TASKS)
 def test_stage_by_stage_the_flight_is_that_of_the_compiled_call_bit_for_bit(name):
     seen = []
     watch = Stage("watch", lambda loop: seen.append(loop.ticks), before="estimate")
@@ -36,14 +28,15 @@ def test_so_it_flies_in_a_vector_of_environments():
         loop.applied[2] = -0.2
 
     given = {"stages": [Stage("push", push, before="actuate")]}
-    envs = gym.make_vec(
-        "windwrench/FanTracking-v0", 2, vectorization_mode="vector_entry_point", **given
-    )
+    envs = make(2, **given)
     envs.reset(seed=[3, 4])
+    env = gym.make("windwrench/FanTracking-v0", **given)
+    env.reset(seed=3)
     for _ in range(4):
         frames, _, _, _, infos = envs.step(np.full((2, 1), 0.2, np.float32))
-    alone = np.concatenate([frames[0], infos["force"][0], infos["torque"][0]])
-    np.testing.assert_array_equal(alone, fly("FanTracking", **given))
+        frame, _, _, _, info = env.step(np.full(1, 0.2, np.float32))
+        np.testing.assert_array_equal(frames[0], frame)
+        np.testing.assert_array_equal(infos["force"][0], info["force"])
 
 
 def test_a_sensor_an_actuator_and_a_wind_of_one_s_own_change_the_flight():
@@ -103,10 +96,4 @@ def test_what_is_no_stage_is_named(stages, words):
     with pytest.raises(InputError, match=words):
         FanTrackingEnv("static", stages=stages()).reset(seed=0)
     with pytest.raises(InputError, match=r"runs no stages of your own; plant='mujoco' does it"):
-        gym.make_vec(
-            "windwrench/FanTracking-v0",
-            num_envs=1,
-            vectorization_mode="vector_entry_point",
-            plant="lanes",
-            stages=[Stage("mine", print, before="sense")],
-        )
+        make(1, "lanes", stages=[Stage("mine", print, before="sense")])

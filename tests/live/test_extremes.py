@@ -20,6 +20,7 @@ from windwrench.live.session import Session
 from windwrench.live.sources.crazyflie import _IMU, _POSE
 from windwrench.live.sources.open import make_source
 from windwrench.live.tallies import Tallies
+from windwrench.live.terminal_page import page
 
 NUMBERS = (
     *(0, 1, -1, 0.0, -0.0, 0.5, 1.0, -1.0, 376.0, 1e-300, 5e-324, 1e9, 1e18, 1e308, -1e308),
@@ -59,7 +60,7 @@ class Attacked:
         assert self.session.estimates > 100
         assert np.isfinite([*output.wrench, *output.std]).all()
         assert counts["malformed"] > 0
-        self.session.snapshot()
+        page(self.session)
 
     def said(self):
         return self.source.tallies.news()

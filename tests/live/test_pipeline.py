@@ -74,7 +74,7 @@ def test_a_tuning_that_is_too_slow_is_told_with_what_to_do():
     found = {}
     for tuning in (None, fit.tuning):
         live = Pipeline(tuning=tuning).take(whole(flown))
-        found[tuning is None] = live.session.snapshot().consistency
+        found[tuning is None] = live.tallies.consistency
     assert found[True].too_slow
     assert "--tuning" in tuning_words(found[True])
     assert found[True].nis == pytest.approx(fit.before.nis, rel=0.05)
@@ -87,7 +87,7 @@ def test_a_clock_that_drifts_changes_nothing_and_is_told(drift):
     flown = flight(30.0, "gentle")
     live = Pipeline().take(whole(flown, drift=drift))
     np.testing.assert_allclose(live.wrench(), offline(flown), atol=1e-9, rtol=0)
-    assert live.session.snapshot().drift_ppm == pytest.approx(1e6 * drift, rel=0.1)
+    assert live.session.clocks.drift == pytest.approx(1e6 * drift, rel=0.1)
 
 
 @settings(max_examples=15, deadline=None, derandomize=True)
@@ -122,7 +122,7 @@ def test_a_second_clock_is_brought_to_the_first():
     flown = flight()
     same = Pipeline(rate_hz=100.0).take(split(flown))
     other = Pipeline(rate_hz=100.0).take(split(flown, sensor_clock=86_400.0))
-    assert [one.session.snapshot().clocks for one in (same, other)] == [1, 2]
+    assert [one.session.clocks.count for one in (same, other)] == [1, 2]
     # brought over by the least delays, which differ by what the poses' is longer: 6 ms
     a, b = same.outputs[-1].estimate, other.outputs[-1].estimate
     assert np.abs(a.force - b.force).max() < 0.05

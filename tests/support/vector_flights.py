@@ -1,19 +1,20 @@
-"""Vector environments of FanTracking and all that their flights return."""
+"""Environments of the tasks, one or many, and what their flights return."""
 
 import gymnasium as gym
 import numpy as np
 
 import windwrench  # noqa: F401  registers the environment
 
+TASKS = ("FanTracking", "FanTracking2D", "WindHover", "WindTrajectory")
 NUMBERS = (
     *("reward_tracking", "reward_change", "fan_y", "fan_velocity", "y", "offset"),
     *("force", "torque", "time", "lost"),
 )
 
 
-def make(num_envs, plant="mujoco", **kwargs):
+def make(num_envs, plant="mujoco", task="FanTracking", **kwargs):
     return gym.make_vec(
-        "windwrench/FanTracking-v0",
+        f"windwrench/{task}-v0",
         num_envs=num_envs,
         vectorization_mode="vector_entry_point",
         plant=plant,
@@ -31,4 +32,19 @@ def fly(envs, decisions, seed=3, law=None):
         numbers = [infos[name].reshape(envs.num_envs, -1) for name in NUMBERS]
         rows.append(np.column_stack([seen, rewards, lost, over, *numbers]))
     envs.close()
+    return np.array(rows)
+
+
+def fly_alone(env, decisions=4, seed=None):
+    """Frame, reward, true position, force and torque (decisions, .) of random commands, after a
+    reset where there is a seed.
+    """
+    rng, rows = np.random.default_rng(1), []
+    if seed is not None:
+        env.reset(seed=seed)
+    for _ in range(decisions):
+        action = rng.uniform(-0.5, 0.5, env.action_space.shape).astype(np.float32)
+        frame, reward, _, _, info = env.step(action)
+        place = env.unwrapped.loop.position
+        rows.append(np.concatenate([frame, [reward], place, info["force"], info["torque"]]))
     return np.array(rows)
