@@ -94,7 +94,7 @@ def with_caption(picture: Picture, caption: Caption) -> Picture:
             max(1, round(_WIDTHS[kind] * size)),
         )
         write(margin + 44 * size, middle, label, small, "lm")
-        write(margin + 285 * size, middle, number, small, "rm")
+        write(margin + 305 * size, middle, number, small, "rm")
         y += line
     y = margin + 1.5 * line
     for text in caption.lines:
