@@ -55,6 +55,9 @@ class Here:
             future.set_result(self.work(task))
         return future
 
+    def wait(self, running, seconds):
+        return set(running)
+
     def end(self):
         pass
 

@@ -171,7 +171,7 @@ CASES = {
         note="moments|coincide",
         without=("mass",),
     ),
-    "quick: a thrust that is not asked for": Case(
+    "a thrust that is not asked for": Case(
         drawn("effect", ("thrust_scale",), "typical", "vertical", 2380884864, 60.0),
         among="",
         note="fit better",
@@ -317,20 +317,18 @@ def test_a_rotor_that_stalls_now_and_then_is_no_certain_curvature():
     assert found.probabilities.names["thrust_curvature"] < 0.95
 
 
-@pytest.mark.parametrize("least", [0.95, 0.999])
-def test_a_name_that_is_not_probable_enough_is_tentative(least, monkeypatch):
+def test_a_name_that_is_not_probable_enough_is_tentative(monkeypatch):
     log = fly("thrust_curvature", a=-0.05)
     monkeypatch.setattr(
         search_verdict,
         "SEARCH_VERDICT",
-        replace(search_verdict.SEARCH_VERDICT, least_sure_probability=least),
+        replace(search_verdict.SEARCH_VERDICT, least_sure_probability=0.999),
     )
     found = diagnose([log], VEHICLE, probabilities=True)
     assert 0.95 < found.probabilities.names["thrust_curvature"] < 0.999
-    assert [(e.name, e.tentative) for e in found.effects] == [("thrust_curvature", least > 0.95)]
-    said = found.doubts.get(search_verdict.IMPROBABLE, ())
-    assert bool(said) == (least > 0.95)
-    assert set(said) <= set(found.notes)
+    assert [(e.name, e.tentative) for e in found.effects] == [("thrust_curvature", True)]
+    (said,) = found.doubts[search_verdict.IMPROBABLE]
+    assert said in found.notes
 
 
 def test_no_flight_keeps_step_with_what_is_held_out():

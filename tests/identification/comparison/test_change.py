@@ -47,11 +47,11 @@ def drawn(rng, count, moved=(0.0, 0.0, 0.0, 0.0), sessions=1):
 
 
 def test_flights_without_a_change_are_never_given_a_sure_one():
-    """Of 300 pairs of sets at most one in a hundred, and most are said to be unchanged."""
+    """Of 150 pairs of sets at most one in fifty, and most are said to be unchanged."""
     rng = np.random.default_rng(1)
-    found = [compare(drawn(rng, 1), drawn(rng, 2)) for _ in range(300)]
+    found = [compare(drawn(rng, 1), drawn(rng, 2)) for _ in range(150)]
     assert sum(c.sure and c.place != NOWHERE for c in found) <= 3
-    assert sum(c.place == NOWHERE for c in found) > 280
+    assert sum(c.place == NOWHERE for c in found) > 140
     assert all(sum(c.places.values()) == pytest.approx(1.0) for c in found)
 
 
@@ -59,7 +59,7 @@ def test_more_sessions_make_an_answer_surer_and_more_flights_of_one_do_not():
     rng = np.random.default_rng(4)
     moved = (0.06, -0.06, -0.06, 0.06)  # rotor 2 is asked for more
     chances = {(count, sessions): [] for count, sessions in ((1, 1), (6, 1), (1, 6))}
-    for _ in range(60):
+    for _ in range(40):
         after = drawn(rng, 1, moved)
         for count, sessions in chances:
             found = compare(after, drawn(rng, count, sessions=sessions))
