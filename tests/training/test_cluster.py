@@ -155,16 +155,6 @@ def test_rllib_knows_the_environment_after_one_line(cluster):
     algorithm.stop()
 
 
-def test_a_cluster_that_is_not_there_is_named():
-    ray = pytest.importorskip(
-        "ray", reason="Ray is not installed: pip install 'windwrench[cluster]'"
-    )
-    if ray.is_initialized():
-        ray.shutdown()
-    with pytest.raises(InputError, match=r"127\.0\.0\.1:1: no Ray cluster there"):
-        next(every(len, [[1]], cluster="127.0.0.1:1"))
-
-
 def fleet_work(task):
     """Answer, or end as the task says."""
     if task == "exits":
@@ -183,3 +173,13 @@ def test_a_task_that_dies_or_takes_too_long_costs_itself_alone(cluster):
     limit = 3.0 + 3.0 * (time.monotonic() - begun)  # however busy this machine is
     done = dict(each(fleet_work, [0, "sleeps", 1], limit, cluster=cluster))
     assert (done.pop("sleeps").kind, done) == ("time", {0: 0, 1: 1})
+
+
+def test_a_cluster_that_is_not_there_is_named():
+    ray = pytest.importorskip(
+        "ray", reason="Ray is not installed: pip install 'windwrench[cluster]'"
+    )
+    if ray.is_initialized():  # last in this file: those before have one cluster
+        ray.shutdown()
+    with pytest.raises(InputError, match=r"127\.0\.0\.1:1: no Ray cluster there"):
+        next(every(len, [[1]], cluster="127.0.0.1:1"))
