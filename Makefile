@@ -18,7 +18,7 @@ COVERAGE = --cov --cov-report=term-missing:skip-covered --cov-fail-under=88
 FAST = tests/controllers tests/dynamics tests/estimator tests/identification/logs tests/identification/motion \
 	tests/runtime tests/evaluation/test_statistics.py tests/project/test_structure.py
 
-# all but the marked slow: some 18 minutes of processor time, 4 of them compiling, and nearly all lines
+# all but the marked slow: some 15 minutes on two cores, and nearly all lines
 test: $(VENV)/.tested
 	$(PYTEST) -m "not slow"
 
