@@ -1,9 +1,8 @@
 """From flight logs to the effects that their vehicle's model lacks: the whole of a diagnosis.
 
-Where rotor speeds were measured, a search and a posterior of the poses say together what acts
-(``search_verdict``); where commands are all that is known of the rotors, the evidence of the force
-balance does (``force_verdict``). Effects and coefficients are chosen on the fitted blocks of
-flight; the errors before and after are those of blocks, or logs, that the fit never saw.
+The evidence of sets of effects says what acts (``verdict``). Effects and coefficients are chosen on
+the fitted blocks of flight; the errors before and after are those of blocks, or logs, that the fit
+never saw.
 """
 
 from __future__ import annotations
@@ -18,8 +17,7 @@ from ..dynamics.effects import get, names
 from ..dynamics.vehicle import Vehicle
 from ..runtime.errors import InputError, unknown_name
 from .findings import CHANNELS, Diagnosis, Errors, NamedEffect, Signature, Structure, Trace
-from .force_verdict import judged_by_force
-from .inference.candidate_regressors import explanatory_variables
+from .inference.explanatory_variables import explanatory_variables
 from .inference.regression import Flights, lost_behind_a_filter
 from .judged import Setting
 from .logs.flight_log import FlightLog
@@ -27,7 +25,7 @@ from .logs.screening import LEAST_SECONDS, screen_log
 from .motion.noise_spectrum import filtering_notes, pose_was_filtered
 from .motion.smoothing import CUTOFFS
 from .prediction import nis_without_wrench_state, rollout_error
-from .search_verdict import judged_by_search
+from .verdict import judged
 from .wrench_series import pose_notes
 
 Array = NDArray[np.float64]
@@ -50,7 +48,6 @@ def diagnose(
     test: Sequence[FlightLog] = (),
     without: Sequence[str] = (),
     report: Callable[[str], None] = lambda text: None,
-    probabilities: bool = False,
 ) -> Diagnosis:
     """Return what the logs of one vehicle say about its model.
 
@@ -62,13 +59,6 @@ def diagnose(
             which the fit never sees.
         without: effects that are taken out of the library.
         report: called with a line of progress.
-        probabilities: whether how probable each name is, is worked out as well; where rotor speeds
-            come from commands it always is. Where pose and rotor speeds were measured, and the
-            vehicle declares no effect, it has a posterior: its likeliest set is then named if it
-            explains the residual better than what the search has found, and the standard deviation
-            of a coefficient includes how far the posterior's estimate of it is from the search's.
-            That takes about as long again. Elsewhere a probability is how often such findings of
-            the search are right.
 
     Raises:
         InputError: a log that is not what it claims to be, or an unknown effect.
@@ -91,30 +81,26 @@ def diagnose(
     notes += [f"{log.name}: {note}" for log in every for note in filtering_notes(log)]
     notes += [f"{log.name}: {note}" for log in every for note in pose_notes(log, vehicle)]
     library = [n for n in names() if n not in without]
-    judged = (
-        judged_by_force(flights, library, report)
-        if flights.commanded
-        else judged_by_search(flights, library, probabilities, report)
-    )
-    effects, found = judged.effects, judged.balance
-    sure = judged.remainder == "none" and not any(
+    said = judged(flights, library, report)
+    effects, found = said.effects, said.balance
+    sure = said.remainder == "none" and not any(
         effect.tentative or effect.indistinguishable_from for effect in effects
     )
     verdict = (
         ("explained" if sure else "partly explained")
         if effects
-        else ("nothing to explain" if judged.remainder == "none" else "unexplained")
+        else ("nothing to explain" if said.remainder == "none" else "unexplained")
     )
-    notes += judged.notes
-    named = [e for e in judged.setting if e]
+    notes += said.notes
+    named = [e for e in said.setting if e]
     report("predicting the flights")
-    amended = flights.amended({e: judged.setting[e] for e in named})
+    amended = flights.amended({e: said.setting[e] for e in named})
     segments = _segments(flights)
-    parts = _parts(flights, judged.setting, found.after)
-    unseen = sorted(flights.needs_pose | judged.hidden)
+    parts = _parts(flights, said.setting, found.after)
+    unseen = sorted(flights.needs_pose | said.hidden)
     return Diagnosis(
         verdict=verdict,
-        remainder=judged.remainder,
+        remainder=said.remainder,
         effects=effects,
         held_out_segments=tuple((flights.logs[i].name, a, b) for i, a, b in segments),
         before=_errors(flights, vehicle, segments, found.error_before),
@@ -125,18 +111,18 @@ def diagnose(
             _advice(
                 effects,
                 sorted(flights.not_identifiable - flights.needs_pose),
-                judged.remainder,
+                said.remainder,
                 flights.filtered,
                 unseen,
             )
         ),
         notes=tuple(dict.fromkeys(notes)),
-        candidates=judged.candidates,
+        candidates=said.candidates,
         traces=tuple(_traces(flights, found.before, found.after, parts)),
-        signatures=tuple(_signature(flights, judged.setting, e.name, found.after) for e in effects),
-        structure=judged.structure,
-        gusts=judged.gusts,
-        pushes=judged.pushes,
+        signatures=tuple(_signature(flights, said.setting, e.name, found.after) for e in effects),
+        structure=said.structure,
+        gusts=said.gusts,
+        pushes=said.pushes,
         cutoff_hz=CUTOFFS.residual_hz,
         declared=vehicle,
         amended=amended,
@@ -146,9 +132,9 @@ def diagnose(
         floor_is_bound=not flights.inertial
         and (flights.filtered or any(map(pose_was_filtered, every))),
         needs_pose=tuple(unseen),
-        doubts=judged.doubts,
-        ranking=judged.ranking,
-        probabilities=judged.probabilities,
+        doubts=said.doubts,
+        ranking=said.ranking,
+        probabilities=said.probabilities,
     )
 
 

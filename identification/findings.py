@@ -17,9 +17,6 @@ from ..dynamics.vehicle import Vehicle
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# tests for structure in the residual: a candidate regressor explains some of it, a coefficient
-# changes with a variable, or innovations confirm an effect that the residual hardly shows
-STRUCTURE_TESTS = ("candidate regressor", "varying coefficient", "innovations")
 CHANNELS = ("Fx", "Fy", "Fz", "tau_x", "tau_y", "tau_z")
 
 
@@ -128,19 +125,17 @@ class Signature:
 
 @dataclass(frozen=True)
 class Structure:
-    """One sign that the residual after all named effects still has structure.
+    """The column of a dictionary that explains most of what the named effects leave.
 
     Attributes:
-        test: what was tried, in words.
-        where: channel and regressor, in words.
-        gain: share of the residual's deviance that it explains on left-out blocks.
-        kind: of the test, one of ``STRUCTURE_TESTS``.
+        test: its group, in words.
+        where: channel and variable, in words.
+        gain: share of the deviance that is left, which it explains.
     """
 
     test: str
     where: str
     gain: float
-    kind: str
 
 
 @dataclass(frozen=True)

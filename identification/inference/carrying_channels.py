@@ -5,7 +5,7 @@ Both are computed. The trace is the share of the effect's deviance in the balanc
 that of torques; what the model reads shows where its wrench changes with an input.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,7 +17,6 @@ from ...dynamics.effects import get
 from ..motion.residual import acting_wrench
 from ..motion.signals import Signals
 from .regression import Flights, Setting
-from .search import FittedEffects, Search
 
 Array = NDArray[np.float64]
 
@@ -49,28 +48,24 @@ ORDER = (
 )
 
 
-def carrying_channels(
-    flights: Flights, setting: Setting, effect: str, traces: Iterable[str]
-) -> tuple[str, ...]:
-    """Return the channels that carry a named effect at a setting, in the order of ``ORDER``; in
-    those of ``traces`` it leaves its trace.
+def carrying_channels(flights: Flights, setting: Setting, effect: str) -> tuple[str, ...]:
+    """Return the channels that carry a named effect at a setting, in the order of ``ORDER``: those
+    in which it leaves its trace, and those that its model reads.
     """
-    found = set(traces) | set(_read(flights, setting, effect))
+    found = {*_traces(flights, setting, effect), *_read(flights, setting, effect)}
     return tuple(channel for channel in ORDER if channel in found)
 
 
-def traces_of(search: Search, fit: FittedEffects, effect: str) -> Iterator[str]:
-    """Yield the channels in which an effect of a fit leaves its trace."""
-    flights = search.flights
-    part = flights.residual(fit.without(effect).setting) - flights.residual(fit.setting)
-    power = np.sum(np.square(search.whiten(part)[flights.fit_rows]), axis=0)
-    whole = float(power.sum())
-    if whole <= 0.0:
-        return
-    force, torque = power[:3].sum() / whole, power[3:].sum() / whole
-    if force > CHANNELS.least_share:
+def _traces(flights: Flights, setting: Setting, effect: str) -> Iterator[str]:
+    """Yield the channels in which an effect leaves its trace."""
+    less = {e: x for e, x in setting.items() if e != effect}
+    part = flights.residual(less) - flights.residual(setting)
+    noise = np.mean(np.square(flights.sensor_noise), axis=0) + 1e-30
+    power = np.mean(np.square(part), axis=0) / noise
+    whole = max(float(power.sum()), 1e-30)
+    if power[:3].sum() / whole > CHANNELS.least_share:
         yield "accelerometer" if flights.inertial else "position"
-    if torque > CHANNELS.least_share:
+    if power[3:].sum() / whole > CHANNELS.least_share and not flights.commanded:
         yield "gyro" if flights.inertial else "attitude"
 
 

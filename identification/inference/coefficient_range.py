@@ -6,86 +6,10 @@ not far outside.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-
-import numpy as np
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Found
-from .regression import CENTRAL, Column, Flights, Setting, typical_size
-from .search import FittedEffects, Search
-
-
-@dataclass(frozen=True)
-class RangeSettings:
-    """From which coefficients on, a named effect is doubtful."""
-
-    # standard deviations beyond a bound; those of true effects are within 2
-    most_excess_in_std: float = 3.5
-    # share of the effect's own size by which it must exceed a bound: effect models are true to that
-    least_excess_share: float = 0.05
-    most_typical_sizes: float = 10.0
-
-
-RANGES = RangeSettings()
-
-
-def implausible_coefficients(search: Search, fit: FittedEffects) -> list[str]:
-    """Return, as sentences, which coefficients would leave their range, or are implausible for
-    their effect.
-
-    Of 340 flights with a wrong name it doubts 71, and 10 as the only check.
-    """
-    vehicle = search.flights.vehicle
-    found = []
-    size = {
-        effect: max(
-            (
-                abs(v) / typical_size((effect, k), vehicle)
-                for k, v in fit.setting[effect].items()
-                if k != CENTRAL
-            ),
-            default=0.0,
-        )
-        for effect in fit.effects
-    }
-    for effect in fit.effects:
-        if size[effect] > RANGES.most_typical_sizes and not get(effect).any_size:
-            found.append(
-                f"{effect} is {size[effect]:.0f} times its typical size: another effect may be the "
-                "cause"
-            )
-    found += [
-        f"{effect} {reason}: another effect may be the cause"
-        for effect in fit.effects
-        if (reason := why_implausible(search.flights, fit.setting, fit.std, effect))
-    ]
-    g = search.gram_at(fit)
-    total, k = g.blocks.sum(axis=0), len(g.columns)
-    normal = total[:k, :k] + np.diag(g.precision)
-    change = np.linalg.solve(normal, total[:k, -1] - g.precision * g.value)
-    std = np.sqrt(np.diag(np.linalg.inv(normal)))
-    beyond: dict[str, list[str]] = {}
-    for (effect, name), d, s, low, high in zip(
-        g.columns, change, std, g.lower, g.upper, strict=True
-    ):
-        least = (
-            RANGES.least_excess_share
-            * typical_size((effect, name), vehicle)
-            * (1.0 if name == CENTRAL else size.get(effect, 0.0))
-        )
-        if (
-            effect
-            and ((low >= 0.0 and d < 0.0) or (high <= 0.0 and d > 0.0))
-            and abs(d) > max(RANGES.most_excess_in_std * s, least)
-        ):
-            beyond.setdefault(effect, []).append(name)
-    found += [
-        f"{effect}: the best fit of {', '.join(names)} lies outside the allowed range: another "
-        "effect may be the cause"
-        for effect, names in beyond.items()
-    ]
-    return found
+from .regression import Column, Flights, Setting, typical_size
 
 
 def why_implausible(

@@ -71,7 +71,7 @@ class RegressionSettings:
     blocks_per_held_out: int = 4  # one of so many blocks is held out
     # the golden ratio, by which the place of the held-out block moves: no flight keeps step with it
     held_out_step: float = 0.5 * (5.0**0.5 - 1.0)
-    filtered_band_hz: tuple[float, float] = (1.0, 2.0)
+    most_period_ratio: float = 1.01  # between logs that one filter reads
     memory: int = 2**28  # bytes, of results kept: of pieces, and of columns
     kept_residuals: int = 16  # a fit asks several times for the residual at its setting
     bytes_per_sample: int = 400  # of a piece
@@ -217,11 +217,11 @@ class Flights:
             *(() if self.inertial else (ATTITUDE_TIME_OFFSET,)),
             *(() if self.commanded or self.inertial else (VELOCITY_TIME_OFFSET,)),
         )
-        # whether innovations say what acts: they need poses as measured, or an IMU, and rotors
-        self.has_innovations = not (self.commanded or self.filtered)
-        # Hz, by which the effects of a filtered pose are weighed: well below any filter; none: all
-        # that the residual holds
-        self.selection_band_hz = REGRESSION.filtered_band_hz if self.filtered else None
+        # poses and rotor speeds as they were measured, for one filter of all logs
+        periods = [log.period for log in self.logs]
+        self.has_raw_poses = not (self.commanded or self.inertial or self.filtered) and (
+            max(periods) <= REGRESSION.most_period_ratio * min(periods)
+        )
         self.logs = tuple(excerpt(self.logs))
         self.biases: tuple[Column, ...] = tuple(bias_columns(len(logs)) if self.inertial else ())
         self._drift: np.random.Generator | None = None  # of a copy whose fusion errs otherwise

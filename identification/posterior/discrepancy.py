@@ -4,11 +4,13 @@ one.
 They are of the state as the filter predicts it, so none knows the noise of the pose to come.
 """
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import bilinear, lfilter
 
 from .causal_filter import Track
 
@@ -24,10 +26,21 @@ class DiscrepancySettings:
     sizes: tuple[float, ...] = (0.001, 0.003, 0.01, 0.03)
     torque_arm: float = 0.25
     heights: tuple[float, ...] = (0.2, 0.6)  # m above the lowest place: where a bump falls off
+    # Hz: a load on a cable of 0.1 to 1.5 m, and a part on a soft mount
+    load_hz: tuple[float, ...] = (0.4, 0.55, 0.75, 1.0, 1.4)
+    mount_hz: tuple[float, ...] = (1.0, 1.6, 2.5, 4.0, 6.0)
+    damping_ratio: float = 0.08  # of these
+    # times the sizes: share of an effect's own wrench by which its coefficients change with a
+    # variable, at a standard deviation of it
+    share_of_effect: float = 30.0
+    model_error: float = 0.01  # share of its own wrench by which the model of an effect is wrong
+    # power of the likelihood where rotor speeds hardly leave their rounding steps: their rounding
+    # is then no noise, and follows the flight
+    rounded: float = 0.25
 
 
 DISCREPANCY = DiscrepancySettings()
-GROUPS = ("velocity", "place", "time", "rotors")
+GROUPS = ("velocity", "place", "time", "rotors", "constant", "resonance")
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +52,7 @@ class State:
     velocity: Array  # (n, 3) m/s, world
     angular_velocity: Array  # (n, 3) rad/s, body
     rotors: Array  # (n, 4) thrust (N) and torques (Nm) of the rotors
+    acceleration: Array  # (n, 3 or more) m/s2, world
 
 
 def _scaled(x: Array) -> Array:
@@ -79,21 +93,31 @@ def discrepancy_columns(
         shapes["rotors"] += [
             (f"angular velocity {axis}", rate[:, i], every),
             (f"torque {axis}", rotors[:, 1 + i], (3, 4, 5)),
-            (f"change of torque {axis}", np.gradient(rotors[:, 1 + i]), (3 + i,)),
+            (f"change of torque {axis}", _change(rotors[:, 1 + i]), (3 + i,)),
         ]
     shapes["rotors"] += [
         ("thrust", rotors[:, 0], every),
-        ("change of thrust", np.gradient(rotors[:, 0]), (2, 3, 4, 5)),
+        ("change of thrust", _change(rotors[:, 0]), (2, 3, 4, 5)),
     ]
+    for a, b in ((0, 1), (1, 2), (0, 2)):
+        axes = f"{'xyz'[a]} and {'xyz'[b]}"
+        shapes["velocity"].append((f"velocities {axes}", body[:, a] * body[:, b], every))
+        shapes["rotors"].append((f"angular velocities {axes}", rate[:, a] * rate[:, b], (3, 4, 5)))
     heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
     places = [("x", position[:, 0]), ("y", position[:, 1]), ("height", position[:, 2])]
     places += [(f"height below {h:g} m", np.exp(-above / h)) for h in DISCREPANCY.heights]
     places += [("heading's sine", np.sin(heading)), ("heading's cosine", np.cos(heading))]
+    places += [(f"tilt {axis}", rotation[:, 2, i]) for i, axis in enumerate("xy")]
     shapes["place"] += [(name, x, every) for name, x in places]
     span = max(float(t[-1] - t[0]), 1e-9)
     for i in (1, 2, 3):
         shapes["time"].append((f"time {i}", np.cos(np.pi * i * (t - t[0]) / span), every))
+    size = np.repeat([weight, weight * DISCREPANCY.torque_arm * arm], 3) / inertias
     out: dict[tuple[str, str], list[Array]] = {}
+
+    def add(group: str, name: str, column: Array) -> None:
+        out[group, name] = np.split(column, ends)
+
     for group, found in shapes.items():
         for name, x, channels in found:
             z = _scaled(x)
@@ -104,7 +128,84 @@ def discrepancy_columns(
                 if channel < 3:
                     column[:, :3] = (weight / inertias[0]) * z[:, None] * rotation[:, :, channel]
                 else:
-                    size = weight * DISCREPANCY.torque_arm * arm / inertias[channel]
-                    column[:, channel] = size * z
-                out[group, f"{name} in {channel}"] = np.split(column, ends)
+                    column[:, channel] = size[channel] * z
+                add(group, f"{name} in {channel}", column)
+    for channel in every:
+        column = np.zeros((len(t), 6))
+        column[:, channel] = size[channel]
+        add("constant", f"a constant in {channel}", column)
+    period = float(np.median(np.diff(t)))
+    acceleration, turning = joined("acceleration"), rotors[:, 1:] / inertias[3:]
+    for hertz in DISCREPANCY.load_hz:
+        column = np.zeros((len(t), 6))
+        column[:, :2] = _resonance(acceleration[:, :2], hertz, period, ends)
+        column *= weight / inertias[0] / max(float(column[:, :2].std()), 1e-9)
+        add("resonance", f"a load that swings at {hertz:g} Hz in 0", column)
+    for hertz, i in itertools.product(DISCREPANCY.mount_hz, range(3)):
+        column = np.zeros((len(t), 6))
+        z = _scaled(_resonance(turning[:, i], hertz, period, ends))
+        column[:, 3 + i] = size[3 + i] * z
+        add("resonance", f"a part that swings at {hertz:g} Hz in {3 + i}", column)
+    return out
+
+
+def _change(x: Array) -> Array:
+    """Return differences from the sample before: those to come know the poses' noise."""
+    return np.diff(x, prepend=x[:1])
+
+
+def _resonance(drive: Array, hertz: float, period: float, ends: Array) -> Array:
+    """Return the reaction (n, ...) of a pendulum or a spring to the acceleration of its base."""
+    # s'' = -a - rate^2 s - 2 damping rate s', which pulls by rate^2 s + 2 damping rate s'
+    rate = 2.0 * np.pi * hertz
+    damping = 2.0 * DISCREPANCY.damping_ratio * rate
+    shape = bilinear([-damping, -(rate**2)], [1.0, damping, rate**2], 1.0 / period)
+    return np.concatenate([lfilter(*shape, x, axis=0) for x in np.split(drive, ends)])
+
+
+def variables(tracks: Sequence[State | Track], times: list[Array]) -> dict[str, list[Array]]:
+    """Return what a coefficient may change with: variables (n,) of each piece by name, of mean zero
+    and standard deviation one over all.
+    """
+    ends = np.cumsum([len(track.position) for track in tracks])[:-1]
+
+    def joined(name: str) -> Array:
+        return np.concatenate([getattr(track, name) for track in tracks])
+
+    rotation, velocity, position = joined("rotation"), joined("velocity"), joined("position")
+    heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
+    speed, rotors = np.linalg.norm(velocity, axis=1), joined("rotors")
+    found = {
+        "speed": speed,
+        "speed, squared": speed**2,
+        "climb rate": velocity[:, 2],
+        "height": position[:, 2],
+        "position x": position[:, 0],
+        "position y": position[:, 1],
+        "heading's sine": np.sin(heading),
+        "heading's cosine": np.cos(heading),
+        "time": np.concatenate(times),
+        "thrust": rotors[:, 0],
+        "yaw rate": joined("angular_velocity")[:, 2],
+    }
+    scaled = {name: _scaled(x) for name, x in found.items()}
+    return {name: np.split(x, ends) for name, x in scaled.items() if x.any()}
+
+
+def changing_columns(
+    parts: Mapping[str, list[Array]], found: Mapping[str, list[Array]]
+) -> dict[tuple[str, str], list[Array]]:
+    """Return columns of coefficients that change with a variable, by group and name.
+
+    Args:
+        parts: what each effect of a set adds (n, ...) to each piece.
+        found: ``variables``.
+    """
+    out = {}
+    for (effect, part), (name, z) in itertools.product(parts.items(), found.items()):
+        column = [
+            DISCREPANCY.share_of_effect * x * y.reshape(-1, *[1] * (x.ndim - 1))
+            for x, y in zip(part, z, strict=True)
+        ]
+        out["changing coefficient", f"{effect} with {name}"] = column
     return out

@@ -9,12 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
-from scipy.optimize import lsq_linear
 
 from ...dynamics.effects import get
 from ...runtime.errors import InputError
 from ..inference.regression import CENTRAL, START_PREFIX, Column, Flights, coefficient
-from ..inference.sensor_bias import bias_columns, flight_and_axis
 from ..motion.smoothing import CUTOFFS, low_pass
 from .discrepancy import State, discrepancy_columns
 from .evidence import Index, marginal, set_evidence, tempering
@@ -22,7 +20,7 @@ from .force_noise import ForceNoise, fitted_noise, white_noise
 from .force_nuisances import force_nuisances
 from .force_rows import ForceRows
 from .likelihood import NUISANCE, UNKNOWN, Sums
-from .priors import Base, Setting, declared, in_prior_units, prior_size
+from .priors import Base, Setting, between, declared, in_prior_units, prior_size
 
 Array = NDArray[np.float64]
 Starts = Mapping[Column, Mapping[str, float]]
@@ -35,7 +33,6 @@ class ForceLikelihoodSettings:
     noise_rounds: int = 3
     rounds: int = 4  # of Gauss-Newton
     shares: tuple[float, ...] = (1.0, 0.5, 0.2, 0.05)  # of a step, tried in turn
-    most_in_std: float = 3.0  # of a prior, that others may differ in an effect's place
     idle: float = 1e-6  # of the largest residual, up to which an effect does nothing
     least_gain: float = 0.1  # nats; a step that gains less is the last
 
@@ -155,6 +152,7 @@ class ForceLikelihood:
                 s.velocity,
                 s.angular_velocity,
                 vehicle.rotor_wrench(s.rotor_speeds),
+                s.acceleration,
             )
             for s in (p.signals for p in pieces)
         ]
@@ -186,13 +184,6 @@ class ForceLikelihood:
         factor, b = self._nuisance_sums(w)
         return self.power * float(w @ w) - float(b @ cho_solve(factor, b))
 
-    def criterion(self, setting: Setting) -> float:
-        """Return Schwarz's information criterion: the deviance, and for each coefficient the
-        logarithm of the number of rows.
-        """
-        cost = math.log(int(self._use.sum()))
-        return self.deviance(setting) + cost * len(self.columns_of(setting))
-
     def _nuisance_sums(self, w: Array) -> tuple[tuple[Array, bool], Array]:
         inner = self.power * self._given.T @ self._given + np.eye(self._given.shape[1])
         return cho_factor(inner), self.power * self._given.T @ w
@@ -211,19 +202,6 @@ class ForceLikelihood:
         except (InputError, np.linalg.LinAlgError):
             return math.inf
 
-    def biases(self, setting: Setting) -> dict[str, float]:
-        """Return the likeliest biases of accelerometers from which the motion was read, as
-        ``Flights`` takes them out.
-        """
-        factor, b = self._nuisance_sums(self._white(self.rows.residual(setting)).ravel())
-        modes = dict(zip(self.nuisances, cho_solve(factor, b).tolist(), strict=True))
-        out = {}
-        for effect, name in bias_columns(len(self.flights.logs)):
-            flight, axis = flight_and_axis(name)
-            if (effect, NUISANCE + name) in modes:
-                out[name] = modes[effect, NUISANCE + name] * self.flights.bias_std(flight)[axis]
-        return out
-
     def idle(self, setting: Setting) -> set[str]:
         """Return the effects of a setting that do nothing there."""
         here = self.rows.residual(setting)
@@ -234,35 +212,6 @@ class ForceLikelihood:
             if np.abs(self.rows.residual(_without(setting, effect)) - here).max() <= least
         }
 
-    def worth(self, setting: Setting) -> dict[str, float]:
-        """Return of each effect the RMS of what nuisances and effects of other families cannot do
-        in its place, within three standard deviations of their priors, over the RMS of what is
-        left: in the channel where that is most.
-        """
-        rows, fit = self.rows, self.rows.fit
-        left = rows.residual(setting)
-        size = np.sqrt(np.mean(np.square(left[fit]), axis=0)) + 1e-12
-        wanted = self.columns_of(setting)
-        columns = rows.columns(setting, wanted)
-        out = {}
-        for effect in setting:
-            less = _without(setting, effect)
-            part = rows.residual(less) - left
-            family = get(effect).family
-            # in still air a drag cannot do what it does in a wind
-            still = rows.columns(less, self.columns_of(less)) if get(effect).sets_wind else columns
-            others = [
-                still[c] * prior_size(c, self.flights)
-                for c in wanted
-                if c[0] != effect and get(c[0]).family != family
-            ]
-            X = np.stack([*self.nuisances.values(), *others], axis=2)[fit] / size[:, None]
-            y = part[fit] / size
-            most = FORCE_LIKELIHOOD.most_in_std
-            done = lsq_linear(X.reshape(-1, X.shape[2]), y.ravel(), (-most, most)).x
-            out[effect] = float(np.sqrt(np.mean(np.square(y - X @ done), axis=0)).max())
-        return out
-
     def fitted(self, setting: Setting) -> Setting:
         """Return the mode of the posterior of a setting's effects (damped Gauss-Newton)."""
         here, value = setting, self.objective(setting)
@@ -270,7 +219,7 @@ class ForceLikelihood:
         for _ in range(FORCE_LIKELIHOOD.rounds):
             target = self._linear_mode(here, wanted)
             for share in FORCE_LIKELIHOOD.shares:
-                trial = _between(here, target, share)
+                trial = between(here, target, share)
                 if (after := self.objective(trial)) < value:
                     break
             else:
@@ -305,14 +254,3 @@ class ForceLikelihood:
 
 def _without(setting: Setting, effect: str) -> Setting:
     return {e: x for e, x in setting.items() if e != effect}
-
-
-def _between(here: Setting, there: Setting, share: float) -> Setting:
-    """Return the setting that lies a share of the way from one to another of the same effects."""
-    return {
-        e: {
-            name: values.get(name, 0.0) + share * (there[e][name] - values.get(name, 0.0))
-            for name in there[e]
-        }
-        for e, values in here.items()
-    }

@@ -5,22 +5,14 @@ The likeliest set is fitted without linearisation, and so is each set that comes
 it, until none does that was not fitted.
 """
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ..findings import Ranking
-from ..inference.regression import START_PREFIX, Column, Flights
-from .evidence import marginal, set_evidence
+from ..inference.regression import Column, Flights
 from .force_likelihood import ForceLikelihood
-from .priors import Base, Setting, declared
-from .ranking import starts_of
+from .priors import Base, Setting
+from .ranking import Found, starts_of
 from .sets import Posterior, is_possible
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -33,76 +25,13 @@ class ForceRankingSettings:
 FORCE_RANKING = ForceRankingSettings()
 
 
-@dataclass(frozen=True, eq=False)
-class ForceRanking:
-    """The posterior, and the likeliest set's fit."""
-
-    ranking: Ranking
-    likelihood: ForceLikelihood
-    setting: Setting  # of the likeliest set
-    strangest: tuple[Column, float]  # beside it, of the dictionary, and the deviance it explains
-    beside_unknown: Mapping[str, float]  # probability of each effect, where that acts as well
-    _base: Base  # about the likeliest set
-    _alone: Base  # about what every set has
-
-    def left(self) -> float:
-        """Return the deviance that the likeliest set leaves."""
-        return self.likelihood.deviance(self.setting)
-
-    def gain(self, effect: str) -> float:
-        """Return the deviance by which an effect of the likeliest set is better than all that the
-        others and the nuisances do without it.
-        """
-        base, flights = self._base, self.likelihood.flights
-        every = self.likelihood.columns_of(self.setting)
-        own = np.array([base.columns[c] for c in every if c[0] == effect], dtype=np.intp)
-        others = [base.columns[c] for c in every if c[0] != effect]
-        total = self.likelihood.power * base.blocks.sum(axis=0)
-        beside = np.array([*base.plain, *others], dtype=np.intp)
-        m = marginal(total[:-1, :-1], total[:-1, -1], 0.0, own, beside, np.ones(len(beside)))
-        names = list(base.columns)
-        z = np.array(
-            [
-                (self.setting[effect][names[i][1]] - declared(names[i], flights)) / base.size[i]
-                for i in own
-            ]
-        )
-        return float(z @ m.normal @ z)
-
-    def alone_shares(self) -> dict[str, float]:
-        """Return the share of the deviance that each effect of the library explains alone, beside
-        what every set has.
-        """
-        base, given = self._alone, self._alone.effects
-        total = self.likelihood.power * base.blocks.sum(axis=0)
-        beside = [*base.plain, *(i for (e, _), i in base.columns.items() if e in given)]
-        asked = np.array([i for (e, _), i in base.columns.items() if e and e not in given])
-        others = np.array(beside, dtype=np.intp)
-        inner = total[np.ix_(others, others)] + np.eye(len(others))
-        known = float(total[others, -1] @ np.linalg.solve(inner, total[others, -1]))
-        whole = float(total[-1, -1]) - known
-        m = marginal(total[:-1, :-1], total[:-1, -1], 0.0, asked, others, np.ones(len(others)))
-        names = list(base.columns)
-        ways: dict[tuple[str, str], list[int]] = {}
-        for k, i in enumerate(asked):
-            effect, name = names[i]
-            ways.setdefault((effect, name if name.startswith(START_PREFIX) else ""), []).append(k)
-        out: dict[str, float] = {}
-        for (effect, _), index in ways.items():
-            at = np.array(index)
-            z = set_evidence(m, index, base.low[asked], base.high[asked]).mode
-            gained = float(2.0 * m.right[at] @ z - z @ m.normal[np.ix_(at, at)] @ z)
-            out[effect] = max(out.get(effect, -math.inf), gained / whole)
-        return out
-
-
 def rank_by_force(
     flights: Flights,
     library: Sequence[str],
     first: Setting,
     fixed: Setting,
     report: Callable[[str], None] = lambda text: None,
-) -> ForceRanking:
+) -> Found:
     """Return the posterior over sets of effects of a library.
 
     Args:
@@ -165,12 +94,4 @@ def rank_by_force(
     bases.pop(key)
     bases[key] = likelihood.base(best, others, unknown=True)
     found = Posterior(flights, library, list(bases.values()), likelihood.power, given, idle)
-    return ForceRanking(
-        found.ranking(),
-        likelihood,
-        best,
-        found.strangest(),
-        found.beside_unknown(),
-        bases[key],
-        alone,
-    )
+    return Found(found, found.ranking(), best)

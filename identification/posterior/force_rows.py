@@ -116,6 +116,11 @@ class ForceRows:
         rotation = self._axes(setting)
         return self._thinned([self._in_body(x, rotation) for x in both])
 
+    def noise(self) -> Array:
+        """Return rows of the sensors' noise, as far as the logs show it."""
+        noise = self.flights.visible_noise / np.repeat([self.flights.vehicle.mass, 1.0], 3)
+        return self.from_world(noise[:, :3], np.zeros_like(noise[:, :3]))
+
     def columns(
         self, setting: Setting, wanted: Iterable[Column], step: float = FORCE_ROWS.step
     ) -> dict[Column, Array]:

@@ -42,7 +42,7 @@ from ..motion.signals import Signals, log_signals
 from ..motion.smoothing import continuous
 from .axis_filter import AXIS, AxisNoise, likeliest_noise, steady_noise
 from .causal_filter import Poses, Track, run, sensitivities
-from .discrepancy import discrepancy_columns
+from .discrepancy import changing_columns, discrepancy_columns, variables
 from .rotor_innovations import DRIVEN, rotor_innovations
 
 Array = NDArray[np.float64]
@@ -101,21 +101,28 @@ class Likelihood:
         setting: the coefficients about which all is linear.
         near: the likelihood of the same flights near another setting, whose noise is where the
             search for this one's begins; default: it begins with what any flight may have.
+        same_noise: whether that noise is taken as it is.
     """
 
     axes: tuple[int, ...] = (0, 1, 2, 3, 4, 5)  # whose innovations count
 
     def __init__(
-        self, flights: Flights, setting: Setting, near: "Likelihood | None" = None
+        self,
+        flights: Flights,
+        setting: Setting,
+        near: "Likelihood | None" = None,
+        same_noise: bool = False,
     ) -> None:
         self.flights, self.setting = flights, setting
         self.vehicle = flights.amended({k: v for k, v in setting.items() if k})
-        self.pieces = [
-            piece
+        found = [
+            (i, piece)
             for i, log in enumerate(flights.logs)
             if flights.fit_rows[flights.log == i].any()  # no test log
             for piece in read_poses(log, self.vehicle)
         ]
+        self.pieces = [piece for _, piece in found]
+        self._fit = [_in_fit(flights, i, piece.t) for i, piece in found]
         self.period = self.pieces[0].period
         inertia = flights.vehicle.inertia
         self.inertias = np.array([flights.vehicle.mass] * 3 + np.diagonal(inertia).tolist())
@@ -128,7 +135,8 @@ class Likelihood:
         else:
             self.noise, self.known = near.noise, near.known
         self.tracks = self._run(self.noise, self.known)
-        for i in range(1 if near else LIKELIHOOD.noise_rounds):
+        rounds = 0 if near and same_noise else 1 if near else LIKELIHOOD.noise_rounds
+        for i in range(rounds):
             self.noise, self.known = self._likeliest(begun=near is not None or i > 0)
             self.tracks = self._run(self.noise, self.known)
         self.signals = [
@@ -379,6 +387,7 @@ class Likelihood:
             )
             for (group, name), column in found.items():
                 acting["", f"{UNKNOWN}{group}: {name}"] = column
+            self._add_changing_coefficients()
         for c, start in starts.items():
             if c not in acting:
                 acting[c] = self._start(c[0], start)
@@ -394,6 +403,29 @@ class Likelihood:
                 if get(c[0]).role == Role.CENTRE_OF_MASS:
                     self._swing(c)
         return self._products(acting, moved)
+
+    def _add_changing_coefficients(self) -> None:
+        """Add the dictionary's columns of effects of the setting whose coefficients change."""
+        acting, moved = self._columns
+        effects = [e for e in self.setting if e]
+        parts, poses = {}, {}
+        for effect in effects:
+            if get(effect).kind == "sensing" and not is_delay(effect):
+                own = self.setting[effect].items()
+                poses[effect] = [
+                    np.sum([value * self._moved((effect, name))[i] for name, value in own], axis=0)
+                    for i in range(len(self.pieces))
+                ]
+                continue
+            vehicle = self.flights.amended({e: self.setting[e] for e in effects if e != effect})
+            parts[effect] = [
+                base - self._acceleration(s, vehicle)
+                for s, base in zip(self.signals, self._base, strict=True)
+            ]
+        found = variables(self.tracks, [p.t for p in self.pieces])
+        for columns, of in ((acting, parts), (moved, poses)):
+            for (group, name), column in changing_columns(of, found).items():
+                columns["", f"{UNKNOWN}{group}: {name}"] = column
 
     def _add_what_any_flight_may_have(self) -> None:
         """Add the columns of time offsets, of rotors between samples and of the model's error."""
@@ -462,7 +494,8 @@ class Likelihood:
 
     def _model_errors(self) -> dict[str, list[Array]]:
         parts: dict[str, list[Array]] = {}
-        for track in self.tracks:
+        answers = self._rotor_innovations()
+        for track, answer in zip(self.tracks, answers, strict=True):
             specific = track.rotors[:, 0] / self.vehicle.mass
             for i, axis in enumerate("xyz"):
                 force, torque = np.zeros((len(specific), 6)), np.zeros((len(specific), 6))
@@ -470,7 +503,16 @@ class Likelihood:
                 torque[:, 3 + i] = track.rotors[:, 1 + i] / self.inertias[3 + i]
                 parts.setdefault(f"of force {axis}", []).append(force)
                 parts.setdefault(f"of torque {axis}", []).append(torque)
+                # of rounded rotor speeds the flight loop's answer to the state shows too little,
+                # and what answers the state stands for it
+                expected = np.zeros_like(torque)
+                expected[:, 3 + i] = torque[:, 3 + i] - answer[:, 1 + i]
+                parts.setdefault(f"of expected torque {axis}", []).append(expected)
         return parts
+
+    def _rotor_innovations(self) -> list[Array]:
+        pairs = list(zip(self.pieces, self.tracks, strict=True))
+        return rotor_innovations(pairs, self.inertias[2:])
 
     def _jumps(self) -> tuple[list[Column], list[Array], NDArray[np.intp]]:
         """Return the columns of the gains on the rotors' innovations, their jumps (n, 6, e) of each
@@ -479,9 +521,7 @@ class Likelihood:
         Thrust and torques say something of the axes that they drive. And a loop that rolls or
         pitches the vehicle has seen where it is, and what pushes it aside.
         """
-        rotors = rotor_innovations(
-            list(zip(self.pieces, self.tracks, strict=True)), self.inertias[2:]
-        )
+        rotors = self._rotor_innovations()
         kinds = (*(f"axis {axis}" for axis in DRIVEN), "roll aside", "pitch aside")
         names: list[Column] = [("", f"{GAIN} {kind} {state}") for kind in kinds for state in STATES]
         out = []
@@ -556,7 +596,9 @@ class Likelihood:
                 out[:, :, :count] = inner
                 out[:, :, count] = track.innovations[at]
                 out /= std[None, :, None]
-                kept = out[max(skip - begin, 0) :, use].reshape(-1, count + 1)
+                fit = self._fit[i][at].copy()
+                fit[: max(skip - begin, 0)] = False
+                kept = out[fit][:, use].reshape(-1, count + 1)
                 if len(kept):
                     samples += len(kept) // len(use)
                     blocks.append(kept.T @ kept)
@@ -565,11 +607,31 @@ class Likelihood:
                 0.0
                 if not effect or name.startswith((START_PREFIX, WHOLE_PREFIX))
                 else self.flights.coefficients(self.setting, effect).get(name, 0.0)
+                - declared((effect, name), self.flights)
                 for effect, name in names
             ]
         )
         penalty = 2.0 * samples * float(np.log(std[use]).sum())
         return Sums(names, np.array(blocks), value, penalty)
+
+
+def declared(column: Column, flights: Flights) -> float:
+    """Return what the vehicle's file states of a column's coefficient, from which a coefficient of
+    the likelihood counts; 0 where it states nothing.
+    """
+    effect, name = column
+    if not effect or name.startswith(START_PREFIX):
+        return 0.0
+    return flights.coefficients({}, effect).get(name.removeprefix(WHOLE_PREFIX), 0.0)
+
+
+def _in_fit(flights: Flights, log: int, t: Array) -> NDArray[np.bool_]:
+    """Return which samples of a log, at times ``t`` (n,) s, the fit may see: those of whose block
+    the rows are.
+    """
+    rows = flights.log == log
+    at = np.searchsorted(flights.t[rows], t).clip(max=int(rows.sum()) - 1)
+    return np.asarray(flights.fit_rows[rows][at])
 
 
 def read_poses(log: FlightLog, vehicle: Vehicle) -> list[Poses]:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Role
-from ..inference.gram_matrix import GRAM
 from ..inference.regression import (
     CENTRAL,
     START_PREFIX,
@@ -33,6 +32,7 @@ from .likelihood import (
     UNKNOWN,
     WHOLE_PREFIX,
     Sums,
+    declared,
 )
 
 Array = NDArray[np.float64]
@@ -49,6 +49,7 @@ class PriorSettings:
     negligible: float = 0.03
     size: float = 1.0  # typical sizes, the standard deviation of a coefficient
     any_size: float = 3.0  # the same of effects that may be of any size
+    most_missing_mass: float = 0.9  # share of the declared mass that a vehicle may lack
     # times a lag or a delay at which a column was made, between which the column stands for it
     near_start: tuple[float, float] = (0.5, 1.5)
 
@@ -122,16 +123,6 @@ def _typical(column: Column, flights: Flights) -> float:
     return typical_size((effect, name.removeprefix(WHOLE_PREFIX)), flights.vehicle)
 
 
-def declared(column: Column, flights: Flights) -> float:
-    """Return what the vehicle's file states of a column's coefficient, from which a coefficient of
-    the likelihood counts; 0 where it states nothing.
-    """
-    effect, name = column
-    if not effect or name.startswith(START_PREFIX):
-        return 0.0
-    return flights.coefficients({}, effect).get(name.removeprefix(WHOLE_PREFIX), 0.0)
-
-
 def _bounds(column: Column, flights: Flights) -> tuple[float, float]:
     effect, name = column
     if not effect:
@@ -141,7 +132,7 @@ def _bounds(column: Column, flights: Flights) -> tuple[float, float]:
     c = coefficient((effect, name.removeprefix(WHOLE_PREFIX)))
     low, high = c.minimum, min(c.maximum, c.plausible)
     if get(effect).role == Role.MASS:
-        low = max(low, -GRAM.most_missing_mass * unit_of_change(column, flights.vehicle))
+        low = max(low, -PRIORS.most_missing_mass * unit_of_change(column, flights.vehicle))
     own = declared(column, flights)
     return min(low - own, 0.0), max(high - own, 0.0)
 
@@ -156,12 +147,12 @@ def _errors_of_torques(total: Array, columns: Mapping[Column, int], size: Array)
     it: by how much it would add to what the column says.
     """
     factor = np.ones(len(size))
-    torque = f"{MODEL_ERROR} of torque "
+    torque, expected = f"{MODEL_ERROR} of torque ", f"{MODEL_ERROR} of expected torque "
     others = np.array(
         [
             i
             for (e, name), i in columns.items()
-            if not e and not name.startswith((torque, ROUNDED, UNKNOWN))
+            if not e and not name.startswith((torque, expected, ROUNDED, UNKNOWN))
         ]
     )
     inner = total[np.ix_(others, others)] + np.eye(len(others))
@@ -174,7 +165,8 @@ def _errors_of_torques(total: Array, columns: Mapping[Column, int], size: Array)
         if (rounded := columns.get(("", ROUNDED + axis))) is not None:
             own = columns["", torque + axis]
             share = left(rounded) / max(left(own) / size[own] ** 2, 1e-30)
-            factor[own] = math.hypot(1.0, share / size[own])
+            for i in (own, columns["", expected + axis]):
+                factor[i] = math.hypot(1.0, share / size[i])
     return factor
 
 
@@ -221,3 +213,14 @@ def in_prior_units(
         np.array(dictionary, dtype=np.intp),
         starts,
     )
+
+
+def between(here: Setting, there: Setting, share: float) -> Setting:
+    """Return the setting that lies a share of the way from one to another of the same effects."""
+    return {
+        e: {
+            name: values.get(name, 0.0) + share * (there[e][name] - values.get(name, 0.0))
+            for name in there[e]
+        }
+        for e, values in here.items()
+    }

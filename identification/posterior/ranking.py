@@ -5,6 +5,7 @@ missing. A set's evidence is that of the likelier noise of two: that beside no e
 beside the best set, because what is not explained counts as a disturbance.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -12,11 +13,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.effects import get
+from ...runtime.errors import InputError
 from ..findings import Ranking
-from ..inference.regression import START_PREFIX, Column, Flights, moves_time, typical_size
+from ..inference.regression import (
+    START_PREFIX,
+    Column,
+    Flights,
+    coefficient,
+    moves_time,
+    typical_size,
+)
 from ..inference.starting_points import starting_points
-from .likelihood import Likelihood
-from .priors import Base, Setting, in_prior_units, variants_of
+from .axis_filter import AxisNoise
+from .evidence import marginal, set_evidence
+from .likelihood import WHOLE_PREFIX, Likelihood, declared
+from .priors import Base, Setting, between, in_prior_units, variants_of
 from .sets import Posterior
 
 Array = NDArray[np.float64]
@@ -28,67 +39,115 @@ class RankingSettings:
 
     # typical sizes at which a lag or a delay is tried as a whole: their columns change with them
     time_starts: tuple[float, ...] = (0.3, 0.6, 1.2)
-    rounds: int = 4  # of fitting the noise beside the best set
+    rounds: int = 6  # of fitting the noise beside the best set
+    # of fitting coefficients in which a force is not linear, and shares of a step, tried in turn
+    fit_rounds: int = 8
+    shares: tuple[float, ...] = (1.0, 0.5, 0.2, 0.05)
+    least_gain: float = 0.5  # nats; a step that gains less is the last
 
 
 RANKING = RankingSettings()
 
 
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The posterior of flights, and what the likeliest set is a fit of."""
+
+    posterior: Posterior
+    ranking: Ranking
+    setting: Setting  # coefficients of the likeliest set
+    # of each channel, where the likelihood has a noise of the motion; none for a force balance
+    noise: tuple[AxisNoise, ...] = ()
+
+
 def rank(
     flights: Flights,
     library: Sequence[str],
-    proposed: Setting | None = None,
     report: Callable[[str], None] = lambda text: None,
-) -> Ranking:
+) -> Found:
     """Return the posterior over sets of effects of a library, of those that flights can show.
 
     Args:
         flights: whose poses are explained.
         library: names of effects that may act.
-        proposed: effects with coefficients that another search has found: its columns are asked
-            beside those of the sets that the posterior comes upon by itself.
         report: called with a line of progress.
     """
-    library = [e for e in library if e not in flights.not_identifiable]
     near = Likelihood(flights, {})
-    starts = starts_of(flights, library, {})
-    sums = near.sums(wanted_columns(library, {}, starts), starts, unknown=False)
-    loud = in_prior_units(flights, sums, {}, starts)
+    nothing = _Beside(flights, library, {}, near)
+    loud = nothing.base()
     explained = _whole_library(loud)
-    now = in_prior_units(flights, near.quieter(explained), {}, starts)
-    tried: dict[frozenset[str], Setting] = {frozenset(): {}}
-    beside: _Beside | None = None
-    others: tuple[Base, ...] = ()
-    if proposed and proposed.keys() <= set(library):
-        tried[frozenset(proposed)] = proposed
-        beside = _Beside(flights, library, proposed, near)
-        others = (beside.base(),)
-    found = Posterior(flights, library, (loud, *others, now))
+    quiet = nothing.quieter_base(explained)
+    found = Posterior(flights, library, (loud, quiet))
     # the best effect first, alone: another set's columns are those of the model that has it
     setting = found.best_setting(1)
-    last: _Beside | None = None
+    tried: dict[frozenset[str], Setting] = {frozenset(): {}}
+    beside = nothing
     for _ in range(RANKING.rounds):
         # the columns of the same set change with its coefficients, where these have moved far
         if not found.is_elsewhere(setting, tried):
             setting = found.best_setting()
             if not found.is_elsewhere(setting, tried):
                 break
-        tried[frozenset(setting)] = setting
-        if beside and beside.setting.keys() == setting.keys():
-            beside, others = None, ()
         report(f"trying {', '.join(setting)}")
-        last = _Beside(flights, library, setting, last.likelihood if last else near)
-        found = Posterior(flights, library, (loud, *others, last.base()))
+        setting = _fitted(flights, setting, near)
+        tried[frozenset(setting)] = setting
+        beside = _Beside(flights, library, setting, near)
+        near = beside.likelihood
+        found = Posterior(flights, library, (loud, beside.base()))
         setting = found.best_setting()
     # once more, with the dictionary's columns, that are dear, beside the likeliest set
-    if beside and found.best_base() == 1:
-        others, last = ((last.base(),) if last else (now,)), beside
-    if last:
-        now = last.base(unknown=True)
-    else:
-        near.sums(wanted_columns(library, {}, starts), starts)
-        now = in_prior_units(flights, near.quieter(explained), {}, starts)
-    return Posterior(flights, library, (loud, *others, now), found.tempering()).ranking()
+    alone = beside is nothing
+    base = nothing.quieter_base(explained, unknown=True) if alone else beside.base(unknown=True)
+    found = Posterior(flights, library, (loud, base), found.tempering())
+    return Found(found, found.ranking(), found.best_setting(), beside.likelihood.noise)
+
+
+def _fitted(flights: Flights, setting: Setting, near: Likelihood) -> Setting:
+    """Return the mode of the posterior of a setting's effects, with the noise as it is (damped
+    Gauss-Newton).
+    """
+    here, value, target = _step(flights, setting, near)
+    for _ in range(RANKING.fit_rounds):
+        for share in RANKING.shares:
+            moved = between(here, target, share)
+            trial = _step(flights, moved, near)
+            if trial[1] < value:
+                break
+        else:
+            break
+        gained = value - trial[1]
+        here, value, target = trial
+        if gained < RANKING.least_gain:
+            break
+    return here
+
+
+def _step(flights: Flights, setting: Setting, near: Likelihood) -> tuple[Setting, float, Setting]:
+    """Return a setting, minus the logarithm of likelihood and prior there, up to a constant, and
+    the mode of the linearised posterior about it; an infinite value where no vehicle is like that.
+    """
+    try:
+        likelihood = Likelihood(flights, setting, near, same_noise=True)
+        wanted = wanted_columns(flights, list(setting), setting, {})
+        sums = likelihood.sums(wanted, {}, unknown=False)
+        base = in_prior_units(flights, sums, setting, {})
+    except (InputError, np.linalg.LinAlgError):
+        return setting, math.inf, setting
+    asked = np.array([i for c, i in base.columns.items() if c in wanted], dtype=np.intp)
+    total = base.blocks.sum(axis=0)
+    ones = np.ones(len(base.plain))
+    m = marginal(total[:-1, :-1], total[:-1, -1], float(total[-1, -1]), asked, base.plain, ones)
+    columns = [list(base.columns)[i] for i in asked]
+    here = np.array([setting[e].get(n, 0.0) - declared((e, n), flights) for e, n in columns])
+    z = here / base.size[asked]
+    value = -m.constant - float(m.right @ z - 0.5 * z @ m.normal @ z) + 0.5 * float(z @ z)
+    mode = set_evidence(m, range(len(asked)), base.low[asked], base.high[asked]).mode
+    out: Setting = {e: dict(x) for e, x in setting.items()}
+    for (effect, name), x in zip(columns, (mode * base.size[asked]).tolist(), strict=True):
+        limits = coefficient((effect, name))
+        x += declared((effect, name), flights)
+        out[effect][name] = min(max(x, limits.minimum), limits.maximum)
+    return setting, value, out
 
 
 class _Beside:
@@ -103,16 +162,32 @@ class _Beside:
 
     def base(self, unknown: bool = False) -> Base:
         """Return its sums; ``unknown``: with the dictionary's columns."""
-        wanted = wanted_columns(self.library, self.setting, self.starts)
+        wanted = wanted_columns(self.flights, self.library, self.setting, self.starts)
         sums = self.likelihood.sums(wanted, self.starts, unknown)
+        return in_prior_units(self.flights, sums, self.setting, self.starts)
+
+    def quieter_base(self, coefficients: Mapping[Column, float], unknown: bool = False) -> Base:
+        """Return its sums with the noise that is likeliest beside the whole library."""
+        if unknown:
+            self.base(unknown)
+        sums = self.likelihood.quieter(coefficients)
         return in_prior_units(self.flights, sums, self.setting, self.starts)
 
 
 def wanted_columns(
-    library: Sequence[str], setting: Setting, starts: Mapping[Column, Mapping[str, float]]
+    flights: Flights,
+    library: Sequence[str],
+    setting: Setting,
+    starts: Mapping[Column, Mapping[str, float]],
 ) -> dict[Column, None]:
-    """Return the columns of all effects, in order."""
-    return dict.fromkeys(c for e in library for v in variants_of(e, setting, starts) for c in v[1])
+    """Return the columns of all effects, in order, but those that the vehicle's file fixes."""
+    return dict.fromkeys(
+        c
+        for e in library
+        for v in variants_of(e, setting, starts)
+        for c in v[1]
+        if c[1].removeprefix(WHOLE_PREFIX) not in flights.stated(e)
+    )
 
 
 def _whole_library(base: Base) -> dict[Column, float]:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ from .evidence import (
     set_evidence,
     tempering,
 )
-from .likelihood import WHOLE_PREFIX
+from .likelihood import UNKNOWN, WHOLE_PREFIX
 from .priors import PRIORS, Base, Setting, Variant, declared, variants_of
 
 Array = NDArray[np.float64]
@@ -40,6 +41,7 @@ class SetSettings:
 
 
 SETS = SetSettings()
+CHANGING = f"{UNKNOWN}changing coefficient: "
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,13 +132,12 @@ class Posterior:
         if key in self.idle:
             return False
         own = self.bases[number].effects
+        if len(self.bases) == 1:
+            return (self.given or frozenset()) <= key
         if self.given is None:  # of a set in another base the columns are that base's
             return number > 0 or not any(x.effects and key >= x.effects for x in self.bases[1:])
-        if len(self.bases) == 1:
-            return self.given <= key
-        return own <= key and len(own) == max(
-            len(x.effects) for x in self.bases if x.effects <= key
-        )
+        most = max(len(x.effects) for x in self.bases if x.effects <= key)
+        return own <= key and len(own) == most
 
     def _variants(self, base: Base) -> list[Variant]:
         out = []
@@ -145,9 +146,14 @@ class Posterior:
         starts: dict[Column, dict[str, float]] = {c: {} for c in from_start}
         for effect in self.library:
             for _, every in variants_of(effect, setting, starts):
-                # a force balance does not see where an effect acts, nor is what a file states asked
-                known = self.given is not None
-                columns = tuple(c for c in every if c in base.columns or not known)
+                # what a file states is not asked, and a balance does not see where an effect acts
+                stated, known = self.flights.stated(effect), self.given is not None
+                columns = tuple(
+                    c
+                    for c in every
+                    if c[1].removeprefix(WHOLE_PREFIX) not in stated
+                    and (c in base.columns or not known)
+                )
                 if columns and all(c in base.columns for c in columns):
                     out.append((effect, columns))
         return out
@@ -219,8 +225,20 @@ class Posterior:
         return self.known[max(self.scores, key=self.scores.__getitem__)].base
 
     def structure(self) -> float:
-        """Return the logarithm of the Bayes factor of one more column beside the likeliest set."""
-        return evidence_of_one_more(*self._beside_best(), DISCREPANCY.sizes)
+        """Return the logarithm of the Bayes factor of one more column beside the likeliest set.
+
+        Each group of the dictionary is as likely as each other to have it, and in it each column.
+        """
+        normal, right, chosen, size, tried = self._beside_best()
+        names = list(self.bases[-1].columns)
+        groups: dict[str, list[int]] = {}
+        for i in tried.tolist():
+            groups.setdefault(names[i][1].split(": ")[0], []).append(i)
+        found = [
+            evidence_of_one_more(normal, right, chosen, size, np.array(i), DISCREPANCY.sizes)
+            for i in groups.values()
+        ]
+        return log_sum(found) - math.log(len(found))
 
     def strangest(self) -> tuple[Column, float]:
         """Return the column of the dictionary that explains most beside the likeliest set, and the
@@ -231,10 +249,16 @@ class Posterior:
         gains = np.square(score) / left
         return names[self.bases[-1].dictionary[int(np.argmax(gains))]], float(gains.max())
 
-    def beside_unknown(self) -> dict[str, float]:
-        """Return the probability of each effect of the library where the column of the dictionary
+    def beside_unknown(self, effects: Collection[str]) -> float:
+        """Return the probability that one of some effects acts where the column of the dictionary
         that explains most acts as well.
         """
+        scores = self._scores_beside_unknown
+        total = log_sum(list(scores.values()))
+        return sum(math.exp(x - total) for key, x in scores.items() if key & set(effects))
+
+    @cached_property
+    def _scores_beside_unknown(self) -> dict[frozenset[str], float]:
         base = self.bases[-1]
         strange = base.columns[self.strangest()[0]]
         plain = np.append(base.plain, strange)
@@ -243,12 +267,105 @@ class Posterior:
         blocks[:, strange] *= largest
         blocks[:, :, strange] *= largest
         beside = replace(base, plain=plain, blocks=blocks)
-        found = Posterior(self.flights, self.library, [beside], self.power, self.given, self.idle)
-        total = log_sum(list(found.scores.values()))
+        given = self.given or frozenset()
+        return Posterior(self.flights, self.library, [beside], self.power, given, self.idle).scores
+
+    def _split(self, base: Base, asked: Index, beside: Sequence[int]) -> Marginal:
+        """Return the likelihood of some columns of a base with others integrated out."""
+        total = self.power * base.blocks.sum(axis=0)
+        others = np.array([*base.plain, *beside], dtype=np.intp)
+        ones = np.ones(len(others))
+        return marginal(total[:-1, :-1], total[:-1, -1], float(total[-1, -1]), asked, others, ones)
+
+    def _best(self) -> tuple[Base, _Candidate]:
+        best = self.known[max(self.scores, key=self.scores.__getitem__)]
+        return self.bases[best.base], best
+
+    def log_bayes_factor(self, effect: str) -> float:
+        """Return by how much the likeliest set with an effect is likelier than the likeliest
+        without it, whatever was believed before.
+        """
+        each = math.log(self.inclusion / (1.0 - self.inclusion))
+        value = {key: x - each * len(key) for key, x in self.scores.items()}
+        have = max(x for key, x in value.items() if effect in key)
+        lack = max((x for key, x in value.items() if effect not in key), default=-math.inf)
+        return have - lack
+
+    def deviances(self) -> tuple[float, float]:
+        """Return the deviance that nothing of the library leaves, and that the likeliest set
+        leaves, with the nuisances integrated out.
+        """
+        base, best = self._best()
+        at = np.array([base.columns[c] for v in best.variants for c in v[1]], dtype=np.intp)
+        m = self._split(base, at, [])
+        inner = np.eye(len(base.plain))  # of the nuisances' integral the logarithm is no deviance
+        total = self.power * base.blocks.sum(axis=0)
+        inner += total[np.ix_(base.plain, base.plain)]
+        log_volume = 0.5 * float(np.linalg.slogdet(inner)[1])
+        whole = -2.0 * (m.constant + log_volume)
+        z = best.evidence.mode
+        return whole, whole - float(2.0 * m.right @ z - z @ m.normal @ z)
+
+    def alone(self) -> dict[str, float]:
+        """Return the deviance that each effect of the library explains alone, beside what every set
+        has, over that which all of them together explain.
+        """
+        given = self.given or frozenset()
+        base = next(x for x in self.bases if x.effects == given)
+        always = [i for (e, _), i in base.columns.items() if e in given]
+        asked = np.array([i for (e, _), i in base.columns.items() if e and e not in given])
+        m = self._split(base, asked, always)
+        at = {i: k for k, i in enumerate(asked.tolist())}
+
+        def explained(index: list[int]) -> float:
+            z = set_evidence(m, index, base.low[asked], base.high[asked]).mode
+            return float(2.0 * m.right[index] @ z - z @ m.normal[np.ix_(index, index)] @ z)
+
+        normal = m.normal + np.eye(len(asked))
+        whole = max(float(m.right @ np.linalg.solve(normal, m.right)), 1e-12)
+        out: dict[str, float] = {}
+        for effect, columns in self._variants(base):
+            if effect not in given:
+                share = explained([at[base.columns[c]] for c in columns]) / whole
+                out[effect] = max(out.get(effect, 0.0), share)
+        return out
+
+    def nuisances(self) -> dict[Column, tuple[float, float]]:
+        """Return what any flight may have beside effects, at the mode beside the likeliest set:
+        values and standard deviations.
+        """
+        base, best = self._best()
+        own = [base.columns[c] for v in best.variants for c in v[1]]
+        m = self._split(base, base.plain, own)
+        normal = m.normal + np.eye(len(base.plain))
+        value, std = np.linalg.solve(normal, m.right), np.sqrt(np.diag(np.linalg.inv(normal)))
+        names = list(base.columns)
+        size = base.size[base.plain]
         return {
-            e: sum(math.exp(x - total) for k, x in found.scores.items() if e in k)
-            for e in self.library
+            names[i]: (float(x), float(s))
+            for i, x, s in zip(base.plain, value * size, std * size, strict=True)
         }
+
+    def hidden(self, hiding: Sequence[Column], least: float) -> frozenset[str]:
+        """Return the effects, outside the likeliest set, of which a typical size changes the
+        deviance by less than ``least``, and would by more if some nuisances were known.
+        """
+        base, best = self._best()
+        own = [base.columns[c] for v in best.variants for c in v[1]]
+        known = [i for i in base.plain.tolist() if list(base.columns)[i] not in hiding]
+        out = set()
+        for effect, columns in self._variants(base):
+            if effect in {e for e, _ in best.variants}:
+                continue
+            at = np.array([base.columns[c] for c in columns], dtype=np.intp)
+            z = base.typical[at]
+            shown = [
+                float(z @ self._split(replace(base, plain=np.array(x)), at, own).normal @ z)
+                for x in (base.plain.tolist(), known)
+            ]
+            if shown[0] < least <= shown[1]:
+                out.add(effect)
+        return frozenset(out)
 
     def _beside_best(self) -> tuple[Array, Array, Index, Array, Index]:
         """Return the sums of the last base, which has the dictionary's columns, those that the
@@ -263,8 +380,23 @@ class Posterior:
         little = PRIORS.negligible * base.typical[asked]
         chosen = np.array([*base.plain, *asked, *own], dtype=np.intp)
         total = self.power * base.blocks.sum(axis=0)
+        total /= 1.0 + DISCREPANCY.model_error**2 * self._done(base, total)
+        if not (self.flights.commanded or self.flights.rotor_speeds_vary):
+            total *= DISCREPANCY.rounded
         size = np.concatenate([np.ones(len(base.plain)), little, np.ones(len(own))])
         return total[:-1, :-1], total[:-1, -1], chosen, size, base.dictionary
+
+    def _done(self, base: Base, total: Array) -> float:
+        """Return the deviance that the effects of a base make, by their parts that change with a
+        variable.
+        """
+        energy: dict[str, list[float]] = {}
+        names = list(base.columns)
+        for i in base.dictionary.tolist():
+            if names[i][1].startswith(CHANGING):
+                effect = names[i][1].removeprefix(CHANGING).split(" with ")[0]
+                energy.setdefault(effect, []).append(total[i, i] / DISCREPANCY.share_of_effect**2)
+        return sum(float(np.mean(x)) for x in energy.values())
 
     def best_setting(self, most: int = SETS.most_effects) -> Setting:
         """Return the coefficients of the likeliest set of at most so many effects."""

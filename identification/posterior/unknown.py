@@ -1,0 +1,62 @@
+"""How probable it is that something acts which no effect of the library is.
+
+Three things speak for it: a column of the dictionary that explains what the likeliest set leaves, a
+push, and, where nothing is named, a disturbance that is too large to be none. Their weights are
+fitted to flights of which the truth is known.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class UnknownSettings:
+    """The weights, in nats. ``python -m studies.probabilities --fit`` fits them."""
+
+    nothing: float = -4.6  # log odds where nothing speaks for it
+    structure: float = 0.7  # a nat of the Bayes factor of one more column
+    disturbance: float = 2.0  # a nat of a disturbance over what counts for none
+    push: float = 3.0
+    # nats, beyond which more says nothing more
+    structure_range: tuple[float, float] = (0.0, 15.0)
+    disturbance_range: tuple[float, float] = (0.0, 3.0)
+
+
+UNKNOWN = UnknownSettings()
+
+
+@dataclass(frozen=True)
+class Signs:
+    """What speaks for something unknown.
+
+    Attributes:
+        structure: logarithm of the Bayes factor of one more column beside the likeliest set.
+        disturbance: logarithm of the largest disturbance over what counts for none. It counts
+            where nothing is named: a turbulence that is named with a wind is no sign of more.
+        push: whether a transient disturbance was found.
+        named: whether an effect is named.
+    """
+
+    structure: float
+    disturbance: float
+    push: bool
+    named: bool
+
+    def numbers(self) -> tuple[float, float, float, float]:
+        """Return what each weight is multiplied with."""
+        strength = 0.0 if self.named else self.disturbance
+        return (
+            1.0,
+            float(np.clip(self.structure, *UNKNOWN.structure_range)),
+            float(np.clip(strength, *UNKNOWN.disturbance_range)),
+            float(self.push),
+        )
+
+
+def unknown(signs: Signs, weights: UnknownSettings = UNKNOWN) -> float:
+    """Return the probability that something acts which no effect of the library is."""
+    by_sign = (weights.nothing, weights.structure, weights.disturbance, weights.push)
+    odds = sum(w * x for w, x in zip(by_sign, signs.numbers(), strict=True))
+    return 1.0 / (1.0 + math.exp(-odds))

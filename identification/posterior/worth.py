@@ -1,0 +1,82 @@
+"""How much an effect does, beside what a model with it leaves unexplained."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from ...dynamics.effects import get
+from ..inference.regression import CENTRAL, Column, Flights, Setting
+from .force_nuisances import force_nuisances
+from .force_rows import ForceRows
+from .priors import prior_size
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class WorthSettings:
+    """What counts as an effect's own, and as left."""
+
+    most_in_std: float = 3.0  # of a prior, that others may differ in an effect's place
+    # of the sensors' noise: as far as that is known
+    noise_known: float = 0.2
+
+
+WORTH = WorthSettings()
+
+
+def worth(flights: Flights, fixed: Setting, setting: Setting) -> dict[str, float]:
+    """Return of each effect the RMS of what nuisances and effects of other families cannot do in
+    its place, within three standard deviations of their priors, over the RMS of what is left beyond
+    the sensors' noise: in the channel where that is most.
+
+    Args:
+        flights: of the vehicle.
+        fixed: effects that are known from elsewhere.
+        setting: coefficients of the effects that are asked about.
+    """
+    if not setting:
+        return {}
+    rows = ForceRows(flights, fixed)
+    fit, left = rows.fit, rows.residual(setting)
+    noise = np.mean(np.square(rows.noise()[fit]), axis=0)
+    power = np.mean(np.square(left[fit]), axis=0)
+    size = np.sqrt(np.maximum(power - noise, WORTH.noise_known**2 * noise)) + 1e-12
+    nuisances = list(force_nuisances(rows).values())
+    columns = rows.columns(setting, _columns_of(flights, setting))
+    out = {}
+    for effect in setting:
+        less = {e: x for e, x in setting.items() if e != effect}
+        part = rows.residual(less) - left
+        # in still air a drag cannot do what it does in a wind
+        still = get(effect).sets_wind
+        others = rows.columns(less, _columns_of(flights, less)) if still else columns
+        own = _scaled(flights, others, effect)
+        X = np.stack([*nuisances, *own], axis=2)[fit] / size[:, None]
+        y = part[fit] / size
+        most = WORTH.most_in_std
+        done = lsq_linear(X.reshape(-1, X.shape[2]), y.ravel(), (-most, most)).x
+        out[effect] = float(np.sqrt(np.mean(np.square(y - X @ done), axis=0)).max())
+    return out
+
+
+def _columns_of(flights: Flights, setting: Setting) -> list[Column]:
+    return [
+        (effect, c.name)
+        for effect in setting
+        for c in get(effect).coefficients
+        if c.name != CENTRAL and c.name not in flights.stated(effect)
+    ]
+
+
+def _scaled(flights: Flights, columns: Mapping[Column, Array], effect: str) -> list[Array]:
+    """Return the columns of effects of other families in standard deviations of their priors."""
+    family = get(effect).family
+    return [
+        x * prior_size(c, flights)
+        for c, x in columns.items()
+        if c[0] != effect and get(c[0]).family != family
+    ]
