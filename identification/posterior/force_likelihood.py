@@ -11,15 +11,16 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import lsq_linear
 
-from ...dynamics.effects import get
+from ...dynamics.effects import Role, get, playing
 from ...runtime.errors import InputError
 from ..inference.regression import CENTRAL, START_PREFIX, Column, Flights, coefficient
 from ..inference.sensor_bias import bias_columns, flight_and_axis
+from ..inference.time_offsets import LAG_ASYMMETRY
 from ..motion.smoothing import CUTOFFS, low_pass
 from .discrepancy import State, discrepancy_columns
 from .evidence import Index, marginal, set_evidence, tempering
 from .force_noise import ForceNoise, fitted_noise, white_noise
-from .force_nuisances import force_nuisances
+from .force_nuisances import row_nuisances
 from .force_rows import ForceRows
 from .likelihood import NUISANCE, UNKNOWN, Sums
 from .priors import Base, Setting, declared, in_prior_units, prior_size
@@ -61,13 +62,14 @@ class ForceLikelihood:
         self.flights, self.library = flights, list(library)
         self.rows = ForceRows(flights, fixed)
         self.nuisances = {
-            ("", f"{NUISANCE}{name}"): x for name, x in force_nuisances(self.rows).items()
+            ("", f"{NUISANCE}{name}"): x for name, x in row_nuisances(self.rows).items()
         }
         self.power = 1.0
         self.noise: ForceNoise = self._noise(first)
         self._use = self.rows.fit & self.noise.known
         N = self._white(np.stack(list(self.nuisances.values()), axis=2))
         self._given = N.reshape(-1, N.shape[2])
+        self._inner = self._given.T @ self._given
 
     def columns_of(self, effects: Iterable[str]) -> list[Column]:
         """Return the columns of effects: their coefficients, but those that the vehicle's file
@@ -119,7 +121,7 @@ class ForceLikelihood:
             unknown: whether the dictionary's columns are among them.
         """
         rows, residual = self.rows, self.rows.residual(setting)
-        columns = dict(self.nuisances)
+        columns = dict(self.nuisances) | self._uneven_lag(setting)
         columns |= rows.columns(setting, [c for c in wanted if not c[1].startswith(START_PREFIX)])
         for c, start in starts.items():
             columns[c] = residual - rows.residual({**setting, c[0]: dict(start)})
@@ -164,13 +166,17 @@ class ForceLikelihood:
         )
         out: dict[Column, Array] = {}
         for (group, name), parts in found.items():
-            if not any(x[:, :3].any() for x in parts):
+            if not self.rows.with_torques and not any(x[:, :3].any() for x in parts):
                 continue
-            sampled = [
-                low_pass(x[:, :3], CUTOFFS.residual_hz, p.signals.period)[p.rows]
-                for x, p in zip(parts, pieces, strict=True)
-            ]
-            out["", f"{UNKNOWN}{group}: {name}"] = self.rows.from_world(np.concatenate(sampled))
+            sampled = np.concatenate(
+                [
+                    low_pass(x, CUTOFFS.residual_hz, p.signals.period)[p.rows]
+                    for x, p in zip(parts, pieces, strict=True)
+                ]
+            )
+            out["", f"{UNKNOWN}{group}: {name}"] = self.rows.from_world(
+                sampled[:, :3], torque=sampled[:, 3:]
+            )
         return out
 
     # Fits
@@ -183,7 +189,7 @@ class ForceLikelihood:
             InputError: no vehicle is like that.
         """
         w = self._white(self.rows.residual(setting)).ravel()
-        factor, b = self._nuisance_sums(w)
+        factor, b = self._nuisance_sums(w, setting)
         return self.power * float(w @ w) - float(b @ cho_solve(factor, b))
 
     def criterion(self, setting: Setting) -> float:
@@ -193,9 +199,20 @@ class ForceLikelihood:
         cost = math.log(int(self._use.sum()))
         return self.deviance(setting) + cost * len(self.columns_of(setting))
 
-    def _nuisance_sums(self, w: Array) -> tuple[tuple[Array, bool], Array]:
-        inner = self.power * self._given.T @ self._given + np.eye(self._given.shape[1])
-        return cho_factor(inner), self.power * self._given.T @ w
+    def _uneven_lag(self, setting: Setting) -> dict[Column, Array]:
+        """Return what rotors that speed up sooner than they slow down do beside a lag."""
+        if self.flights.commanded or not playing(Role.LAG, among=list(setting)):
+            return {}
+        return self.rows.columns(setting, [LAG_ASYMMETRY])
+
+    def _nuisance_sums(self, w: Array, setting: Setting) -> tuple[tuple[Array, bool], Array]:
+        inner, right = self._inner, self._given.T @ w
+        for c, column in self._uneven_lag(setting).items():
+            x = self._white(column).ravel() * prior_size(c, self.flights)
+            cross = self._given.T @ x
+            inner = np.block([[inner, cross[:, None]], [cross, x @ x]])
+            right = np.append(right, x @ w)
+        return cho_factor(self.power * inner + np.eye(len(inner))), self.power * right
 
     def objective(self, setting: Setting) -> float:
         """Return minus the logarithm of likelihood and prior at a setting, up to a constant;
@@ -215,8 +232,9 @@ class ForceLikelihood:
         """Return the likeliest biases of accelerometers from which the motion was read, as
         ``Flights`` takes them out.
         """
-        factor, b = self._nuisance_sums(self._white(self.rows.residual(setting)).ravel())
-        modes = dict(zip(self.nuisances, cho_solve(factor, b).tolist(), strict=True))
+        w = self._white(self.rows.residual(setting)).ravel()
+        factor, b = self._nuisance_sums(w, setting)
+        modes = dict(zip(self.nuisances, cho_solve(factor, b).tolist(), strict=False))
         out = {}
         for effect, name in bias_columns(len(self.flights.logs)):
             flight, axis = flight_and_axis(name)

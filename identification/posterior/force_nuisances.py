@@ -1,5 +1,5 @@
-"""What any flight may have beside effects where rotors are known by commands: columns in standard
-deviations of their priors, which are integrated out.
+"""What any flight may have beside effects: columns in standard deviations of their priors, which
+are integrated out.
 """
 
 from collections.abc import Sequence
@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.effects import Role, playing
+from ..inference.time_offsets import timing_of
 from ..inference.turning_delay import rotor_delay
 from ..motion.smoothing import CUTOFFS, low_pass
 from .force_rows import ForceRows
+from .likelihood import LIKELIHOOD, MODEL_ERROR
 
 Array = NDArray[np.float64]
 
@@ -32,61 +34,124 @@ class NuisanceSettings:
 NUISANCES = NuisanceSettings()
 
 
-def force_nuisances(rows: ForceRows) -> dict[str, Array]:
-    """Return columns (n, channels) by name, each in standard deviations of its prior.
+def row_nuisances(rows: ForceRows) -> dict[str, Array]:
+    """Return columns (n, channels) by name, each in standard deviations of its prior."""
+    out: dict[str, Array] = {}
+    for i in range(len(rows.flights.logs)):
+        here = np.zeros(len(rows.flights.t))
+        here[rows.flights.log == i] = 1.0
+        if here.any():
+            of = _Flown(rows, i, here)
+            out |= _of_sensors(of)
+            out |= _of_commands(of) if rows.flights.commanded else _of_rotors(of)
+    if not rows.flights.commanded:
+        out |= _of_timing(rows)
+    return out
+
+
+class _Flown:
+    """A flight, and what its rotors deliver by the declared vehicle.
+
+    Attributes:
+        here: (samples,) 1 in this flight, 0 in others.
+        thrust: (samples,) specific, m/s2.
+        slope: (samples,) its derivative, m/s3.
+        turning: (samples, 3) angular acceleration by the rotors, rad/s2.
+        rotation: (samples, 3, 3) body to world.
+    """
+
+    def __init__(self, rows: ForceRows, number: int, here: Array) -> None:
+        self.rows, self.number, self.here = rows, number, here
+        flights = rows.flights
+        vehicle, pieces = flights.vehicle, flights.pieces({})
+        self.rotation = np.concatenate([p.signals.rotation[p.rows] for p in pieces])
+        wrench, slope = [], []
+        for p in pieces:
+            s = p.signals
+            smooth = low_pass(
+                vehicle.rotor_wrench(s.rotor_speeds), CUTOFFS.residual_hz, s.period
+            )
+            wrench.append(smooth[p.rows])
+            slope.append(np.gradient(smooth[:, 0], s.period)[p.rows])
+        both = np.concatenate(wrench) * here[:, None]
+        self.thrust = both[:, 0] / vehicle.mass
+        self.turning = both[:, 1:] / np.diagonal(vehicle.inertia)
+        self.slope = np.concatenate(slope) * here / vehicle.mass
+        self.none = np.zeros((len(here), 3))
+
+    @staticmethod
+    def along(axis: int, size: Array) -> Array:
+        return np.asarray(size[:, None] * np.eye(3)[axis])
+
+
+def _of_commands(of: _Flown) -> dict[str, Array]:
+    """Return what differs between flights whose rotors are known by commands.
 
     Where the delay of commands is known from how the vehicle turns, that of its thrust may still
     differ: the flight loop answers vertical motion.
     """
-    flights = rows.flights
-    several = len(flights.logs) > 1
-    out: dict[str, Array] = {}
-    begins = np.flatnonzero(flights.start)
-    pieces = flights.pieces({})
-    for i in range(len(flights.logs)):
-        here = np.zeros(len(flights.t))
-        here[flights.log == i] = 1.0
-        if not here.any():
-            continue
-        thrust, slope = np.zeros(len(flights.t)), np.zeros(len(flights.t))
-        rotation = np.concatenate([p.signals.rotation[p.rows] for p in pieces])
-        for begin, piece in zip(begins, pieces, strict=True):
-            own = slice(begin, begin + len(piece.rows))
-            s = piece.signals
-            specific = flights.vehicle.rotor_wrench(s.rotor_speeds)[:, 0] / flights.vehicle.mass
-            smooth = low_pass(specific, CUTOFFS.residual_hz, s.period)
-            thrust[own], slope[own] = smooth[piece.rows], np.gradient(smooth, s.period)[piece.rows]
-        thrust, slope = thrust * here, slope * here
-        time = flights.t - flights.t[here > 0][0]
-        w = 2.0 * time / max(float(time[here > 0][-1]), 1e-9) - 1.0
-        use = NUISANCES
-        none = np.zeros((len(here), 3))
+    rows, flights, use, i = of.rows, of.rows.flights, NUISANCES, of.number
+    time = flights.t - flights.t[of.here > 0][0]
+    w = 2.0 * time / max(float(time[of.here > 0][-1]), 1e-9) - 1.0
+    out = {}
+    if len(flights.logs) > 1:
+        out[f"thrust {i}"] = use.thrust * rows.from_body(of.along(2, of.thrust))
+    out[f"drift {i}"] = use.drift * rows.from_body(of.along(2, of.thrust * w))
+    bend = of.thrust * (1.5 * w * w - 0.5)
+    out[f"bend {i}"] = use.drift * rows.from_body(of.along(2, bend))
+    if rows.fixed:
+        out[f"delay {i}"] = use.delay * rows.from_body(of.along(2, -of.slope))
+    level = flights.vehicle.gravity * of.here[:, None]
+    for axis, name in enumerate("xy"):
+        if not flights.inertial:
+            tilted = use.frame_tilt * level * of.rotation[:, axis, :]
+            out[f"frame tilt {name} {i}"] = rows.from_body(tilted, of.none)
+        aside = use.thrust_axis * of.along(axis, of.thrust)
+        out[f"thrust axis {name} {i}"] = rows.from_body(aside)
+    return out
 
-        def along(axis: int, size: Array) -> Array:
-            return np.asarray(size[:, None] * np.eye(3)[axis])
 
-        if several:
-            out[f"thrust {i}"] = use.thrust * rows.from_body(along(2, thrust))
-        out[f"drift {i}"] = use.drift * rows.from_body(along(2, thrust * w))
-        out[f"bend {i}"] = use.drift * rows.from_body(along(2, thrust * (1.5 * w * w - 0.5)))
-        if rows.fixed:
-            out[f"delay {i}"] = use.delay * rows.from_body(along(2, -slope))
-        level = flights.vehicle.gravity * here[:, None]
-        for axis, name in enumerate("xy"):
-            tilted = use.frame_tilt * level * rotation[:, axis, :]
-            if not flights.inertial:
-                out[f"frame tilt {name} {i}"] = rows.from_body(tilted, none)
-            out[f"thrust axis {name} {i}"] = use.thrust_axis * rows.from_body(along(axis, thrust))
-        if rows.has_accelerometer:
-            for axis, name in enumerate("xyz"):
-                bias = use.accelerometer_bias * along(axis, here)
-                out[f"accelerometer bias {name} {i}"] = rows.from_body(none, bias)
-            scaled = use.accelerometer_scale * along(2, thrust)
-            out[f"accelerometer scale {i}"] = rows.from_body(none, scaled)
-        elif flights.inertial:
-            for axis, name in enumerate("xyz"):
-                bias = flights.bias_std(i)[axis] * along(axis, here)
-                out[f"accelerometer bias {name} {i}"] = rows.from_body(bias)
+def _of_rotors(of: _Flown) -> dict[str, Array]:
+    """Return by how much the model of measured rotors is wrong.
+
+    A torque's gain is biased low by the share of its column that is noise of the rotor speeds
+    (errors in variables).
+    """
+    rows, i = of.rows, of.number
+    noise = rows.flights.rotor_noise[1:]
+    out = {}
+    for axis, name in enumerate("xyz"):
+        force = LIKELIHOOD.model_error * of.along(axis, of.thrust)
+        out[f"{MODEL_ERROR} of force {name} {i}"] = rows.from_body(force)
+        gain = np.hypot(LIKELIHOOD.model_error, noise[axis])
+        torque = gain * of.along(axis, of.turning[:, axis])
+        out[f"{MODEL_ERROR} of torque {name} {i}"] = rows.from_body(of.none, torque=torque)
+    return out
+
+
+def _of_sensors(of: _Flown) -> dict[str, Array]:
+    rows, flights, use, i = of.rows, of.rows.flights, NUISANCES, of.number
+    out = {}
+    if rows.has_accelerometer:
+        for axis, name in enumerate("xyz"):
+            bias = use.accelerometer_bias * of.along(axis, of.here)
+            out[f"accelerometer bias {name} {i}"] = rows.from_body(of.none, bias)
+        scaled = use.accelerometer_scale * of.along(2, of.thrust)
+        out[f"accelerometer scale {i}"] = rows.from_body(of.none, scaled)
+    elif flights.inertial:
+        for axis, name in enumerate("xyz"):
+            bias = flights.bias_std(i)[axis] * of.along(axis, of.here)
+            out[f"accelerometer bias {name} {i}"] = rows.from_body(bias)
+    return out
+
+
+def _of_timing(rows: ForceRows) -> dict[str, Array]:
+    """Return what signals that are apart in time do, to first order."""
+    out = {}
+    for column, x in rows.columns({}, rows.flights.time_offsets).items():
+        timing = timing_of(column, rows.flights.filtered)
+        assert timing is not None
+        out[column[1].replace("_", " ")] = timing.size * x
     return out
 
 
