@@ -20,7 +20,7 @@ from ..motion.smoothing import CUTOFFS, low_pass
 from .discrepancy import State, discrepancy_columns
 from .evidence import Index, marginal, set_evidence, tempering
 from .force_noise import ForceNoise, fitted_noise, white_noise
-from .force_nuisances import row_nuisances
+from .force_nuisances import answers, row_nuisances
 from .force_rows import ForceRows
 from .likelihood import NUISANCE, UNKNOWN, Sums
 from .priors import Base, Setting, declared, in_prior_units, prior_size
@@ -67,6 +67,11 @@ class ForceLikelihood:
         self.power = 1.0
         self.noise: ForceNoise = self._noise(first)
         self._use = self.rows.fit & self.noise.known
+        if not flights.commanded:
+            coloured = self.noise.coloured(self._answers)
+            self.nuisances |= {
+                ("", f"{NUISANCE}answer {i}"): coloured[:, :, i] for i in range(coloured.shape[2])
+            }
         N = self._white(np.stack(list(self.nuisances.values()), axis=2))
         self._given = N.reshape(-1, N.shape[2])
         self._inner = self._given.T @ self._given
@@ -95,12 +100,14 @@ class ForceLikelihood:
             axis=2,
         )
         noise = white_noise(y, rows.begins, rows.fit)
+        self._answers = np.zeros((*y.shape, 0)) if self.flights.commanded else answers(rows)
         for _ in range(FORCE_LIKELIHOOD.noise_rounds):
             use = rows.fit & noise.known
-            x = noise.white(X)[use].reshape(-1, X.shape[2])
+            every = np.concatenate([X, noise.coloured(self._answers)], axis=2)
+            x = noise.white(every)[use].reshape(-1, every.shape[2])
             z = noise.white(y)[use].ravel()
             mode = np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ z)
-            noise = fitted_noise(y - X @ mode, rows.begins, rows.fit)
+            noise = fitted_noise(y - every @ mode, rows.begins, rows.fit)
         return noise
 
     def _white(self, x: Array) -> Array:

@@ -29,6 +29,11 @@ class NuisanceSettings:
     thrust_axis: float = 0.01  # rad, of the rotors' mean axis
     accelerometer_bias: float = 0.3  # m/s2, of a MEMS sensor between warm and cold
     accelerometer_scale: float = 0.02  # relative
+    # of what the rotors do at once against a disturbance, how much of it they answer: any share
+    answer: float = 3.0
+    # rows before, the first and the last, that say what rotors do in any case: the row just before
+    # knows some of what comes, through the low-pass of zero phase
+    answer_rows: tuple[int, int] = (2, 4)
 
 
 NUISANCES = NuisanceSettings()
@@ -118,15 +123,55 @@ def _of_rotors(of: _Flown) -> dict[str, Array]:
     (errors in variables).
     """
     rows, i = of.rows, of.number
-    noise = rows.flights.rotor_noise[1:]
+    noise = rows.flights.rotor_noise
     out = {}
+    varying = of.thrust - of.here * of.thrust[of.here > 0].mean()
+    out[f"{MODEL_ERROR} of thrust's changes {i}"] = noise[0] * rows.from_body(of.along(2, varying))
     for axis, name in enumerate("xyz"):
         force = LIKELIHOOD.model_error * of.along(axis, of.thrust)
         out[f"{MODEL_ERROR} of force {name} {i}"] = rows.from_body(force)
-        gain = np.hypot(LIKELIHOOD.model_error, noise[axis])
+        gain = np.hypot(LIKELIHOOD.model_error, noise[1 + axis])
         torque = gain * of.along(axis, of.turning[:, axis])
         out[f"{MODEL_ERROR} of torque {name} {i}"] = rows.from_body(of.none, torque=torque)
     return out
+
+
+def answers(rows: ForceRows) -> Array:
+    """Return what the flight loop does at once against what it feels: the innovations (n, channels,
+    4) of thrust and torques, each in its own axis.
+
+    Rotors follow disturbances, so a gain on them explains a part of these. Their rows before say
+    what else they do.
+    """
+    count = len(rows.flights.t)
+    flown = [_Flown(rows, i, (rows.flights.log == i).astype(float)) for i in range(len(rows.flights.logs))]
+    driven = [sum((f.along(2, f.thrust) for f in flown), np.zeros((count, 3)))]
+    turning = sum((f.turning for f in flown), np.zeros((count, 3)))
+    every = [rows.from_body(driven[0])]
+    every += [rows.from_body(np.zeros((count, 3)), torque=turning * np.eye(3)[i]) for i in range(3)]
+    left = rows.residual({})
+    signals = np.column_stack([np.abs(x).max(axis=1) * np.sign(x.sum(axis=1)) for x in every])
+    past = np.column_stack([left, signals])
+    size = past[rows.fit].std(axis=0) + 1e-12
+    past = (past - past[rows.fit].mean(axis=0)) / size
+    columns = [np.ones((len(past), 1))]
+    since = np.arange(len(past))
+    since = since - since[rows.begins][np.cumsum(rows.begins) - 1]
+    first, lags = NUISANCES.answer_rows
+    for k in range(first, lags + 1):
+        moved = np.zeros_like(past)
+        moved[k:] = past[:-k]
+        moved[since < k] = 0.0
+        columns.append(moved)
+    X = np.column_stack(columns)
+    use = rows.fit & (since >= lags)
+    ridge = 0.01 * use.sum() * np.eye(X.shape[1])
+    out = []
+    for i, x in enumerate(every):
+        b = np.linalg.solve(X[use].T @ X[use] + ridge, X[use].T @ (signals[use, i]))
+        news = np.where(since >= lags, signals[:, i] - X @ b, 0.0)
+        out.append(NUISANCES.answer * news[:, None] * (np.abs(x).max(axis=0) > 0))
+    return np.stack(out, axis=2)
 
 
 def _of_sensors(of: _Flown) -> dict[str, Array]:
