@@ -16,7 +16,7 @@ from ...runtime.errors import InputError
 from ..inference.regression import CENTRAL, START_PREFIX, Column, Flights, coefficient
 from ..inference.sensor_bias import bias_columns, flight_and_axis
 from ..inference.time_offsets import LAG_ASYMMETRY
-from ..motion.smoothing import CUTOFFS, low_pass
+from ..motion.smoothing import low_pass
 from .discrepancy import State, discrepancy_columns
 from .evidence import Index, marginal, set_evidence, tempering
 from .force_noise import ForceNoise, fitted_noise, white_noise
@@ -155,7 +155,7 @@ class ForceLikelihood:
         return in_prior_units(self.flights, sums, setting, starts)
 
     def _dictionary(self) -> dict[Column, Array]:
-        flights, vehicle = self.flights, self.flights.vehicle
+        flights, vehicle = self.rows.flights, self.flights.vehicle
         pieces = flights.pieces({})
         seen = [
             State(
@@ -177,7 +177,7 @@ class ForceLikelihood:
                 continue
             sampled = np.concatenate(
                 [
-                    low_pass(x, CUTOFFS.residual_hz, p.signals.period)[p.rows]
+                    low_pass(x, flights.residual_hz, p.signals.period)[p.rows]
                     for x, p in zip(parts, pieces, strict=True)
                 ]
             )

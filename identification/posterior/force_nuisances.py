@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...dynamics.effects import Role, playing
 from ..inference.time_offsets import timing_of
 from ..inference.turning_delay import rotor_delay
-from ..motion.smoothing import CUTOFFS, low_pass
+from ..motion.smoothing import low_pass
 from .force_rows import ForceRows
 from .likelihood import LIKELIHOOD, MODEL_ERROR
 
@@ -31,9 +31,9 @@ class NuisanceSettings:
     accelerometer_scale: float = 0.02  # relative
     # of what the rotors do at once against a disturbance, how much of it they answer: any share
     answer: float = 3.0
-    # rows before, the first and the last, that say what rotors do in any case: the row just before
-    # knows some of what comes, through the low-pass of zero phase
-    answer_rows: tuple[int, int] = (2, 4)
+    answer_lags: int = 3  # rows before, that say what rotors do in any case
+    answer_ridge: float = 0.01  # of the variance of the rows before
+    answered: float = 1.0  # of what the rotors do against disturbances, over these
 
 
 NUISANCES = NuisanceSettings()
@@ -50,7 +50,7 @@ def row_nuisances(rows: ForceRows) -> dict[str, Array]:
             out |= _of_sensors(of)
             out |= _of_commands(of) if rows.flights.commanded else _of_rotors(of)
     if not rows.flights.commanded:
-        out |= _of_timing(rows)
+        out |= _of_timing(rows) | answered(rows)
     return out
 
 
@@ -74,7 +74,7 @@ class _Flown:
         for p in pieces:
             s = p.signals
             smooth = low_pass(
-                vehicle.rotor_wrench(s.rotor_speeds), CUTOFFS.residual_hz, s.period
+                vehicle.rotor_wrench(s.rotor_speeds), flights.residual_hz, s.period
             )
             wrench.append(smooth[p.rows])
             slope.append(np.gradient(smooth[:, 0], s.period)[p.rows])
@@ -136,6 +136,60 @@ def _of_rotors(of: _Flown) -> dict[str, Array]:
     return out
 
 
+@dataclass(frozen=True, eq=False)
+class Driven:
+    """What measured rotors make of the rows' accelerations.
+
+    Attributes:
+        size: (n, 4) specific thrust, and angular accelerations by the rotors' torques.
+        channels: for each, the channels in which it acts.
+        left: (n, channels) the residual of no effect.
+    """
+
+    size: Array
+    channels: tuple[tuple[int, ...], ...]
+    left: Array
+
+    def column(self, i: int, size: Array) -> Array:
+        """Return a column (n, channels) that is ``size`` (n,) where one of them acts."""
+        out = np.zeros_like(self.left)
+        out[:, self.channels[i]] = size[:, None]
+        return out
+
+
+def driven(rows: ForceRows) -> Driven:
+    """Return what the rotors make of the rows' accelerations."""
+    flights = rows.flights
+    wrench = flights.rotor_wrench({}) / np.array(
+        [flights.vehicle.mass, *np.diagonal(flights.vehicle.inertia)]
+    )
+    torque = rows.channels - 3
+    force = tuple(range(2, torque, 3))
+    channels = (force, *((torque + i,) for i in range(3)))
+    return Driven(wrench, channels, rows.residual({}))
+
+
+def answered(rows: ForceRows) -> dict[str, Array]:
+    """Return what a flight loop does against disturbances, where these are: a share of thrust and
+    of torques, of the row and of the next.
+
+    Rotors that follow a disturbance ``d`` make a gain of the rotors explain the share ``var(d) /
+    var(rotors)`` of it, whatever the loop. In hover that is all of it, and next to nothing where
+    the flight is far from one.
+    """
+    rotors = driven(rows)
+    out = {}
+    for i, name in enumerate(("thrust", *(f"torque {axis}" for axis in "xyz"))):
+        size = rotors.size[:, i] - rotors.size[rows.fit, i].mean()
+        own = rotors.left[np.ix_(rows.fit, rotors.channels[i])]
+        share = min(float(own.var(axis=0).max() / max(size[rows.fit].var(), 1e-12)), 1.0)
+        later = np.append(size[1:], 0.0)
+        later[:-1][rows.begins[1:]] = 0.0
+        out[f"answer by {name}"] = rotors.column(i, NUISANCES.answered * share * size)
+        out[f"later answer by {name}"] = rotors.column(i, NUISANCES.answered * share * later)
+    return out
+
+
 def answers(rows: ForceRows) -> Array:
     """Return what the flight loop does at once against what it feels: the innovations (n, channels,
     4) of thrust and torques, each in its own axis.
@@ -143,35 +197,21 @@ def answers(rows: ForceRows) -> Array:
     Rotors follow disturbances, so a gain on them explains a part of these. Their rows before say
     what else they do.
     """
-    count = len(rows.flights.t)
-    flown = [_Flown(rows, i, (rows.flights.log == i).astype(float)) for i in range(len(rows.flights.logs))]
-    driven = [sum((f.along(2, f.thrust) for f in flown), np.zeros((count, 3)))]
-    turning = sum((f.turning for f in flown), np.zeros((count, 3)))
-    every = [rows.from_body(driven[0])]
-    every += [rows.from_body(np.zeros((count, 3)), torque=turning * np.eye(3)[i]) for i in range(3)]
-    left = rows.residual({})
-    signals = np.column_stack([np.abs(x).max(axis=1) * np.sign(x.sum(axis=1)) for x in every])
-    past = np.column_stack([left, signals])
-    size = past[rows.fit].std(axis=0) + 1e-12
-    past = (past - past[rows.fit].mean(axis=0)) / size
-    columns = [np.ones((len(past), 1))]
+    rotors, lags = driven(rows), NUISANCES.answer_lags
+    past = np.column_stack([rotors.left, rotors.size])
+    past = (past - past[rows.fit].mean(axis=0)) / (past[rows.fit].std(axis=0) + 1e-12)
     since = np.arange(len(past))
     since = since - since[rows.begins][np.cumsum(rows.begins) - 1]
-    first, lags = NUISANCES.answer_rows
-    for k in range(first, lags + 1):
-        moved = np.zeros_like(past)
-        moved[k:] = past[:-k]
-        moved[since < k] = 0.0
-        columns.append(moved)
-    X = np.column_stack(columns)
-    use = rows.fit & (since >= lags)
-    ridge = 0.01 * use.sum() * np.eye(X.shape[1])
-    out = []
-    for i, x in enumerate(every):
-        b = np.linalg.solve(X[use].T @ X[use] + ridge, X[use].T @ (signals[use, i]))
-        news = np.where(since >= lags, signals[:, i] - X @ b, 0.0)
-        out.append(NUISANCES.answer * news[:, None] * (np.abs(x).max(axis=0) > 0))
-    return np.stack(out, axis=2)
+    known = since >= lags
+    parts = [np.ones((len(past), 1))]
+    parts += [np.roll(past, k, axis=0) for k in range(1, lags + 1)]
+    X, use = np.column_stack(parts), rows.fit & known
+    ridge = NUISANCES.answer_ridge * use.sum() * np.eye(X.shape[1])
+    b = np.linalg.solve(X[use].T @ X[use] + ridge, X[use].T @ rotors.size[use])
+    news = np.where(known[:, None], rotors.size - X @ b, 0.0)
+    return np.stack(
+        [NUISANCES.answer * rotors.column(i, x) for i, x in enumerate(news.T)], axis=2
+    )
 
 
 def _of_sensors(of: _Flown) -> dict[str, Array]:

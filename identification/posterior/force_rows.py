@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...dynamics.effects import get
 from ..inference.regression import Column, Flights, Setting, coefficient, typical_size
-from ..motion.smoothing import CUTOFFS, low_pass
+from ..motion.smoothing import low_pass
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -27,9 +27,9 @@ class ForceRowSettings:
     """The rows, and the steps by which columns are differences."""
 
     cutoff_hz: float = 3.5  # where rotors are known by commands
-    measured_cutoff_hz: float = CUTOFFS.residual_hz  # where they are measured
-    # where they are, and the pose was filtered: well below any filter
+    # where the pose was filtered: well below any filter
     filtered_cutoff_hz: float = 2.0
+    inertial_cutoff_hz: float = 5.0  # where the motion is read from an IMU
     rows_per_cutoff: float = 25.0 / 10.5  # rows in a period of the cut-off
     block: float = 4.0  # s, of the sums by which the likelihood's scatter is judged
     step: float = 0.1  # typical sizes
@@ -62,17 +62,15 @@ class ForceRows:
     """
 
     def __init__(self, flights: Flights, fixed: Setting) -> None:
+        self.with_torques, use = not flights.commanded, FORCE_ROWS
+        self._cutoff, step = np.inf, 1
+        if flights.commanded:
+            self._cutoff = use.cutoff_hz
+            step = max(1, round(1.0 / (use.rows_per_cutoff * self._cutoff * flights.period)))
+        else:
+            cutoff = use.inertial_cutoff_hz if flights.inertial else use.filtered_cutoff_hz
+            flights = flights.in_band(cutoff, use.rows_per_cutoff * cutoff)
         self.flights, self.fixed = flights, fixed
-        self.with_torques = not flights.commanded
-        use = FORCE_ROWS
-        self._cutoff = (
-            use.cutoff_hz
-            if flights.commanded
-            else use.filtered_cutoff_hz
-            if flights.filtered
-            else use.measured_cutoff_hz
-        )
-        step = max(1, round(1.0 / (use.rows_per_cutoff * self._cutoff * flights.period)))
         self._pieces = np.split(np.arange(len(flights.t)), np.flatnonzero(flights.start)[1:])
         kept = [rows[::step] for rows in self._pieces]
         self._at: Index = np.concatenate(kept)
