@@ -20,7 +20,7 @@ from ..motion.smoothing import low_pass
 from .discrepancy import State, discrepancy_columns
 from .evidence import Index, marginal, set_evidence, tempering
 from .force_noise import ForceNoise, fitted_noise, white_noise
-from .force_nuisances import answers, row_nuisances
+from .force_nuisances import answered, answers, followers, row_nuisances
 from .force_rows import ForceRows
 from .likelihood import NUISANCE, UNKNOWN, Sums
 from .priors import Base, Setting, declared, in_prior_units, prior_size
@@ -67,11 +67,6 @@ class ForceLikelihood:
         self.power = 1.0
         self.noise: ForceNoise = self._noise(first)
         self._use = self.rows.fit & self.noise.known
-        if not flights.commanded:
-            coloured = self.noise.coloured(self._answers)
-            self.nuisances |= {
-                ("", f"{NUISANCE}answer {i}"): coloured[:, :, i] for i in range(coloured.shape[2])
-            }
         N = self._white(np.stack(list(self.nuisances.values()), axis=2))
         self._given = N.reshape(-1, N.shape[2])
         self._inner = self._given.T @ self._given
@@ -95,20 +90,50 @@ class ForceLikelihood:
         traced = {c[0] for c, x in found.items() if x.any()}
         self.library = [e for e in self.library if e in traced or e not in linear]
         wanted = self.columns_of(e for e in linear if e in traced)
-        X = np.stack(
-            [*self.nuisances.values(), *(found[c] * prior_size(c, self.flights) for c in wanted)],
-            axis=2,
-        )
+        own = [found[c] * prior_size(c, self.flights) for c in wanted]
+        if self.flights.commanded:
+            return self._noise_beside(y, own, np.zeros((*y.shape, 0)))[0]
+        signals = followers(rows)
+        at_once = answers(rows, signals)
+        known = self.nuisances
+        # first as if all of the signals were answers, to see what disturbances there are
+        for _ in range(1):
+            more = answered(rows, signals, y)
+            self.nuisances = known | {("", NUISANCE + name): x for name, x in more.items()}
+            noise, explained = self._noise_beside(y, own, at_once)
+            y_left = y - explained
+        more = answered(rows, signals, y_left)
+        self.nuisances = known | {("", NUISANCE + name): x for name, x in more.items()}
+        noise, _ = self._noise_beside(y, own, at_once)
+        coloured = noise.coloured(at_once)
+        self.nuisances |= {
+            ("", f"{NUISANCE}{signal.name} at once"): coloured[:, :, i]
+            for i, signal in enumerate(signals)
+        }
+        return noise
+
+    def _noise_beside(
+        self, y: Array, own: Sequence[Array], at_once: Array
+    ) -> tuple[ForceNoise, Array]:
+        """Return the noise of the residual ``y`` (n, channels) and what effects explain of it.
+
+        Args:
+            y: of what every set has.
+            own: columns of effects, in standard deviations of their priors.
+            at_once: (n, channels, signals) columns of the noise's innovations.
+        """
+        rows = self.rows
+        X = np.stack([*self.nuisances.values(), *own], axis=2)
         noise = white_noise(y, rows.begins, rows.fit)
-        self._answers = np.zeros((*y.shape, 0)) if self.flights.commanded else answers(rows)
         for _ in range(FORCE_LIKELIHOOD.noise_rounds):
             use = rows.fit & noise.known
-            every = np.concatenate([X, noise.coloured(self._answers)], axis=2)
+            every = np.concatenate([X, noise.coloured(at_once)], axis=2)
             x = noise.white(every)[use].reshape(-1, every.shape[2])
             z = noise.white(y)[use].ravel()
             mode = np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ z)
             noise = fitted_noise(y - every @ mode, rows.begins, rows.fit)
-        return noise
+        effects = slice(len(self.nuisances), X.shape[2])
+        return noise, X[:, :, effects] @ mode[effects]
 
     def _white(self, x: Array) -> Array:
         return self.noise.white(x)[self._use]

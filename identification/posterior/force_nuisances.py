@@ -33,7 +33,10 @@ class NuisanceSettings:
     answer: float = 3.0
     answer_lags: int = 3  # rows before, that say what rotors do in any case
     answer_ridge: float = 0.01  # of the variance of the rows before
-    answered: float = 1.0  # of what the rotors do against disturbances, over these
+    # of what follows disturbances, over these: a loop answers them whole, and overshoots
+    answered: float = 1.0
+    # s, in which a flight loop stops a velocity, and an angular velocity, that it did not want
+    stopped: tuple[float, float] = (0.5, 0.1)
 
 
 NUISANCES = NuisanceSettings()
@@ -50,7 +53,7 @@ def row_nuisances(rows: ForceRows) -> dict[str, Array]:
             out |= _of_sensors(of)
             out |= _of_commands(of) if rows.flights.commanded else _of_rotors(of)
     if not rows.flights.commanded:
-        out |= _of_timing(rows) | answered(rows)
+        out |= _of_timing(rows)
     return out
 
 
@@ -137,68 +140,83 @@ def _of_rotors(of: _Flown) -> dict[str, Array]:
 
 
 @dataclass(frozen=True, eq=False)
-class Driven:
-    """What measured rotors make of the rows' accelerations.
+class Follower:
+    """A signal that follows disturbances, because the flight loop answers them, or because it is
+    the motion that they make.
 
     Attributes:
-        size: (n, 4) specific thrust, and angular accelerations by the rotors' torques.
-        channels: for each, the channels in which it acts.
-        left: (n, channels) the residual of no effect.
+        name: of the signal.
+        size: (n,) m/s2 or rad/s2: of a velocity, what makes it within the time in which the loop
+            stops it.
+        channels: of the rows, in which the disturbances act.
     """
 
+    name: str
     size: Array
-    channels: tuple[tuple[int, ...], ...]
-    left: Array
+    channels: tuple[int, ...]
 
-    def column(self, i: int, size: Array) -> Array:
-        """Return a column (n, channels) that is ``size`` (n,) where one of them acts."""
-        out = np.zeros_like(self.left)
-        out[:, self.channels[i]] = size[:, None]
+    def column(self, rows: ForceRows, size: Array) -> Array:
+        """Return a column (n, channels) that is ``size`` (n,) where the disturbances act."""
+        out = np.zeros((len(size), rows.channels))
+        out[:, self.channels] = size[:, None]
         return out
 
 
-def driven(rows: ForceRows) -> Driven:
-    """Return what the rotors make of the rows' accelerations."""
+def followers(rows: ForceRows) -> list[Follower]:
+    """Return the signals of measured rotors and of the motion that follow disturbances."""
     flights = rows.flights
-    wrench = flights.rotor_wrench({}) / np.array(
-        [flights.vehicle.mass, *np.diagonal(flights.vehicle.inertia)]
-    )
+    inertias = np.array([flights.vehicle.mass, *np.diagonal(flights.vehicle.inertia)])
+    wrench = flights.rotor_wrench({}) / inertias
+    rates = np.zeros((len(wrench), 6))
+    begin = 0
+    for p in flights.pieces({}):
+        s = p.signals
+        body = np.einsum("nji,nj->ni", s.rotation, s.velocity)
+        both = low_pass(
+            np.column_stack([body, s.angular_velocity]), flights.residual_hz, s.period
+        )
+        rates[begin : begin + len(p.rows)] = both[p.rows]
+        begin += len(p.rows)
+    rates /= np.repeat(NUISANCES.stopped, 3)
     torque = rows.channels - 3
-    force = tuple(range(2, torque, 3))
-    channels = (force, *((torque + i,) for i in range(3)))
-    return Driven(wrench, channels, rows.residual({}))
+    forces = [tuple(range(axis, torque, 3)) for axis in range(3)]
+    return [
+        Follower("thrust", wrench[:, 0], forces[2]),
+        *(Follower(f"torque {x}", wrench[:, 1 + i], (torque + i,)) for i, x in enumerate("xyz")),
+        *(Follower(f"rate {x}", rates[:, 3 + i], (torque + i,)) for i, x in enumerate("xyz")),
+    ]
 
 
-def answered(rows: ForceRows) -> dict[str, Array]:
-    """Return what a flight loop does against disturbances, where these are: a share of thrust and
-    of torques, of the row and of the next.
+def answered(rows: ForceRows, signals: Sequence[Follower], disturbance: Array) -> dict[str, Array]:
+    """Return what disturbances are where a signal follows them: a share of it.
 
-    Rotors that follow a disturbance ``d`` make a gain of the rotors explain the share ``var(d) /
-    var(rotors)`` of it, whatever the loop. In hover that is all of it, and next to nothing where
-    the flight is far from one.
+    A signal that follows a disturbance ``d`` explains the share ``var(d) / var(signal)`` of itself
+    as one, whatever the loop. In hover that is all of it, and next to nothing where the flight is
+    far from one.
+
+    Args:
+        rows: of the flights.
+        signals: that follow.
+        disturbance: (n, channels) what is one, as far as it is known.
     """
-    rotors = driven(rows)
     out = {}
-    for i, name in enumerate(("thrust", *(f"torque {axis}" for axis in "xyz"))):
-        size = rotors.size[:, i] - rotors.size[rows.fit, i].mean()
-        own = rotors.left[np.ix_(rows.fit, rotors.channels[i])]
+    for signal in signals:
+        size = signal.size - signal.size[rows.fit].mean()
+        own = disturbance[np.ix_(rows.fit, signal.channels)]
         share = min(float(own.var(axis=0).max() / max(size[rows.fit].var(), 1e-12)), 1.0)
-        later = np.append(size[1:], 0.0)
-        later[:-1][rows.begins[1:]] = 0.0
-        out[f"answer by {name}"] = rotors.column(i, NUISANCES.answered * share * size)
-        out[f"later answer by {name}"] = rotors.column(i, NUISANCES.answered * share * later)
+        out[f"answer by {signal.name}"] = signal.column(rows, NUISANCES.answered * share * size)
     return out
 
 
-def answers(rows: ForceRows) -> Array:
-    """Return what the flight loop does at once against what it feels: the innovations (n, channels,
-    4) of thrust and torques, each in its own axis.
+def answers(rows: ForceRows, signals: Sequence[Follower]) -> Array:
+    """Return what follows disturbances at once: the innovations (n, channels, signals) of the
+    signals, each in its own channels.
 
-    Rotors follow disturbances, so a gain on them explains a part of these. Their rows before say
-    what else they do.
+    They explain a part of the disturbances' innovations. The rows before say what else a signal is.
     """
-    rotors, lags = driven(rows), NUISANCES.answer_lags
-    past = np.column_stack([rotors.left, rotors.size])
+    lags = NUISANCES.answer_lags
+    size = np.column_stack([x.size for x in signals])
+    past = np.column_stack([rows.residual({}), size])
     past = (past - past[rows.fit].mean(axis=0)) / (past[rows.fit].std(axis=0) + 1e-12)
     since = np.arange(len(past))
     since = since - since[rows.begins][np.cumsum(rows.begins) - 1]
@@ -207,10 +225,10 @@ def answers(rows: ForceRows) -> Array:
     parts += [np.roll(past, k, axis=0) for k in range(1, lags + 1)]
     X, use = np.column_stack(parts), rows.fit & known
     ridge = NUISANCES.answer_ridge * use.sum() * np.eye(X.shape[1])
-    b = np.linalg.solve(X[use].T @ X[use] + ridge, X[use].T @ rotors.size[use])
-    news = np.where(known[:, None], rotors.size - X @ b, 0.0)
+    b = np.linalg.solve(X[use].T @ X[use] + ridge, X[use].T @ size[use])
+    news = np.where(known[:, None], size - X @ b, 0.0)
     return np.stack(
-        [NUISANCES.answer * rotors.column(i, x) for i, x in enumerate(news.T)], axis=2
+        [NUISANCES.answer * s.column(rows, x) for s, x in zip(signals, news.T, strict=True)], axis=2
     )
 
 
