@@ -26,7 +26,14 @@ from .findings import (
 )
 from .inference.carrying_channels import carrying_channels
 from .inference.commanded_rotors import COMMANDED, THRUST_FACTORS, assumed_thrust_doubts
-from .inference.regression import CENTRAL, Flights, coefficient, typical_size, unit_of_change
+from .inference.regression import (
+    CENTRAL,
+    Flights,
+    coefficient,
+    moves_time,
+    typical_size,
+    unit_of_change,
+)
 from .inference.time_offsets import ROTOR_TIME_OFFSET
 from .inference.transient_disturbances import transient_disturbances
 from .judged import Judged, Report, balance, calm
@@ -34,6 +41,7 @@ from .motion.inertial_signals import pose_rate
 from .motion.smoothing import CUTOFFS
 from .posterior.commands import Given, what_commands_show
 from .posterior.force_ranking import rank_by_force
+from .posterior.likelihood import NUISANCE
 from .posterior.ranking import Found, rank
 from .posterior.unknown import Signs, unknown
 from .posterior.worth import worth
@@ -84,7 +92,7 @@ def judged(flights: Flights, library: Sequence[str], report: Report) -> Judged:
         if flights.has_raw_poses
         else rank_by_force(flights, given.library, given.first, given.fixed, report)
     )
-    setting = _whole_setting(flights, given, found)
+    setting = _whole_setting(given, found)
     left = balance(flights, setting)
     gusts = _gusts(flights, found)
     pushes = tuple(transient_disturbances(flights, setting))
@@ -123,7 +131,9 @@ def judged(flights: Flights, library: Sequence[str], report: Report) -> Judged:
     signs = (_sign(found),) if strange > 0.5 and found.ranking.structure > 0.0 else ()
     some = left.noisy or disturbed > 0.0 or bool(pushes)
     hidden = (
-        found.posterior.hidden(flights.biases, VERDICT.least_shown)
+        found.posterior.hidden(
+            [("", f"{NUISANCE}{name}") for _, name in flights.biases], VERDICT.least_shown
+        )
         if flights.inertial
         else frozenset[str]()
     )
@@ -156,13 +166,9 @@ def beyond_calm(disturbances: Sequence[Disturbance], vehicle: Vehicle) -> float:
     return float(np.log(np.max(slow / calm(vehicle.weight, vehicle.arm_l)))) if slow else -np.inf
 
 
-def _whole_setting(flights: Flights, given: Given, found: Found) -> dict[str, dict[str, float]]:
+def _whole_setting(given: Given, found: Found) -> dict[str, dict[str, float]]:
     """Return the coefficients of all effects; under no name time offsets and biases."""
-    own = {
-        name: value
-        for (effect, name), (value, _) in found.posterior.nuisances().items()
-        if not effect and ("", name) in (*flights.time_offsets, *flights.biases)
-    }
+    own = {name: value for name, (value, _) in found.sensors.items()}
     setting = {e: dict(x) for e, x in {**given.fixed, **found.setting}.items()}
     return {**setting, **({"": own} if own else {})}
 
@@ -335,7 +341,9 @@ def _sign(found: Found) -> Structure:
 
 def _late_rotors(flights: Flights, found: Found) -> list[str]:
     """Return, as a sentence, by how much rotor speeds act later than they are logged."""
-    offset, std = found.posterior.nuisances().get(ROTOR_TIME_OFFSET, (0.0, math.inf))
+    offset, std = found.sensors.get(ROTOR_TIME_OFFSET[1], (0.0, math.inf))
+    if flights.inertial or any(moves_time(e) for e in found.setting):
+        return []
     if abs(offset) < max(VERDICT.least_rotor_time_offset, VERDICT.least_in_std * std):
         return []
     return [

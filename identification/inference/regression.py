@@ -223,6 +223,8 @@ class Flights:
             max(periods) <= REGRESSION.most_period_ratio * min(periods)
         )
         self.logs = tuple(excerpt(self.logs))
+        self.residual_hz, self._row_rate_hz = CUTOFFS.residual_hz, REGRESSION.row_rate_hz
+        self._fit_logs, self._has_test = len(logs), bool(test)
         self.biases: tuple[Column, ...] = tuple(bias_columns(len(logs)) if self.inertial else ())
         self._drift: np.random.Generator | None = None  # of a copy whose fusion errs otherwise
         self._fused: dict[
@@ -235,6 +237,30 @@ class Flights:
         self._residuals: dict[tuple[object, ...], Array] = {}
         self._smooth_imu: dict[int, tuple[Array, Array]] = {}
         self._first: list[Piece] = []
+        self.log: Index  # (rows,) which log
+        self.block: Index  # (rows,)
+        self.fit_rows: Mask  # (rows,)
+        self.start: Mask  # (rows,) first row of a piece
+        self.t: Array  # (rows,) s
+        self.period: float  # s, from row to row
+        self._lay_rows()
+        self.sensor_noise: Array  # (rows, 6) a sample of what sensors alone leave
+        self.visible_noise: Array  # (rows, 6) of it, what the logs themselves show
+        # of a log that is read by its IMU: effects that leave no trace in it at all, and those that
+        # would show beside a pose
+        self.without_trace: frozenset[str] = frozenset()
+        self.needs_pose: frozenset[str] = frozenset()
+        self.not_identifiable: frozenset[
+            str
+        ]  # effects whose columns are sensor noise to a large part
+        self.rotor_noise: (
+            Array  # (4,) its share of the variance of what the rotors deliver: thrust and torque
+        )
+        self.angular_velocity_noise: Array  # (3,) its share of the variance of angular velocities
+        self.sensor_noise, self.not_identifiable, self.rotor_noise = self._repeat_sensor_noise()
+
+    def _lay_rows(self) -> None:
+        """Cut the flights into pieces, and say of which of their samples rows are."""
         self._first = pieces = self.pieces({})
         log_of, block, fit, start, t = [], [], [], [], []
         count = 0
@@ -250,34 +276,36 @@ class Flights:
             log_of.append(np.full(len(time), piece.log))
             block.append(number + count)
             seen = (
-                np.full(len(time), piece.log < len(logs))
-                if test
+                np.full(len(time), piece.log < self._fit_logs)
+                if self._has_test
                 else number % REGRESSION.blocks_per_held_out != held_out(number)
             )
             fit.append(seen)
             start.append(np.arange(len(time)) == 0)
             t.append(time)
             count += int(number[-1]) + 1
-        self.log: Index = np.concatenate(log_of)  # (rows,) which log
-        self.block: Index = np.concatenate(block)  # (rows,)
-        self.fit_rows: Mask = np.concatenate(fit)  # (rows,)
-        self.start: Mask = np.concatenate(start)  # (rows,) first row of a piece
-        self.t: Array = np.concatenate(t)
+        self.log = np.concatenate(log_of)
+        self.block = np.concatenate(block)
+        self.fit_rows = np.concatenate(fit)
+        self.start = np.concatenate(start)
+        self.t = np.concatenate(t)
         self.period = float(np.median(np.diff(self.t)))
-        self.sensor_noise: Array  # (rows, 6) a sample of what sensors alone leave
-        self.visible_noise: Array  # (rows, 6) of it, what the logs themselves show
-        # of a log that is read by its IMU: effects that leave no trace in it at all, and those that
-        # would show beside a pose
-        self.without_trace: frozenset[str] = frozenset()
-        self.needs_pose: frozenset[str] = frozenset()
-        self.not_identifiable: frozenset[
-            str
-        ]  # effects whose columns are sensor noise to a large part
-        self.rotor_noise: (
-            Array  # (4,) its share of the variance of what the rotors deliver: thrust and torque
-        )
-        self.angular_velocity_noise: Array  # (3,) its share of the variance of angular velocities
-        self.sensor_noise, self.not_identifiable, self.rotor_noise = self._repeat_sensor_noise()
+
+    def in_band(self, cutoff_hz: float, rate_hz: float) -> "Flights":
+        """Return the same flights with a residual up to another cut-off, and as many rows a second;
+        what is identifiable stays as it is.
+        """
+        out = self._with_nothing_kept()
+        out.residual_hz, out._row_rate_hz, out._first = cutoff_hz, rate_hz, []
+        out._lay_rows()
+        out.visible_noise = out._sample_noise()
+        return out
+
+    def _sample_noise(self) -> Array:
+        """Return a sample of what of the sensors' noise, as the logs show it, the residual holds."""
+        noisy = self._with_nothing_kept()
+        noisy.logs = tuple(noisy_logs(self.logs, self.vehicle))
+        return noisy.residual({}) - self.residual({})
 
     def _repeat_sensor_noise(self) -> tuple[Array, frozenset[str], Array]:
         """Return a sample of the residual's sensor noise, the effects that are not identifiable,
@@ -420,7 +448,7 @@ class Flights:
             [
                 low_pass(
                     vehicle.rotor_wrench(p.signals.rotor_speeds),
-                    CUTOFFS.residual_hz,
+                    self.residual_hz,
                     p.signals.period,
                 )[p.rows]
                 for p in self.pieces(setting)
@@ -431,7 +459,7 @@ class Flights:
         """Return the angular velocities (rows, 3) at the rows, low-passed."""
         return np.concatenate(
             [
-                low_pass(p.signals.angular_velocity, CUTOFFS.residual_hz, p.signals.period)[p.rows]
+                low_pass(p.signals.angular_velocity, self.residual_hz, p.signals.period)[p.rows]
                 for p in self.pieces({})
             ]
         )
@@ -494,7 +522,7 @@ class Flights:
         if self.commanded:
             found = [(i, downsampled(s)) for i, s in found]
         if not self._first:
-            return [Piece(i, s, _rows(s)) for i, s in found]
+            return [Piece(i, s, _rows(s, self._row_rate_hz)) for i, s in found]
         # a clock offset moves the start of a piece: the rows stay where they are in time
         pieces = []
         for first in self._first:
@@ -569,7 +597,7 @@ class Flights:
             found = np.concatenate(
                 [
                     self._needed(piece)
-                    - low_pass(model, CUTOFFS.residual_hz, piece.signals.period)[piece.rows]
+                    - low_pass(model, self.residual_hz, piece.signals.period)[piece.rows]
                     for piece, model in pieces
                 ]
             )
@@ -610,7 +638,7 @@ class Flights:
                 needed[:, 3:] = 0.0
             self._needs[id(piece)] = (
                 piece,
-                low_pass(needed, CUTOFFS.residual_hz, piece.signals.period)[piece.rows],
+                low_pass(needed, self.residual_hz, piece.signals.period)[piece.rows],
             )
         return self._needs[id(piece)][1]
 
@@ -628,7 +656,7 @@ class Flights:
                 self._smooth_imu[piece.log] = _smooth_accelerometer(log)
             read = resampled(s.t, *self._smooth_imu[piece.log])
             force = self.vehicle.mass * np.einsum("nij,nj->ni", s.rotation, read)
-            smooth = low_pass(force, CUTOFFS.residual_hz, s.period)[piece.rows]
+            smooth = low_pass(force, self.residual_hz, s.period)[piece.rows]
             out.append(smooth - self._needed(piece)[:, :3])
         return np.concatenate(out)
 
@@ -767,7 +795,7 @@ def held_out(number: Index) -> Index:
     return np.asarray(REGRESSION.blocks_per_held_out * turn, dtype=np.int64)
 
 
-def _rows(signals: Signals) -> Index:
-    step = max(1, round(1.0 / (REGRESSION.row_rate_hz * signals.period)))
+def _rows(signals: Signals, rate_hz: float) -> Index:
+    step = max(1, round(1.0 / (rate_hz * signals.period)))
     edge = round(REGRESSION.margin / signals.period)
     return np.arange(edge, len(signals.t) - edge, step)

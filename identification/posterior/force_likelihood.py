@@ -10,14 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from ...dynamics.effects import get
+from ...dynamics.effects import Role, get, playing
 from ...runtime.errors import InputError
 from ..inference.regression import CENTRAL, START_PREFIX, Column, Flights, coefficient
-from ..motion.smoothing import CUTOFFS, low_pass
+from ..inference.sensor_bias import flight_and_axis
+from ..inference.time_offsets import LAG_ASYMMETRY, timing_of
+from ..motion.smoothing import low_pass
 from .discrepancy import State, discrepancy_columns
 from .evidence import Index, marginal, set_evidence, tempering
 from .force_noise import ForceNoise, fitted_noise, white_noise
-from .force_nuisances import force_nuisances
+from .force_nuisances import answered, answers, followers, row_nuisances
 from .force_rows import ForceRows
 from .likelihood import NUISANCE, UNKNOWN, Sums
 from .priors import Base, Setting, between, declared, in_prior_units, prior_size
@@ -58,13 +60,14 @@ class ForceLikelihood:
         self.flights, self.library = flights, list(library)
         self.rows = ForceRows(flights, fixed)
         self.nuisances = {
-            ("", f"{NUISANCE}{name}"): x for name, x in force_nuisances(self.rows).items()
+            ("", f"{NUISANCE}{name}"): x for name, x in row_nuisances(self.rows).items()
         }
         self.power = 1.0
         self.noise: ForceNoise = self._noise(first)
         self._use = self.rows.fit & self.noise.known
         N = self._white(np.stack(list(self.nuisances.values()), axis=2))
         self._given = N.reshape(-1, N.shape[2])
+        self._inner = self._given.T @ self._given
 
     def columns_of(self, effects: Iterable[str]) -> list[Column]:
         """Return the columns of effects: their coefficients, but those that the vehicle's file
@@ -85,18 +88,50 @@ class ForceLikelihood:
         traced = {c[0] for c, x in found.items() if x.any()}
         self.library = [e for e in self.library if e in traced or e not in linear]
         wanted = self.columns_of(e for e in linear if e in traced)
-        X = np.stack(
-            [*self.nuisances.values(), *(found[c] * prior_size(c, self.flights) for c in wanted)],
-            axis=2,
-        )
+        own = [found[c] * prior_size(c, self.flights) for c in wanted]
+        if self.flights.commanded:
+            return self._noise_beside(y, own, np.zeros((*y.shape, 0)))[0]
+        signals = followers(rows)
+        at_once = answers(rows, signals)
+        known = self.nuisances
+        # first as if all of the signals were answers, to see what disturbances there are
+        for _ in range(1):
+            more = answered(rows, signals, y)
+            self.nuisances = known | {("", NUISANCE + name): x for name, x in more.items()}
+            noise, explained = self._noise_beside(y, own, at_once)
+            y_left = y - explained
+        more = answered(rows, signals, y_left)
+        self.nuisances = known | {("", NUISANCE + name): x for name, x in more.items()}
+        noise, _ = self._noise_beside(y, own, at_once)
+        coloured = noise.coloured(at_once)
+        self.nuisances |= {
+            ("", f"{NUISANCE}{signal.name} at once"): coloured[:, :, i]
+            for i, signal in enumerate(signals)
+        }
+        return noise
+
+    def _noise_beside(
+        self, y: Array, own: Sequence[Array], at_once: Array
+    ) -> tuple[ForceNoise, Array]:
+        """Return the noise of the residual ``y`` (n, channels) and what effects explain of it.
+
+        Args:
+            y: of what every set has.
+            own: columns of effects, in standard deviations of their priors.
+            at_once: (n, channels, signals) columns of the noise's innovations.
+        """
+        rows = self.rows
+        X = np.stack([*self.nuisances.values(), *own], axis=2)
         noise = white_noise(y, rows.begins, rows.fit)
         for _ in range(FORCE_LIKELIHOOD.noise_rounds):
             use = rows.fit & noise.known
-            x = noise.white(X)[use].reshape(-1, X.shape[2])
+            every = np.concatenate([X, noise.coloured(at_once)], axis=2)
+            x = noise.white(every)[use].reshape(-1, every.shape[2])
             z = noise.white(y)[use].ravel()
             mode = np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ z)
-            noise = fitted_noise(y - X @ mode, rows.begins, rows.fit)
-        return noise
+            noise = fitted_noise(y - every @ mode, rows.begins, rows.fit)
+        effects = slice(len(self.nuisances), X.shape[2])
+        return noise, X[:, :, effects] @ mode[effects]
 
     def _white(self, x: Array) -> Array:
         return self.noise.white(x)[self._use]
@@ -116,7 +151,7 @@ class ForceLikelihood:
             unknown: whether the dictionary's columns are among them.
         """
         rows, residual = self.rows, self.rows.residual(setting)
-        columns = dict(self.nuisances)
+        columns = dict(self.nuisances) | self._uneven_lag(setting)
         columns |= rows.columns(setting, [c for c in wanted if not c[1].startswith(START_PREFIX)])
         for c, start in starts.items():
             columns[c] = residual - rows.residual({**setting, c[0]: dict(start)})
@@ -143,7 +178,7 @@ class ForceLikelihood:
         return in_prior_units(self.flights, sums, setting, starts)
 
     def _dictionary(self) -> dict[Column, Array]:
-        flights, vehicle = self.flights, self.flights.vehicle
+        flights, vehicle = self.rows.flights, self.flights.vehicle
         pieces = flights.pieces({})
         seen = [
             State(
@@ -162,13 +197,17 @@ class ForceLikelihood:
         )
         out: dict[Column, Array] = {}
         for (group, name), parts in found.items():
-            if not any(x[:, :3].any() for x in parts):
+            if not self.rows.with_torques and not any(x[:, :3].any() for x in parts):
                 continue
-            sampled = [
-                low_pass(x[:, :3], CUTOFFS.residual_hz, p.signals.period)[p.rows]
-                for x, p in zip(parts, pieces, strict=True)
-            ]
-            out["", f"{UNKNOWN}{group}: {name}"] = self.rows.from_world(np.concatenate(sampled))
+            sampled = np.concatenate(
+                [
+                    low_pass(x, flights.residual_hz, p.signals.period)[p.rows]
+                    for x, p in zip(parts, pieces, strict=True)
+                ]
+            )
+            out["", f"{UNKNOWN}{group}: {name}"] = self.rows.from_world(
+                sampled[:, :3], torque=sampled[:, 3:]
+            )
         return out
 
     # Fits
@@ -181,12 +220,23 @@ class ForceLikelihood:
             InputError: no vehicle is like that.
         """
         w = self._white(self.rows.residual(setting)).ravel()
-        factor, b = self._nuisance_sums(w)
+        factor, b = self._nuisance_sums(w, setting)
         return self.power * float(w @ w) - float(b @ cho_solve(factor, b))
 
-    def _nuisance_sums(self, w: Array) -> tuple[tuple[Array, bool], Array]:
-        inner = self.power * self._given.T @ self._given + np.eye(self._given.shape[1])
-        return cho_factor(inner), self.power * self._given.T @ w
+    def _uneven_lag(self, setting: Setting) -> dict[Column, Array]:
+        """Return what rotors that speed up sooner than they slow down do beside a lag."""
+        if self.flights.commanded or not playing(Role.LAG, among=list(setting)):
+            return {}
+        return self.rows.columns(setting, [LAG_ASYMMETRY])
+
+    def _nuisance_sums(self, w: Array, setting: Setting) -> tuple[tuple[Array, bool], Array]:
+        inner, right = self._inner, self._given.T @ w
+        for c, column in self._uneven_lag(setting).items():
+            x = self._white(column).ravel() * prior_size(c, self.flights)
+            cross = self._given.T @ x
+            inner = np.block([[inner, cross[:, None]], [cross, x @ x]])
+            right = np.append(right, x @ w)
+        return cho_factor(self.power * inner + np.eye(len(inner))), self.power * right
 
     def objective(self, setting: Setting) -> float:
         """Return minus the logarithm of likelihood and prior at a setting, up to a constant;
@@ -201,6 +251,27 @@ class ForceLikelihood:
             return 0.5 * (self.deviance(setting) + prior)
         except (InputError, np.linalg.LinAlgError):
             return math.inf
+
+    def sensors(self, setting: Setting) -> dict[str, tuple[float, float]]:
+        """Return the likeliest biases of accelerometers from which the motion was read, and the
+        time offsets of logs, as ``Flights`` takes them out, with their standard deviations.
+        """
+        w = self._white(self.rows.residual(setting)).ravel()
+        factor, b = self._nuisance_sums(w, setting)
+        modes = cho_solve(factor, b)
+        std = np.sqrt(np.diag(cho_solve(factor, np.eye(len(b)))))
+        at = {name: i for i, (_, name) in enumerate(self.nuisances)}
+        out = {}
+        for column in (*self.flights.biases, *self.flights.time_offsets):
+            timing = timing_of(column, self.flights.filtered)
+            if timing is None:
+                flight, axis = flight_and_axis(column[1])
+                size = float(self.flights.bias_std(flight)[axis])
+            else:
+                size = timing.size
+            if (i := at.get(NUISANCE + column[1])) is not None:
+                out[column[1]] = size * float(modes[i]), size * float(std[i])
+        return out
 
     def idle(self, setting: Setting) -> set[str]:
         """Return the effects of a setting that do nothing there."""

@@ -1,5 +1,5 @@
-"""What any flight may have beside effects where rotors are known by commands: columns in standard
-deviations of their priors, which are integrated out.
+"""What any flight may have beside effects: columns in standard deviations of their priors, which
+are integrated out.
 """
 
 from collections.abc import Sequence
@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.effects import Role, playing
+from ..inference.time_offsets import timing_of
 from ..inference.turning_delay import rotor_delay
-from ..motion.smoothing import CUTOFFS, low_pass
+from ..motion.smoothing import low_pass
 from .force_rows import ForceRows
+from .likelihood import LIKELIHOOD, MODEL_ERROR
 
 Array = NDArray[np.float64]
 
@@ -27,66 +29,228 @@ class NuisanceSettings:
     thrust_axis: float = 0.01  # rad, of the rotors' mean axis
     accelerometer_bias: float = 0.3  # m/s2, of a MEMS sensor between warm and cold
     accelerometer_scale: float = 0.02  # relative
+    # of what the rotors do at once against a disturbance, how much of it they answer: any share
+    answer: float = 3.0
+    answer_lags: int = 3  # rows before, that say what rotors do in any case
+    answer_ridge: float = 0.01  # of the variance of the rows before
+    # of what follows disturbances, over these: a loop answers them whole, and overshoots
+    answered: float = 1.0
+    # s, in which a flight loop stops a velocity, and an angular velocity, that it did not want
+    stopped: tuple[float, float] = (0.5, 0.1)
 
 
 NUISANCES = NuisanceSettings()
 
 
-def force_nuisances(rows: ForceRows) -> dict[str, Array]:
-    """Return columns (n, channels) by name, each in standard deviations of its prior.
+def row_nuisances(rows: ForceRows) -> dict[str, Array]:
+    """Return columns (n, channels) by name, each in standard deviations of its prior."""
+    out: dict[str, Array] = {}
+    for i in range(len(rows.flights.logs)):
+        here = np.zeros(len(rows.flights.t))
+        here[rows.flights.log == i] = 1.0
+        if here.any():
+            of = _Flown(rows, i, here)
+            out |= _of_sensors(of)
+            out |= _of_commands(of) if rows.flights.commanded else _of_rotors(of)
+    if not rows.flights.commanded:
+        out |= _of_timing(rows)
+    return out
+
+
+class _Flown:
+    """A flight, and what its rotors deliver by the declared vehicle.
+
+    Attributes:
+        here: (samples,) 1 in this flight, 0 in others.
+        thrust: (samples,) specific, m/s2.
+        slope: (samples,) its derivative, m/s3.
+        turning: (samples, 3) angular acceleration by the rotors, rad/s2.
+        rotation: (samples, 3, 3) body to world.
+    """
+
+    def __init__(self, rows: ForceRows, number: int, here: Array) -> None:
+        self.rows, self.number, self.here = rows, number, here
+        flights = rows.flights
+        vehicle, pieces = flights.vehicle, flights.pieces({})
+        self.rotation = np.concatenate([p.signals.rotation[p.rows] for p in pieces])
+        wrench, slope = [], []
+        for p in pieces:
+            s = p.signals
+            smooth = low_pass(vehicle.rotor_wrench(s.rotor_speeds), flights.residual_hz, s.period)
+            wrench.append(smooth[p.rows])
+            slope.append(np.gradient(smooth[:, 0], s.period)[p.rows])
+        both = np.concatenate(wrench) * here[:, None]
+        self.thrust = both[:, 0] / vehicle.mass
+        self.turning = both[:, 1:] / np.diagonal(vehicle.inertia)
+        self.slope = np.concatenate(slope) * here / vehicle.mass
+        self.none = np.zeros((len(here), 3))
+
+    @staticmethod
+    def along(axis: int, size: Array) -> Array:
+        return np.asarray(size[:, None] * np.eye(3)[axis])
+
+
+def _of_commands(of: _Flown) -> dict[str, Array]:
+    """Return what differs between flights whose rotors are known by commands.
 
     Where the delay of commands is known from how the vehicle turns, that of its thrust may still
     differ: the flight loop answers vertical motion.
     """
+    rows, flights, use, i = of.rows, of.rows.flights, NUISANCES, of.number
+    time = flights.t - flights.t[of.here > 0][0]
+    w = 2.0 * time / max(float(time[of.here > 0][-1]), 1e-9) - 1.0
+    out = {}
+    if len(flights.logs) > 1:
+        out[f"thrust {i}"] = use.thrust * rows.from_body(of.along(2, of.thrust))
+    out[f"drift {i}"] = use.drift * rows.from_body(of.along(2, of.thrust * w))
+    bend = of.thrust * (1.5 * w * w - 0.5)
+    out[f"bend {i}"] = use.drift * rows.from_body(of.along(2, bend))
+    if rows.fixed:
+        out[f"delay {i}"] = use.delay * rows.from_body(of.along(2, -of.slope))
+    level = flights.vehicle.gravity * of.here[:, None]
+    for axis, name in enumerate("xy"):
+        if not flights.inertial:
+            tilted = use.frame_tilt * level * of.rotation[:, axis, :]
+            out[f"frame tilt {name} {i}"] = rows.from_body(tilted, of.none)
+        aside = use.thrust_axis * of.along(axis, of.thrust)
+        out[f"thrust axis {name} {i}"] = rows.from_body(aside)
+    return out
+
+
+def _of_rotors(of: _Flown) -> dict[str, Array]:
+    """Return by how much the model of measured rotors is wrong.
+
+    A torque's gain is biased low by the share of its column that is noise of the rotor speeds
+    (errors in variables).
+    """
+    rows, i = of.rows, of.number
+    noise = rows.flights.rotor_noise
+    out = {}
+    varying = of.thrust - of.here * of.thrust[of.here > 0].mean()
+    out[f"{MODEL_ERROR} of thrust's changes {i}"] = noise[0] * rows.from_body(of.along(2, varying))
+    for axis, name in enumerate("xyz"):
+        force = LIKELIHOOD.model_error * of.along(axis, of.thrust)
+        out[f"{MODEL_ERROR} of force {name} {i}"] = rows.from_body(force)
+        gain = np.hypot(LIKELIHOOD.model_error, noise[1 + axis])
+        torque = gain * of.along(axis, of.turning[:, axis])
+        out[f"{MODEL_ERROR} of torque {name} {i}"] = rows.from_body(of.none, torque=torque)
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Follower:
+    """A signal that follows disturbances, because the flight loop answers them, or because it is
+    the motion that they make.
+
+    Attributes:
+        name: of the signal.
+        size: (n,) m/s2 or rad/s2: of a velocity, what makes it within the time in which the loop
+            stops it.
+        channels: of the rows, in which the disturbances act.
+    """
+
+    name: str
+    size: Array
+    channels: tuple[int, ...]
+
+    def column(self, rows: ForceRows, size: Array) -> Array:
+        """Return a column (n, channels) that is ``size`` (n,) where the disturbances act."""
+        out = np.zeros((len(size), rows.channels))
+        out[:, self.channels] = size[:, None]
+        return out
+
+
+def followers(rows: ForceRows) -> list[Follower]:
+    """Return the signals of measured rotors and of the motion that follow disturbances."""
     flights = rows.flights
-    several = len(flights.logs) > 1
-    out: dict[str, Array] = {}
-    begins = np.flatnonzero(flights.start)
-    pieces = flights.pieces({})
-    for i in range(len(flights.logs)):
-        here = np.zeros(len(flights.t))
-        here[flights.log == i] = 1.0
-        if not here.any():
-            continue
-        thrust, slope = np.zeros(len(flights.t)), np.zeros(len(flights.t))
-        rotation = np.concatenate([p.signals.rotation[p.rows] for p in pieces])
-        for begin, piece in zip(begins, pieces, strict=True):
-            own = slice(begin, begin + len(piece.rows))
-            s = piece.signals
-            specific = flights.vehicle.rotor_wrench(s.rotor_speeds)[:, 0] / flights.vehicle.mass
-            smooth = low_pass(specific, CUTOFFS.residual_hz, s.period)
-            thrust[own], slope[own] = smooth[piece.rows], np.gradient(smooth, s.period)[piece.rows]
-        thrust, slope = thrust * here, slope * here
-        time = flights.t - flights.t[here > 0][0]
-        w = 2.0 * time / max(float(time[here > 0][-1]), 1e-9) - 1.0
-        use = NUISANCES
-        none = np.zeros((len(here), 3))
+    inertias = np.array([flights.vehicle.mass, *np.diagonal(flights.vehicle.inertia)])
+    wrench = flights.rotor_wrench({}) / inertias
+    rates = np.zeros((len(wrench), 6))
+    begin = 0
+    for p in flights.pieces({}):
+        s = p.signals
+        body = np.einsum("nji,nj->ni", s.rotation, s.velocity)
+        both = low_pass(np.column_stack([body, s.angular_velocity]), flights.residual_hz, s.period)
+        rates[begin : begin + len(p.rows)] = both[p.rows]
+        begin += len(p.rows)
+    rates /= np.repeat(NUISANCES.stopped, 3)
+    torque = rows.channels - 3
+    forces = [tuple(range(axis, torque, 3)) for axis in range(3)]
+    return [
+        Follower("thrust", wrench[:, 0], forces[2]),
+        *(Follower(f"torque {x}", wrench[:, 1 + i], (torque + i,)) for i, x in enumerate("xyz")),
+        *(Follower(f"rate {x}", rates[:, 3 + i], (torque + i,)) for i, x in enumerate("xyz")),
+    ]
 
-        def along(axis: int, size: Array) -> Array:
-            return np.asarray(size[:, None] * np.eye(3)[axis])
 
-        if several:
-            out[f"thrust {i}"] = use.thrust * rows.from_body(along(2, thrust))
-        out[f"drift {i}"] = use.drift * rows.from_body(along(2, thrust * w))
-        out[f"bend {i}"] = use.drift * rows.from_body(along(2, thrust * (1.5 * w * w - 0.5)))
-        if rows.fixed:
-            out[f"delay {i}"] = use.delay * rows.from_body(along(2, -slope))
-        level = flights.vehicle.gravity * here[:, None]
-        for axis, name in enumerate("xy"):
-            tilted = use.frame_tilt * level * rotation[:, axis, :]
-            if not flights.inertial:
-                out[f"frame tilt {name} {i}"] = rows.from_body(tilted, none)
-            out[f"thrust axis {name} {i}"] = use.thrust_axis * rows.from_body(along(axis, thrust))
-        if rows.has_accelerometer:
-            for axis, name in enumerate("xyz"):
-                bias = use.accelerometer_bias * along(axis, here)
-                out[f"accelerometer bias {name} {i}"] = rows.from_body(none, bias)
-            scaled = use.accelerometer_scale * along(2, thrust)
-            out[f"accelerometer scale {i}"] = rows.from_body(none, scaled)
-        elif flights.inertial:
-            for axis, name in enumerate("xyz"):
-                bias = flights.bias_std(i)[axis] * along(axis, here)
-                out[f"accelerometer bias {name} {i}"] = rows.from_body(bias)
+def answered(rows: ForceRows, signals: Sequence[Follower], disturbance: Array) -> dict[str, Array]:
+    """Return what disturbances are where a signal follows them: a share of it.
+
+    A signal that follows a disturbance ``d`` explains the share ``var(d) / var(signal)`` of itself
+    as one, whatever the loop. In hover that is all of it, and next to nothing where the flight is
+    far from one.
+
+    Args:
+        rows: of the flights.
+        signals: that follow.
+        disturbance: (n, channels) what is one, as far as it is known.
+    """
+    out = {}
+    for signal in signals:
+        size = signal.size - signal.size[rows.fit].mean()
+        own = disturbance[np.ix_(rows.fit, signal.channels)]
+        share = min(float(own.var(axis=0).max() / max(size[rows.fit].var(), 1e-12)), 1.0)
+        out[f"answer by {signal.name}"] = signal.column(rows, NUISANCES.answered * share * size)
+    return out
+
+
+def answers(rows: ForceRows, signals: Sequence[Follower]) -> Array:
+    """Return what follows disturbances at once: the innovations (n, channels, signals) of the
+    signals, each in its own channels.
+
+    They explain a part of the disturbances' innovations. The rows before say what else a signal is.
+    """
+    lags = NUISANCES.answer_lags
+    size = np.column_stack([x.size for x in signals])
+    past = np.column_stack([rows.residual({}), size])
+    past = (past - past[rows.fit].mean(axis=0)) / (past[rows.fit].std(axis=0) + 1e-12)
+    since = np.arange(len(past))
+    since = since - since[rows.begins][np.cumsum(rows.begins) - 1]
+    known = since >= lags
+    parts = [np.ones((len(past), 1))]
+    parts += [np.roll(past, k, axis=0) for k in range(1, lags + 1)]
+    X, use = np.column_stack(parts), rows.fit & known
+    ridge = NUISANCES.answer_ridge * use.sum() * np.eye(X.shape[1])
+    b = np.linalg.solve(X[use].T @ X[use] + ridge, X[use].T @ size[use])
+    news = np.where(known[:, None], size - X @ b, 0.0)
+    return np.stack(
+        [NUISANCES.answer * s.column(rows, x) for s, x in zip(signals, news.T, strict=True)], axis=2
+    )
+
+
+def _of_sensors(of: _Flown) -> dict[str, Array]:
+    rows, flights, use, i = of.rows, of.rows.flights, NUISANCES, of.number
+    out = {}
+    if rows.has_accelerometer:
+        for axis, name in enumerate("xyz"):
+            bias = use.accelerometer_bias * of.along(axis, of.here)
+            out[f"accelerometer bias {name} {i}"] = rows.from_body(of.none, bias)
+        scaled = use.accelerometer_scale * of.along(2, of.thrust)
+        out[f"accelerometer scale {i}"] = rows.from_body(of.none, scaled)
+    elif flights.inertial:
+        for axis, name in enumerate("xyz"):
+            bias = flights.bias_std(i)[axis] * of.along(axis, of.here)
+            out[f"accelerometer bias {name} {i}"] = rows.from_body(bias)
+    return out
+
+
+def _of_timing(rows: ForceRows) -> dict[str, Array]:
+    """Return what signals that are apart in time do, to first order."""
+    out = {}
+    for column, x in rows.columns({}, rows.flights.time_offsets).items():
+        timing = timing_of(column, rows.flights.filtered)
+        assert timing is not None
+        out[column[1]] = timing.size * x
     return out
 
 

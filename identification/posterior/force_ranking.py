@@ -94,4 +94,4 @@ def rank_by_force(
     bases.pop(key)
     bases[key] = likelihood.base(best, others, unknown=True)
     found = Posterior(flights, library, list(bases.values()), likelihood.power, given, idle)
-    return Found(found, found.ranking(), best)
+    return Found(found, found.ranking(), best, sensors=likelihood.sensors(best))

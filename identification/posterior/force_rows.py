@@ -1,9 +1,10 @@
-"""The force balance of flights as rows of a regression: specific force in body axes that the model
-leaves, by the pose and by the accelerometer, at all frequencies from zero to a few hertz.
+"""The balance of forces and torques of flights as rows of a regression: the accelerations in body
+axes that the model leaves, by the pose and by the accelerometer, at all frequencies from zero to a
+few hertz.
 
 A steady wind has no power between 1 and 2 Hz, and a tilted frame none above them: what tells one
 from the other is the whole band down to zero. Above 3.5 Hz motors, filters and the flight loop
-decide what commands do.
+decide what commands do, and they say nothing of torques.
 """
 
 from collections.abc import Iterable
@@ -25,8 +26,11 @@ Index = NDArray[np.intp]
 class ForceRowSettings:
     """The rows, and the steps by which columns are differences."""
 
-    cutoff_hz: float = 3.5
-    rate_hz: float = 25.0 / 3.0  # of the rows: 2.4 times the cut-off
+    cutoff_hz: float = 3.5  # where rotors are known by commands
+    # where the pose was filtered: well below any filter
+    filtered_cutoff_hz: float = 2.0
+    inertial_cutoff_hz: float = 5.0  # where the motion is read from an IMU
+    rows_per_cutoff: float = 25.0 / 10.5  # rows in a period of the cut-off
     block: float = 4.0  # s, of the sums by which the likelihood's scatter is judged
     step: float = 0.1  # typical sizes
 
@@ -35,10 +39,11 @@ FORCE_ROWS = ForceRowSettings()
 
 
 class ForceRows:
-    """Rows (n, channels) m/s2 of flights: body x, y and z by the pose; then, where each log has an
-    accelerometer beside it, the same by the accelerometer.
+    """Rows (n, channels) of flights: specific force along body x, y and z, m/s2, by the pose; where
+    each log has an accelerometer beside it, the same by the accelerometer; and, where rotors are
+    measured, angular acceleration about the same axes, rad/s2.
 
-    Of logs whose motion is read from an IMU the accelerometer is the motion, and there are three
+    Of logs whose motion is read from an IMU the accelerometer is the motion, and force is in three
     channels.
 
     Args:
@@ -52,12 +57,20 @@ class ForceRows:
         block: (n,) number of the block of 4 s.
         log: (n,) which log.
         t: (n,) s.
-        channels: 3 or 6.
+        channels: 3, 6 or 9.
+        with_torques: whether torques are among them.
     """
 
     def __init__(self, flights: Flights, fixed: Setting) -> None:
+        self.with_torques, use = not flights.commanded, FORCE_ROWS
+        self._cutoff, step = np.inf, 1
+        if flights.commanded:
+            self._cutoff = use.cutoff_hz
+            step = max(1, round(1.0 / (use.rows_per_cutoff * self._cutoff * flights.period)))
+        else:
+            cutoff = use.filtered_cutoff_hz if flights.filtered else use.inertial_cutoff_hz
+            flights = flights.in_band(cutoff, use.rows_per_cutoff * cutoff)
         self.flights, self.fixed = flights, fixed
-        step = max(1, round(1.0 / (FORCE_ROWS.rate_hz * flights.period)))
         self._pieces = np.split(np.arange(len(flights.t)), np.flatnonzero(flights.start)[1:])
         kept = [rows[::step] for rows in self._pieces]
         self._at: Index = np.concatenate(kept)
@@ -70,37 +83,44 @@ class ForceRows:
         new = self.begins | (np.diff(number, prepend=-1) != 0)
         self.block = np.cumsum(new) - 1
         self.has_accelerometer = flights.felt({}) is not None
-        self.channels = 6 if self.has_accelerometer else 3
+        self.channels = 3 * (1 + self.has_accelerometer + self.with_torques)
+        self._inertia = np.diagonal(flights.vehicle.inertia)
         self._rotation = self._axes({})
 
     def _axes(self, setting: Setting) -> Array:
         pieces = self.flights.pieces(setting)
         return np.concatenate([p.signals.rotation[p.rows] for p in pieces])
 
-    def from_world(self, pose: Array, accelerometer: Array | None = None) -> Array:
+    def from_world(
+        self, pose: Array, accelerometer: Array | None = None, torque: Array | None = None
+    ) -> Array:
         """Return rows (n, channels, ...) of accelerations (samples, 3, ...) m/s2 in the world frame
         at the samples of ``flights``.
 
         Args:
             pose: that the pose shows.
             accelerometer: that the accelerometer shows, where there is one; default: the same.
+            torque: the angular acceleration (samples, 3, ...) rad/s2, body axes; default: none.
         """
         both = [pose, pose if accelerometer is None else accelerometer]
-        return self._thinned([self._in_body(x, self._rotation) for x in both])
+        return self._thinned([self._in_body(x, self._rotation) for x in both], torque)
 
-    def from_body(self, pose: Array, accelerometer: Array | None = None) -> Array:
+    def from_body(
+        self, pose: Array, accelerometer: Array | None = None, torque: Array | None = None
+    ) -> Array:
         """Return rows of accelerations in body axes; arguments as of ``from_world``."""
-        return self._thinned([pose, pose if accelerometer is None else accelerometer])
+        return self._thinned([pose, pose if accelerometer is None else accelerometer], torque)
 
     @staticmethod
     def _in_body(x: Array, rotation: Array) -> Array:
         return np.asarray(np.einsum("nji,nj...->ni...", rotation, x))
 
-    def _thinned(self, channels: list[Array]) -> Array:
-        x = np.concatenate(channels[: self.channels // 3], axis=1)
-        smooth = [
-            low_pass(x[rows], FORCE_ROWS.cutoff_hz, self.flights.period) for rows in self._pieces
-        ]
+    def _thinned(self, forces: list[Array], torque: Array | None) -> Array:
+        channels = forces[: 1 + self.has_accelerometer]
+        if self.with_torques:
+            channels = [*channels, np.zeros_like(forces[0]) if torque is None else torque]
+        x = np.concatenate(channels, axis=1)
+        smooth = [low_pass(x[rows], self._cutoff, self.flights.period) for rows in self._pieces]
         return np.asarray(np.concatenate(smooth)[self._at])
 
     def residual(self, setting: Setting) -> Array:
@@ -110,16 +130,20 @@ class ForceRows:
             InputError: no vehicle is like that.
         """
         mass, setting = self.flights.vehicle.mass, {**self.fixed, **setting}
-        left = self.flights.residual(setting)[:, :3] / mass
+        wrench = self.flights.residual(setting)
+        left = wrench[:, :3] / mass
         felt = self.flights.felt(setting)
         both = [left] if felt is None else [left, left + felt / mass]
         rotation = self._axes(setting)
-        return self._thinned([self._in_body(x, rotation) for x in both])
+        return self._thinned(
+            [self._in_body(x, rotation) for x in both], wrench[:, 3:] / self._inertia
+        )
 
     def noise(self) -> Array:
         """Return rows of the sensors' noise, as far as the logs show it."""
-        noise = self.flights.visible_noise / np.repeat([self.flights.vehicle.mass, 1.0], 3)
-        return self.from_world(noise[:, :3], np.zeros_like(noise[:, :3]))
+        noise = self.flights.visible_noise
+        force = noise[:, :3] / self.flights.vehicle.mass
+        return self.from_world(force, np.zeros_like(force), noise[:, 3:] / self._inertia)
 
     def columns(
         self, setting: Setting, wanted: Iterable[Column], step: float = FORCE_ROWS.step
@@ -133,11 +157,12 @@ class ForceRows:
         mass, setting = self.flights.vehicle.mass, {**self.fixed, **setting}
         found = self.flights.columns(setting, wanted, step)
         pose = np.stack([found[c][:, :3] / mass for c in wanted], axis=2)
+        torque = np.stack([found[c][:, 3:] / self._inertia for c in wanted], axis=2)
         both = pose.copy()
         for i, (effect, name) in enumerate(wanted):
             if self.has_accelerometer and effect and get(effect).kind == "sensing":
                 both[:, :, i] += self._felt_slope(setting, (effect, name), step) / mass
-        rows = self.from_world(pose, both)
+        rows = self.from_world(pose, both, torque)
         return {c: rows[:, :, i] for i, c in enumerate(wanted)}
 
     def _felt_slope(self, setting: Setting, column: Column, step: float) -> Array:

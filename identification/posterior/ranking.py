@@ -7,7 +7,7 @@ beside the best set, because what is not explained counts as a disturbance.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +58,8 @@ class Found:
     setting: Setting  # coefficients of the likeliest set
     # of each channel, where the likelihood has a noise of the motion; none for a force balance
     noise: tuple[AxisNoise, ...] = ()
+    # biases and time offsets of the sensors, with their standard deviations
+    sensors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 def rank(
@@ -99,7 +101,10 @@ def rank(
     alone = beside is nothing
     base = nothing.quieter_base(explained, unknown=True) if alone else beside.base(unknown=True)
     found = Posterior(flights, library, (loud, base), found.tempering())
-    return Found(found, found.ranking(), found.best_setting(), beside.likelihood.noise)
+    late = {
+        name: x for (_, name), x in found.nuisances().items() if ("", name) in flights.time_offsets
+    }
+    return Found(found, found.ranking(), found.best_setting(), beside.likelihood.noise, late)
 
 
 def _fitted(flights: Flights, setting: Setting, near: Likelihood) -> Setting:

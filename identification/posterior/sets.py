@@ -118,9 +118,17 @@ class Posterior:
         others = np.concatenate([base.plain, asked])
         normal, right = total[:-1, :-1], total[:-1, -1]
         little = np.ones(len(right))
-        little[asked] = PRIORS.negligible * base.typical[asked]
+        little[asked] = self._negligible(base, asked)
         at = {c: i for i, c in enumerate(c for c in base.columns if c[0])}
         return marginal(normal, right, deviance, asked, others, little[others]), asked, at
+
+    def _negligible(self, base: Base, asked: Index) -> Array:
+        """Return how much (len(asked),) of each column any flight may have."""
+        little = PRIORS.negligible * base.typical[asked]
+        if self.given is not None:  # bases have the starts of other effects: of none a little acts
+            names = list(base.columns)
+            little[[names[i][1].startswith(START_PREFIX) for i in asked]] = 0.0
+        return little
 
     def _log_prior(self, effects: int) -> float:
         p = self.inclusion
@@ -376,8 +384,8 @@ class Posterior:
         own = [
             base.columns[c] for v in self.known[best].variants for c in v[1] if c in base.columns
         ]
-        asked = [i for (e, _), i in base.columns.items() if e]
-        little = PRIORS.negligible * base.typical[asked]
+        asked = np.array([i for (e, _), i in base.columns.items() if e], dtype=np.intp)
+        little = self._negligible(base, asked)
         chosen = np.array([*base.plain, *asked, *own], dtype=np.intp)
         total = self.power * base.blocks.sum(axis=0)
         total /= 1.0 + DISCREPANCY.model_error**2 * self._done(base, total)

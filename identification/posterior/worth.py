@@ -9,7 +9,7 @@ from scipy.optimize import lsq_linear
 
 from ...dynamics.effects import get
 from ..inference.regression import CENTRAL, Column, Flights, Setting
-from .force_nuisances import force_nuisances
+from .force_nuisances import row_nuisances
 from .force_rows import ForceRows
 from .priors import prior_size
 
@@ -45,7 +45,7 @@ def worth(flights: Flights, fixed: Setting, setting: Setting) -> dict[str, float
     noise = np.mean(np.square(rows.noise()[fit]), axis=0)
     power = np.mean(np.square(left[fit]), axis=0)
     size = np.sqrt(np.maximum(power - noise, WORTH.noise_known**2 * noise)) + 1e-12
-    nuisances = list(force_nuisances(rows).values())
+    nuisances = list(row_nuisances(rows).values())
     columns = rows.columns(setting, _columns_of(flights, setting))
     out = {}
     for effect in setting:
