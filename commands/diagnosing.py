@@ -38,7 +38,6 @@ def diagnose(
     piece: int | None = None,
     rotor_faults: bool = False,
     without: list[str] | None = None,
-    probabilities: bool = True,
     vehicle: str | None = None,
     out: Path = Path("results/diagnose"),
 ) -> dict[str, Any]:
@@ -58,7 +57,7 @@ def diagnose(
         with example_flight() as flight:
             introduce(flight)
             read = read_flights([flight.log], None, flight.vehicle)
-            result = _diagnose(read, [flight.log], without, out, probabilities)
+            result = _diagnose(read, [flight.log], without, out)
         result["known"] = conclude(flight, result["effects"])
         show_page(out / "report.html", not no_open)
         return result
@@ -70,7 +69,7 @@ def diagnose(
             raise InputError(f"--rotor-faults: expected no {unwanted} with it")
         return _rotor_faults(logs, reader, vehicle, out, map)
     read = read_flights([*logs, *(test or [])], reader, vehicle, map, piece)
-    return _diagnose(read, logs, without, out, probabilities)
+    return _diagnose(read, logs, without, out)
 
 
 def _diagnose(
@@ -78,7 +77,6 @@ def _diagnose(
     paths: Sequence[Path],
     without: Sequence[str] | None,
     out: Path,
-    probabilities: bool,
 ) -> dict[str, Any]:
     """Find the effects that a vehicle's model lacks; write the report.
 
@@ -87,7 +85,6 @@ def _diagnose(
         paths: of the logs to which effects are fitted.
         without: effects that are left out of the library.
         out: folder for the report.
-        probabilities: state how probable each name is.
     """
     from ..identification.diagnosis import diagnose as run
     from ..identification.report.files import report_data, write_report
@@ -103,7 +100,6 @@ def _diagnose(
             every[count:],
             without or (),
             staged(progress),
-            probabilities,
         )
     found = _with_rotor_faults(found, paths, every[:count])
     # before a word is said: a reader who has read enough (a pipe to head) must not cost the results
@@ -126,7 +122,7 @@ def _show(found: "Diagnosis") -> None:
     from ..identification.report.page import error_table
     from ..identification.report.words import chance, name_in_words
 
-    stated = found.probabilities.names if found.probabilities else {}
+    stated = found.probabilities.names
     rows: list[tuple[str, ...]] = []
     for effect in found.effects:
         head = [name_in_words(effect), *([chance(stated[effect.name])] if stated else [])]

@@ -31,7 +31,9 @@ class NamedEffect:
         units: of each coefficient; "1" for a pure number.
         tentative: it may stand for another effect: see ``Diagnosis.structure``.
         indistinguishable_from: effects that would explain these logs as well.
-        evidence: e.g. share of the residual on held-out blocks that it alone explains.
+        evidence: the share of the held-out residual's energy that it explains; the logarithm of
+            the Bayes factor of sets with it against those without; its largest coefficient in
+            typical sizes; and its size over what is left unexplained.
         channels: of the logs, that carried the finding.
     """
 
@@ -64,11 +66,11 @@ class Errors:
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect that was tried first, alone, against the bare model.
+    """An effect that was tried alone, against the bare model.
 
     Attributes:
         name: as the effect library has it.
-        gain: share of the residual's deviance that it explains on left-out blocks; may be negative.
+        gain: deviance that it explains, over that which the whole library explains.
         named: whether the diagnosis names it.
     """
 
@@ -191,7 +193,7 @@ class Alternative:
 
 @dataclass(frozen=True)
 class Probabilities:
-    """How probable what was found is, by the search and the likelihood of the logs' poses together.
+    """How probable what was found is.
 
     Attributes:
         names: that it acts, of each effect that is named, or that an alternative has.
@@ -206,7 +208,7 @@ class Probabilities:
 
 @dataclass(frozen=True)
 class RankedSet:
-    """A set of effects, by the posterior alone.
+    """A set of effects.
 
     Attributes:
         effects: names, in order of the alphabet.
@@ -238,10 +240,6 @@ class Ranking:
     structure: float
     tempering: float
 
-    def likeliest_with(self, effect: str) -> RankedSet | None:
-        """Return the likeliest set that has an effect; None where no set has it."""
-        return next((s for s in self.sets if effect in s.effects), None)
-
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
@@ -265,9 +263,8 @@ class Diagnosis:
         traces: residual over time, a piece of flight each.
         signatures: one a named effect.
         structure: strongest first.
-        gusts: of each channel; none where rotor speeds are worked out from commands.
-        pushes: one a channel at most, the plainest first; none where rotor speeds are worked out
-            from commands.
+        gusts: of each channel; none where pose or rotor speeds are not as they were measured.
+        pushes: one a channel at most, the plainest first.
         cutoff_hz: Hz, of the low-pass of everything that was compared.
         declared: the vehicle that was given.
         amended: with the named effects, ready for ``estimate`` and the environment.
@@ -282,11 +279,8 @@ class Diagnosis:
             beside the IMU.
         doubts: why names are tentative, by the check that says so: sentences, which are notes as
             well, or names. Beside these, ``structure`` is a doubt of all names.
-        ranking: the posterior of sets of effects; none where it was not asked for, or where rotors
-            or pose were not measured as they were.
-        probabilities: of what was found, by search and posterior together, or by the search alone
-            where there is no posterior; none where they were not asked for, or where rotor speeds
-            are worked out from commands.
+        ranking: the posterior of sets of effects.
+        probabilities: of what was found.
     """
 
     verdict: str
@@ -316,7 +310,7 @@ class Diagnosis:
     needs_pose: tuple[str, ...] = ()
     doubts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     ranking: Ranking | None = None
-    probabilities: Probabilities | None = None
+    probabilities: Probabilities = field(default_factory=lambda: Probabilities({}, (), math.nan))
 
     @property
     def held_out_by_log(self) -> dict[str, list[tuple[float, float]]]:

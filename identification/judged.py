@@ -1,5 +1,6 @@
 """What a judgement of flights gives to the report, whichever way it was reached."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -110,4 +111,4 @@ class Judged:
     gusts: tuple[Disturbance, ...] = ()
     pushes: tuple[TransientDisturbance, ...] = ()
     ranking: Ranking | None = None
-    probabilities: Probabilities | None = None
+    probabilities: Probabilities = field(default_factory=lambda: Probabilities({}, (), math.nan))

@@ -201,7 +201,7 @@ def _rivals(found: Found, effect: str) -> tuple[str, ...]:
     """
     best = found.ranking.sets[0]
     rest = set(best.effects) - {effect}
-    out = []
+    out: list[str] = []
     for other in found.ranking.sets:
         more = set(other.effects) - rest
         in_its_place = rest < set(other.effects) and len(more) == 1 and effect not in more

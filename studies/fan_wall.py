@@ -74,8 +74,7 @@ def fan_wall(folder: Path) -> list[dict[str, Any]]:
             if not path.exists():
                 continue
             print(f"fan wall: {path.stem}", flush=True)
-            found = diagnose([read(path)], vehicle(), probabilities=True)
-            assert found.probabilities is not None
+            found = diagnose([read(path)], vehicle())
             wind = next((e for e in found.effects if e.name == "wind"), None)
             rows.append(
                 {

@@ -84,9 +84,8 @@ NOT_COMMANDED = (Need.MOMENTS, Need.SINGLE_ROTORS)
 
 # Coefficients by effect: what is added to the declared vehicle
 Setting = Mapping[str, Mapping[str, float]]
-# A column: an effect's coefficient, or ``moment`` of it, the torque part of that column alone
+# A column: an effect's coefficient
 Column = tuple[str, str]
-MOMENT_PREFIX = "moment of "
 CENTRAL = "central"  # the coefficient of effects that act rotor by rotor
 # a whole effect at coefficients of its own; the column is a multiple of it
 START_PREFIX = "start "
@@ -118,9 +117,7 @@ def lost_behind_a_filter() -> frozenset[str]:
 
 def coefficient(column: Column) -> Coefficient:
     """Return the declaration of a column's coefficient."""
-    return next(
-        c for c in get(column[0]).coefficients if c.name == column[1].removeprefix(MOMENT_PREFIX)
-    )
+    return next(c for c in get(column[0]).coefficients if c.name == column[1])
 
 
 def unit_of_change(column: Column, vehicle: Vehicle) -> float:
@@ -151,14 +148,6 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
         return max(others, default=1.0)
     share = np.clip(np.log(vehicle.mass / 0.03) / np.log(0.45 / 0.03), 0.0, 1.3)
     return float(small * (large / small) ** share)
-
-
-def range_of(column: Column, filtered: bool = False) -> tuple[float, float]:
-    """Return the range of a time offset, or of a bias; ``filtered``: of flights whose pose was
-    filtered.
-    """
-    timing = timing_of(column, filtered)
-    return (-BIAS.largest, BIAS.largest) if timing is None else timing.range
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,7 +291,7 @@ class Flights:
         return out
 
     def _sample_noise(self) -> Array:
-        """Return a sample of what of the sensors' noise, as the logs show it, the residual holds."""
+        """Return a sample of the sensors' noise in the residual, as the logs show it."""
         noisy = self._with_nothing_kept()
         noisy.logs = tuple(noisy_logs(self.logs, self.vehicle))
         return noisy.residual({}) - self.residual({})
@@ -738,9 +727,7 @@ class Flights:
         out: dict[Column, Array] = {}
         kept = self._kept(setting)
         for column in wanted:
-            effect, name = column
-            if name.startswith(MOMENT_PREFIX):
-                continue
+            effect = column[0]
             keep = effect not in setting and effect != ""
             if keep and column in kept:
                 out[column] = kept[column]
@@ -750,11 +737,6 @@ class Flights:
             )
             if keep:
                 kept[column] = out[column]
-        for column in wanted:
-            if column[1].startswith(MOMENT_PREFIX):
-                part = out[column[0], column[1].removeprefix(MOMENT_PREFIX)].copy()
-                part[:, :3] = 0.0
-                out[column] = part
         return out
 
 

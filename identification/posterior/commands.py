@@ -2,7 +2,7 @@
 calibrations, which any such vehicle has, and the delay that its turns show.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ...dynamics.effects import get, playing
@@ -11,8 +11,6 @@ from ..inference.commanded_rotors import THRUST_FACTORS, thrust_is_assumed
 from ..inference.regression import CENTRAL, Flights, coefficient
 from ..inference.turning_delay import Delay, rotor_delay, same_delays, turning_delay
 from .force_nuisances import calibrations
-
-Setting = Mapping[str, Mapping[str, float]]
 
 
 @dataclass(frozen=True)
@@ -31,7 +29,7 @@ class Given:
 
     library: list[str]
     first: dict[str, dict[str, float]]
-    fixed: Setting
+    fixed: dict[str, dict[str, float]]
     late: str = ""
     same: tuple[str, ...] = ()
     delay: Delay | None = None

@@ -21,8 +21,8 @@ from .evidence import Index, marginal, set_evidence, tempering
 from .force_noise import ForceNoise, fitted_noise, white_noise
 from .force_nuisances import answered, answers, followers, row_nuisances
 from .force_rows import ForceRows
-from .likelihood import NUISANCE, UNKNOWN, Sums
-from .priors import Base, Setting, between, declared, in_prior_units, prior_size
+from .likelihood import NUISANCE, UNKNOWN, Sums, declared
+from .priors import Base, Setting, between, in_prior_units, prior_size
 
 Array = NDArray[np.float64]
 Starts = Mapping[Column, Mapping[str, float]]

@@ -24,8 +24,8 @@ from .evidence import (
     set_evidence,
     tempering,
 )
-from .likelihood import UNKNOWN, WHOLE_PREFIX
-from .priors import PRIORS, Base, Setting, Variant, declared, variants_of
+from .likelihood import UNKNOWN, WHOLE_PREFIX, declared
+from .priors import PRIORS, Base, Setting, Variant, variants_of
 
 Array = NDArray[np.float64]
 
@@ -228,10 +228,6 @@ class Posterior:
                 return False
         return True
 
-    def best_base(self) -> int:
-        """Return the number of the base in which the likeliest set is."""
-        return self.known[max(self.scores, key=self.scores.__getitem__)].base
-
     def structure(self) -> float:
         """Return the logarithm of the Bayes factor of one more column beside the likeliest set.
 
@@ -388,23 +384,15 @@ class Posterior:
         little = self._negligible(base, asked)
         chosen = np.array([*base.plain, *asked, *own], dtype=np.intp)
         total = self.power * base.blocks.sum(axis=0)
-        total /= 1.0 + DISCREPANCY.model_error**2 * self._done(base, total)
         if not (self.flights.commanded or self.flights.rotor_speeds_vary):
             total *= DISCREPANCY.rounded
-        size = np.concatenate([np.ones(len(base.plain)), little, np.ones(len(own))])
-        return total[:-1, :-1], total[:-1, -1], chosen, size, base.dictionary
-
-    def _done(self, base: Base, total: Array) -> float:
-        """Return the deviance that the effects of a base make, by their parts that change with a
-        variable.
-        """
-        energy: dict[str, list[float]] = {}
+        # an effect of the set is true to some per cent, whatever it changes with
         names = list(base.columns)
-        for i in base.dictionary.tolist():
-            if names[i][1].startswith(CHANGING):
-                effect = names[i][1].removeprefix(CHANGING).split(" with ")[0]
-                energy.setdefault(effect, []).append(total[i, i] / DISCREPANCY.share_of_effect**2)
-        return sum(float(np.mean(x)) for x in energy.values())
+        changing = [i for i in base.dictionary.tolist() if names[i][1].startswith(CHANGING)]
+        wrong = np.full(len(changing), DISCREPANCY.model_error / DISCREPANCY.share_of_effect)
+        chosen = np.append(chosen, np.array(changing, dtype=np.intp))
+        size = np.concatenate([np.ones(len(base.plain)), little, np.ones(len(own)), wrong])
+        return total[:-1, :-1], total[:-1, -1], chosen, size, base.dictionary
 
     def best_setting(self, most: int = SETS.most_effects) -> Setting:
         """Return the coefficients of the likeliest set of at most so many effects."""

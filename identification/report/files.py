@@ -3,7 +3,6 @@
 """
 
 import json
-import math
 import shlex
 from dataclasses import asdict
 from importlib import resources
@@ -14,7 +13,7 @@ from ... import __version__
 from ...dynamics.vehicle_file import save_vehicle
 from ...runtime.page_files import write_text
 from ...runtime.plain_values import as_text, plain
-from ..findings import Diagnosis, Errors, Probabilities
+from ..findings import Diagnosis, Errors
 from .headline import headline
 from .page import report_page
 
@@ -72,7 +71,7 @@ def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
     }
     if len(diagnosis.logs) + len(diagnosis.test_logs) > 1:
         error["held_out_by_log"] = diagnosis.held_out_by_log
-    stated = diagnosis.probabilities or Probabilities({}, (), math.nan)
+    stated = diagnosis.probabilities
     data: dict[str, Any] = {
         "verdict": diagnosis.verdict,
         "remainder": diagnosis.remainder,

@@ -270,12 +270,8 @@ def held_out_sum(diagnosis: Diagnosis) -> str:
 
 
 def _probability(diagnosis: Diagnosis) -> list[str]:
-    """Return how probable the names are, and that something unknown acts; nothing where that was
-    not asked.
-    """
+    """Return how probable the names are, and that something unknown acts."""
     stated = diagnosis.probabilities
-    if stated is None:
-        return []
     names = [f"{e.name} {chance(stated.names.get(e.name, 0.0))}" for e in diagnosis.effects]
     acts = f"Probability that it acts: {in_words(names)}. " if names else ""
     return [f"{acts}Probability of a cause outside the library: {chance(stated.unknown)}."]

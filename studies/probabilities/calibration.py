@@ -1,29 +1,20 @@
 """What the probabilities of recorded flights are worth: calibration, log score, and the coverage of
 coefficients' intervals.
-
-Flights are halved by their numbers, ten by ten, so that either half has all kinds. Each is scored
-with weights that were fitted to the other: no flight is scored with weights that know it.
 """
 
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from windwrench.identification.findings import Probabilities
-from windwrench.identification.posterior.pooling import SEARCH_ALONE, PoolingSettings
-from windwrench.identification.search_verdict import SEARCH_VERDICT
 from windwrench.studies.kept_results import kept
 from windwrench.studies.probabilities.fitting import (
     acts_unknown,
-    fit,
     is_right,
-    pool,
+    right_set,
     stands_for,
-    without_posterior,
 )
 from windwrench.studies.scoring import area_under_curve, share
 
@@ -33,7 +24,6 @@ RESULTS = {  # kept flights, below docs/
     "other logs": "probabilities/other-logs.json.gz",
 }
 TITLES = {
-    "pose": "a pose, without its posterior",
     "no pose": "an IMU alone",
     "position at 10 Hz": "an IMU, and ten positions a second",
     "filtered": "a pose filtered before it was written",
@@ -44,61 +34,35 @@ _RESAMPLED = 2000
 Claim = tuple[float, bool]
 
 
-@dataclass(frozen=True)
-class Scored:
-    """A recorded flight and its probabilities by one way."""
-
-    own: bool
-    flight: dict[str, Any]
-    found: Probabilities
-
-    def claims(self) -> list[Claim]:
-        """Return the probability of each name, and whether it is right: of what the search names,
-        and of each other effect from the least probability that is shown.
-        """
-        named = {e["name"] for e in self.flight["named"]}
-        return [
-            (p, is_right(self.flight, e))
-            for e, p in self.found.names.items()
-            if e in named or p >= EDGES[0]
-        ]
-
-    def log_score(self) -> float:
-        """Return the sum of logarithms of the probabilities of what is true, over claims and
-        effects that act and that nobody claims.
-        """
-        claims = self.claims()
-        shown = [e for e, p in self.found.names.items() if p >= EDGES[0]]
-        shown += [e["name"] for e in self.flight["named"]]
-        claimed = {x for e in shown for x in stands_for(self.flight, e)}
-        missed = set(self.flight["truth"]) - set(self.flight["left_out"]) - claimed
-        claims += [
-            (sum(self.found.names.get(x, 0.0) for x in stands_for(self.flight, e)), True)
-            for e in missed
-        ]
-        total = 0.0
-        for p, right in claims:
-            q = min(max(p, _CERTAIN), 1.0 - _CERTAIN)
-            total += math.log(q if right else 1.0 - q)
-        return total
+Flight = dict[str, Any]
 
 
-def half_of(record: Mapping[str, Any]) -> int:
-    """Return in which half a record is: ten numbers in a row have all kinds of flights."""
-    return int(record["task"][2]) // 10 % 2
+def claims_of_one(flight: Flight) -> list[Claim]:
+    """Return the probability of each name, and whether it is right."""
+    return [(e["probability"], is_right(flight, e["name"])) for e in flight["named"]]
 
 
-def _halves(records: Sequence[Mapping[str, Any]]) -> list[list[dict[str, Any]]]:
-    """Return the flights of either half."""
-    return [[r["result"] for r in records if half_of(r) == half] for half in (0, 1)]
+def log_score(flight: Flight) -> float:
+    """Return the sum of logarithms of the probabilities of what is true, over names and effects
+    that act and that are not named.
+    """
+    claimed = {x for e in flight["named"] for x in stands_for(flight, e["name"])}
+    missed = set(flight["truth"]) - set(flight["left_out"]) - claimed
+    total = len(missed) * math.log(_CERTAIN)
+    for p, right in claims_of_one(flight):
+        q = min(max(p, _CERTAIN), 1.0 - _CERTAIN)
+        total += math.log(q if right else 1.0 - q)
+    return total
 
 
-def cross_fitted(records: Sequence[Mapping[str, Any]]) -> list[Scored]:
-    """Return the flights with pooled probabilities, none by weights that know it."""
-    weights = [fit(half) for half in reversed(_halves(records))]
+def flights_of(records: Sequence[Mapping[str, Any]], **task: Any) -> list[Flight]:
+    """Return the flights of records that were not refused; of one simulator, or one way to log."""
     return [
-        Scored(r["task"][0] == "own", r["result"], pool(r["result"], weights[half_of(r)]))
+        r["result"]
         for r in records
+        if "refused" not in r["result"]
+        and task.get("simulator", r["task"][0]) == r["task"][0]
+        and task.get("way", r["task"][-1]) == r["task"][-1]
     ]
 
 
@@ -112,15 +76,15 @@ def expected_calibration_error(claims: Sequence[Claim]) -> float:
     return total / max(len(claims), 1)
 
 
-def claims_of(flights: Sequence[Scored]) -> list[Claim]:
+def claims_of(flights: Sequence[Flight]) -> list[Claim]:
     """Return the claims of all flights."""
-    return [claim for flight in flights for claim in flight.claims()]
+    return [claim for flight in flights for claim in claims_of_one(flight)]
 
 
-def calibration_interval(flights: Sequence[Scored]) -> tuple[float, float]:
+def calibration_interval(flights: Sequence[Flight]) -> tuple[float, float]:
     """Return the 95 % interval of the expected calibration error, over flights drawn anew."""
     rng = np.random.default_rng(0)
-    claims = [flight.claims() for flight in flights]
+    claims = [claims_of_one(flight) for flight in flights]
     drawn = [
         expected_calibration_error(
             [c for i in rng.integers(len(claims), size=len(claims)) for c in claims[i]]
@@ -158,7 +122,7 @@ def mean_and_interval(values: Sequence[float]) -> str:
     return f"{x.mean():.2f} ({low:.2f} to {high:.2f})"
 
 
-def reliability(flights: Sequence[Scored]) -> list[dict[str, Any]]:
+def reliability(flights: Sequence[Flight]) -> list[dict[str, Any]]:
     """Return rows of the reliability diagram: probability, its mean, and how often it is right."""
     rows: list[dict[str, Any]] = []
     claims = claims_of(flights)
@@ -174,69 +138,65 @@ def reliability(flights: Sequence[Scored]) -> list[dict[str, Any]]:
     return rows
 
 
-def area(flights: Sequence[Scored]) -> str:
+def area(flights: Sequence[Flight]) -> str:
     """Return the area under the curve of ``unknown``, with the counts of flights."""
-    strange = [x.found.unknown for x in flights if acts_unknown(x.flight)]
-    known = [x.found.unknown for x in flights if not acts_unknown(x.flight)]
+    strange = [x["unknown"] for x in flights if acts_unknown(x)]
+    known = [x["unknown"] for x in flights if not acts_unknown(x)]
     return area_under_curve(strange, known)
 
 
-def errors_of_coefficients(flights: Sequence[Scored]) -> list[float]:
+def errors_of_coefficients(flights: Sequence[Flight]) -> list[float]:
     """Return errors of coefficients in stated standard deviations, of right names whose truth is
     known.
     """
     out = []
     for x in flights:
-        for e in x.flight["named"]:
-            for name, value in x.flight["truth"].get(e["name"], {}).items():
+        for e in x["named"]:
+            for name, value in x["truth"].get(e["name"], {}).items():
                 std = e["std"].get(name) or 0.0
-                if std > 0.0 and not acts_unknown(x.flight):
+                if std > 0.0 and not acts_unknown(x):
                     out.append(abs(e["coefficients"][name] - value) / std)
     return out
 
 
-def summary(title: str, flights: Sequence[Scored]) -> dict[str, Any]:
+def summary(title: str, flights: Sequence[Flight]) -> dict[str, Any]:
     """Return what names and probabilities of flights are worth, as a row of a table."""
     claims = claims_of(flights)
-    sure = [(e, x) for x in flights for e in x.flight["named"] if not e["tentative"]]
+    known = [x for x in flights if not acts_unknown(x)]
     return {
         "title": title,
         "flights": len(flights),
-        "unknown": sum(acts_unknown(x.flight) for x in flights),
-        "sure": share(sum(is_right(x.flight, e["name"]) for e, x in sure), len(sure)),
+        "unknown": len(flights) - len(known),
+        "right": share(sum(map(right_set, known)), len(known)),
+        "sure": _sure(flights),
         "error": expected_calibration_error(claims),
         "error_ci95": calibration_interval(flights),
         "error_of_perfect": error_of_perfect_calibration(claims),
-        "log_score": mean_and_interval([x.log_score() for x in flights]),
+        "log_score": mean_and_interval([log_score(x) for x in flights]),
         "area": area(flights),
     }
 
 
-def counts(flights: Sequence[Scored]) -> dict[str, str]:
-    """Return counts with their intervals: names that are sure by their probability, names where
-    nothing is missing or something unknown acts, and the coverage of coefficients' intervals.
-    """
-    known = [x for x in flights if not acts_unknown(x.flight)]
-    nothing = [x for x in known if not x.flight["truth"]]
-    strange = [x for x in flights if acts_unknown(x.flight)]
-    least = SEARCH_VERDICT.least_sure_probability
-    sure = [
-        (e, x)
-        for x in flights
-        for e in x.flight["named"]
-        if not e["tentative"] and min(x.found.names[n["name"]] for n in x.flight["named"]) >= least
-    ]
+def _sure(flights: Sequence[Flight]) -> str:
+    sure = [(e, x) for x in flights for e in x["named"] if not e["tentative"]]
+    return share(sum(is_right(x, e["name"]) for e, x in sure), len(sure))
 
-    def above(some: Sequence[Scored], least: float) -> str:
-        return share(sum(any(p >= least for p in x.found.names.values()) for x in some), len(some))
+
+def counts(flights: Sequence[Flight]) -> dict[str, str]:
+    """Return counts with their intervals: names that are sure, names where nothing is missing or
+    something unknown acts, and the coverage of coefficients' intervals.
+    """
+    known = [x for x in flights if not acts_unknown(x)]
+    nothing = [x for x in known if not x["truth"]]
+    strange = [x for x in flights if acts_unknown(x)]
+
+    def sure(some: Sequence[Flight]) -> str:
+        return share(sum(any(not e["tentative"] for e in x["named"]) for x in some), len(some))
 
     out = {
-        "names that are sure, and right": share(
-            sum(is_right(x.flight, e["name"]) for e, x in sure), len(sure)
-        ),
-        "nothing missing, yet a name of 0.5 and more": above(nothing, 0.5),
-        "outsiders and left-out effects, yet a name of 0.5 and more": above(strange, 0.5),
-        "outsiders and left-out effects, yet a name of 0.95 and more": above(strange, 0.95),
+        "names that are sure, and right": _sure(flights),
+        "nothing missing, yet a sure name": sure(nothing),
+        "outsiders and left-out effects, yet a sure name": sure(strange),
     }
     errors = errors_of_coefficients(flights)
     for level, most in ((68, 0.9945), (95, 1.96)):
@@ -245,57 +205,19 @@ def counts(flights: Sequence[Scored]) -> dict[str, str]:
     return out
 
 
-def without_posteriors(
-    records: Sequence[Mapping[str, Any]], poses: Sequence[Mapping[str, Any]]
-) -> dict[str, list[Mapping[str, Any]]]:
-    """Return records without a posterior by the keys of ``SEARCH_ALONE``; refused flights are left
-    out.
-
-    Args:
-        records: of logs of other kinds, whose task ends with the way to log.
-        poses: of flights whose pose is logged as measured.
-    """
-    out: dict[str, list[Mapping[str, Any]]] = {kind: [] for kind in SEARCH_ALONE}
-    for record in (*({**r, "task": [*r["task"], "pose"]} for r in poses), *records):
-        way = record["task"][3]
-        if "refused" not in record["result"]:
-            found = {**record, "result": without_posterior(record["result"])}
-            out[way if way in SEARCH_ALONE else "imu"].append(found)
-    return out
-
-
-def weights_without_posterior(
-    records: Sequence[Mapping[str, Any]], poses: Sequence[Mapping[str, Any]]
-) -> dict[str, PoolingSettings]:
-    """Return what ``SEARCH_ALONE`` should be by these flights; arguments as of
-    ``without_posteriors``.
-    """
-    found = {
-        kind: fit([r["result"] for r in some])
-        for kind, some in without_posteriors(records, poses).items()
-    }
-    return {k: replace(x, evidence=0.0, other=0.0, structure=0.0) for k, x in found.items()}
-
-
 def shown() -> dict[str, Any]:
     """Return what the page shows of the kept results."""
     records, later = kept(RESULTS["first"]), kept(RESULTS["later"])
     others = kept(RESULTS["other logs"])
-    fitted = cross_fitted(records)
-    after = [Scored(r["task"][0] == "own", r["result"], pool(r["result"])) for r in later]
+    earlier, after = flights_of(records), flights_of(later)
     rows = [
-        summary("this project's plant", [x for x in fitted if x.own]),
-        summary("the other simulator", [x for x in fitted if not x.own]),
-        summary("both, later, with the weights in use", after),
+        summary("this project's plant", flights_of(records, simulator="own")),
+        summary("the other simulator", flights_of(records, simulator="other")),
+        summary("both, later", after),
+        *(summary(title, flights_of(others, way=way)) for way, title in TITLES.items()),
     ]
-    for some in without_posteriors(others, records).values():
-        scored = cross_fitted(some)
-        ways = [record["task"][3] for record in some]
-        for way in dict.fromkeys(ways):
-            mine = [x for x, own in zip(scored, ways, strict=True) if own == way]
-            rows.append(summary(TITLES[way], mine))
     return {
         "rows": rows,
-        "counts": {"earlier": counts(fitted), "later": counts(after)},
-        "reliability": {"earlier": reliability(fitted), "later": reliability(after)},
+        "counts": {"earlier": counts(earlier), "later": counts(after)},
+        "reliability": {"earlier": reliability(earlier), "later": reliability(after)},
     }

@@ -6,7 +6,7 @@ import importlib.util
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -18,10 +18,9 @@ from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.dynamics.vehicle import Vehicle
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.findings import Ranking
 from windwrench.identification.inference.regression import lost_behind_a_filter
 from windwrench.identification.logs.flight_log import FlightLog
-from windwrench.identification.search_verdict import IMPROBABLE
+from windwrench.identification.verdict import beyond_calm
 from windwrench.runtime.errors import InputError
 from windwrench.studies.scoring import EQUIVALENTS
 from windwrench.studies.trials.logged_poses import FILTERS, LOGS
@@ -50,7 +49,6 @@ OF_TEN = (
     "left out",
 )
 _ATTEMPTS = 4  # at a flight that crashes
-_MOST_SETS = 10  # of the posterior, that are kept
 _GUST_TIMES = (0.1, 2.0)  # s, between which a gust's duration is drawn
 _STRONGEST_GUSTS = 3.0  # times the background's
 _MASSES = (0.1, 2.0)  # kg, between which a vehicle of half the flights lies
@@ -68,8 +66,8 @@ _KNOWN = {
 
 
 def recorded(simulator: str, kind: str, number: int, way: str = "pose") -> dict[str, Any]:
-    """Return what the search and the posterior say of one flight, and its truth, as JSON; only why
-    it was refused, where it was.
+    """Return what the diagnosis says of one flight, and its truth, as JSON; only why it was
+    refused, where it was.
 
     Args:
         simulator: "own", "rotorpy", or the file of the other one.
@@ -93,53 +91,58 @@ def recorded(simulator: str, kind: str, number: int, way: str = "pose") -> dict[
     left_out: list[str] = []
     if kind == "left out":
         left_out = [e for t in truth for e in (t, *EQUIVALENTS.get(t, ()))]
+    return diagnosed(log, vehicle, truth, outsider, flown, left_out)
+
+
+def diagnosed(
+    log: FlightLog,
+    vehicle: Vehicle,
+    truth: Mapping[str, Any],
+    outsider: str,
+    flown: str,
+    left_out: Sequence[str],
+) -> dict[str, Any]:
+    """Return what the diagnosis says of one flight; arguments as of its record."""
     begun = time.process_time()
     try:
-        search = diagnose([log], vehicle, without=left_out, probabilities=True)
+        found = diagnose([log], vehicle, without=left_out)
     except InputError as error:
         return {"refused": str(error)}
     ended = time.process_time()
-    lost = {*search.needs_pose, *(lost_behind_a_filter() if way == "filtered" else ())}
-    # a log that looks filtered has no posterior
-    found = search.ranking or Ranking({}, (), 0.0, 1.0)
+    lost = set(found.needs_pose)
+    if "filtered pose" in found.doubts or any("were filtered before" in x for x in found.notes):
+        lost |= lost_behind_a_filter()
+    stated, ranking = found.probabilities, found.ranking
+    assert ranking is not None
     return {
         "flown": flown,
         "truth": truth,
         "outsider": outsider,
-        "left_out": left_out,
+        "left_out": list(left_out),
         "hidden": sorted(lost & set(truth)),
         "named": [
             {
                 "name": e.name,
-                # by the search: its doubts are known before any probability
-                "tentative": e.tentative and IMPROBABLE not in search.doubts,
+                "tentative": e.tentative,
                 "indistinguishable_from": list(e.indistinguishable_from),
                 "coefficients": {k: float(f"{v:.5g}") for k, v in e.coefficients.items()},
                 "std": {k: float(f"{v:.5g}") for k, v in e.std.items()},
+                "probability": round(stated.names[e.name], 4),
+                "worth": float(f"{e.evidence.get('size_over_what_is_left', 0.0):.3g}"),
             }
-            for e in search.effects
+            for e in found.effects
         ],
-        "remainder": search.remainder,
-        "doubts": {c: len(words) for c, words in search.doubts.items() if c != IMPROBABLE},
-        "signs": sorted({sign.kind for sign in search.structure}),
-        "gusts": [[float(f"{g.rms:.3g}"), float(f"{g.time:.3g}")] for g in search.gusts],
-        "weight": [round(vehicle.weight, 4), round(vehicle.arm_l, 5)],
-        "sets": [[list(s.effects), float(f"{s.probability:.4g}")] for s in found.sets[:_MOST_SETS]],
-        "fitted": _fitted(found, [e.name for e in search.effects]),
-        "structure": round(found.structure, 3),
-        "tempering": round(found.tempering, 4),
+        "unknown": round(stated.unknown, 4),
+        "remainder": found.remainder,
+        "signs": {
+            "structure": round(ranking.structure, 3),
+            "disturbance": round(max(beyond_calm(found.gusts, vehicle), -9.0), 3),
+            "push": bool(found.pushes),
+            "named": bool(found.effects),
+        },
+        "tempering": round(ranking.tempering, 4),
         "cpu_s": round(ended - begun, 2),
     }
-
-
-def _fitted(found: Ranking, effects: Sequence[str]) -> dict[str, Any]:
-    """Return coefficients of effects in the likeliest set that has each."""
-    out = {}
-    for e in effects:
-        best = found.likeliest_with(e)
-        if best is not None:
-            out[e] = {k: float(f"{x:.5g}") for k, x in best.coefficients[e].items()}
-    return out
 
 
 def _own(kind: str, number: int, imu: bool) -> Flown:
