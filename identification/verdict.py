@@ -1,7 +1,7 @@
 """What the evidence of sets of effects says of flights, in words that a report can use.
 
 A name is sure where it is probable, where what it does is at least as large as what is left
-unexplained beyond the sensors' noise, and where nothing outside the library is likelier than not.
+unexplained, and where nothing outside the library is likelier than not.
 The rule is the same for every kind of log; what differs is whose likelihood it is: that of the
 poses, where they and the rotors were measured as they were, or that of the wrench's balance.
 """
@@ -118,7 +118,7 @@ def judged(flights: Flights, library: Sequence[str], report: Report) -> Judged:
         for e in named
     }
     doubts = _doubts(flights, strange, named, given)
-    worths = worth(flights, given.fixed, found.setting)
+    worths = worth(flights, given.fixed, given.first, found.setting)
     energy = _energy_shares(flights, setting, left.after, named)
     unsure = bool(set(doubts) - {"assumed thrust"})
     effects = [

@@ -287,14 +287,7 @@ class Flights:
         out = self._with_nothing_kept()
         out.residual_hz, out._row_rate_hz, out._first = cutoff_hz, rate_hz, []
         out._lay_rows()
-        out.visible_noise = out._sample_noise()
         return out
-
-    def _sample_noise(self) -> Array:
-        """Return a sample of the sensors' noise in the residual, as the logs show it."""
-        noisy = self._with_nothing_kept()
-        noisy.logs = tuple(noisy_logs(self.logs, self.vehicle))
-        return noisy.residual({}) - self.residual({})
 
     def _repeat_sensor_noise(self) -> tuple[Array, frozenset[str], Array]:
         """Return a sample of the residual's sensor noise, the effects that are not identifiable,

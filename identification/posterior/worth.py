@@ -1,6 +1,6 @@
 """How much an effect does, beside what a model with it leaves unexplained."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,33 +18,32 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class WorthSettings:
-    """What counts as an effect's own, and as left."""
+    """What counts as an effect's own."""
 
     most_in_std: float = 3.0  # of a prior, that others may differ in an effect's place
-    # of the sensors' noise: as far as that is known
-    noise_known: float = 0.2
 
 
 WORTH = WorthSettings()
 
 
-def worth(flights: Flights, fixed: Setting, setting: Setting) -> dict[str, float]:
-    """Return of each effect the RMS of what nuisances and effects of other families cannot do in
-    its place, within three standard deviations of their priors, over the RMS of what is left beyond
-    the sensors' noise: in the channel where that is most.
+def worth(
+    flights: Flights, fixed: Setting, first: Collection[str], setting: Setting
+) -> dict[str, float]:
+    """Return of each effect the RMS of what nuisances, effects that any set has and effects of
+    other families cannot do in its place, within three standard deviations of their priors, over the RMS of what is left: in
+    the channel where that is most.
 
     Args:
         flights: of the vehicle.
         fixed: effects that are known from elsewhere.
+        first: effects that any set has.
         setting: coefficients of the effects that are asked about.
     """
     if not setting:
         return {}
     rows = ForceRows(flights, fixed)
     fit, left = rows.fit, rows.residual(setting)
-    noise = np.mean(np.square(rows.noise()[fit]), axis=0)
-    power = np.mean(np.square(left[fit]), axis=0)
-    size = np.sqrt(np.maximum(power - noise, WORTH.noise_known**2 * noise)) + 1e-12
+    size = np.sqrt(np.mean(np.square(left[fit]), axis=0)) + 1e-12
     nuisances = list(row_nuisances(rows).values())
     columns = rows.columns(setting, _columns_of(flights, setting))
     out = {}
@@ -54,7 +53,7 @@ def worth(flights: Flights, fixed: Setting, setting: Setting) -> dict[str, float
         # in still air a drag cannot do what it does in a wind
         still = get(effect).sets_wind
         others = rows.columns(less, _columns_of(flights, less)) if still else columns
-        own = _scaled(flights, others, effect)
+        own = _scaled(flights, others, effect, first)
         X = np.stack([*nuisances, *own], axis=2)[fit] / size[:, None]
         y = part[fit] / size
         most = WORTH.most_in_std
@@ -72,11 +71,15 @@ def _columns_of(flights: Flights, setting: Setting) -> list[Column]:
     ]
 
 
-def _scaled(flights: Flights, columns: Mapping[Column, Array], effect: str) -> list[Array]:
-    """Return the columns of effects of other families in standard deviations of their priors."""
+def _scaled(
+    flights: Flights, columns: Mapping[Column, Array], effect: str, first: Collection[str]
+) -> list[Array]:
+    """Return the columns of effects that any set has, and of those of other families, in standard
+    deviations of their priors.
+    """
     family = get(effect).family
     return [
         x * prior_size(c, flights)
         for c, x in columns.items()
-        if c[0] != effect and get(c[0]).family != family
+        if c[0] != effect and (c[0] in first or get(c[0]).family != family)
     ]

@@ -12,7 +12,7 @@ import pytest
 
 from tests.support.data_paths import data_file
 from windwrench.dynamics import EffectSetting, Vehicle, load_vehicle
-from windwrench.identification import search_verdict
+from windwrench.identification import verdict
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.findings import Diagnosis
 from windwrench.identification.inference.regression import Flights, held_out
@@ -313,22 +313,16 @@ def test_what_a_flight_hardly_excites_may_be_behind_what_is_named():
 def test_a_rotor_that_stalls_now_and_then_is_no_certain_curvature():
     """A tenth of the thrust beyond a tenth more than at hover is lost, in few moments."""
     log, vehicle = drawn("outsider", ("thrust_saturation",), "small", None, 2343211471, 60.0)()
-    found = diagnose([log], vehicle, probabilities=True)
+    found = diagnose([log], vehicle)
     assert found.probabilities.names["thrust_curvature"] < 0.95
 
 
 def test_a_name_that_is_not_probable_enough_is_tentative(monkeypatch):
     log = fly("thrust_curvature", a=-0.05)
-    monkeypatch.setattr(
-        search_verdict,
-        "SEARCH_VERDICT",
-        replace(search_verdict.SEARCH_VERDICT, least_sure_probability=0.999),
-    )
-    found = diagnose([log], VEHICLE, probabilities=True)
-    assert 0.95 < found.probabilities.names["thrust_curvature"] < 0.999
+    monkeypatch.setattr(verdict, "VERDICT", replace(verdict.VERDICT, least_sure_probability=1.0))
+    found = diagnose([log], VEHICLE)
+    assert 0.95 < found.probabilities.names["thrust_curvature"] < 1.0
     assert [(e.name, e.tentative) for e in found.effects] == [("thrust_curvature", True)]
-    (said,) = found.doubts[search_verdict.IMPROBABLE]
-    assert said in found.notes
 
 
 def test_no_flight_keeps_step_with_what_is_held_out():

@@ -2,12 +2,12 @@
 
 import pytest
 
-from tests.support.searches import recorded, searched
+from tests.support.flown import VEHICLE, recorded
 from windwrench.identification.inference.carrying_channels import (
     ORDER,
     carrying_channels,
-    traces_of,
 )
+from windwrench.identification.inference.regression import Flights
 
 CASES = {
     "constant_torque": ({"tx": 0.01, "ty": 0.01, "tz": 0.0}, {"attitude"}, {"rotor speeds"}),
@@ -21,8 +21,7 @@ CASES = {
 def test_channels_are_those_of_the_trace_and_of_the_model(effect):
     coefficients, carried, others = CASES[effect]
     log = recorded(seconds=12.0, **{effect: coefficients})
-    search, fit = searched(log, [effect], **{effect: coefficients})
-    found = carrying_channels(search.flights, fit.setting, effect, traces_of(search, fit, effect))
+    found = carrying_channels(Flights([log], VEHICLE), {effect: coefficients}, effect)
     assert carried <= set(found)
     assert not others & set(found)
     assert list(found) == [channel for channel in ORDER if channel in found]

@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.support.searches import VEHICLE, recorded, searched
+from tests.support.flown import VEHICLE, recorded
+from windwrench.identification.inference.regression import Flights
+from windwrench.identification.inference.time_offsets import LAG_ASYMMETRY
 from windwrench.identification.motion.smoothing import low_pass
+from windwrench.identification.posterior.ranking import rank
 
 TAU, APART = 0.03, 0.008  # s: 22 ms up, 38 ms down
-EFFECTS = {"motor_lag": {"tau": TAU}, "mass": {"dm": 0.0}}
 
 
 def flown(commanded):
@@ -21,17 +23,13 @@ def flown(commanded):
     return replace(log, rotor_speeds=speeds + tau * rate if commanded else speeds)
 
 
-def fitted(log, *effects):
-    return searched(log, ["motor_lag", "mass"], **{name: EFFECTS[name] for name in effects})
-
-
 def test_a_lag_that_is_uneven_leaves_no_mass():
     """The mass is that of a fit to the rotor speeds themselves, which are smoothed here."""
-    _, known = fitted(flown(commanded=False), "mass")
-    search, fit = fitted(flown(commanded=True), "mass", "motor_lag")
-    assert fit.setting[""]["lag_asymmetry"] == pytest.approx(APART, abs=0.003)
-    assert fit.setting["motor_lag"]["tau"] == pytest.approx(TAU, abs=0.003)
-    off = fit.setting["mass"]["dm"] - known.setting["mass"]["dm"]
-    assert abs(off) < 0.001 * VEHICLE.mass
-    # a lag that goes takes its asymmetry with it
-    assert "lag_asymmetry" not in search.refit(fit.without("motor_lag")).setting.get("", {})
+    library = ["motor_lag", "mass"]
+    known = rank(Flights([flown(commanded=False)], VEHICLE), library).ranking.sets[0]
+    found = rank(Flights([flown(commanded=True)], VEHICLE), library)
+    assert found.setting["motor_lag"]["tau"] == pytest.approx(TAU, abs=0.003)
+    apart, _ = found.posterior.nuisances()[LAG_ASYMMETRY]
+    assert apart == pytest.approx(APART, abs=0.003)
+    off = [x.coefficients.get("mass", {"dm": 0.0})["dm"] for x in (found.ranking.sets[0], known)]
+    assert abs(off[0] - off[1]) < 0.001 * VEHICLE.mass

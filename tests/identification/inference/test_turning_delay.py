@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.support.searches import recorded
+from tests.support.flown import recorded
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.inference.turning_delay import turning_delay
 from windwrench.identification.motion.signals import log_signals

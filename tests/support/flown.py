@@ -1,9 +1,7 @@
-"""Simulated flights and the searches for effects on them."""
+"""Simulated flights with effects."""
 
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.envs.recording import record_flight
-from windwrench.identification.inference.regression import Flights
-from windwrench.identification.inference.search import FittedEffects, Search
 from windwrench.identification.logs.flight_log import FlightLog
 
 VEHICLE = load_vehicle("ardrone2")
@@ -21,13 +19,3 @@ def recorded(
     """Return the log of a simulated flight with effects, each by its coefficients."""
     c = record_flight(vehicle, settings(effects), trajectory, seconds, seed, background)
     return FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c["voltage"])
-
-
-def searched(log, library, **begun):
-    """Return a search of a library on a log, its noise that of the effects begun with, and the fit
-    of these.
-    """
-    search = Search(Flights([log], VEHICLE), library)
-    fit = FittedEffects({name: dict(values) for name, values in begun.items()})
-    search.set_noise(fit, search.linearise(fit))
-    return search, search.refit(fit) if begun else fit
