@@ -124,6 +124,7 @@ class ForceLikelihood:
         """
         rows = self.rows
         X = np.stack([*self.nuisances.values(), *own], axis=2)
+        follows = np.array([" by " in c[1] for c in self.nuisances] + [False] * len(own) + [True] * at_once.shape[2])
         noise = white_noise(y, rows.begins, rows.fit)
         for _ in range(FORCE_LIKELIHOOD.noise_rounds):
             use = rows.fit & noise.known
@@ -131,7 +132,9 @@ class ForceLikelihood:
             x = noise.white(every)[use].reshape(-1, every.shape[2])
             z = noise.white(y)[use].ravel()
             mode = np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ z)
-            noise = fitted_noise(y - every @ mode, rows.begins, rows.fit)
+            # what follows disturbances explains them, and does not make them less
+            explained = every[:, :, ~follows] @ mode[~follows]
+            noise = fitted_noise(y - explained, rows.begins, rows.fit)
         effects = slice(len(self.nuisances), X.shape[2])
         return noise, X[:, :, effects] @ mode[effects]
 
