@@ -19,7 +19,7 @@ from ..motion.smoothing import low_pass
 from .discrepancy import State, discrepancy_columns
 from .evidence import Index, marginal, set_evidence, tempering
 from .force_noise import ForceNoise, fitted_noise, white_noise
-from .force_nuisances import answered, answers, followers, row_nuisances
+from .force_nuisances import answered, followers, row_nuisances
 from .force_rows import ForceRows
 from .likelihood import NUISANCE, UNKNOWN, Sums, declared
 from .priors import Base, Setting, between, in_prior_units, prior_size
@@ -59,9 +59,7 @@ class ForceLikelihood:
     ) -> None:
         self.flights, self.library = flights, list(library)
         self.rows = ForceRows(flights, fixed)
-        self.nuisances = {
-            ("", f"{NUISANCE}{name}"): x for name, x in row_nuisances(self.rows).items()
-        }
+        self.nuisances = _named(row_nuisances(self.rows))
         self.power = 1.0
         self.noise: ForceNoise = self._noise(first)
         self._use = self.rows.fit & self.noise.known
@@ -90,48 +88,38 @@ class ForceLikelihood:
         wanted = self.columns_of(e for e in linear if e in traced)
         own = [found[c] * prior_size(c, self.flights) for c in wanted]
         if self.flights.commanded:
-            return self._noise_beside(y, own, np.zeros((*y.shape, 0)))[0]
+            return self._noise_beside(y, own, {})[0]
+        # first as if all of a signal could be disturbances that it follows
         signals = followers(rows)
-        at_once = answers(rows, signals)
-        known = self.nuisances
-        # first as if all of the signals were answers, to see what disturbances there are
-        for _ in range(1):
-            more = answered(rows, signals, y)
-            self.nuisances = known | {("", NUISANCE + name): x for name, x in more.items()}
-            noise, explained = self._noise_beside(y, own, at_once)
-            y_left = y - explained
-        more = answered(rows, signals, y_left)
-        self.nuisances = known | {("", NUISANCE + name): x for name, x in more.items()}
-        noise, _ = self._noise_beside(y, own, at_once)
-        coloured = noise.coloured(at_once)
-        self.nuisances |= {
-            ("", f"{NUISANCE}{signal.name} at once"): coloured[:, :, i]
-            for i, signal in enumerate(signals)
-        }
+        _, explained = self._noise_beside(y, own, _named(answered(rows, signals, y)))
+        answers = _named(answered(rows, signals, y - explained))
+        noise, _ = self._noise_beside(y, own, answers)
+        self.nuisances |= answers
         return noise
 
     def _noise_beside(
-        self, y: Array, own: Sequence[Array], at_once: Array
+        self, y: Array, own: Sequence[Array], answers: Mapping[Column, Array]
     ) -> tuple[ForceNoise, Array]:
         """Return the noise of the residual ``y`` (n, channels) and what effects explain of it.
+
+        What follows disturbances explains them, and does not make them less: they are noise.
 
         Args:
             y: of what every set has.
             own: columns of effects, in standard deviations of their priors.
-            at_once: (n, channels, signals) columns of the noise's innovations.
+            answers: columns of what follows disturbances.
         """
         rows = self.rows
-        X = np.stack([*self.nuisances.values(), *own], axis=2)
+        X = np.stack([*own, *self.nuisances.values(), *answers.values()], axis=2)
+        known = X.shape[2] - len(answers)
         noise = white_noise(y, rows.begins, rows.fit)
         for _ in range(FORCE_LIKELIHOOD.noise_rounds):
             use = rows.fit & noise.known
-            every = np.concatenate([X, noise.coloured(at_once)], axis=2)
-            x = noise.white(every)[use].reshape(-1, every.shape[2])
+            x = noise.white(X)[use].reshape(-1, X.shape[2])
             z = noise.white(y)[use].ravel()
             mode = np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ z)
-            noise = fitted_noise(y - every @ mode, rows.begins, rows.fit)
-        effects = slice(len(self.nuisances), X.shape[2])
-        return noise, X[:, :, effects] @ mode[effects]
+            noise = fitted_noise(y - X[:, :, :known] @ mode[:known], rows.begins, rows.fit)
+        return noise, X[:, :, : len(own)] @ mode[: len(own)]
 
     def _white(self, x: Array) -> Array:
         return self.noise.white(x)[self._use]
@@ -321,6 +309,10 @@ class ForceLikelihood:
         base = in_prior_units(self.flights, self.sums(setting, wanted, {}), setting, {})
         chosen: Index = np.arange(len(base.columns))
         return tempering(base.blocks, chosen)
+
+
+def _named(columns: Mapping[str, Array]) -> dict[Column, Array]:
+    return {("", f"{NUISANCE}{name}"): x for name, x in columns.items()}
 
 
 def _without(setting: Setting, effect: str) -> Setting:

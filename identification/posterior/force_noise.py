@@ -59,20 +59,6 @@ class ForceNoise:
         root = np.linalg.inv(np.linalg.cholesky(self.covariance))
         return np.asarray(np.einsum("ij,nj...->ni...", root, out))
 
-    def coloured(self, x: Array) -> Array:
-        """Return the rows (n, c, ...) of which ``x`` are the innovations."""
-        out = x.copy()
-        known = self.known
-        for row in range(1, len(x)):
-            back = (
-                len(self.lags)
-                if known[row]
-                else int(row - np.flatnonzero(self.begins[: row + 1])[-1])
-            )
-            for k in range(1, min(back, len(self.lags)) + 1):
-                out[row] += np.tensordot(self.lags[k - 1], out[row - k], axes=1)
-        return out
-
 
 def white_noise(x: Array, begins: Mask, fit: Mask) -> ForceNoise:
     """Return noise without memory of the size of rows ``x`` (n, c), of the rows ``fit``."""

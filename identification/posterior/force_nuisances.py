@@ -29,10 +29,6 @@ class NuisanceSettings:
     thrust_axis: float = 0.01  # rad, of the rotors' mean axis
     accelerometer_bias: float = 0.3  # m/s2, of a MEMS sensor between warm and cold
     accelerometer_scale: float = 0.02  # relative
-    # of what the rotors do at once against a disturbance, how much of it they answer: any share
-    answer: float = 3.0
-    answer_lags: int = 3  # rows before, that say what rotors do in any case
-    answer_ridge: float = 0.01  # of the variance of the rows before
     # of what follows disturbances, over these: a loop answers them whole, and overshoots
     answered: float = 1.0
     # s, in which a flight loop stops a velocity, and an angular velocity, that it did not want
@@ -202,30 +198,6 @@ def answered(rows: ForceRows, signals: Sequence[Follower], disturbance: Array) -
         share = min(float(own.var(axis=0).max() / max(size[rows.fit].var(), 1e-12)), 1.0)
         out[f"answer by {signal.name}"] = signal.column(rows, NUISANCES.answered * share * size)
     return out
-
-
-def answers(rows: ForceRows, signals: Sequence[Follower]) -> Array:
-    """Return what follows disturbances at once: the innovations (n, channels, signals) of the
-    signals, each in its own channels.
-
-    They explain a part of the disturbances' innovations. The rows before say what else a signal is.
-    """
-    lags = NUISANCES.answer_lags
-    size = np.column_stack([x.size for x in signals])
-    past = np.column_stack([rows.residual({}), size])
-    past = (past - past[rows.fit].mean(axis=0)) / (past[rows.fit].std(axis=0) + 1e-12)
-    since = np.arange(len(past))
-    since = since - since[rows.begins][np.cumsum(rows.begins) - 1]
-    known = since >= lags
-    parts = [np.ones((len(past), 1))]
-    parts += [np.roll(past, k, axis=0) for k in range(1, lags + 1)]
-    X, use = np.column_stack(parts), rows.fit & known
-    ridge = NUISANCES.answer_ridge * use.sum() * np.eye(X.shape[1])
-    b = np.linalg.solve(X[use].T @ X[use] + ridge, X[use].T @ size[use])
-    news = np.where(known[:, None], size - X @ b, 0.0)
-    return np.stack(
-        [NUISANCES.answer * s.column(rows, x) for s, x in zip(signals, news.T, strict=True)], axis=2
-    )
 
 
 def _of_sensors(of: _Flown) -> dict[str, Array]:

@@ -87,8 +87,21 @@ def rank_by_force(
             report(f"trying {', '.join(e for e in setting if e not in given) or 'no effect'}")
             add(setting)
 
-    likelihood.power = likelihood.tempered(likeliest())
-    best = likeliest()
+    def confirmed() -> Setting:
+        """Return the likeliest set's fit, once no set that lacks one of its effects is likelier
+        where it is fitted as well.
+        """
+        while True:
+            best = likeliest()
+            less = [{e: x for e, x in best.items() if e != out} for out in best if out not in given]
+            new = [x for x in less if frozenset(x) not in fitted]
+            if flights.commanded or not new:
+                return best
+            for setting in new:
+                add(setting)
+
+    likelihood.power = likelihood.tempered(confirmed())
+    best = confirmed()
     key = frozenset(best)
     others = {c: x for c, x in lags.items() if c[0] not in key}
     bases.pop(key)

@@ -30,8 +30,8 @@ def worth(
     flights: Flights, fixed: Setting, first: Collection[str], setting: Setting
 ) -> dict[str, float]:
     """Return of each effect the RMS of what nuisances, effects that any set has and effects of
-    other families cannot do in its place, within three standard deviations of their priors, over the RMS of what is left: in
-    the channel where that is most.
+    other families cannot do in its place, within three standard deviations of their priors, over
+    the RMS of what is left: in the channel where that is most.
 
     Args:
         flights: of the vehicle.
