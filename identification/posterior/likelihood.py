@@ -126,6 +126,8 @@ class Likelihood:
         self.period = self.pieces[0].period
         inertia = flights.vehicle.inertia
         self.inertias = np.array([flights.vehicle.mass] * 3 + np.diagonal(inertia).tolist())
+        # tracks, and the rotors' innovations of them
+        self._answers: tuple[list[Track], list[Array]] = [], []
         self.known: list[Array]  # (n, 6, 3) of each piece, what rotors' innovations say of it
         lengths = [len(piece.t) for piece in self.pieces]
         if near is None or [len(piece.t) for piece in near.pieces] != lengths:
@@ -511,8 +513,12 @@ class Likelihood:
         return parts
 
     def _rotor_innovations(self) -> list[Array]:
-        pairs = list(zip(self.pieces, self.tracks, strict=True))
-        return rotor_innovations(pairs, self.inertias[2:])
+        tracks, found = self._answers
+        if tracks is not self.tracks:
+            pairs = list(zip(self.pieces, self.tracks, strict=True))
+            found = rotor_innovations(pairs, self.inertias[2:])
+            self._answers = self.tracks, found
+        return found
 
     def _jumps(self) -> tuple[list[Column], list[Array], NDArray[np.intp]]:
         """Return the columns of the gains on the rotors' innovations, their jumps (n, 6, e) of each

@@ -28,7 +28,7 @@ def test_a_lag_that_is_uneven_leaves_no_mass():
     library = ["motor_lag", "mass"]
     known = rank(Flights([flown(commanded=False)], VEHICLE), library).ranking.sets[0]
     found = rank(Flights([flown(commanded=True)], VEHICLE), library)
-    assert found.setting["motor_lag"]["tau"] == pytest.approx(TAU, abs=0.003)
+    assert found.setting["motor_lag"]["tau"] == pytest.approx(TAU, abs=0.006)
     apart, _ = found.posterior.nuisances()[LAG_ASYMMETRY]
     assert apart == pytest.approx(APART, abs=0.003)
     off = [x.coefficients.get("mass", {"dm": 0.0})["dm"] for x in (found.ranking.sets[0], known)]
