@@ -32,6 +32,7 @@ from ..inference.time_offsets import (
     LAG_ASYMMETRY,
     ROTOR_TIME_OFFSET,
     TIMING,
+    with_time_offsets,
     with_uneven_lag,
 )
 from ..logs.flight_log import FlightLog
@@ -643,11 +644,18 @@ def _in_fit(flights: Flights, log: int, t: Array) -> NDArray[np.bool_]:
 def read_poses(log: FlightLog, vehicle: Vehicle) -> list[Poses]:
     """Return the unbroken pieces of a log as they were measured, without what the vehicle's sensing
     effects did to them.
+
+    Where poses are late or early, rotor speeds are moved instead: poses would lose of their noise.
     """
-    undone = undo_log_sensing(log, vehicle)
+    late = [e for e in vehicle.effects if is_delay(e.name) and get(e.name).kind == "sensing"]
+    offset = sum(sum(e.coefficients.values()) for e in late)
+    undone = undo_log_sensing(
+        log, replace(vehicle, effects=tuple(e for e in vehicle.effects if e not in late))
+    )
     out = []
     for raw, smooth in zip(log_signals(undone, np.inf), log_signals(undone), strict=True):
         q = Rotation.from_matrix(raw.rotation).as_quat(scalar_first=True)
+        raw = with_time_offsets(raw, {ROTOR_TIME_OFFSET[1]: offset})
         out.append(
             Poses(
                 raw.t,

@@ -77,7 +77,10 @@ class Base:
 
 
 def variants_of(
-    effect: str, setting: Setting, starts: Mapping[Column, Mapping[str, float]]
+    flights: Flights,
+    effect: str,
+    setting: Setting,
+    starts: Mapping[Column, Mapping[str, float]],
 ) -> list[Variant]:
     """Return the ways in which an effect may act."""
     names = [c.name for c in get(effect).coefficients]
@@ -85,7 +88,7 @@ def variants_of(
         derivative: Variant = (effect, tuple((effect, name) for name in names))
         return [derivative, *((effect, (c,)) for c in starts if c[0] == effect)]
     if get(effect).starting_points is not None:
-        if effect in setting:
+        if effect in setting or not flights.is_nonlinear(effect):
             return [(effect, tuple((effect, name) for name in names))]
         return [(effect, (c,)) for c in starts if c[0] == effect]
     if CENTRAL not in names:

@@ -189,7 +189,7 @@ def wanted_columns(
     return dict.fromkeys(
         c
         for e in library
-        for v in variants_of(e, setting, starts)
+        for v in variants_of(flights, e, setting, starts)
         for c in v[1]
         if c[1].removeprefix(WHOLE_PREFIX) not in flights.stated(e)
     )

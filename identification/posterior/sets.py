@@ -153,7 +153,7 @@ class Posterior:
         from_start = [c for c in base.columns if c[1].startswith(START_PREFIX)]
         starts: dict[Column, dict[str, float]] = {c: {} for c in from_start}
         for effect in self.library:
-            for _, every in variants_of(effect, setting, starts):
+            for _, every in variants_of(self.flights, effect, setting, starts):
                 # what a file states is not asked, and a balance does not see where an effect acts
                 stated, known = self.flights.stated(effect), self.given is not None
                 columns = tuple(
