@@ -123,7 +123,8 @@ class Posterior:
     def _negligible(self, base: Base, asked: Index) -> Array:
         """Return how much (len(asked),) of each column any flight may have."""
         little = PRIORS.negligible * base.typical[asked]
-        if self.given is not None:  # bases have the starts of other effects: of none a little acts
+        # bases have the starts of other effects: of none a little acts
+        if self.given is not None and not self.flights.commanded:
             names = list(base.columns)
             little[[names[i][1].startswith(START_PREFIX) for i in asked]] = 0.0
         return little
