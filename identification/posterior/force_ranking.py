@@ -1,5 +1,8 @@
-"""Which effects act on flights whose rotors are known by commands: the posterior over sets, from
-the force balance alone.
+"""Which effects act on flights whose pose is no measurement as it was made: the posterior over
+sets, from rows of forces and, where rotors are measured, of torques.
+
+Such are flights whose rotors are known by commands, whose pose was filtered before it was logged,
+and whose motion is read from an IMU.
 
 The likeliest set is fitted without linearisation, and so is each set that comes out likeliest after
 it, until none does that was not fitted.
@@ -13,9 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..findings import Ranking
-from ..inference.regression import START_PREFIX, Column, Flights
+from ..inference.regression import START_PREFIX, Column, Flights, coefficient
+from ..inference.sensor_bias import PREFIX
 from .evidence import marginal, set_evidence
 from .force_likelihood import ForceLikelihood
+from .likelihood import NUISANCE
 from .priors import Base, Setting, declared
 from .ranking import starts_of
 from .sets import Posterior, is_possible
@@ -25,9 +30,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ForceRankingSettings:
-    """Which starts are fitted."""
+    """Which starts are fitted, and what counts as hidden."""
 
     most_starts: int = 2  # of an effect with nonlinear coefficients, the likeliest, that are fitted
+    # deviance by which an effect of typical size is sure: of one of some thirty effects, before
+    # which one is expected, 20 to 1 afterwards
+    shown: float = 13.0
 
 
 FORCE_RANKING = ForceRankingSettings()
@@ -69,6 +77,37 @@ class ForceRanking:
         )
         return float(z @ m.normal @ z)
 
+    def hidden_by_bias(self) -> frozenset[str]:
+        """Return the effects of which a typical size would be sure if the accelerometer had no
+        bias, and is not beside the one that it may have.
+        """
+        base, flights = self._base, self.likelihood.flights
+        if not flights.inertial:
+            return frozenset()
+        total = self.likelihood.power * base.blocks.sum(axis=0)
+        names = list(base.columns)
+        own = [base.columns[c] for c in self.likelihood.columns_of(self.setting)]
+        every = np.array([*base.plain, *own], dtype=np.intp)
+        unbiased = np.array(
+            [i for i in every if names[i][0] or NUISANCE + PREFIX not in names[i][1]], dtype=np.intp
+        )
+
+        def shown(at: Array, size: Array, beside: Array) -> bool:
+            m = marginal(total[:-1, :-1], total[:-1, -1], 0.0, at, beside, np.ones(len(beside)))
+            return bool(size @ m.normal @ size >= FORCE_RANKING.shown)
+
+        out = set()
+        for effect in self.likelihood.library:
+            asked = {c: i for c, i in base.columns.items() if c[0] == effect}
+            if effect in self.setting or any(c[1].startswith(START_PREFIX) for c in asked):
+                continue
+            at = np.array(list(asked.values()), dtype=np.intp)
+            signs = np.sign([coefficient(c).typical[0] for c in asked])
+            size = signs * base.typical[at]
+            if shown(at, size, unbiased) and not shown(at, size, every):
+                out.add(effect)
+        return frozenset(out)
+
     def alone_shares(self) -> dict[str, float]:
         """Return the share of the deviance that each effect of the library explains alone, beside
         what every set has.
@@ -106,9 +145,10 @@ def rank_by_force(
     """Return the posterior over sets of effects of a library.
 
     Args:
-        flights: with rotors that are known by commands.
+        flights: of the vehicle.
         library: effects that may act, those of ``first`` among them.
-        first: effects that any set has, with coefficients about which a fit begins.
+        first: effects that any set has, with coefficients about which a fit begins; none where
+            rotors are measured.
         fixed: effects that are known from elsewhere, with their coefficients.
         report: called with a line of progress.
     """
