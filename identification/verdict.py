@@ -64,8 +64,9 @@ class VerdictSettings:
     least_size: float = 0.1  # typical sizes, from which a calibration is worth a name
     least_rotor_time_offset: float = 0.001  # s, worth a note
     least_in_std: float = 3.0  # standard deviations, from which a nuisance is
-    # deviance, of a typical size, from which an effect shows
-    least_shown: float = 40.0
+    # deviance by which an effect of typical size is sure: of one of some thirty effects, before
+    # which one is expected, 20 to 1 afterwards
+    least_shown: float = 13.0
 
 
 VERDICT = VerdictSettings()
@@ -117,7 +118,7 @@ def judged(flights: Flights, library: Sequence[str], report: Report) -> Judged:
         e: differs[e] if e in differs else _probability(found, (e, *rivals[e]), strange)
         for e in named
     }
-    doubts = _doubts(flights, strange, named, given)
+    doubts = _doubts(flights, strange, named, given, found.behind)
     worths = worth(flights, given.fixed, given.first, found.setting)
     energy = _energy_shares(flights, setting, left.after, named)
     unsure = bool(set(doubts) - {"assumed thrust"})
@@ -222,7 +223,11 @@ def _probability(found: Found, effects: Sequence[str], strange: float) -> float:
 
 
 def _doubts(
-    flights: Flights, strange: float, named: Sequence[str], given: Given
+    flights: Flights,
+    strange: float,
+    named: Sequence[str],
+    given: Given,
+    behind: Mapping[str, Sequence[str]],
 ) -> dict[str, tuple[str, ...]]:
     """Return for each check, by its name, the sentences that say why a name may be wrong."""
     found: dict[str, tuple[str, ...]] = {}
@@ -239,6 +244,12 @@ def _doubts(
         )
     if flights.filtered and named:
         found["filtered pose"] = (FILTERED,)
+    if behind:
+        found["hidden cause"] = tuple(
+            f"{effect}: {' or '.join(hidden)}, which these logs do not show, would look like it. "
+            "Log the pose to tell them apart"
+            for effect, hidden in behind.items()
+        )
     if given.assumed and (words := assumed_thrust_doubts(named)):
         found["assumed thrust"] = tuple(words)
     return found

@@ -16,7 +16,7 @@ from ..inference.regression import CENTRAL, START_PREFIX, Column, Flights, coeff
 from ..inference.sensor_bias import flight_and_axis
 from ..inference.time_offsets import LAG_ASYMMETRY, timing_of
 from ..motion.smoothing import low_pass
-from .discrepancy import State, discrepancy_columns
+from .discrepancy import State, changing_columns, discrepancy_columns, variables
 from .evidence import Index, marginal, set_evidence, tempering
 from .force_noise import ForceNoise, fitted_noise, white_noise
 from .force_nuisances import answered, followers, row_nuisances
@@ -144,7 +144,7 @@ class ForceLikelihood:
         for c, start in starts.items():
             columns[c] = residual - rows.residual({**setting, c[0]: dict(start)})
         if unknown:
-            columns |= self._dictionary()
+            columns |= self._dictionary() | self._changing(setting)
         names = tuple(columns)
         x = self._white(np.stack([*columns.values(), residual], axis=2))
         block = self.rows.block[self._use]
@@ -168,17 +168,7 @@ class ForceLikelihood:
     def _dictionary(self) -> dict[Column, Array]:
         flights, vehicle = self.rows.flights, self.flights.vehicle
         pieces = flights.pieces({})
-        seen = [
-            State(
-                s.position,
-                s.rotation,
-                s.velocity,
-                s.angular_velocity,
-                vehicle.rotor_wrench(s.rotor_speeds),
-                s.acceleration,
-            )
-            for s in (p.signals for p in pieces)
-        ]
+        seen = self._states()
         inertias = np.array([vehicle.mass] * 3 + np.diagonal(vehicle.inertia).tolist())
         found = discrepancy_columns(
             seen, [p.signals.t for p in pieces], vehicle.weight, vehicle.arm_l, inertias
@@ -197,6 +187,34 @@ class ForceLikelihood:
                 sampled[:, :3], torque=sampled[:, 3:]
             )
         return out
+
+    def _states(self) -> list[State]:
+        return [
+            State(
+                s.position,
+                s.rotation,
+                s.velocity,
+                s.angular_velocity,
+                self.flights.vehicle.rotor_wrench(s.rotor_speeds),
+                s.acceleration,
+            )
+            for s in (p.signals for p in self.rows.flights.pieces({}))
+        ]
+
+    def _changing(self, setting: Setting) -> dict[Column, Array]:
+        """Return the dictionary's columns of effects whose coefficients change."""
+        rows, pieces = self.rows, self.rows.flights.pieces({})
+        here = rows.residual(setting)
+        parts = {e: [rows.residual(_without(setting, e)) - here] for e in setting}
+        found = variables(self._states(), [p.signals.t for p in pieces])
+        at_rows = {
+            name: [rows.at_rows([z[p.rows] for z, p in zip(x, pieces, strict=True)])]
+            for name, x in found.items()
+        }
+        return {
+            ("", f"{UNKNOWN}{group}: {name}"): column[0]
+            for (group, name), column in changing_columns(parts, at_rows).items()
+        }
 
     # Fits
 

@@ -31,8 +31,7 @@ class NuisanceSettings:
     accelerometer_scale: float = 0.02  # relative
     # of what follows disturbances, over these: a loop answers them whole, and overshoots
     answered: float = 1.0
-    # s, in which a flight loop stops a velocity, and an angular velocity, that it did not want
-    stopped: tuple[float, float] = (0.5, 0.1)
+    stopped: float = 0.1  # s, in which a flight loop stops an angular velocity that it did not want
 
 
 NUISANCES = NuisanceSettings()
@@ -140,8 +139,8 @@ class Follower:
 
     Attributes:
         name: of the signal.
-        size: (n,) m/s2 or rad/s2: of a velocity, what makes it within the time in which the loop
-            stops it.
+        size: (n,) m/s2 or rad/s2: of an angular velocity, what makes it within the time in which
+            the loop stops it.
         channels: of the rows, in which the disturbances act.
     """
 
@@ -161,21 +160,19 @@ def followers(rows: ForceRows) -> list[Follower]:
     flights = rows.flights
     inertias = np.array([flights.vehicle.mass, *np.diagonal(flights.vehicle.inertia)])
     wrench = flights.rotor_wrench({}) / inertias
-    rates = np.zeros((len(wrench), 6))
-    begin = 0
-    for p in flights.pieces({}):
-        s = p.signals
-        body = np.einsum("nji,nj->ni", s.rotation, s.velocity)
-        both = low_pass(np.column_stack([body, s.angular_velocity]), flights.residual_hz, s.period)
-        rates[begin : begin + len(p.rows)] = both[p.rows]
-        begin += len(p.rows)
-    rates /= np.repeat(NUISANCES.stopped, 3)
+    rates = np.concatenate(
+        [
+            low_pass(p.signals.angular_velocity, flights.residual_hz, p.signals.period)[p.rows]
+            for p in flights.pieces({})
+        ]
+    )
+    rates /= NUISANCES.stopped
     torque = rows.channels - 3
-    forces = [tuple(range(axis, torque, 3)) for axis in range(3)]
+    force = tuple(range(2, torque, 3))
     return [
-        Follower("thrust", wrench[:, 0], forces[2]),
+        Follower("thrust", wrench[:, 0], force),
         *(Follower(f"torque {x}", wrench[:, 1 + i], (torque + i,)) for i, x in enumerate("xyz")),
-        *(Follower(f"rate {x}", rates[:, 3 + i], (torque + i,)) for i, x in enumerate("xyz")),
+        *(Follower(f"rate {x}", rates[:, i], (torque + i,)) for i, x in enumerate("xyz")),
     ]
 
 

@@ -1,5 +1,8 @@
-"""Which effects act on flights whose rotors are known by commands: the posterior over sets, from
-the force balance alone.
+"""Which effects act on flights whose pose is no measurement as it was made: the posterior over
+sets, from rows of forces and, where rotors are measured, of torques.
+
+Such are flights whose rotors are known by commands, whose pose was filtered before it was logged,
+and whose motion is read from an IMU.
 
 The likeliest set is fitted without linearisation, and so is each set that comes out likeliest after
 it, until none does that was not fitted.
@@ -8,18 +11,23 @@ it, until none does that was not fitted.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..inference.regression import Column, Flights
+from .evidence import marginal, set_evidence
 from .force_likelihood import ForceLikelihood
-from .priors import Base, Setting
+from .priors import Base, Setting, in_prior_units
 from .ranking import Found, starts_of
 from .sets import Posterior, is_possible
 
 
 @dataclass(frozen=True)
 class ForceRankingSettings:
-    """Which starts are fitted."""
+    """Which starts are fitted, and what counts as hidden."""
 
     most_starts: int = 2  # of an effect with nonlinear coefficients, the likeliest, that are fitted
+    # deviance, up to which an effect does as well as another in its place: a likelihood of 20 to 1
+    apart: float = 6.0
 
 
 FORCE_RANKING = ForceRankingSettings()
@@ -35,9 +43,10 @@ def rank_by_force(
     """Return the posterior over sets of effects of a library.
 
     Args:
-        flights: with rotors that are known by commands.
+        flights: of the vehicle.
         library: effects that may act, those of ``first`` among them.
-        first: effects that any set has, with coefficients about which a fit begins.
+        first: effects that any set has, with coefficients about which a fit begins; none where
+            rotors are measured.
         fixed: effects that are known from elsewhere, with their coefficients.
         report: called with a line of progress.
     """
@@ -107,4 +116,32 @@ def rank_by_force(
     bases.pop(key)
     bases[key] = likelihood.base(best, others, unknown=True)
     found = Posterior(flights, library, list(bases.values()), likelihood.power, given, idle)
-    return Found(found, found.ranking(), best, sensors=likelihood.sensors(best))
+    hidden = sorted(flights.needs_pose - flights.without_trace - set(best))
+    behind = _behind(likelihood, best, [e for e in hidden if not flights.is_nonlinear(e)])
+    return Found(found, found.ranking(), best, sensors=likelihood.sensors(best), behind=behind)
+
+
+def _behind(
+    likelihood: ForceLikelihood, best: Setting, hidden: Sequence[str]
+) -> dict[str, tuple[str, ...]]:
+    """Return of each effect of a set the ``hidden`` ones, which logs do not show and which may act
+    all the same, that explain the flights as well in its place.
+    """
+    if not hidden or not best:
+        return {}
+    columns = likelihood.columns_of([*best, *hidden])
+    sums = likelihood.sums(best, columns, {})
+    base = in_prior_units(likelihood.flights, sums, best, {})
+    at = np.array([base.columns[c] for c in columns], dtype=np.intp)
+    total = likelihood.power * base.blocks.sum(axis=0)
+    ones = np.ones(len(base.plain))
+    m = marginal(total[:-1, :-1], total[:-1, -1], 0.0, at, base.plain, ones)
+
+    def explained(effects: set[str]) -> float:
+        index = [i for i, (effect, _) in enumerate(columns) if effect in effects]
+        z = set_evidence(m, index, base.low[at], base.high[at]).mode
+        return float(2.0 * m.right[index] @ z - z @ m.normal[np.ix_(index, index)] @ z)
+
+    whole = explained(set(best)) - FORCE_RANKING.apart
+    found = {e: tuple(h for h in hidden if explained({*best, h} - {e}) > whole) for e in best}
+    return {e: others for e, others in found.items() if others}

@@ -7,7 +7,7 @@ from the other is the whole band down to zero. Above 3.5 Hz motors, filters and 
 decide what commands do, and they say nothing of torques.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -122,6 +122,10 @@ class ForceRows:
         x = np.concatenate(channels, axis=1)
         smooth = [low_pass(x[rows], self._cutoff, self.flights.period) for rows in self._pieces]
         return np.asarray(np.concatenate(smooth)[self._at])
+
+    def at_rows(self, parts: Sequence[Array]) -> Array:
+        """Return at the rows (n, ...) what is known at the samples of ``flights``, of each piece."""
+        return np.asarray(np.concatenate(parts)[self._at])
 
     def residual(self, setting: Setting) -> Array:
         """Return what a model with these effects leaves (n, channels).

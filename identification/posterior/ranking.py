@@ -60,6 +60,8 @@ class Found:
     noise: tuple[AxisNoise, ...] = ()
     # biases and time offsets of the sensors, with their standard deviations
     sensors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    # of each effect of the set, those that the logs do not show and that do as well in its place
+    behind: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 def rank(

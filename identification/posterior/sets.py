@@ -125,7 +125,8 @@ class Posterior:
     def _negligible(self, base: Base, asked: Index) -> Array:
         """Return how much (len(asked),) of each column any flight may have."""
         little = PRIORS.negligible * base.typical[asked]
-        if self.given is not None:  # bases have the starts of other effects: of none a little acts
+        # bases have the starts of other effects: of none a little acts
+        if self.given is not None:
             names = list(base.columns)
             little[[names[i][1].startswith(START_PREFIX) for i in asked]] = 0.0
         return little
@@ -361,8 +362,10 @@ class Posterior:
         for effect, columns in self._variants(base):
             if effect in {e for e, _ in best.variants}:
                 continue
+            if any(c[1].startswith(START_PREFIX) for c in columns):
+                continue
             at = np.array([base.columns[c] for c in columns], dtype=np.intp)
-            z = base.typical[at]
+            z = base.typical[at] * np.sign([coefficient(c).typical[0] for c in columns])
             shown = [
                 float(z @ self._split(replace(base, plain=np.array(x)), at, own).normal @ z)
                 for x in (base.plain.tolist(), known)

@@ -31,7 +31,7 @@ def diagnoses():
             remainder="structured",
             test_logs=("third",),
             after=Errors(math.nan, math.inf, math.nan, 0.1),
-            structure=(Structure("a wave", "Fx", 0.3, "candidate regressor"),),
+            structure=(Structure("a wave", "Fx", 0.3),),
             gusts=(Disturbance("tau_z", 0.1, 0.2),),
             pushes=(TransientDisturbance("Fx", "log 0", 1.0, -2.0),),
             rotor_faults=({"log": "log 0", "rotor": None},),
