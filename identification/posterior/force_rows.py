@@ -124,7 +124,7 @@ class ForceRows:
         return np.asarray(np.concatenate(smooth)[self._at])
 
     def at_rows(self, parts: Sequence[Array]) -> Array:
-        """Return at the rows (n, ...) what is known at the samples of ``flights``, of each piece."""
+        """Return at the rows (n, ...) what is known at the samples of each piece."""
         return np.asarray(np.concatenate(parts)[self._at])
 
     def residual(self, setting: Setting) -> Array:

@@ -12,6 +12,7 @@ from windwrench.identification.inference.regression import Flights
 from windwrench.identification.posterior import force_ranking
 from windwrench.identification.posterior.force_nuisances import answered, followers
 from windwrench.identification.posterior.force_ranking import rank_by_force
+from windwrench.identification.posterior.worth import worth
 from windwrench.identification.posterior.force_rows import ForceRows
 from windwrench.studies.trials.logged_poses import FILTERS
 from windwrench.studies.trials.practice_flights import fly_practice
@@ -51,7 +52,7 @@ def test_a_centre_of_mass_is_found_behind_a_filter(offset):
     assert best.effects == ("com_offset",)
     assert found.ranking.probability["com_offset"] > 0.95
     assert best.coefficients["com_offset"]["cx"] == pytest.approx(0.01, abs=0.001)
-    assert found.likelihood.worth(found.setting)["com_offset"] > 1.0
+    assert worth(offset, {}, (), found.setting)["com_offset"] > 1.0
 
 
 def test_a_weak_rotor_is_found_by_an_imu_alone(weak):
