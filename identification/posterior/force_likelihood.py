@@ -272,11 +272,12 @@ class ForceLikelihood:
             timing = timing_of(column, self.flights.filtered)
             if timing is None:
                 flight, axis = flight_and_axis(column[1])
-                size = float(self.flights.bias_std(flight)[axis])
+                size, limits = float(self.flights.bias_std(flight)[axis]), (-math.inf, math.inf)
             else:
-                size = timing.size
+                size, limits = timing.size, timing.range
             if (i := at.get(NUISANCE + column[1])) is not None:
-                out[column[1]] = size * float(modes[i]), size * float(std[i])
+                value = float(np.clip(size * modes[i], *limits))
+                out[column[1]] = value, size * float(std[i])
         return out
 
     def idle(self, setting: Setting) -> set[str]:

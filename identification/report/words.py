@@ -270,8 +270,12 @@ def held_out_sum(diagnosis: Diagnosis) -> str:
 
 
 def _probability(diagnosis: Diagnosis) -> list[str]:
-    """Return how probable the names are, and that something unknown acts."""
+    """Return how probable the names are, and that something unknown acts; nothing where that is not
+    known.
+    """
     stated = diagnosis.probabilities
+    if math.isnan(stated.unknown):
+        return []
     names = [f"{e.name} {chance(stated.names.get(e.name, 0.0))}" for e in diagnosis.effects]
     acts = f"Probability that it acts: {in_words(names)}. " if names else ""
     return [f"{acts}Probability of a cause outside the library: {chance(stated.unknown)}."]

@@ -47,14 +47,11 @@ def test_what_a_few_positions_add() -> None:
 
 
 @pytest.mark.slow
-def test_an_imu_has_probabilities_without_a_posterior() -> None:
-    """What the search names is as probable as such names of IMU logs are right."""
+def test_an_imu_has_probabilities() -> None:
     log = pose_removed(imu_flight(VEHICLE, (WEAK,), seconds=15.0))
-    found = diagnose([log], VEHICLE, probabilities=True)
-    assert found.ranking is None
-    assert found.probabilities is not None
+    found = diagnose([log], VEHICLE)
     assert set(found.probabilities.names) == {effect.name for effect in found.effects}
-    assert {x.effects for x in found.probabilities.alternatives} >= {()}
+    assert found.probabilities.names[WEAK.name] > 0.95
 
 
 def test_a_pose_and_an_imu_are_not_mixed() -> None:

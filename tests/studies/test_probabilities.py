@@ -1,40 +1,21 @@
-"""What is said of probabilities follows from flights that are kept, and no flight knows its own
-weights.
-"""
+"""What is said of probabilities follows from flights that are kept."""
 
 from dataclasses import asdict
 
 import pytest
 
-from windwrench.identification.posterior.pooling import POOLING, SEARCH_ALONE
+from windwrench.identification.posterior.unknown import UNKNOWN
 from windwrench.studies.kept_results import kept
 from windwrench.studies.probabilities.__main__ import plan, plan_of_other_logs
-from windwrench.studies.probabilities.calibration import (
-    RESULTS,
-    half_of,
-    weights_without_posterior,
-)
+from windwrench.studies.probabilities.calibration import RESULTS, flights_of
 from windwrench.studies.probabilities.fitting import fit
 from windwrench.studies.probabilities.flights import KINDS, WAYS_TO_LOG
 
 
-@pytest.fixture(scope="module")
-def records():
-    return kept(RESULTS["first"])
-
-
-def test_the_weights_in_use_are_those_of_the_kept_flights(records):
-    found = weights_without_posterior(kept(RESULTS["other logs"]), records)
-    found["with a posterior"] = fit([r["result"] for r in records])
-    for kind, weights in {**SEARCH_ALONE, "with a posterior": POOLING}.items():
-        for name, value in asdict(weights).items():
-            assert getattr(found[kind], name) == pytest.approx(value, abs=0.02), (kind, name)
-
-
-def test_either_half_has_all_kinds():
-    tasks = [{"task": task} for task in plan(40, 40, 800_000, 3000, "other.py")]
-    for half in (0, 1):
-        assert {t["task"][1] for t in tasks if half_of(t) == half} >= {*KINDS, "catalogue"}
+def test_the_weights_in_use_are_those_of_the_kept_flights():
+    found = fit(flights_of(kept(RESULTS["first"])))
+    for name, value in asdict(UNKNOWN).items():
+        assert getattr(found, name) == pytest.approx(value, abs=0.02), name
 
 
 def test_a_run_has_flights_of_both_and_none_twice():

@@ -70,7 +70,7 @@ def diagnoses():
     yield "disturbed", replace(partly, gusts=gusts)
     pushes = (TransientDisturbance("tau_x", "flight", 1.5, -0.002),)
     yield "pushed", replace(partly, pushes=pushes)
-    signs = (Structure("a wave at 1.1 Hz", "Fx", 0.31, "candidate regressor"),)
+    signs = (Structure("a wave at 1.1 Hz", "Fx", 0.31),)
     yield "structured", replace(partly, remainder="structured", structure=signs)
     ranked = [("rotor_efficiency", 0.9), ("mass", 0.8), ("rotor_drag", 0.5), ("wind", 0.4)]
     candidates = tuple(Candidate(n, gain, n == "rotor_drag") for n, gain in ranked)

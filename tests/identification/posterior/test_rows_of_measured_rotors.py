@@ -1,7 +1,5 @@
 """The rows of flights with measured rotors: torques, a pose that was filtered, and an IMU alone."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,11 +7,11 @@ from tests.support.imu_flights import imu_flight, pose_removed
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.identification.inference.regression import Flights
-from windwrench.identification.posterior import force_ranking
 from windwrench.identification.posterior.force_nuisances import answered, followers
 from windwrench.identification.posterior.force_ranking import rank_by_force
-from windwrench.identification.posterior.worth import worth
 from windwrench.identification.posterior.force_rows import ForceRows
+from windwrench.identification.posterior.likelihood import NUISANCE
+from windwrench.identification.posterior.worth import worth
 from windwrench.studies.trials.logged_poses import FILTERS
 from windwrench.studies.trials.practice_flights import fly_practice
 
@@ -62,20 +60,18 @@ def test_a_weak_rotor_is_found_by_an_imu_alone(weak):
     assert best.coefficients["rotor_efficiency"]["e2"] == pytest.approx(
         -0.06, abs=3.0 * best.std["rotor_efficiency"]["e2"]
     )
-    biases = found.likelihood.biases(found.setting)
-    assert set(biases) == {f"accelerometer bias {axis} 0" for axis in "xyz"}
-    assert not found.hidden_by_bias()
+    assert set(found.sensors) >= {f"accelerometer bias {axis} 0" for axis in "xyz"}
 
 
-def test_a_bias_hides_steady_forces_along_the_body(monkeypatch):
+def test_a_bias_hides_steady_forces_along_the_body():
     """In a calm hover they show by little else, and torques do not look like a bias."""
     log = pose_removed(imu_flight(VEHICLE, seconds=15.0, trajectory="gentle"))
-    found = rank_by_force(Flights([log], VEHICLE), [*LIBRARY, "thrust_axis_tilt"], {}, {})
+    flights = Flights([log], VEHICLE)
+    found = rank_by_force(flights, [*LIBRARY, "thrust_axis_tilt"], {}, {})
     assert found.ranking.sets[0].effects == ()
-    assert not found.hidden_by_bias()
-    least = replace(force_ranking.FORCE_RANKING, shown=250.0)
-    monkeypatch.setattr(force_ranking, "FORCE_RANKING", least)
-    assert found.hidden_by_bias() == {"thrust_scale", "thrust_axis_tilt"}
+    biases = [("", f"{NUISANCE}{name}") for _, name in flights.biases]
+    assert not found.posterior.hidden(biases, 13.0)
+    assert found.posterior.hidden(biases, 250.0) == {"thrust_scale", "thrust_axis_tilt"}
 
 
 def test_a_share_of_what_follows_disturbances_counts_as_one(weak):

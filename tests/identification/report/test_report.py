@@ -105,8 +105,8 @@ def hard(diagnosis):
             Candidate("fan_jet", math.nan, False),
         ),
         structure=(
-            Structure("a wave at 1.1 Hz", "Fx", 0.31, "candidate regressor"),
-            Structure("a dependence on height", "Fz over height", 0.084, "candidate regressor"),
+            Structure("a wave at 1.1 Hz", "Fx", 0.31),
+            Structure("a dependence on height", "Fz over height", 0.084),
         ),
     )
 
