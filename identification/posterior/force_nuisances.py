@@ -191,7 +191,7 @@ def answered(rows: ForceRows, signals: Sequence[Follower], disturbance: Array) -
     out = {}
     for signal in signals:
         size = signal.size - signal.size[rows.fit].mean()
-        own = disturbance[np.ix_(rows.fit, signal.channels)]
+        own = disturbance[rows.fit][:, list(signal.channels)]
         share = min(float(own.var(axis=0).max() / max(size[rows.fit].var(), 1e-12)), 1.0)
         out[f"answer by {signal.name}"] = signal.column(rows, NUISANCES.answered * share * size)
     return out

@@ -37,7 +37,7 @@ STOREYS = (
     {"inference", "comparison", "vehicle_fit"},
     {"posterior"},
     {"judged"},
-    {"search_verdict", "force_verdict"},
+    {"verdict"},
     {"diagnosis"},
     {"report", "wrench_track"},
     {"fleet"},
