@@ -1,7 +1,7 @@
 """What the evidence of sets of effects says of flights, in words that a report can use.
 
 A name is sure where it is probable, where what it does is at least as large as what is left
-unexplained, and where nothing outside the library is likelier than not.
+unexplained, and where little speaks for a cause outside the library.
 The rule is the same for every kind of log; what differs is whose likelihood it is: that of the
 poses, where they and the rotors were measured as they were, or that of the wrench's balance.
 """
@@ -40,6 +40,7 @@ from .judged import Judged, Report, balance, calm
 from .motion.inertial_signals import pose_rate
 from .motion.smoothing import CUTOFFS
 from .posterior.commands import Given, what_commands_show
+from .posterior.composite import composites
 from .posterior.force_ranking import rank_by_force
 from .posterior.likelihood import NUISANCE
 from .posterior.ranking import Found, rank
@@ -54,7 +55,8 @@ Setting = Mapping[str, Mapping[str, float]]
 class VerdictSettings:
     """From when on a name is sure, and what is reported."""
 
-    least_sure_probability: float = 0.95
+    least_sure_probability: float = 0.95  # if nothing acts but effects of the library
+    most_unknown: float = 0.25  # probability that something else acts, beside which a name is sure
     least_worth: float = 1.0  # times what is left, in the channel where the effect does most
     least_seconds: float = 10.0  # of flight; a shorter one names nothing surely
     # share of the likeliest set's probability from which another effect in a place of it is one
@@ -101,11 +103,10 @@ def judged(flights: Flights, library: Sequence[str], report: Report) -> Judged:
     differs = {e: _differs(flights, found, e) for e in given.first if e in best.effects}
     named = [e for e in found.setting if differs.get(e, 1.0) >= VERDICT.least_sure_probability]
     disturbed = beyond_calm(gusts, flights.vehicle)
-    strange = unknown(
-        Signs(
-            found.ranking.structure, disturbed, bool(pushes), any(e not in differs for e in named)
-        )
-    )
+    one = composites(flights.vehicle, found.setting, best.std)
+    some = any(e not in differs for e in named)
+    signs = Signs(found.ranking.structure, disturbed, bool(pushes), bool(one), some)
+    strange = unknown(signs)
     rivals = {
         e: _other_factor(e)
         if get(e).role in THRUST_FACTORS and e in given.first
@@ -114,11 +115,9 @@ def judged(flights: Flights, library: Sequence[str], report: Report) -> Judged:
         else _rivals(found, e)
         for e in named
     }
-    names = {
-        e: differs[e] if e in differs else _probability(found, (e, *rivals[e]), strange)
-        for e in named
-    }
-    doubts = _doubts(flights, strange, named, given, found.behind)
+    known = {e: differs[e] if e in differs else _probability(found, (e, *rivals[e])) for e in named}
+    names = {e: (1.0 - strange) * p for e, p in known.items()}
+    doubts = _doubts(flights, strange, named, given, found.behind, one)
     worths = worth(flights, given.fixed, given.first, found.setting)
     energy = _energy_shares(flights, setting, left.after, named)
     unsure = bool(set(doubts) - {"assumed thrust"})
@@ -129,7 +128,8 @@ def judged(flights: Flights, library: Sequence[str], report: Report) -> Judged:
     if given.late:
         effects.append(given.late_name(tentative="short" in doubts))
         names[given.late] = 1.0
-    signs = (_sign(found),) if strange > 0.5 and found.ranking.structure > 0.0 else ()
+    structured = strange > 0.5 and found.ranking.structure > 0.0
+    structure = (_sign(found),) if structured else ()
     some = left.noisy or disturbed > 0.0 or bool(pushes)
     hidden = (
         found.posterior.hidden(
@@ -142,8 +142,8 @@ def judged(flights: Flights, library: Sequence[str], report: Report) -> Judged:
         setting,
         left,
         tuple(effects),
-        "structured" if signs else "random" if some else "none",
-        signs,
+        "structured" if structured else "random" if some else "none",
+        structure,
         _candidates(found, named),
         (
             *_inertial_notes(flights, named),
@@ -215,11 +215,11 @@ def _other_factor(effect: str) -> tuple[str, ...]:
     return tuple(x for x in playing(*THRUST_FACTORS) if x != effect)
 
 
-def _probability(found: Found, effects: Sequence[str], strange: float) -> float:
-    """Return the probability that one of some effects acts, which flights do not tell apart."""
-    known = sum(x.probability for x in found.ranking.sets if set(effects) & set(x.effects))
-    beside = found.posterior.beside_unknown(effects) if strange > VERDICT.least_stated else known
-    return min((1.0 - strange) * known + strange * beside, 1.0)
+def _probability(found: Found, effects: Sequence[str]) -> float:
+    """Return the probability that one of some effects acts, which flights do not tell apart, if
+    nothing acts but effects of the library.
+    """
+    return min(sum(x.probability for x in found.ranking.sets if set(effects) & set(x.effects)), 1.0)
 
 
 def _doubts(
@@ -228,10 +228,13 @@ def _doubts(
     named: Sequence[str],
     given: Given,
     behind: Mapping[str, Sequence[str]],
+    one: tuple[str, ...],
 ) -> dict[str, tuple[str, ...]]:
     """Return for each check, by its name, the sentences that say why a name may be wrong."""
     found: dict[str, tuple[str, ...]] = {}
-    if strange > 0.5:
+    if one:
+        found["composite"] = one
+    if strange > VERDICT.most_unknown:
         found["unknown"] = (
             "something that no effect of the library is acts with a probability of "
             f"{strange:.0%}: all names are tentative",

@@ -348,14 +348,6 @@ class Flights:
         )
         return floor, frozenset(not_identifiable), rounded
 
-    def with_drift(self, rng: np.random.Generator) -> "Flights":
-        """Return the same flights with other errors of what an IMU does not know, as large as its
-        fusion states them.
-        """
-        out = self._with_nothing_kept()
-        out._drift = rng
-        return out
-
     def _with_nothing_kept(self) -> "Flights":
         out = copy(self)
         out._pieces, out._columns, out._needs = {}, {}, {}

@@ -18,12 +18,8 @@ Array = NDArray[np.float64]
 class BiasSettings:
     """Size of the bias that is left."""
 
-    # m/s2, over which derivatives are taken, and beyond which no MEMS sensor is off
+    # m/s2, over which derivatives are taken
     step: float = 0.04
-    # standard deviations of what the fusion leaves, beyond which a bias is none: a free one takes
-    # the force of an effect on thrust, and its moments then look like an inertia
-    most_in_std: float = 3.0
-    largest: float = 2.0
 
 
 BIAS = BiasSettings()

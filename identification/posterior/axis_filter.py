@@ -26,7 +26,7 @@ class AxisSettings:
     settling_time: float = 1.0  # s, from the start of a piece to the first innovation that counts
     first_time: float = 0.4  # s, correlation time at which a search begins
     # s, correlation times: gusts last 0.1 to 2 s; what lasts longer is no disturbance
-    times: tuple[float, float] = (0.03, 3.0)
+    times: tuple[float, float] = (0.03, 2.0)
     ridge: float = 1e-9  # relative, of gains that do the same
     # logarithms of variances and of the correlation time, by which the search's first points differ
     # where nothing is known, and where a noise of the same flight is

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -253,27 +252,6 @@ class Posterior:
         names = list(self.bases[-1].columns)
         gains = np.square(score) / left
         return names[self.bases[-1].dictionary[int(np.argmax(gains))]], float(gains.max())
-
-    def beside_unknown(self, effects: Collection[str]) -> float:
-        """Return the probability that one of some effects acts where the column of the dictionary
-        that explains most acts as well.
-        """
-        scores = self._scores_beside_unknown
-        total = log_sum(list(scores.values()))
-        return sum(math.exp(x - total) for key, x in scores.items() if key & set(effects))
-
-    @cached_property
-    def _scores_beside_unknown(self) -> dict[frozenset[str], float]:
-        base = self.bases[-1]
-        strange = base.columns[self.strangest()[0]]
-        plain = np.append(base.plain, strange)
-        blocks = base.blocks.copy()
-        largest = max(DISCREPANCY.sizes)
-        blocks[:, strange] *= largest
-        blocks[:, :, strange] *= largest
-        beside = replace(base, plain=plain, blocks=blocks)
-        given = self.given or frozenset()
-        return Posterior(self.flights, self.library, [beside], self.power, given, self.idle).scores
 
     def _split(self, base: Base, asked: Index, beside: Sequence[int]) -> Marginal:
         """Return the likelihood of some columns of a base with others integrated out."""

@@ -14,7 +14,7 @@ from windwrench.studies.scoring import EQUIVALENTS
 Array = NDArray[np.float64]
 
 _DECIMALS = 2  # of a weight
-_WEIGHT_STD = (1e3, 1.0, 3.0, 3.0)  # of each weight, before the flights
+_WEIGHT_STD = (1e3, 3.0, 3.0, 3.0)  # of each weight but that of the Bayes factor, before the flights
 
 
 def acts_unknown(flight: Mapping[str, Any]) -> bool:
@@ -51,19 +51,24 @@ def right_set(flight: dict[str, Any]) -> bool:
     )
 
 
+def _misled(flight: dict[str, Any]) -> bool:
+    """Return whether a name that explains as much as is left is wrong: something is missing."""
+    return any(e["worth"] >= 1.0 and not is_right(flight, e["name"]) for e in flight["named"])
+
+
 def fit(flights: Sequence[dict[str, Any]]) -> UnknownSettings:
-    """Return the weights of signs at maximum posterior."""
+    """Return the weights of signs at maximum posterior; a Bayes factor counts as what it is."""
     x = np.array([Signs(**flight["signs"]).numbers() for flight in flights])
-    y = np.array([acts_unknown(flight) for flight in flights])
+    y = np.array([acts_unknown(f) or _misled(f) for f in flights])
+    given, x = x[:, 1], np.delete(x, 1, axis=1)
     scale = np.array(_WEIGHT_STD)
 
     def loss(w: Array) -> float:
-        odds = x @ w
+        odds = given + x @ w
         return float(
             np.sum(np.logaddexp(0.0, odds) - y * odds) + 0.5 * np.sum(np.square(w / scale))
         )
 
     found = minimize(loss, np.zeros(len(scale))).x.round(_DECIMALS).tolist()
-    return replace(
-        UNKNOWN, nothing=found[0], structure=found[1], disturbance=found[2], push=found[3]
-    )
+    names = ("nothing", "disturbance", "push", "composite")
+    return replace(UNKNOWN, **dict(zip(names, found, strict=True)))

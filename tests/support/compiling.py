@@ -69,7 +69,7 @@ def compile_estimates():
     flown = ((2.0, 10.0),)
     nis_without_wrench_state(alone, vehicle, flown)
     rollout_error(alone, vehicle, flown)
-    diagnose([alone], vehicle, probabilities=True)
+    diagnose([alone], vehicle)
     rows = np.arange(len(log.t))
     for seen in (rows % 40 == 0, rows < 0):
         position = np.where(seen[:, None], log.position, np.nan)
