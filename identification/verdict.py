@@ -122,7 +122,7 @@ def judged(flights: Flights, library: Sequence[str], report: Report) -> Judged:
     energy = _energy_shares(flights, setting, left.after, named)
     unsure = bool(set(doubts) - {"assumed thrust"})
     effects = [
-        _named(flights, found, given, e, names[e], (worths[e], energy[e]), unsure, rivals[e])
+        _named(flights, found, given, e, known[e], (worths[e], energy[e]), unsure, rivals[e])
         for e in named
     ]
     if given.late:

@@ -14,7 +14,8 @@ from windwrench.studies.scoring import EQUIVALENTS
 Array = NDArray[np.float64]
 
 _DECIMALS = 2  # of a weight
-_WEIGHT_STD = (1e3, 3.0, 3.0, 3.0)  # of each weight but that of the Bayes factor, before the flights
+# of each weight but that of the Bayes factor, before the flights
+_WEIGHT_STD = (1e3, 3.0, 3.0, 3.0)
 
 
 def acts_unknown(flight: Mapping[str, Any]) -> bool:
