@@ -105,7 +105,7 @@ def judged(flights: Flights, library: Sequence[str], report: Report) -> Judged:
     disturbed = beyond_calm(gusts, flights.vehicle)
     one = composites(flights.vehicle, found.setting, best.std)
     some = any(e not in differs for e in named)
-    signs = Signs(found.ranking.structure, disturbed, bool(pushes), bool(one), some)
+    signs = Signs(found.ranking.structure, disturbed, bool(pushes), some)
     strange = unknown(signs)
     rivals = {
         e: _other_factor(e)

@@ -1,8 +1,8 @@
 """How probable it is that something acts which no effect of the library is.
 
-Four things speak for it: a column of the dictionary that explains what the likeliest set leaves, a
-push, two named effects that may be one, and, where nothing is named, a disturbance that is too
-large to be none. Their weights are fitted to flights of which the truth is known.
+Three things speak for it: a column of the dictionary that explains what the likeliest set leaves, a
+push, and, where nothing is named, a disturbance that is too large to be none. The first is a Bayes
+factor; the weights of the others are fitted to flights of which the truth is known.
 """
 
 import math
@@ -16,9 +16,8 @@ class UnknownSettings:
     """The weights, in nats. ``tests/studies/test_probabilities.py`` fits them anew."""
 
     nothing: float = -2.12  # log odds where nothing speaks for it
-    disturbance: float = 2.74  # a nat of a disturbance over what counts for none
-    push: float = 2.95
-    composite: float = 2.88
+    disturbance: float = 2.23  # a nat of a disturbance over what counts for none
+    push: float = 1.36
     # nats, beyond which more says nothing more
     structure_range: tuple[float, float] = (0.0, 15.0)
     disturbance_range: tuple[float, float] = (0.0, 3.0)
@@ -36,14 +35,12 @@ class Signs:
         disturbance: logarithm of the largest disturbance over what counts for none. It counts
             where nothing is named: a turbulence that is named with a wind is no sign of more.
         push: whether a transient disturbance was found.
-        composite: whether two named effects may be one.
         named: whether an effect is named.
     """
 
     structure: float
     disturbance: float
     push: bool
-    composite: bool
     named: bool
 
     def numbers(self) -> tuple[float, ...]:
@@ -54,13 +51,12 @@ class Signs:
             float(np.clip(self.structure, *UNKNOWN.structure_range)),
             float(np.clip(strength, *UNKNOWN.disturbance_range)),
             float(self.push),
-            float(self.composite),
         )
 
 
 def unknown(signs: Signs, weights: UnknownSettings = UNKNOWN) -> float:
     """Return the probability that the likeliest set is not all that acts."""
     w = weights
-    by_sign = (w.nothing, 1.0, w.disturbance, w.push, w.composite)
+    by_sign = (w.nothing, 1.0, w.disturbance, w.push)
     odds = sum(a * x for a, x in zip(by_sign, signs.numbers(), strict=True))
     return 1.0 / (1.0 + math.exp(-odds))

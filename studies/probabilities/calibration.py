@@ -128,13 +128,8 @@ def reliability(flights: Sequence[Flight]) -> list[dict[str, Any]]:
     claims = claims_of(flights)
     for low, high in itertools.pairwise((0.0, *EDGES)):
         inside = [x for x in claims if low <= x[0] < high]
-        if inside:
-            row = {
-                "from": low,
-                "to": min(high, 1.0),
-                "mean": float(np.mean([p for p, _ in inside])),
-            }
-            rows.append(row | {"right": share(sum(right for _, right in inside), len(inside))})
+        right = share(sum(right for _, right in inside), len(inside)) if inside else "–"
+        rows.append({"from": low, "to": min(high, 1.0), "right": right})
     return rows
 
 

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 _DECIMALS = 2  # of a weight
 # of each weight but that of the Bayes factor, before the flights
-_WEIGHT_STD = (1e3, 3.0, 3.0, 3.0)
+_WEIGHT_STD = (1e3, 3.0, 3.0)
 
 
 def acts_unknown(flight: Mapping[str, Any]) -> bool:
@@ -71,5 +71,5 @@ def fit(flights: Sequence[dict[str, Any]]) -> UnknownSettings:
         )
 
     found = minimize(loss, np.zeros(len(scale))).x.round(_DECIMALS).tolist()
-    names = ("nothing", "disturbance", "push", "composite")
+    names = ("nothing", "disturbance", "push")
     return replace(UNKNOWN, **dict(zip(names, found, strict=True)))

@@ -138,7 +138,6 @@ def diagnosed(
             "structure": round(ranking.structure, 3),
             "disturbance": round(max(beyond_calm(found.gusts, vehicle), -9.0), 3),
             "push": bool(found.pushes),
-            "composite": "composite" in found.doubts,
             "named": bool(found.effects),
         },
         "tempering": round(ranking.tempering, 4),

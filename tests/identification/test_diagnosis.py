@@ -287,7 +287,7 @@ def test_a_name_that_is_not_probable_enough_is_tentative(monkeypatch):
     log = fly("thrust_curvature", a=-0.05)
     monkeypatch.setattr(verdict, "VERDICT", replace(verdict.VERDICT, least_sure_probability=1.0))
     found = diagnose([log], VEHICLE)
-    assert 0.95 < found.probabilities.names["thrust_curvature"] < 1.0
+    assert 0.8 < found.probabilities.names["thrust_curvature"] < 1.0
     assert [(e.name, e.tentative) for e in found.effects] == [("thrust_curvature", True)]
 
 

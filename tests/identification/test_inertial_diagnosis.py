@@ -51,7 +51,7 @@ def test_an_imu_has_probabilities() -> None:
     log = pose_removed(imu_flight(VEHICLE, (WEAK,), seconds=15.0))
     found = diagnose([log], VEHICLE)
     assert set(found.probabilities.names) == {effect.name for effect in found.effects}
-    assert found.probabilities.names[WEAK.name] > 0.95
+    assert found.probabilities.names[WEAK.name] > 0.8
 
 
 def test_a_pose_and_an_imu_are_not_mixed() -> None:

@@ -70,7 +70,7 @@ def test_a_wind_is_named_and_no_tilt(windy):
     for name, true in (("wx", -4.0), ("wy", 1.0)):
         assert wind.coefficients[name] == pytest.approx(true, abs=3.0 * wind.std[name] + 0.1)
         assert wind.std[name] < 1.0
-    assert windy.probabilities.names["wind"] > 0.95
+    assert windy.probabilities.names["wind"] > 0.8
     assert windy.after.force_rms < 0.2 * windy.before.force_rms
 
 
