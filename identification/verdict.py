@@ -1,7 +1,7 @@
 """What the evidence of sets of effects says of flights, in words that a report can use.
 
 A name is sure where it is probable, where what it does is at least as large as what is left
-unexplained, and where little speaks for a cause outside the library.
+unexplained beyond the sensors' noise, and where little speaks for a cause outside the library.
 The rule is the same for every kind of log; what differs is whose likelihood it is: that of the
 poses, where they and the rotors were measured as they were, or that of the wrench's balance.
 """

@@ -287,6 +287,9 @@ class Flights:
         out = self._with_nothing_kept()
         out.residual_hz, out._row_rate_hz, out._first = cutoff_hz, rate_hz, []
         out._lay_rows()
+        noisy = out._with_nothing_kept()
+        noisy.logs = tuple(noisy_logs(out.logs, out.vehicle))
+        out.visible_noise = noisy.residual({}) - out.residual({})
         return out
 
     def _repeat_sensor_noise(self) -> tuple[Array, frozenset[str], Array]:

@@ -143,6 +143,12 @@ class ForceRows:
             [self._in_body(x, rotation) for x in both], wrench[:, 3:] / self._inertia
         )
 
+    def noise(self) -> Array:
+        """Return rows of the sensors' noise, as far as the logs show it."""
+        noise = self.flights.visible_noise
+        force = noise[:, :3] / self.flights.vehicle.mass
+        return self.from_world(force, np.zeros_like(force), noise[:, 3:] / self._inertia)
+
     def columns(
         self, setting: Setting, wanted: Iterable[Column], step: float = FORCE_ROWS.step
     ) -> dict[Column, Array]:

@@ -18,9 +18,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class WorthSettings:
-    """What counts as an effect's own."""
+    """What counts as an effect's own, and as left."""
 
     most_in_std: float = 3.0  # of a prior, that others may differ in an effect's place
+    noise_known: float = 0.2  # share of the sensors' noise, to which it is known
 
 
 WORTH = WorthSettings()
@@ -31,7 +32,7 @@ def worth(
 ) -> dict[str, float]:
     """Return of each effect the RMS of what nuisances, effects that any set has and effects of
     other families cannot do in its place, within three standard deviations of their priors, over
-    the RMS of what is left: in the channel where that is most.
+    the RMS of what is left beyond the sensors' noise: in the channel where that is most.
 
     Args:
         flights: of the vehicle.
@@ -43,7 +44,8 @@ def worth(
         return {}
     rows = ForceRows(flights, fixed)
     fit, left = rows.fit, rows.residual(setting)
-    size = np.sqrt(np.mean(np.square(left[fit]), axis=0)) + 1e-12
+    power, noise = (np.mean(np.square(x[fit]), axis=0) for x in (left, rows.noise()))
+    size = np.sqrt(np.maximum(power - noise, WORTH.noise_known**2 * noise)) + 1e-12
     nuisances = list(row_nuisances(rows).values())
     columns = rows.columns(setting, _columns_of(flights, setting))
     out = {}
