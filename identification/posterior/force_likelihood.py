@@ -189,17 +189,13 @@ class ForceLikelihood:
         return out
 
     def _states(self) -> list[State]:
-        return [
-            State(
-                s.position,
-                s.rotation,
-                s.velocity,
-                s.angular_velocity,
-                self.flights.vehicle.rotor_wrench(s.rotor_speeds),
-                s.acceleration,
-            )
-            for s in (p.signals for p in self.rows.flights.pieces({}))
-        ]
+        """Return the flight; the acceleration is the rotors', which knows no disturbance."""
+        vehicle, out = self.flights.vehicle, []
+        for s in (p.signals for p in self.rows.flights.pieces({})):
+            rotors = vehicle.rotor_wrench(s.rotor_speeds)
+            push = rotors[:, :1] / vehicle.mass * s.rotation[:, :, 2]
+            out.append(State(s.position, s.rotation, s.velocity, s.angular_velocity, rotors, push))
+        return out
 
     def _changing(self, setting: Setting) -> dict[Column, Array]:
         """Return the dictionary's columns of effects whose coefficients change."""
