@@ -350,7 +350,7 @@ def _sign(found: Found) -> Structure:
     group, what = name.removeprefix("unknown ").split(": ", 1)
     column, _, channel = what.rpartition(" in ")
     where = f"{CHANNELS[int(channel)]} with {column}" if column else f"the part of {what}"
-    return Structure(group, where, gained / found.posterior.deviances()[1])
+    return Structure(group, where, gained / found.posterior.left())
 
 
 def _late_rotors(flights: Flights, found: Found) -> list[str]:

@@ -555,6 +555,17 @@ class Flights:
         every = {c.name for c in get(effect).coefficients} - {CENTRAL}
         return own if every - set(own) else {}
 
+    def columns_of(self, effects: Iterable[str]) -> list[Column]:
+        """Return the columns of effects: their coefficients, but those that the vehicle's file
+        fixes. Where an effect acts makes no force.
+        """
+        return [
+            (e, c.name)
+            for e in effects
+            for c in get(e).coefficients
+            if c.name != CENTRAL and c.name not in self.stated(e)
+        ]
+
     def is_nonlinear(self, effect: str) -> bool:
         """Return whether an effect's force is no sum over its coefficients, and no file states them
         all, about which it would be one.

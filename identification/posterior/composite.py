@@ -39,17 +39,17 @@ def composites(vehicle: Vehicle, setting: Setting, std: Setting) -> tuple[str, .
         setting: coefficients of effects.
         std: their standard deviations.
     """
-    own = {role: playing(role, among=setting) for role in ROLES}
     found = []
-    for a, b in itertools.combinations([effect for own_ in own.values() for effect in own_], 2):
-        (x, dx), (y, dy) = (_relative(vehicle, e, setting[e], std[e]) for e in (a, b))
-        off = np.subtract.outer(x, y)
-        alike = COMPOSITE.share * np.maximum.outer(np.abs(x), np.abs(y))
-        size = np.sqrt(np.add.outer(dx**2, dy**2) + alike**2)
-        third = next(role for role in ROLES if not {a, b} & set(own[role]))
-        if np.all(np.abs(off) < COMPOSITE.most_apart * size):
-            other = " or ".join(playing(third))
-            found.append(f"{a} and {b} change alike: {other} may be the one cause")
+    for third in ROLES:
+        pair = [playing(role, among=setting) for role in ROLES if role != third]
+        for a, b in itertools.product(*pair):
+            (x, dx), (y, dy) = (_relative(vehicle, e, setting[e], std[e]) for e in (a, b))
+            off = np.subtract.outer(x, y)
+            alike = COMPOSITE.share * np.maximum.outer(np.abs(x), np.abs(y))
+            size = np.sqrt(np.add.outer(dx**2, dy**2) + alike**2)
+            if np.all(np.abs(off) < COMPOSITE.most_apart * size):
+                other = " or ".join(playing(third))
+                found.append(f"{a} and {b} change alike: {other} may be the one cause")
     return tuple(found)
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from ...dynamics.effects import Role, get, playing
+from ...dynamics.effects import Role, playing
 from ...runtime.errors import InputError
-from ..inference.regression import CENTRAL, START_PREFIX, Column, Flights, coefficient
+from ..inference.regression import START_PREFIX, Column, Flights, coefficient
 from ..inference.sensor_bias import flight_and_axis
 from ..inference.time_offsets import LAG_ASYMMETRY, timing_of
 from ..motion.smoothing import low_pass
@@ -67,25 +67,14 @@ class ForceLikelihood:
         self._given = N.reshape(-1, N.shape[2])
         self._inner = self._given.T @ self._given
 
-    def columns_of(self, effects: Iterable[str]) -> list[Column]:
-        """Return the columns of effects: their coefficients, but those that the vehicle's file
-        fixes. Where an effect acts makes no force.
-        """
-        return [
-            (e, c.name)
-            for e in effects
-            for c in get(e).coefficients
-            if c.name != CENTRAL and c.name not in self.flights.stated(e)
-        ]
-
     def _noise(self, first: Setting) -> ForceNoise:
         rows = self.rows
         y = rows.residual(first)
         linear = [e for e in self.library if not self.flights.is_nonlinear(e)]
-        found = rows.columns(first, self.columns_of(linear))
+        found = rows.columns(first, self.flights.columns_of(linear))
         traced = {c[0] for c, x in found.items() if x.any()}
         self.library = [e for e in self.library if e in traced or e not in linear]
-        wanted = self.columns_of(e for e in linear if e in traced)
+        wanted = self.flights.columns_of(e for e in linear if e in traced)
         own = [found[c] * prior_size(c, self.flights) for c in wanted]
         if self.flights.commanded:
             return self._noise_beside(y, own, {})[0]
@@ -162,7 +151,7 @@ class ForceLikelihood:
     def base(self, setting: Setting, starts: Starts, unknown: bool = False) -> Base:
         """Return the likelihood about a setting, with all effects of the library."""
         linear = [e for e in self.library if not self.flights.is_nonlinear(e) or e in setting]
-        sums = self.sums(setting, self.columns_of(linear), starts, unknown)
+        sums = self.sums(setting, self.flights.columns_of(linear), starts, unknown)
         return in_prior_units(self.flights, sums, setting, starts)
 
     def _dictionary(self) -> dict[Column, Array]:
@@ -246,7 +235,7 @@ class ForceLikelihood:
         """
         prior = sum(
             ((setting[e].get(name, 0.0) - declared((e, name), self.flights)) / size) ** 2
-            for e, name in self.columns_of(setting)
+            for e, name in self.flights.columns_of(setting)
             if (size := prior_size((e, name), self.flights))
         )
         try:
@@ -289,7 +278,7 @@ class ForceLikelihood:
     def fitted(self, setting: Setting) -> Setting:
         """Return the mode of the posterior of a setting's effects (damped Gauss-Newton)."""
         here, value = setting, self.objective(setting)
-        wanted = self.columns_of(setting)
+        wanted = self.flights.columns_of(setting)
         for _ in range(FORCE_LIKELIHOOD.rounds):
             target = self._linear_mode(here, wanted)
             for share in FORCE_LIKELIHOOD.shares:
@@ -320,7 +309,7 @@ class ForceLikelihood:
 
     def tempered(self, setting: Setting) -> float:
         """Return the power of the likelihood that its scatter beside a setting allows."""
-        wanted = self.columns_of(setting)
+        wanted = self.flights.columns_of(setting)
         base = in_prior_units(self.flights, self.sums(setting, wanted, {}), setting, {})
         chosen: Index = np.arange(len(base.columns))
         return tempering(base.blocks, chosen)

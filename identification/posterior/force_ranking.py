@@ -129,7 +129,7 @@ def _behind(
     """
     if not hidden or not best:
         return {}
-    columns = likelihood.columns_of([*best, *hidden])
+    columns = likelihood.flights.columns_of([*best, *hidden])
     sums = likelihood.sums(best, columns, {})
     base = in_prior_units(likelihood.flights, sums, best, {})
     at = np.array([base.columns[c] for c in columns], dtype=np.intp)

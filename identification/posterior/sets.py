@@ -274,10 +274,8 @@ class Posterior:
         lack = max((x for key, x in value.items() if effect not in key), default=-math.inf)
         return have - lack
 
-    def deviances(self) -> tuple[float, float]:
-        """Return the deviance that nothing of the library leaves, and that the likeliest set
-        leaves, with the nuisances integrated out.
-        """
+    def left(self) -> float:
+        """Return the deviance that the likeliest set leaves, with the nuisances integrated out."""
         base, best = self._best()
         at = np.array([base.columns[c] for v in best.variants for c in v[1]], dtype=np.intp)
         m = self._split(base, at, [])
@@ -287,7 +285,7 @@ class Posterior:
         log_volume = 0.5 * float(np.linalg.slogdet(inner)[1])
         whole = -2.0 * (m.constant + log_volume)
         z = best.evidence.mode
-        return whole, whole - float(2.0 * m.right @ z - z @ m.normal @ z)
+        return whole - float(2.0 * m.right @ z - z @ m.normal @ z)
 
     def alone(self) -> dict[str, float]:
         """Return the deviance that each effect of the library explains alone, beside what every set

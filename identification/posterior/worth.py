@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from ...dynamics.effects import get
-from ..inference.regression import CENTRAL, Column, Flights, Setting
+from ..inference.regression import Column, Flights, Setting
 from .force_nuisances import row_nuisances
 from .force_rows import ForceRows
 from .priors import prior_size
@@ -47,14 +47,14 @@ def worth(
     power, noise = (np.mean(np.square(x[fit]), axis=0) for x in (left, rows.noise()))
     size = np.sqrt(np.maximum(power - noise, WORTH.noise_known**2 * noise)) + 1e-12
     nuisances = list(row_nuisances(rows).values())
-    columns = rows.columns(setting, _columns_of(flights, setting))
+    columns = rows.columns(setting, flights.columns_of(setting))
     out = {}
     for effect in setting:
         less = {e: x for e, x in setting.items() if e != effect}
         part = rows.residual(less) - left
         # in still air a drag cannot do what it does in a wind
         still = get(effect).sets_wind
-        others = rows.columns(less, _columns_of(flights, less)) if still else columns
+        others = rows.columns(less, flights.columns_of(less)) if still else columns
         own = _scaled(flights, others, effect, first)
         X = np.stack([*nuisances, *own], axis=2)[fit] / size[:, None]
         y = part[fit] / size
@@ -62,15 +62,6 @@ def worth(
         done = lsq_linear(X.reshape(-1, X.shape[2]), y.ravel(), (-most, most)).x
         out[effect] = float(np.sqrt(np.mean(np.square(y - X @ done), axis=0)).max())
     return out
-
-
-def _columns_of(flights: Flights, setting: Setting) -> list[Column]:
-    return [
-        (effect, c.name)
-        for effect in setting
-        for c in get(effect).coefficients
-        if c.name != CENTRAL and c.name not in flights.stated(effect)
-    ]
 
 
 def _scaled(
