@@ -136,6 +136,7 @@ def innovations(
     pieces: Sequence[Piece],
     outlier_chance: float,
     outlier_range: float,
+    covariance: Array | None = None,
 ) -> Innovations:
     """Return how likely the poses that count are to a filter with this tuning (M,).
 
@@ -149,17 +150,19 @@ def innovations(
         tuning: what the filter assumes of noise.
         period: s, to which the tuning belongs.
         pieces: of the flight.
-        outlier_chance: between 0 and 1.
+        outlier_chance: from 0, every pose is taken in, to 1.
         outlier_range: m.
+        covariance: (18, 18) at the start of each piece; default: the filter's own.
     """
     density = outlier_chance / ((2.0 * outlier_range) ** 3 * _MRP_VOLUME)
+    outlier = math.log(density) if density > 0.0 else -math.inf
     found = []
     for piece in pieces:
         ukf = WrenchUKF(vehicle, tuning, period)
         twist = {"velocity": piece.velocity, "angular_velocity": piece.angular_velocity}
-        ukf.reset(piece.position, piece.quaternion, **twist)
+        ukf.reset(piece.position, piece.quaternion, covariance, **twist)
         out = np.zeros(len(piece.rows), dtype=INNOVATION)
-        _pass(ukf.record, piece.rows, period, math.log1p(-outlier_chance), math.log(density), out)
+        _pass(ukf.record, piece.rows, period, math.log1p(-outlier_chance), outlier, out)
         found.append(out[piece.rows["counted"]])
     return np.concatenate(found).view(np.recarray)
 

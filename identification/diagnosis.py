@@ -21,7 +21,7 @@ from .inference.explanatory_variables import explanatory_variables
 from .inference.regression import Flights, lost_behind_a_filter
 from .judged import Setting
 from .logs.flight_log import FlightLog
-from .logs.screening import LEAST_SECONDS, screen_log
+from .logs.screening import LEAST_SECONDS, screened
 from .motion.noise_spectrum import filtering_notes, pose_was_filtered
 from .motion.smoothing import CUTOFFS
 from .prediction import nis_without_wrench_state, rollout_error
@@ -75,11 +75,12 @@ def diagnose(
         if len(every) == 1 and not every[0].commanded
         else DIAGNOSIS.least_seconds_each
     )
-    doubts = [f"{log.name}: {note}" for log in every for note in screen_log(log, vehicle, least)]
+    checked = [screened(log, vehicle, least) for log in every]
+    doubts = [f"{log.name}: {note}" for log, found in checked for note in found]
     flights = Flights(logs, vehicle, test)
     notes = [*(f"{log.name}: {note}" for log in flights.logs for note in log.notes), *doubts]
     notes += [f"{log.name}: {note}" for log in every for note in filtering_notes(log)]
-    notes += [f"{log.name}: {note}" for log in every for note in pose_notes(log, vehicle)]
+    notes += [f"{log.name}: {note}" for log, _ in checked for note in pose_notes(log, vehicle)]
     library = [n for n in names() if n not in without]
     said = judged(flights, library, report)
     effects, found = said.effects, said.balance
@@ -97,7 +98,8 @@ def diagnose(
     amended = flights.amended({e: said.setting[e] for e in named})
     segments = _segments(flights)
     parts = _parts(flights, said.setting, found.after)
-    unseen = sorted(flights.needs_pose | said.hidden)
+    hidden = sorted(flights.needs_pose | said.hidden)
+    unseen = sorted((flights.not_identifiable | said.unseen) - flights.needs_pose)
     return Diagnosis(
         verdict=verdict,
         remainder=said.remainder,
@@ -110,10 +112,10 @@ def diagnose(
         advice=tuple(
             _advice(
                 effects,
-                sorted(flights.not_identifiable - flights.needs_pose),
+                unseen,
                 said.remainder,
                 flights.filtered,
-                unseen,
+                hidden,
             )
         ),
         notes=tuple(dict.fromkeys(notes)),
@@ -131,7 +133,7 @@ def diagnose(
         seconds=float(sum(log.t[-1] - log.t[0] for log in (*logs, *test))),
         floor_is_bound=not flights.inertial
         and (flights.filtered or any(map(pose_was_filtered, every))),
-        needs_pose=tuple(unseen),
+        needs_pose=tuple(hidden),
         doubts=said.doubts,
         ranking=said.ranking,
         probabilities=said.probabilities,

@@ -93,6 +93,7 @@ class Judged:
         notes: sentences.
         doubts: why names are tentative, by the check that says so.
         hidden: effects that would show if the errors of an IMU were known.
+        unseen: effects of which these flights would not show a typical size.
         gusts: disturbances of each channel.
         pushes: transient disturbances.
         ranking: the posterior.
@@ -108,6 +109,7 @@ class Judged:
     notes: tuple[str, ...] = ()
     doubts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     hidden: frozenset[str] = frozenset()
+    unseen: frozenset[str] = frozenset()
     gusts: tuple[Disturbance, ...] = ()
     pushes: tuple[TransientDisturbance, ...] = ()
     ranking: Ranking | None = None

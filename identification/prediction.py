@@ -21,17 +21,17 @@ from ..dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model
 from ..dynamics.motion import accelerations
 from ..dynamics.rotation import turn_body
 from ..dynamics.vehicle import Vehicle
-from ..estimator import UKFTuning, WrenchUKF
-from ..estimator.estimate import NIS, STATE_SIZE
+from ..estimator import UKFTuning
+from ..estimator.estimate import STATE_SIZE
 from ..estimator.filter_record import propagate
+from ..estimator.innovations import innovations, pieces_of
 from ..estimator.ukf import default_covariance
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
 from .logs.flight_log import FlightLog
 from .motion.sensing_effects import undo_log_sensing
 from .motion.signals import Signals, log_signals
-from .motion.smoothing import CUTOFFS, continuous, low_pass, unbroken
-from .wrench_series import predict_to_row
+from .motion.smoothing import CUTOFFS, continuous, low_pass
 
 Array = NDArray[np.float64]
 Segments = Sequence[tuple[float, float]]
@@ -384,12 +384,6 @@ def nis_without_wrench_state(log: FlightLog, vehicle: Vehicle, segments: Segment
     Raises:
         InputError: the vehicle has more effects than a model holds.
     """
-    seen = np.flatnonzero(log.valid)
-    inside = np.zeros(len(log.t), dtype=np.bool_)
-    for t0, t1 in segments:
-        inside |= (log.t >= t0) & (log.t <= t1)
-    if not seen.size:
-        return math.nan
     period = log.period
     tuning = UKFTuning.for_vehicle(vehicle, period)
     tuning = replace(
@@ -399,17 +393,11 @@ def nis_without_wrench_state(log: FlightLog, vehicle: Vehicle, segments: Segment
     )
     covariance = default_covariance(vehicle, tuning)
     covariance[12:18, 12:18] *= PREDICTION.frozen_wrench_factor**2
-    ukf = WrenchUKF(vehicle, tuning, period=period)
-    nis = np.full(len(log.t), np.nan)
-    for rows in unbroken(log.t, seen, PREDICTION.longest_gap):
-        first = int(rows[0])
-        ukf.reset(log.position[first], log.quaternion[first], covariance)
-        ukf.record[0]["time"] = log.t[first] - log.t[0]
-        inside[first] = False  # the filter's start has nothing to compare with
-        for k in range(first + 1, int(rows[-1]) + 1):
-            predict_to_row(ukf, log, k)
-            if log.valid[k]:
-                ukf.correct(log.position[k], log.quaternion[k])
-                nis[k] = ukf.record[0]["x"][NIS]
-    values = nis[inside & log.valid]
-    return float(np.mean(values)) if values.size else math.nan
+    position = np.where(log.valid[:, None], log.position, np.nan)
+    columns = log.t, log.rotor_speeds, position, log.quaternion, log.voltage
+    pieces = pieces_of(vehicle, *columns, PREDICTION.longest_gap, 0.0)
+    if not pieces:
+        return math.nan
+    found = innovations(vehicle, tuning, period, pieces, 0.0, math.inf, covariance)
+    inside = np.any([(found.t >= t0) & (found.t <= t1) for t0, t1 in segments], axis=0)
+    return float(np.mean(found.nis[inside])) if inside.any() else math.nan

@@ -28,6 +28,7 @@ from .inference.carrying_channels import carrying_channels
 from .inference.commanded_rotors import COMMANDED, THRUST_FACTORS, assumed_thrust_doubts
 from .inference.regression import (
     CENTRAL,
+    Column,
     Flights,
     coefficient,
     moves_time,
@@ -131,13 +132,9 @@ def judged(flights: Flights, library: Sequence[str], report: Report) -> Judged:
     structured = strange > 0.5 and found.ranking.structure > 0.0
     structure = (_sign(found),) if structured else ()
     some = left.noisy or disturbed > 0.0 or bool(pushes)
-    hidden = (
-        found.posterior.hidden(
-            [("", f"{NUISANCE}{name}") for _, name in flights.biases], VERDICT.least_shown
-        )
-        if flights.inertial
-        else frozenset[str]()
-    )
+    biases = [("", f"{NUISANCE}{name}") for _, name in flights.biases]
+    unseen = _too_small_to_show(found)
+    hidden = unseen - _too_small_to_show(found, biases)
     return Judged(
         setting,
         left,
@@ -152,11 +149,18 @@ def judged(flights: Flights, library: Sequence[str], report: Report) -> Judged:
         ),
         doubts,
         hidden,
+        unseen - hidden,
         gusts,
         pushes,
         found.ranking,
         Probabilities(names, _alternatives(found, frozenset(given.first), 1.0 - strange), strange),
     )
+
+
+def _too_small_to_show(found: Found, known: Sequence[Column] = ()) -> frozenset[str]:
+    """Return the effects of which a typical size would not be sure, with some nuisances known."""
+    shown = found.posterior.shown(known)
+    return frozenset(e for e, x in shown.items() if x < VERDICT.least_shown)
 
 
 def beyond_calm(disturbances: Sequence[Disturbance], vehicle: Vehicle) -> float:

@@ -111,6 +111,19 @@ def estimate_log(
             (``screen_for_estimate``), or its rotor speeds make the filter's numbers overflow.
     """
     log, doubts = screen_for_estimate(log, vehicle)
+    return _estimate(log, vehicle, tuning, report, smooth, gate, doubts)
+
+
+def _estimate(
+    log: FlightLog,
+    vehicle: Vehicle,
+    tuning: UKFTuning | None = None,
+    report: Callable[[float], None] = lambda share: None,
+    smooth: bool = False,
+    gate: float | None = GATE,
+    doubts: tuple[str, ...] = (),
+) -> WrenchSeries:
+    """Return the estimate of a log as ``screen_for_estimate`` gives it back, with its doubts."""
     if log.commanded:
         vehicle = replace(vehicle, omega_source="commanded")
     both = log.gyro is not None and log.accelerometer is not None
@@ -181,16 +194,16 @@ def _slow_motors(log: FlightLog, vehicle: Vehicle, estimate: WrenchEstimate) -> 
 
 
 def pose_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
-    """Return what ``estimate_log`` notes of a log's poses: how many jump from those before, and
-    where its filter restarted. For answers of other kinds from the same log; none of one whose
-    motion is that of its IMU.
+    """Return what ``estimate_log`` notes of the poses of a log that was screened: how many jump
+    from those before, and where its filter restarted. For answers of other kinds from the same log;
+    none of one whose motion is that of its IMU.
 
     Raises:
-        InputError: as ``estimate_log``.
+        InputError: rotor speeds make the filter's numbers overflow.
     """
     if reads_imu(log):
         return ()
-    return tuple(_notes(log, estimate_log(log, vehicle), False))
+    return tuple(_notes(log, _estimate(log, vehicle), False))
 
 
 def counts(series: WrenchSeries) -> dict[str, int]:

@@ -296,9 +296,7 @@ class Flights:
         """Return a sample of the residual's sensor noise, the effects that are not identifiable,
         and the share of noise in the rotors.
 
-        The noise is added to the logs once more, and the change is what noise makes. An effect
-        whose column is noise to a large part is not identifiable; fitted all the same, it would
-        come out too small, or explain the noise of the residual by removing it from the pose.
+        The noise is added to the logs once more, and the change is what noise makes.
         """
         noisy = self._with_nothing_kept()  # the same rows of louder logs
         noisy.logs = tuple(noisy_logs(self.logs, self.vehicle))
@@ -309,6 +307,23 @@ class Flights:
             noisy._pieces, noisy._needs, noisy._offset_signals, noisy._residuals = {}, {}, {}, {}
             noisy.logs = tuple(noisy_logs(self.logs, self.vehicle, hidden=True))
             floor = noisy.residual({}) - self.residual({})
+        lost = frozenset() if self.has_raw_poses else self._lost_in_noise(noisy, floor)
+        rotors, more = self.rotor_wrench({}), noisy.rotor_wrench({})
+        rounded = np.var(more - rotors, axis=0) / np.maximum(np.var(rotors, axis=0), 1e-30)
+        rates = self._angular_velocities()
+        noise = noisy._angular_velocities() - rates
+        self.angular_velocity_noise = np.var(noise, axis=0) / np.maximum(
+            np.var(rates, axis=0), 1e-30
+        )
+        return floor, lost | self.explained_by_rounding, rounded
+
+    def _lost_in_noise(self, noisy: "Flights", floor: Array) -> frozenset[str]:
+        """Return the effects whose columns are noise to a large part, of logs whose columns are of
+        the measured motion.
+
+        Fitted all the same, one would come out too small, or explain the noise of the residual by
+        removing it from the pose.
+        """
         weight = 1.0 / (np.mean(np.square(floor), axis=0) + 1e-30)
         quietly: set[str] = set()  # of these, what the sensors' noise alone hides
         own: list[Column] = [
@@ -341,15 +356,7 @@ class Flights:
             not_identifiable |= needing(*NOT_COMMANDED)
         if self.filtered:
             not_identifiable |= lost_behind_a_filter()
-        not_identifiable |= self.explained_by_rounding
-        rotors, more = self.rotor_wrench({}), noisy.rotor_wrench({})
-        rounded = np.var(more - rotors, axis=0) / np.maximum(np.var(rotors, axis=0), 1e-30)
-        rates = self._angular_velocities()
-        noise = noisy._angular_velocities() - rates
-        self.angular_velocity_noise = np.var(noise, axis=0) / np.maximum(
-            np.var(rates, axis=0), 1e-30
-        )
-        return floor, frozenset(not_identifiable), rounded
+        return frozenset(not_identifiable)
 
     def _with_nothing_kept(self) -> "Flights":
         out = copy(self)

@@ -93,7 +93,7 @@ def screen_log(
             jumps, its pose leaps, nothing flew, or it follows another convention than it declares;
             the message names the file, what was found and what to do.
     """
-    return _screened(log, vehicle, least_seconds)[1]
+    return screened(log, vehicle, least_seconds)[1]
 
 
 def screen_for_estimate(log: FlightLog, vehicle: Vehicle) -> tuple[FlightLog, tuple[str, ...]]:
@@ -115,10 +115,10 @@ def screen_for_estimate(log: FlightLog, vehicle: Vehicle) -> tuple[FlightLog, tu
         InputError: every number of an estimate would be wrong: other units or conventions than the
             log declares, nothing flew, or no pose is another one.
     """
-    return _screened(log, vehicle, None)
+    return screened(log, vehicle, None)
 
 
-def _screened(
+def screened(
     log: FlightLog, vehicle: Vehicle, least: float | None
 ) -> tuple[FlightLog, tuple[str, ...]]:
     """Return a log without held poses, and notes, after all checks in their order; ``least`` is the

@@ -11,7 +11,6 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter, savgol_filter, sosfiltfilt
-from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 
@@ -116,12 +115,30 @@ def derivative(x: Array, period: float, order: int = 1) -> Array:
     return np.asarray(savgol_filter(x, 5, 4, deriv=order, delta=period, axis=0))
 
 
+def turn_between(before: Array, after: Array) -> Array:
+    """Return the rotations (n, 3) rad, body, from attitudes (n, 4) to others, each by at most half
+    a turn.
+    """
+    w0, x0, y0, z0 = before.T
+    w1, x1, y1, z1 = after.T
+    cosine = w0 * w1 + x0 * x1 + y0 * y1 + z0 * z1  # before* times after
+    sine = np.column_stack(
+        [
+            w0 * x1 - x0 * w1 - y0 * z1 + z0 * y1,
+            w0 * y1 - y0 * w1 - z0 * x1 + x0 * z1,
+            w0 * z1 - z0 * w1 - x0 * y1 + y0 * x1,
+        ]
+    )
+    half = np.linalg.norm(sine, axis=1)
+    angle = 2.0 * np.arctan2(half, np.abs(cosine)) * np.where(cosine < 0.0, -1.0, 1.0)
+    return np.asarray(sine * (angle / np.maximum(half, 1e-300))[:, None])
+
+
 def turned(quaternion: Array) -> Array:
     """Return the sum (n - 1, 3) of the rotations (rad, body) between quaternions (n, 4). White
     noise stays white in this sum, but for a small share that the motion turns.
     """
-    attitude = Rotation.from_quat(quaternion, scalar_first=True)
-    return np.asarray(np.cumsum((attitude[:-1].inv() * attitude[1:]).as_rotvec(), axis=0))
+    return np.asarray(np.cumsum(turn_between(quaternion[:-1], quaternion[1:]), axis=0))
 
 
 def continuous(quaternion: Array) -> Array:

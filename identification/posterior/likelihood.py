@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.effects import Role, get, playing
-from ...dynamics.vehicle import Vehicle
+from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
 from ..inference.regression import (
     CENTRAL,
@@ -40,7 +40,7 @@ from ..motion.residual import acting_wrench
 from ..motion.sensing_effects import undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, log_signals
-from ..motion.smoothing import continuous
+from ..motion.smoothing import continuous, turn_between, turned
 from .axis_filter import AXIS, AxisNoise, likeliest_noise, steady_noise
 from .causal_filter import Poses, Track, run, sensitivities
 from .discrepancy import changing_columns, discrepancy_columns, variables
@@ -102,7 +102,8 @@ class Likelihood:
         setting: the coefficients about which all is linear.
         near: the likelihood of the same flights near another setting, whose noise is where the
             search for this one's begins; default: it begins with what any flight may have.
-        same_noise: whether that noise is taken as it is.
+        same_noise: whether that noise is taken as it is, and the columns of what any flight may
+            have.
     """
 
     axes: tuple[int, ...] = (0, 1, 2, 3, 4, 5)  # whose innovations count
@@ -116,19 +117,23 @@ class Likelihood:
     ) -> None:
         self.flights, self.setting = flights, setting
         self.vehicle = flights.amended({k: v for k, v in setting.items() if k})
-        found = [
-            (i, piece)
-            for i, log in enumerate(flights.logs)
-            if flights.fit_rows[flights.log == i].any()  # no test log
-            for piece in read_poses(log, self.vehicle)
-        ]
-        self.pieces = [piece for _, piece in found]
-        self._fit = [_in_fit(flights, i, piece.t) for i, piece in found]
+        if near is not None and _sensing(near.vehicle) == _sensing(self.vehicle):
+            self.pieces, self._fit = near.pieces, near._fit
+        else:
+            found = [
+                (i, piece)
+                for i, log in enumerate(flights.logs)
+                if flights.fit_rows[flights.log == i].any()  # no test log
+                for piece in read_poses(log, self.vehicle)
+            ]
+            self.pieces = [piece for _, piece in found]
+            self._fit = [_in_fit(flights, i, piece.t) for i, piece in found]
         self.period = self.pieces[0].period
         inertia = flights.vehicle.inertia
         self.inertias = np.array([flights.vehicle.mass] * 3 + np.diagonal(inertia).tolist())
         # tracks, and the rotors' innovations of them
         self._answers: tuple[list[Track], list[Array]] = [], []
+        self._quiet: tuple[tuple[AxisNoise, ...], list[Array]] | None = None
         self.known: list[Array]  # (n, 6, 3) of each piece, what rotors' innovations say of it
         lengths = [len(piece.t) for piece in self.pieces]
         if near is None or [len(piece.t) for piece in near.pieces] != lengths:
@@ -149,6 +154,9 @@ class Likelihood:
         # what a unit of each column adds to the accelerations, or to the measured pose; a column
         # that was asked for once is kept
         self._columns: tuple[dict[Column, list[Array]], dict[Column, list[Array]]] = {}, {}
+        if near is not None and same_noise:  # what any flight may have changes little with effects
+            self._columns = near.nuisances()
+            self._answers = self.tracks, near._rotor_innovations()
 
     def _run(self, noise: tuple[AxisNoise, ...], known: Sequence[Array]) -> list[Track]:
         return [
@@ -212,12 +220,7 @@ class Likelihood:
         states of each piece (n, 6, 3); ``explained`` (n, 2, 6) is what is known to move the pose,
         and to accelerate, beside the model. ``begun``: whether this noise is roughly known.
         """
-        angles = []
-        for piece in self.pieces:
-            q = Rotation.from_quat(piece.quaternion, scalar_first=True)
-            angles.append(
-                np.vstack([np.zeros(3), np.cumsum((q[:-1].inv() * q[1:]).as_rotvec(), axis=0)])
-            )
+        angles = [np.vstack([np.zeros(3), turned(piece.quaternion)]) for piece in self.pieces]
         out = []
         white = self._rounding()
         # rotors that answer a gust before the pose shows it leave less of it unknown
@@ -351,14 +354,9 @@ class Likelihood:
                 piece.t, track.predicted[:, :3], track.predicted[:, 3:], piece.rotor_speeds
             )
             undone = undo_log_sensing(log, vehicle)
-            old = Rotation.from_quat(track.predicted[:, 3:], scalar_first=True)
-            new = Rotation.from_quat(undone.quaternion, scalar_first=True)
-            out.append(
-                np.column_stack(
-                    [undone.position - track.predicted[:, :3], (old.inv() * new).as_rotvec()]
-                )
-                / delta
-            )
+            shift = undone.position - track.predicted[:, :3]
+            turn = turn_between(track.predicted[:, 3:], undone.quaternion)
+            out.append(np.column_stack([shift, turn]) / delta)
         return out
 
     def sums(
@@ -380,6 +378,8 @@ class Likelihood:
         acting, moved = self._columns
         if not acting:
             self._add_what_any_flight_may_have()
+        if playing(Role.LAG, among=[e for e in self.setting if e]) and LAG_ASYMMETRY not in acting:
+            acting[LAG_ASYMMETRY] = self._uneven_lag()
         if unknown and not any(name.startswith(UNKNOWN) for _, name in acting):
             found = discrepancy_columns(
                 self.tracks,
@@ -406,6 +406,18 @@ class Likelihood:
                 if get(c[0]).role == Role.CENTRE_OF_MASS:
                     self._swing(c)
         return self._products(acting, moved)
+
+    def nuisances(self) -> tuple[dict[Column, list[Array]], dict[Column, list[Array]]]:
+        """Return the columns of what any flight may have beside effects: what a unit of each adds
+        to the accelerations, and to the pose.
+        """
+        if not self._columns[0]:
+            self._add_what_any_flight_may_have()
+        acting, moved = (
+            {c: x for c, x in part.items() if not c[0] and not c[1].startswith(UNKNOWN)}
+            for part in self._columns
+        )
+        return acting, moved
 
     def _add_changing_coefficients(self) -> None:
         """Add the dictionary's columns of effects of the setting whose coefficients change."""
@@ -435,8 +447,6 @@ class Likelihood:
         acting, moved = self._columns
         acting[ROTOR_TIME_OFFSET] = self._later_rotors()
         acting["", BETWEEN] = self._bent_rotors()
-        if playing(Role.LAG, among=[e for e in self.setting if e]):
-            acting[LAG_ASYMMETRY] = self._uneven_lag()
         for name, column in self._model_errors().items():
             acting["", f"{MODEL_ERROR} {name}"] = column
         if self._rounding_std > 0.0:
@@ -454,8 +464,22 @@ class Likelihood:
         these coefficients.
 
         What an effect explains counts as a disturbance where the effect is not known. Beside the
-        whole library the noise is that of a flight of which everything is known.
+        whole library the noise is that of a flight of which everything is known. It is found once.
         """
+        if self._quiet is None:
+            self._quiet = self._likeliest(self._explained(coefficients))
+        noise, tracks = self.noise, self.tracks
+        self.noise, known = self._quiet
+        heard = [track.innovations for track in self._run(self.noise, known)]
+        self.tracks = [
+            replace(track, innovations=x) for track, x in zip(self.tracks, heard, strict=True)
+        ]
+        out = self._products(*self._columns)
+        self.noise, self.tracks = noise, tracks
+        return out
+
+    def _explained(self, coefficients: Mapping[Column, float]) -> list[Array]:
+        """Return what the columns move the pose of each piece by, and accelerate (n, 2, 6)."""
         acting, moved = self._columns
         explained = []
         for i, track in enumerate(self.tracks):
@@ -469,15 +493,7 @@ class Likelihood:
                 x[:, 0, 4:5] * track.rotation[:, :, 0] - x[:, 0, 3:4] * track.rotation[:, :, 1]
             )
             explained.append(x)
-        noise, tracks = self.noise, self.tracks
-        self.noise, known = self._likeliest(explained)
-        heard = [track.innovations for track in self._run(self.noise, known)]
-        self.tracks = [
-            replace(track, innovations=x) for track, x in zip(self.tracks, heard, strict=True)
-        ]
-        out = self._products(acting, moved)
-        self.noise, self.tracks = noise, tracks
-        return out
+        return explained
 
     def _swing(self, column: Column) -> None:
         """Have a centre of mass move the measured point as a marker does that lies as far on the
@@ -639,6 +655,11 @@ def _in_fit(flights: Flights, log: int, t: Array) -> NDArray[np.bool_]:
     rows = flights.log == log
     at = np.searchsorted(flights.t[rows], t).clip(max=int(rows.sum()) - 1)
     return np.asarray(flights.fit_rows[rows][at])
+
+
+def _sensing(vehicle: Vehicle) -> tuple[EffectSetting, ...]:
+    """Return the effects that change what a log's poses are."""
+    return tuple(e for e in vehicle.effects if get(e.name).kind == "sensing")
 
 
 def read_poses(log: FlightLog, vehicle: Vehicle) -> list[Poses]:

@@ -174,6 +174,9 @@ class Posterior:
         ways = {e: sum(v[0] == e for v in variants) for e, _ in variants}
 
         def score(some: tuple[Variant, ...]) -> float:
+            key = frozenset(e for e, _ in some)
+            if not self._counts(number, key):
+                return -math.inf
             index = [at[c] for v in some for c in v[1]]
             try:
                 evidence = set_evidence(m, index, low, high)
@@ -181,9 +184,6 @@ class Posterior:
                 return -math.inf
             value = evidence.log_evidence - sum(math.log(ways[e]) for e, _ in some)
             if not self._possible(base, some, evidence):
-                return -math.inf
-            key = frozenset(e for e, _ in some)
-            if not self._counts(number, key):
                 return -math.inf
             total = value + self._log_prior(len(some))
             if total > self.scores.get(key, -math.inf):
@@ -217,14 +217,19 @@ class Posterior:
 
     def _possible(self, base: Base, some: Sequence[Variant], evidence: SetEvidence) -> bool:
         """Return whether a vehicle can have the coefficients of a set at its mode."""
-        if not any(get(e).possible or get(e).implausible for e, _ in some):
+        plausible = self.given is not None
+        asked = [
+            (e, columns)
+            for e, columns in some
+            if get(e).possible or (plausible and get(e).implausible)
+            if not columns[0][1].startswith(START_PREFIX)
+        ]
+        if not asked:
             return True
         setting, std = self._at_mode(base, some, evidence)
-        for effect, columns in some:
-            if columns[0][1].startswith(START_PREFIX):
-                continue
+        for effect, _ in asked:
             own = {(effect, name): x for name, x in std[effect].items()}
-            if not is_possible(self.flights, setting, own, effect, self.given is not None):
+            if not is_possible(self.flights, setting, own, effect, plausible):
                 return False
         return True
 
@@ -327,28 +332,24 @@ class Posterior:
             for i, x, s in zip(base.plain, value * size, std * size, strict=True)
         }
 
-    def hidden(self, hiding: Sequence[Column], least: float) -> frozenset[str]:
-        """Return the effects, outside the likeliest set, of which a typical size changes the
-        deviance by less than ``least``, and would by more if some nuisances were known.
+    def shown(self, known: Sequence[Column] = ()) -> dict[str, float]:
+        """Return for each effect outside the likeliest set by how much a typical size of it changes
+        the deviance; ``known``: nuisances of which nothing is left to find out.
         """
         base, best = self._best()
         own = [base.columns[c] for v in best.variants for c in v[1]]
-        known = [i for i in base.plain.tolist() if list(base.columns)[i] not in hiding]
-        out = set()
+        base = replace(base, plain=np.setdiff1d(base.plain, [base.columns[c] for c in known]))
+        out: dict[str, float] = {}
         for effect, columns in self._variants(base):
-            if effect in {e for e, _ in best.variants}:
-                continue
-            if any(c[1].startswith(START_PREFIX) for c in columns):
+            starts = any(c[1].startswith(START_PREFIX) for c in columns)
+            if starts or effect in {e for e, _ in best.variants}:
                 continue
             at = np.array([base.columns[c] for c in columns], dtype=np.intp)
-            z = base.typical[at] * np.sign([coefficient(c).typical[0] for c in columns])
-            shown = [
-                float(z @ self._split(replace(base, plain=np.array(x)), at, own).normal @ z)
-                for x in (base.plain.tolist(), known)
-            ]
-            if shown[0] < least <= shown[1]:
-                out.add(effect)
-        return frozenset(out)
+            names = [(e, name.removeprefix(WHOLE_PREFIX)) for e, name in columns]
+            z = base.typical[at] * np.sign([coefficient(c).typical[0] for c in names])
+            shown = float(z @ self._split(base, at, own).normal @ z)
+            out[effect] = max(shown, out.get(effect, 0.0))
+        return out
 
     def _beside_best(self) -> tuple[Array, Array, Index, Array, Index]:
         """Return the sums of the last base, which has the dictionary's columns, those that the
