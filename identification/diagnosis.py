@@ -17,6 +17,7 @@ from ..dynamics.effects import get, names
 from ..dynamics.vehicle import Vehicle
 from ..runtime.errors import InputError, unknown_name
 from .findings import CHANNELS, Diagnosis, Errors, NamedEffect, Signature, Structure, Trace
+from .fit_range import range_notes
 from .inference.explanatory_variables import explanatory_variables
 from .inference.regression import Flights, lost_behind_a_filter
 from .judged import Setting
@@ -96,6 +97,7 @@ def diagnose(
     named = [e for e in said.setting if e]
     report("predicting the flights")
     amended = flights.amended({e: said.setting[e] for e in named})
+    notes += range_notes(flights)
     segments = _segments(flights)
     parts = _parts(flights, said.setting, found.after)
     hidden = sorted(flights.needs_pose | said.hidden)
@@ -127,7 +129,7 @@ def diagnose(
         pushes=said.pushes,
         cutoff_hz=CUTOFFS.residual_hz,
         declared=vehicle,
-        amended=amended,
+        amended=amended if found.better or not named else vehicle,
         logs=tuple(log.name for log in logs),
         test_logs=tuple(log.name for log in test),
         seconds=float(sum(log.t[-1] - log.t[0] for log in (*logs, *test))),

@@ -267,7 +267,8 @@ class Diagnosis:
         pushes: one a channel at most, the plainest first.
         cutoff_hz: Hz, of the low-pass of everything that was compared.
         declared: the vehicle that was given.
-        amended: with the named effects, ready for ``estimate`` and the environment.
+        amended: with the named effects, ready for ``estimate`` and the environment; the declared
+            vehicle where they do not make the held-out error smaller.
         logs: names of those it learned from.
         test_logs: those the error is on, if they were given apart.
         seconds: of flight in all.

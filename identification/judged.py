@@ -20,6 +20,7 @@ from .inference.regression import Flights
 from .inference.sensor_bias import biases
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 Setting = Mapping[str, Mapping[str, float]]
 Report = Callable[[str], None]
 
@@ -49,6 +50,14 @@ class Balance:
     error_before: tuple[float, float]  # RMS on held-out rows, N and Nm
     error_after: tuple[float, float]
     noisy: bool  # whether more is left than the sensors' noise
+    # by how much the mean square of force and torque grows on held-out blocks, as a share, and the
+    # standard error of that over the blocks
+    growth: tuple[float, float]
+
+    @property
+    def better(self) -> bool:
+        """Whether the amended vehicle's held-out error is smaller."""
+        return self.growth[0] < 0.0
 
 
 def balance(flights: Flights, setting: Setting) -> Balance:
@@ -64,7 +73,25 @@ def balance(flights: Flights, setting: Setting) -> Balance:
     quiet = calm(flights.vehicle.weight, flights.vehicle.arm_l)[[0, 3]]
     least = np.hypot(floor, quiet) if flights.inertial else np.array(floor)
     noisy = bool(np.any(np.array(error) > NOISE.most_floor_ratio * least))
-    return Balance(before, after, floor, _rms(before[held_out]), error, flights.filtered or noisy)
+    return Balance(
+        before,
+        after,
+        floor,
+        _rms(before[held_out]),
+        error,
+        flights.filtered or noisy,
+        _growth(before[held_out], after[held_out], flights.block[held_out]),
+    )
+
+
+def _growth(before: Array, after: Array, block: Index) -> tuple[float, float]:
+    """Return by how much the mean square of six channels grows, each as a share of what it was, and
+    the standard error over blocks.
+    """
+    size = np.mean(np.square(before), axis=0) + 1e-30
+    change = np.mean((np.square(after) - np.square(before)) / size, axis=1)
+    blocks = np.array([change[block == b].mean() for b in np.unique(block)])
+    return float(blocks.mean()), float(blocks.std() / math.sqrt(max(len(blocks) - 1, 1)))
 
 
 def calm(weight: float, arm: float) -> Array:

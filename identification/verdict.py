@@ -37,7 +37,7 @@ from .inference.regression import (
 )
 from .inference.time_offsets import ROTOR_TIME_OFFSET
 from .inference.transient_disturbances import transient_disturbances
-from .judged import Judged, Report, balance, calm
+from .judged import Balance, Judged, Report, balance, calm
 from .motion.inertial_signals import pose_rate
 from .motion.smoothing import CUTOFFS
 from .posterior.commands import Given, what_commands_show
@@ -118,7 +118,7 @@ def judged(flights: Flights, library: Sequence[str], report: Report) -> Judged:
     }
     known = {e: differs[e] if e in differs else _probability(found, (e, *rivals[e])) for e in named}
     names = {e: (1.0 - strange) * p for e, p in known.items()}
-    doubts = _doubts(flights, strange, named, given, found.behind, one)
+    doubts = _doubts(flights, strange, named, given, found.behind, one, left)
     worths = worth(flights, given.fixed, given.first, found.setting)
     energy = _energy_shares(flights, setting, left.after, named)
     unsure = bool(set(doubts) - {"assumed thrust"})
@@ -233,6 +233,7 @@ def _doubts(
     given: Given,
     behind: Mapping[str, Sequence[str]],
     one: tuple[str, ...],
+    left: Balance,
 ) -> dict[str, tuple[str, ...]]:
     """Return for each check, by its name, the sentences that say why a name may be wrong."""
     found: dict[str, tuple[str, ...]] = {}
@@ -248,6 +249,12 @@ def _doubts(
         found["short"] = (
             f"{seconds:.1f} s of flight are too few for a sure name: fly at least "
             f"{VERDICT.least_seconds:g} s",
+        )
+    if named and not left.better:
+        growth, std = (100.0 * x for x in left.growth)
+        found["held out"] = (
+            "on held-out flight the named effects do not make the squared error smaller "
+            f"({growth:+.2g} +- {std:.2g} %): the model stays as it was declared",
         )
     if flights.filtered and named:
         found["filtered pose"] = (FILTERED,)

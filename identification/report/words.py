@@ -319,7 +319,8 @@ def next_step(diagnosis: Diagnosis) -> str:
         return f"{use}, and confirm it on another flight (--test)."
     if first:
         return _short(first)
-    use = "Use vehicle.yaml, which holds the named effects. " if diagnosis.effects else ""
+    better = diagnosis.effects and "held out" not in diagnosis.doubts
+    use = "Use vehicle.yaml, which holds the named effects. " if better else ""
     return f"{use}To see whether the rest is wind, fly again in still air."
 
 
