@@ -32,9 +32,9 @@ from windwrench.identification.comparison.fault_detection import find_fault
 from windwrench.identification.comparison.trim import Trim, carrying, trim_of, trim_of_log
 from windwrench.identification.comparison.words import fault_data
 from windwrench.identification.diagnosis import diagnose
+from windwrench.identification.diagnosis.commanded_rotors import in_flight
+from windwrench.identification.diagnosis.regression import Flights
 from windwrench.identification.findings import Diagnosis
-from windwrench.identification.inference.commanded_rotors import in_flight
-from windwrench.identification.inference.regression import Flights
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.tables import open_table

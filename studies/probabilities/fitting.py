@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from windwrench.identification.posterior.unknown import UNKNOWN, Signs, UnknownSettings
+from windwrench.identification.diagnosis.unknown import UNKNOWN, Signs, UnknownSettings
 from windwrench.studies.scoring import EQUIVALENTS
 
 Array = NDArray[np.float64]

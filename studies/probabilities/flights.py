@@ -18,9 +18,9 @@ from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.dynamics.vehicle import Vehicle
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.inference.regression import lost_behind_a_filter
+from windwrench.identification.diagnosis.regression import lost_behind_a_filter
+from windwrench.identification.diagnosis.verdict import beyond_calm
 from windwrench.identification.logs.flight_log import FlightLog
-from windwrench.identification.verdict import beyond_calm
 from windwrench.runtime.errors import InputError
 from windwrench.studies.scoring import EQUIVALENTS
 from windwrench.studies.trials.logged_poses import FILTERS, LOGS

@@ -17,7 +17,7 @@ from windwrench.dynamics.effects import get, names
 from windwrench.dynamics.vehicle import EffectSetting, Vehicle
 from windwrench.envs.plant import TICK, is_a_body
 from windwrench.envs.recording import background, draw_trajectory, record_flight
-from windwrench.identification.inference.regression import typical_size
+from windwrench.identification.diagnosis.regression import typical_size
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import InputError, unknown_name
 from windwrench.studies.trials.outsiders import HELD_BACK, OUTSIDERS, wrench_input

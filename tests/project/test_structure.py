@@ -34,11 +34,7 @@ STOREYS = (
     {"inertial_wrench"},
     {"wrench_series"},
     {"prediction"},
-    {"inference", "comparison", "vehicle_fit"},
-    {"posterior"},
-    {"judged"},
-    {"verdict"},
-    {"diagnosis"},
+    {"comparison", "vehicle_fit", "diagnosis"},
     {"report", "wrench_track"},
     {"fleet"},
 )
@@ -188,7 +184,7 @@ def test_who_knows_torch_and_mujoco(modules):
     ("file", "before", "line"),
     [
         ("estimator/ukf.py", "def f():\n    ", "from ..envs import plant"),
-        ("identification/diagnosis.py", "", "import windwrench.envs.fan"),
+        ("identification/prediction.py", "", "import windwrench.envs.fan"),
         ("evaluation/benchmark.py", "", "from ..training.train import train"),
         ("runtime/workers.py", "if TYPE_CHECKING:\n    ", "from ..dynamics import vehicle"),
     ],

@@ -8,7 +8,7 @@ import pytest
 from tests.support.data_paths import crazyswarm2_file, data_file
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.inference.commanded_rotors import in_flight
+from windwrench.identification.diagnosis.commanded_rotors import in_flight
 from windwrench.identification.logs.reading import read_log
 from windwrench.studies.measured_flights import (
     CARRIER,

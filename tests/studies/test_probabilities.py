@@ -4,7 +4,7 @@ from dataclasses import asdict
 
 import pytest
 
-from windwrench.identification.posterior.unknown import UNKNOWN
+from windwrench.identification.diagnosis.unknown import UNKNOWN
 from windwrench.studies.kept_results import kept
 from windwrench.studies.probabilities.__main__ import plan, plan_of_other_logs
 from windwrench.studies.probabilities.calibration import RESULTS, flights_of

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tests.support.random_tables import flight, random_table, save
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import MotorCurve
-from windwrench.identification.inference.commanded_rotors import thrust_is_assumed
+from windwrench.identification.diagnosis.commanded_rotors import thrust_is_assumed
 from windwrench.identification.logs.flight_log import FlightLog, with_rows, write_log
 from windwrench.identification.logs.log_map import load_map, map_names, parse_map
 from windwrench.identification.logs.mapped_log import map_table

@@ -1,0 +1,7 @@
+"""What the model of a vehicle lacks, by its flights: columns of effects, the evidence of sets of
+them, and the findings.
+"""
+
+from .diagnosing import diagnose
+
+__all__ = ["diagnose"]

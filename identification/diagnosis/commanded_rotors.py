@@ -1,0 +1,118 @@
+"""Logs whose rotor speeds are worked out from commands (PWM, thrust): what a regression may use of
+them, and what it must allow for.
+
+The rotors' moments are only commanded ones, and the ground carries too. So only the time in the air
+counts, and torque is left out. What differs from flight to flight, thrust and the motion capture's
+vertical, is for ``row_nuisances`` to say.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...dynamics.effects import Role, get
+from ...dynamics.vehicle import Vehicle
+from ..logs.flight_log import FlightLog, with_rows
+from ..logs.flight_phases import FLIGHT, flight_phases
+from ..motion.signals import Signals
+from ..motion.smoothing import CUTOFFS, low_pass
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CommandedSettings:
+    """What a regression allows for where rotor speeds are worked out from commands."""
+
+    period: float = 0.02  # s, of the samples that are used
+    # of the median thrust in flight, from which rotors carry the vehicle, and s that taking off and
+    # landing last beyond: where no height shows them
+    carrying_share: float = 0.7
+    take_off: float = 1.0
+    # relative standard deviation of the thrust that a command makes where nobody stated the motor
+    # curve: of three kinds of vehicle, measured flights had 0.69 to 1.12 of what was assumed
+    unstated_thrust_std: float = 0.3
+
+
+COMMANDED = CommandedSettings()
+# what an error of the assumed thrust makes exactly
+THRUST_FACTORS = (Role.THRUST, Role.MASS)
+
+
+def in_flight(log: FlightLog, vehicle: Vehicle) -> FlightLog:
+    """Return the rows of a log between take-off and landing; the log itself where it shows neither,
+    or no flight at all.
+    """
+    seen = log.valid
+    if not seen.any():
+        return log
+    height = np.interp(log.t, log.t[seen], log.position[seen, 2])
+    flight = [
+        p for p in flight_phases(log.t, height, log.rotor_speeds, vehicle) if p.name == FLIGHT
+    ]
+    if not flight:
+        return log
+    return with_rows(log, (log.t >= flight[0].start) & (log.t <= flight[0].end))
+
+
+def in_flight_by_thrust(log: FlightLog, vehicle: Vehicle) -> FlightLog:
+    """Return the rows of a log without a height between take-off and landing, as the rotors' thrust
+    shows them; the log itself where they carry the vehicle all the time.
+    """
+    thrust = np.square(log.rotor_speeds) @ vehicle.k
+    if len(thrust) * log.period > 1.0 / CUTOFFS.flying_hz:
+        thrust = low_pass(thrust, CUTOFFS.flying_hz, log.period)
+    level = np.median(thrust[thrust > 0.5 * np.quantile(thrust, 0.9)])
+    carried = np.flatnonzero(thrust > COMMANDED.carrying_share * level)
+    if not carried.size:
+        return log
+    first, last = carried[0], carried[-1]
+    begin, end = log.t[first], log.t[last]
+    begin += COMMANDED.take_off if first > 0 else 0.0
+    end -= COMMANDED.take_off if last < len(thrust) - 1 else 0.0
+    keep = (log.t >= begin) & (log.t <= end)
+    return with_rows(log, keep) if keep.any() else log
+
+
+def downsampled(signals: Signals) -> Signals:
+    """Return signals at 50 Hz or a little more, with the rotor speeds through the same filter as
+    the pose.
+    """
+    step = max(1, int(COMMANDED.period / signals.period + 1e-6))
+    if step == 1:
+        return signals
+    count = len(signals.t)
+    at = np.arange(0, count, step)
+    smooth = np.maximum(low_pass(signals.rotor_speeds, CUTOFFS.pose_hz, signals.period), 0.0)
+    sampled: dict[str, Any] = {
+        name: x[at]
+        for name, x in {**vars(signals), "rotor_speeds": smooth}.items()
+        if isinstance(x, np.ndarray) and len(x) == count
+    }
+    return replace(signals, period=step * signals.period, **sampled)
+
+
+def thrust_is_assumed(logs: Sequence[FlightLog], vehicle: Vehicle) -> bool:
+    """Return whether rotor speeds are worked out from commands, and the vehicle states no curve
+    (``motor_curve``) that says how much thrust a command makes.
+    """
+    return any_commanded(logs) and getattr(vehicle, "motor_curve", None) is None
+
+
+def assumed_thrust_doubts(effects: Sequence[str]) -> list[str]:
+    """Return, as sentences, which effects rest on a thrust that nobody measured."""
+    found = [effect for effect in effects if get(effect).role in THRUST_FACTORS]
+    return [
+        f"{effect}: the log holds motor commands and the vehicle file states no motor curve, so "
+        "how much thrust a command makes is an assumption, and this effect may be its error alone. "
+        "State motor_curve in the vehicle file, or log rotor speeds"
+        for effect in found
+    ]
+
+
+def any_commanded(logs: Sequence[FlightLog]) -> bool:
+    """Return whether any log's rotor speeds are worked out from commands."""
+    return any(log.commanded for log in logs)

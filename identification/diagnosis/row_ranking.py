@@ -1,0 +1,147 @@
+"""Which effects act on flights whose pose is no measurement as it was made: the posterior over
+sets, from rows of forces and, where rotors are measured, of torques.
+
+Such are flights whose rotors are known by commands, whose pose was filtered before it was logged,
+and whose motion is read from an IMU.
+
+The likeliest set is fitted without linearisation, and so is each set that comes out likeliest after
+it, until none does that was not fitted.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .evidence import marginal, set_evidence
+from .priors import Base, Setting, in_prior_units
+from .ranking import Found, starts_of
+from .regression import Column, Flights
+from .row_likelihood import RowLikelihood
+from .sets import Posterior, is_possible
+
+
+@dataclass(frozen=True)
+class RowRankingSettings:
+    """Which starts are fitted, and what counts as hidden."""
+
+    most_starts: int = 2  # of an effect with nonlinear coefficients, the likeliest, that are fitted
+    # deviance, up to which an effect does as well as another in its place: a likelihood of 20 to 1
+    apart: float = 6.0
+
+
+ROW_RANKING = RowRankingSettings()
+
+
+def rank_by_rows(
+    flights: Flights,
+    library: Sequence[str],
+    first: Setting,
+    fixed: Setting,
+    report: Callable[[str], None] = lambda text: None,
+) -> Found:
+    """Return the posterior over sets of effects of a library.
+
+    Args:
+        flights: of the vehicle.
+        library: effects that may act, those of ``first`` among them.
+        first: effects that any set has, with coefficients about which a fit begins; none where
+            rotors are measured.
+        fixed: effects that are known from elsewhere, with their coefficients.
+        report: called with a line of progress.
+    """
+    likelihood = RowLikelihood(flights, library, first, fixed)
+    library = likelihood.library
+    first = {e: x for e, x in first.items() if e in library}
+    given = frozenset(first)
+    first = likelihood.fitted(first)
+    starts = starts_of(flights, library, first)
+    alone = likelihood.base(first, starts)
+    fitted: dict[frozenset[str], Setting] = {given: first}
+    bases: dict[frozenset[str], Base] = {given: alone}
+    lags: dict[Column, dict[str, float]] = {
+        c: dict(x) for c, x in starts.items() if not flights.is_nonlinear(c[0])
+    }
+
+    idle: set[frozenset[str]] = set()
+
+    def add(setting: Setting) -> None:
+        key = frozenset(setting)
+        fitted[key] = likelihood.fitted(setting)
+        found = set(fitted[key]) - given
+        if found & likelihood.idle(fitted[key]) or not all(
+            is_possible(flights, fitted[key], {}, e, plausible=True) for e in found
+        ):
+            idle.add(key)
+            return
+        others = {c: x for c, x in lags.items() if c[0] not in setting}
+        bases[key] = likelihood.base(fitted[key], others)
+
+    for effect in library:
+        if not flights.is_nonlinear(effect) or effect in given:
+            continue
+        report(f"trying {effect}")
+        own = [{**first, effect: dict(x)} for c, x in starts.items() if c[0] == effect]
+        near = sorted(own, key=likelihood.objective)[: ROW_RANKING.most_starts]
+        if near:
+            add(min(map(likelihood.fitted, near), key=likelihood.objective))
+
+    def likeliest() -> Setting:
+        """Return the likeliest set's fit, once no set is likelier that was not fitted."""
+        while True:
+            found = Posterior(flights, library, list(bases.values()), likelihood.power, given, idle)
+            setting = found.best_setting(len(library))
+            if (key := frozenset(setting)) in bases:
+                return fitted[key]
+            report(f"trying {', '.join(e for e in setting if e not in given) or 'no effect'}")
+            add(setting)
+
+    def confirmed() -> Setting:
+        """Return the likeliest set's fit, once no set that lacks one of its effects is likelier
+        where it is fitted as well.
+        """
+        while True:
+            best = likeliest()
+            less = [{e: x for e, x in best.items() if e != out} for out in best if out not in given]
+            new = [x for x in less if frozenset(x) not in fitted]
+            if flights.commanded or not new:
+                return best
+            for setting in new:
+                add(setting)
+
+    likelihood.power = likelihood.tempered(confirmed())
+    best = confirmed()
+    key = frozenset(best)
+    others = {c: x for c, x in lags.items() if c[0] not in key}
+    bases.pop(key)
+    bases[key] = likelihood.base(best, others, unknown=True)
+    found = Posterior(flights, library, list(bases.values()), likelihood.power, given, idle)
+    hidden = sorted(flights.needs_pose - flights.without_trace - set(best))
+    behind = _behind(likelihood, best, [e for e in hidden if not flights.is_nonlinear(e)])
+    return Found(found, found.ranking(), best, sensors=likelihood.sensors(best), behind=behind)
+
+
+def _behind(
+    likelihood: RowLikelihood, best: Setting, hidden: Sequence[str]
+) -> dict[str, tuple[str, ...]]:
+    """Return of each effect of a set the ``hidden`` ones, which logs do not show and which may act
+    all the same, that explain the flights as well in its place.
+    """
+    if not hidden or not best:
+        return {}
+    columns = likelihood.flights.columns_of([*best, *hidden])
+    sums = likelihood.sums(best, columns, {})
+    base = in_prior_units(likelihood.flights, sums, best, {})
+    at = np.array([base.columns[c] for c in columns], dtype=np.intp)
+    total = likelihood.power * base.blocks.sum(axis=0)
+    ones = np.ones(len(base.plain))
+    m = marginal(total[:-1, :-1], total[:-1, -1], 0.0, at, base.plain, ones)
+
+    def explained(effects: set[str]) -> float:
+        index = [i for i, (effect, _) in enumerate(columns) if effect in effects]
+        z = set_evidence(m, index, base.low[at], base.high[at]).mode
+        return float(2.0 * m.right[index] @ z - z @ m.normal[np.ix_(index, index)] @ z)
+
+    whole = explained(set(best)) - ROW_RANKING.apart
+    found = {e: tuple(h for h in hidden if explained({*best, h} - {e}) > whole) for e in best}
+    return {e: others for e, others in found.items() if others}

@@ -1,0 +1,186 @@
+"""The balance of forces and torques of flights as rows of a regression: the accelerations in body
+axes that the model leaves, by the pose and by the accelerometer, at all frequencies from zero to a
+few hertz.
+
+A steady wind has no power between 1 and 2 Hz, and a tilted frame none above them: what tells one
+from the other is the whole band down to zero. Above 3.5 Hz motors, filters and the flight loop
+decide what commands do, and they say nothing of torques.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...dynamics.effects import get
+from ..motion.smoothing import low_pass
+from .regression import Column, Flights, Setting, coefficient, typical_size
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Index = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class RowSettings:
+    """The rows, and the steps by which columns are differences."""
+
+    cutoff_hz: float = 3.5  # where rotors are known by commands
+    # where the pose was filtered: well below any filter
+    filtered_cutoff_hz: float = 2.0
+    inertial_cutoff_hz: float = 5.0  # where the motion is read from an IMU
+    rows_per_cutoff: float = 25.0 / 10.5  # rows in a period of the cut-off
+    block: float = 4.0  # s, of the sums by which the likelihood's scatter is judged
+    step: float = 0.1  # typical sizes
+
+
+ROWS = RowSettings()
+
+
+class Rows:
+    """Rows (n, channels) of flights: specific force along body x, y and z, m/s2, by the pose; where
+    each log has an accelerometer beside it, the same by the accelerometer; and, where rotors are
+    measured, angular acceleration about the same axes, rad/s2.
+
+    Of logs whose motion is read from an IMU the accelerometer is the motion, and force is in three
+    channels.
+
+    Args:
+        flights: of the vehicle.
+        fixed: effects that are known from elsewhere, with their coefficients; they are in every
+            setting.
+
+    Attributes:
+        fit: (n,) rows that the fit may see.
+        begins: (n,) first row of an unbroken piece.
+        block: (n,) number of the block of 4 s.
+        log: (n,) which log.
+        t: (n,) s.
+        channels: 3, 6 or 9.
+        with_torques: whether torques are among them.
+    """
+
+    def __init__(self, flights: Flights, fixed: Setting) -> None:
+        self.with_torques, use = not flights.commanded, ROWS
+        self._cutoff, step = np.inf, 1
+        if flights.commanded:
+            self._cutoff = use.cutoff_hz
+            step = max(1, round(1.0 / (use.rows_per_cutoff * self._cutoff * flights.period)))
+        else:
+            cutoff = use.filtered_cutoff_hz if flights.filtered else use.inertial_cutoff_hz
+            flights = flights.in_band(cutoff, use.rows_per_cutoff * cutoff)
+        self.flights, self.fixed = flights, fixed
+        self._pieces = np.split(np.arange(len(flights.t)), np.flatnonzero(flights.start)[1:])
+        kept = [rows[::step] for rows in self._pieces]
+        self._at: Index = np.concatenate(kept)
+        self.begins: Mask = np.concatenate([np.arange(len(rows)) == 0 for rows in kept])
+        self.t: Array = flights.t[self._at]
+        self.log = flights.log[self._at]
+        self.fit: Mask = flights.fit_rows[self._at]
+        since = self.t - self.t[self.begins][np.cumsum(self.begins) - 1]
+        number = (since // ROWS.block).astype(np.int64)
+        new = self.begins | (np.diff(number, prepend=-1) != 0)
+        self.block = np.cumsum(new) - 1
+        self.has_accelerometer = flights.felt({}) is not None
+        self.channels = 3 * (1 + self.has_accelerometer + self.with_torques)
+        self._inertia = np.diagonal(flights.vehicle.inertia)
+        self._rotation = self._axes({})
+
+    def _axes(self, setting: Setting) -> Array:
+        pieces = self.flights.pieces(setting)
+        return np.concatenate([p.signals.rotation[p.rows] for p in pieces])
+
+    def from_world(
+        self, pose: Array, accelerometer: Array | None = None, torque: Array | None = None
+    ) -> Array:
+        """Return rows (n, channels, ...) of accelerations (samples, 3, ...) m/s2 in the world frame
+        at the samples of ``flights``.
+
+        Args:
+            pose: that the pose shows.
+            accelerometer: that the accelerometer shows, where there is one; default: the same.
+            torque: the angular acceleration (samples, 3, ...) rad/s2, body axes; default: none.
+        """
+        both = [pose, pose if accelerometer is None else accelerometer]
+        return self._thinned([self._in_body(x, self._rotation) for x in both], torque)
+
+    def from_body(
+        self, pose: Array, accelerometer: Array | None = None, torque: Array | None = None
+    ) -> Array:
+        """Return rows of accelerations in body axes; arguments as of ``from_world``."""
+        return self._thinned([pose, pose if accelerometer is None else accelerometer], torque)
+
+    @staticmethod
+    def _in_body(x: Array, rotation: Array) -> Array:
+        return np.asarray(np.einsum("nji,nj...->ni...", rotation, x))
+
+    def _thinned(self, forces: list[Array], torque: Array | None) -> Array:
+        channels = forces[: 1 + self.has_accelerometer]
+        if self.with_torques:
+            channels = [*channels, np.zeros_like(forces[0]) if torque is None else torque]
+        x = np.concatenate(channels, axis=1)
+        smooth = [low_pass(x[rows], self._cutoff, self.flights.period) for rows in self._pieces]
+        return np.asarray(np.concatenate(smooth)[self._at])
+
+    def at_rows(self, parts: Sequence[Array]) -> Array:
+        """Return at the rows (n, ...) what is known at the samples of each piece."""
+        return np.asarray(np.concatenate(parts)[self._at])
+
+    def residual(self, setting: Setting) -> Array:
+        """Return what a model with these effects leaves (n, channels).
+
+        Raises:
+            InputError: no vehicle is like that.
+        """
+        mass, setting = self.flights.vehicle.mass, {**self.fixed, **setting}
+        wrench = self.flights.residual(setting)
+        left = wrench[:, :3] / mass
+        felt = self.flights.felt(setting)
+        both = [left] if felt is None else [left, left + felt / mass]
+        rotation = self._axes(setting)
+        return self._thinned(
+            [self._in_body(x, rotation) for x in both], wrench[:, 3:] / self._inertia
+        )
+
+    def noise(self) -> Array:
+        """Return rows of the sensors' noise, as far as the logs show it."""
+        noise = self.flights.visible_noise
+        force = noise[:, :3] / self.flights.vehicle.mass
+        return self.from_world(force, np.zeros_like(force), noise[:, 3:] / self._inertia)
+
+    def columns(
+        self, setting: Setting, wanted: Iterable[Column], step: float = ROWS.step
+    ) -> dict[Column, Array]:
+        """Return what a unit of each coefficient explains (n, channels), by differences of ``step``
+        typical sizes.
+        """
+        wanted = list(wanted)
+        if not wanted:
+            return {}
+        mass, setting = self.flights.vehicle.mass, {**self.fixed, **setting}
+        found = self.flights.columns(setting, wanted, step)
+        pose = np.stack([found[c][:, :3] / mass for c in wanted], axis=2)
+        torque = np.stack([found[c][:, 3:] / self._inertia for c in wanted], axis=2)
+        both = pose.copy()
+        for i, (effect, name) in enumerate(wanted):
+            if self.has_accelerometer and effect and get(effect).kind == "sensing":
+                both[:, :, i] += self._felt_slope(setting, (effect, name), step) / mass
+        rows = self.from_world(pose, both, torque)
+        return {c: rows[:, :, i] for i, c in enumerate(wanted)}
+
+    def _felt_slope(self, setting: Setting, column: Column, step: float) -> Array:
+        """Return how a unit of a sensing effect changes what the accelerometer has beyond the pose
+        (samples, 3), N.
+        """
+        effect, name = column
+        own = self.flights.coefficients(setting, effect)
+        value, c = own.get(name, 0.0), coefficient(column)
+        delta = step * typical_size(column, self.flights.vehicle)
+        if value + delta > c.maximum:
+            delta = -delta
+        moved = self.flights.felt({**setting, effect: {**own, name: value + delta}})
+        here = self.flights.felt(setting)
+        assert moved is not None
+        assert here is not None
+        return (here - moved) / delta

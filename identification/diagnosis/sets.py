@@ -1,0 +1,442 @@
+"""The posterior over sets of effects, from sums of products beside some settings of them."""
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...dynamics.effects import get
+from ..findings import RankedSet, Ranking
+from .coefficient_range import why_implausible
+from .discrepancy import DISCREPANCY
+from .evidence import (
+    Index,
+    Marginal,
+    SetEvidence,
+    evidence_of_one_more,
+    log_sum,
+    marginal,
+    one_more,
+    set_evidence,
+    tempering,
+)
+from .likelihood import UNKNOWN, WHOLE_PREFIX, declared
+from .priors import PRIORS, Base, Setting, Variant, variants_of
+from .regression import CENTRAL, START_PREFIX, Column, Flights, coefficient, moves_time
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SetSettings:
+    """How much of the sets is looked at."""
+
+    most_effects: int = 5
+    kept_sets: int = 8  # of each size, to which a further effect is added
+    kept_asked: int = 24  # sets, the best, that are asked for beside the noise of no effect too
+    least_probability: float = 1e-6  # of a set that is kept
+
+
+SETS = SetSettings()
+CHANGING = f"{UNKNOWN}changing coefficient: "
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    base: int
+    variants: tuple[Variant, ...]
+    evidence: SetEvidence
+
+
+def is_possible(
+    flights: Flights, setting: Setting, std: Mapping[Column, float], effect: str, plausible: bool
+) -> bool:
+    """Return whether a vehicle can have an effect's coefficients at a setting; ``plausible``: and
+    whether they are physics of this effect.
+    """
+    possible = get(effect).possible
+    if possible is not None and not possible(setting[effect], flights.vehicle):
+        return False
+    return not (plausible and why_implausible(flights, setting, std, effect))
+
+
+class Posterior:
+    """The evidence of sets, of all bases together.
+
+    Args:
+        flights: whose motion is explained.
+        library: names of effects that may act.
+        bases: the likelihood beside some settings. The first has the noise of nothing explained.
+        power: of the likelihood.
+        given: effects that any set has; then the noise is one, and each set is judged beside the
+            base that has most of its effects; a single one has them all. Without them each has a
+            noise of its own, and of a set the likeliest counts.
+        idle: sets that are none: where they fit best an effect of them does nothing.
+    """
+
+    def __init__(
+        self,
+        flights: Flights,
+        library: Sequence[str],
+        bases: Sequence[Base],
+        power: float = 1.0,
+        given: frozenset[str] | None = None,
+        idle: Collection[frozenset[str]] = (),
+    ) -> None:
+        self.flights, self.library, self.bases, self.power = flights, library, bases, power
+        self.idle = idle
+        self.given = given
+        self.asked_about = len(library) - len(given or ())
+        self.inclusion = min(PRIORS.expected / max(self.asked_about, 1), 0.5)
+        self.known: dict[frozenset[str], _Candidate] = {}
+        self.scores: dict[frozenset[str], float] = {}
+        if given is not None:
+            for i in range(len(bases)):
+                self._search(i)
+            return
+        # beside the noise of nothing explained no effect shows: what others found is asked there
+        for i in range(1, len(bases)):
+            self._search(i)
+        found = sorted(self.scores, key=self.scores.__getitem__, reverse=True)
+        self._search(0, [self.known[k].variants for k in found[: SETS.kept_asked]])
+
+    def tempering(self) -> float:
+        """Return the power of the likelihood that the scatter beside the likeliest set allows."""
+        best = self.known[max(self.scores, key=self.scores.__getitem__)]
+        base = self.bases[best.base]
+        own = [base.columns[c] for v in best.variants for c in v[1]]
+        return tempering(base.blocks, np.array(sorted([*base.plain, *own]), dtype=np.intp))
+
+    def _marginal(self, base: Base) -> tuple[Marginal, Index, dict[Column, int]]:
+        total = self.power * base.blocks.sum(axis=0)
+        deviance = float(total[-1, -1]) + self.power * base.penalty
+        asked = np.array([i for (e, _), i in base.columns.items() if e], dtype=np.intp)
+        # what any flight may have, and a little of every effect
+        others = np.concatenate([base.plain, asked])
+        normal, right = total[:-1, :-1], total[:-1, -1]
+        little = np.ones(len(right))
+        little[asked] = self._negligible(base, asked)
+        at = {c: i for i, c in enumerate(c for c in base.columns if c[0])}
+        return marginal(normal, right, deviance, asked, others, little[others]), asked, at
+
+    def _negligible(self, base: Base, asked: Index) -> Array:
+        """Return how much (len(asked),) of each column any flight may have."""
+        little = PRIORS.negligible * base.typical[asked]
+        # bases have the starts of other effects: of none a little acts
+        if self.given is not None:
+            names = list(base.columns)
+            little[[names[i][1].startswith(START_PREFIX) for i in asked]] = 0.0
+        return little
+
+    def _log_prior(self, effects: int) -> float:
+        p = self.inclusion
+        named = effects - len(self.given or ())
+        return named * math.log(p) + (self.asked_about - named) * math.log1p(-p)
+
+    def _counts(self, number: int, key: frozenset[str]) -> bool:
+        """Return whether a set is judged beside a base."""
+        if key in self.idle:
+            return False
+        own = self.bases[number].effects
+        if len(self.bases) == 1:
+            return (self.given or frozenset()) <= key
+        if self.given is None:  # of a set in another base the columns are that base's
+            return number > 0 or not any(x.effects and key >= x.effects for x in self.bases[1:])
+        most = max(len(x.effects) for x in self.bases if x.effects <= key)
+        return own <= key and len(own) == most
+
+    def _variants(self, base: Base) -> list[Variant]:
+        out = []
+        setting: dict[str, dict[str, float]] = {e: {} for e in base.effects}
+        from_start = [c for c in base.columns if c[1].startswith(START_PREFIX)]
+        starts: dict[Column, dict[str, float]] = {c: {} for c in from_start}
+        for effect in self.library:
+            for _, every in variants_of(self.flights, effect, setting, starts):
+                # what a file states is not asked, and a balance does not see where an effect acts
+                stated, known = self.flights.stated(effect), self.given is not None
+                columns = tuple(
+                    c
+                    for c in every
+                    if c[1].removeprefix(WHOLE_PREFIX) not in stated
+                    and (c in base.columns or not known)
+                )
+                if columns and all(c in base.columns for c in columns):
+                    out.append((effect, columns))
+        return out
+
+    def _search(self, number: int, asked_sets: Sequence[tuple[Variant, ...]] | None = None) -> None:
+        base = self.bases[number]
+        m, asked, at = self._marginal(base)
+        low, high = base.low[asked], base.high[asked]
+        variants = self._variants(base)
+        ways = {e: sum(v[0] == e for v in variants) for e, _ in variants}
+
+        def score(some: tuple[Variant, ...]) -> float:
+            key = frozenset(e for e, _ in some)
+            if not self._counts(number, key):
+                return -math.inf
+            index = [at[c] for v in some for c in v[1]]
+            try:
+                evidence = set_evidence(m, index, low, high)
+            except np.linalg.LinAlgError:
+                return -math.inf
+            value = evidence.log_evidence - sum(math.log(ways[e]) for e, _ in some)
+            if not self._possible(base, some, evidence):
+                return -math.inf
+            total = value + self._log_prior(len(some))
+            if total > self.scores.get(key, -math.inf):
+                self.scores[key] = total
+                self.known[key] = _Candidate(number, some, evidence)
+            return total
+
+        always = base.effects if len(self.bases) > 1 else self.given or frozenset()
+        first = tuple(v for v in variants if self.given is not None and v[0] in always)
+        score(first)
+        if asked_sets is not None:
+            for some in asked_sets:
+                if all(c in at for v in some for c in v[1]):
+                    score(some)
+        single = [(*first, v) for v in variants if v not in first]
+        level = [(score(some), some) for some in single]
+        most = 0 if asked_sets is not None else SETS.most_effects + len(self.given or ())
+        for size in range(len(first) + 2, most + 1):
+            level.sort(key=lambda x: x[0], reverse=True)
+            seen: set[frozenset[Variant]] = set()
+            more = []
+            kept = level[: SETS.kept_sets * (2 if size == len(first) + 2 else 1)]
+            for _, some in kept:
+                for v in variants:
+                    key = frozenset((*some, v))
+                    if v[0] in {e for e, _ in some} or key in seen:
+                        continue
+                    seen.add(key)
+                    more.append((score((*some, v)), (*some, v)))
+            level = more
+
+    def _possible(self, base: Base, some: Sequence[Variant], evidence: SetEvidence) -> bool:
+        """Return whether a vehicle can have the coefficients of a set at its mode."""
+        plausible = self.given is not None
+        asked = [
+            (e, columns)
+            for e, columns in some
+            if get(e).possible or (plausible and get(e).implausible)
+            if not columns[0][1].startswith(START_PREFIX)
+        ]
+        if not asked:
+            return True
+        setting, std = self._at_mode(base, some, evidence)
+        for effect, _ in asked:
+            own = {(effect, name): x for name, x in std[effect].items()}
+            if not is_possible(self.flights, setting, own, effect, plausible):
+                return False
+        return True
+
+    def structure(self) -> float:
+        """Return the logarithm of the Bayes factor of one more column beside the likeliest set.
+
+        Each group of the dictionary is as likely as each other to have it, and in it each column.
+        """
+        normal, right, chosen, size, tried = self._beside_best()
+        names = list(self.bases[-1].columns)
+        groups: dict[str, list[int]] = {}
+        for i in tried.tolist():
+            groups.setdefault(names[i][1].split(": ")[0], []).append(i)
+        found = [
+            evidence_of_one_more(normal, right, chosen, size, np.array(i), DISCREPANCY.sizes)
+            for i in groups.values()
+        ]
+        return log_sum(found) - math.log(len(found))
+
+    def strangest(self) -> tuple[Column, float]:
+        """Return the column of the dictionary that explains most beside the likeliest set, and the
+        deviance that it explains.
+        """
+        score, left = one_more(*self._beside_best())
+        names = list(self.bases[-1].columns)
+        gains = np.square(score) / left
+        return names[self.bases[-1].dictionary[int(np.argmax(gains))]], float(gains.max())
+
+    def _split(self, base: Base, asked: Index, beside: Sequence[int]) -> Marginal:
+        """Return the likelihood of some columns of a base with others integrated out."""
+        total = self.power * base.blocks.sum(axis=0)
+        others = np.array([*base.plain, *beside], dtype=np.intp)
+        ones = np.ones(len(others))
+        return marginal(total[:-1, :-1], total[:-1, -1], float(total[-1, -1]), asked, others, ones)
+
+    def _best(self) -> tuple[Base, _Candidate]:
+        best = self.known[max(self.scores, key=self.scores.__getitem__)]
+        return self.bases[best.base], best
+
+    def log_bayes_factor(self, effect: str) -> float:
+        """Return by how much the likeliest set with an effect is likelier than the likeliest
+        without it, whatever was believed before.
+        """
+        each = math.log(self.inclusion / (1.0 - self.inclusion))
+        value = {key: x - each * len(key) for key, x in self.scores.items()}
+        have = max(x for key, x in value.items() if effect in key)
+        lack = max((x for key, x in value.items() if effect not in key), default=-math.inf)
+        return have - lack
+
+    def left(self) -> float:
+        """Return the deviance that the likeliest set leaves, with the nuisances integrated out."""
+        base, best = self._best()
+        at = np.array([base.columns[c] for v in best.variants for c in v[1]], dtype=np.intp)
+        m = self._split(base, at, [])
+        inner = np.eye(len(base.plain))  # of the nuisances' integral the logarithm is no deviance
+        total = self.power * base.blocks.sum(axis=0)
+        inner += total[np.ix_(base.plain, base.plain)]
+        log_volume = 0.5 * float(np.linalg.slogdet(inner)[1])
+        whole = -2.0 * (m.constant + log_volume)
+        z = best.evidence.mode
+        return whole - float(2.0 * m.right @ z - z @ m.normal @ z)
+
+    def alone(self) -> dict[str, float]:
+        """Return the deviance that each effect of the library explains alone, beside what every set
+        has, over that which all of them together explain.
+        """
+        given = self.given or frozenset()
+        base = next(x for x in self.bases if x.effects == given)
+        always = [i for (e, _), i in base.columns.items() if e in given]
+        asked = np.array([i for (e, _), i in base.columns.items() if e and e not in given])
+        m = self._split(base, asked, always)
+        at = {i: k for k, i in enumerate(asked.tolist())}
+
+        def explained(index: list[int]) -> float:
+            z = set_evidence(m, index, base.low[asked], base.high[asked]).mode
+            return float(2.0 * m.right[index] @ z - z @ m.normal[np.ix_(index, index)] @ z)
+
+        normal = m.normal + np.eye(len(asked))
+        whole = max(float(m.right @ np.linalg.solve(normal, m.right)), 1e-12)
+        out: dict[str, float] = {}
+        for effect, columns in self._variants(base):
+            if effect not in given:
+                share = explained([at[base.columns[c]] for c in columns]) / whole
+                out[effect] = max(out.get(effect, 0.0), share)
+        return out
+
+    def nuisances(self) -> dict[Column, tuple[float, float]]:
+        """Return what any flight may have beside effects, at the mode beside the likeliest set:
+        values and standard deviations.
+        """
+        base, best = self._best()
+        own = [base.columns[c] for v in best.variants for c in v[1]]
+        m = self._split(base, base.plain, own)
+        normal = m.normal + np.eye(len(base.plain))
+        value, std = np.linalg.solve(normal, m.right), np.sqrt(np.diag(np.linalg.inv(normal)))
+        names = list(base.columns)
+        size = base.size[base.plain]
+        return {
+            names[i]: (float(x), float(s))
+            for i, x, s in zip(base.plain, value * size, std * size, strict=True)
+        }
+
+    def shown(self, known: Sequence[Column] = ()) -> dict[str, float]:
+        """Return for each effect outside the likeliest set by how much a typical size of it changes
+        the deviance; ``known``: nuisances of which nothing is left to find out.
+        """
+        base, best = self._best()
+        own = [base.columns[c] for v in best.variants for c in v[1]]
+        base = replace(base, plain=np.setdiff1d(base.plain, [base.columns[c] for c in known]))
+        out: dict[str, float] = {}
+        for effect, columns in self._variants(base):
+            starts = any(c[1].startswith(START_PREFIX) for c in columns)
+            if starts or effect in {e for e, _ in best.variants}:
+                continue
+            at = np.array([base.columns[c] for c in columns], dtype=np.intp)
+            names = [(e, name.removeprefix(WHOLE_PREFIX)) for e, name in columns]
+            z = base.typical[at] * np.sign([coefficient(c).typical[0] for c in names])
+            shown = float(z @ self._split(base, at, own).normal @ z)
+            out[effect] = max(shown, out.get(effect, 0.0))
+        return out
+
+    def _beside_best(self) -> tuple[Array, Array, Index, Array, Index]:
+        """Return the sums of the last base, which has the dictionary's columns, those that the
+        likeliest set has there with their sizes, and the dictionary's.
+        """
+        base = self.bases[-1]
+        best = max(self.scores, key=self.scores.__getitem__)
+        own = [
+            base.columns[c] for v in self.known[best].variants for c in v[1] if c in base.columns
+        ]
+        asked = np.array([i for (e, _), i in base.columns.items() if e], dtype=np.intp)
+        little = self._negligible(base, asked)
+        chosen = np.array([*base.plain, *asked, *own], dtype=np.intp)
+        total = self.power * base.blocks.sum(axis=0)
+        if not (self.flights.commanded or self.flights.rotor_speeds_vary):
+            total *= DISCREPANCY.rounded
+        # an effect of the set is true to some per cent, whatever it changes with
+        names = list(base.columns)
+        changing = [i for i in base.dictionary.tolist() if names[i][1].startswith(CHANGING)]
+        wrong = np.full(len(changing), DISCREPANCY.model_error / DISCREPANCY.share_of_effect)
+        chosen = np.append(chosen, np.array(changing, dtype=np.intp))
+        size = np.concatenate([np.ones(len(base.plain)), little, np.ones(len(own)), wrong])
+        return total[:-1, :-1], total[:-1, -1], chosen, size, base.dictionary
+
+    def best_setting(self, most: int = SETS.most_effects) -> Setting:
+        """Return the coefficients of the likeliest set of at most so many effects."""
+        key = max((k for k in self.scores if len(k) <= most), key=self.scores.__getitem__)
+        return self._setting(key)[0]
+
+    def is_elsewhere(self, new: Setting, tried: Mapping[frozenset[str], Setting]) -> bool:
+        """Return whether a set was not tried yet, or with coefficients that are more than a
+        standard deviation away.
+        """
+        if frozenset(new) not in tried:
+            return True
+        old = tried[frozenset(new)]
+        std = self._setting(frozenset(new))[1]
+        return any(
+            abs(value - old[effect].get(name, 0.0)) > std[effect].get(name, math.inf)
+            for effect, values in new.items()
+            for name, value in values.items()
+        )
+
+    def _setting(self, key: frozenset[str]) -> tuple[Setting, Setting]:
+        found = self.known[key]
+        return self._at_mode(self.bases[found.base], found.variants, found.evidence)
+
+    def _at_mode(
+        self, base: Base, some: Sequence[Variant], evidence: SetEvidence
+    ) -> tuple[Setting, Setting]:
+        """Return the coefficients of a set at the mode, and their standard deviations."""
+        setting: Setting = {}
+        std: Setting = {}
+        row = 0
+        for effect, columns in some:
+            own: dict[str, float] = dict(self.flights.coefficients({}, effect))
+            off: dict[str, float] = {}
+            for c in columns:
+                value = float(evidence.mode[row] * base.size[base.columns[c]])
+                deviation = float(evidence.std[row] * base.size[base.columns[c]])
+                row += 1
+                if c[1].startswith(START_PREFIX):
+                    own |= base.starts[c]
+                    if moves_time(effect):
+                        first = get(effect).coefficients[0].name
+                        own[first] *= float(evidence.mode[row - 1])
+                    continue
+                name = c[1].removeprefix(WHOLE_PREFIX)
+                limits = coefficient((effect, name))
+                value += declared(c, self.flights)
+                own[name] = float(np.clip(value, limits.minimum, limits.maximum))
+                off[name] = deviation
+                if c[1].startswith(WHOLE_PREFIX):
+                    own[CENTRAL] = 1.0
+            setting[effect], std[effect] = own, off
+        return setting, std
+
+    def ranking(self) -> Ranking:
+        """Return probabilities."""
+        total = log_sum(list(self.scores.values()))
+        p = {k: math.exp(v - total) for k, v in self.scores.items()}
+        probability = {e: sum(x for k, x in p.items() if e in k) for e in self.library}
+        best = sorted(p, key=p.__getitem__, reverse=True)
+        sets = []
+        for key in best:
+            if p[key] < SETS.least_probability:
+                break
+            setting, std = self._setting(key)
+            sets.append(RankedSet(tuple(sorted(key)), p[key], setting, std))
+        return Ranking(probability, tuple(sets), self.structure(), self.power)

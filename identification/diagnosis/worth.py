@@ -1,0 +1,78 @@
+"""How much an effect does, beside what a model with it leaves unexplained."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from ...dynamics.effects import get
+from .priors import prior_size
+from .regression import Column, Flights, Setting
+from .row_nuisances import row_nuisances
+from .rows import Rows
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class WorthSettings:
+    """What counts as an effect's own, and as left."""
+
+    most_in_std: float = 3.0  # of a prior, that others may differ in an effect's place
+    noise_known: float = 0.2  # share of the sensors' noise, to which it is known
+
+
+WORTH = WorthSettings()
+
+
+def worth(
+    flights: Flights, fixed: Setting, first: Collection[str], setting: Setting
+) -> dict[str, float]:
+    """Return of each effect the RMS of what nuisances, effects that any set has and effects of
+    other families cannot do in its place, within three standard deviations of their priors, over
+    the RMS of what is left beyond the sensors' noise: in the channel where that is most.
+
+    Args:
+        flights: of the vehicle.
+        fixed: effects that are known from elsewhere.
+        first: effects that any set has.
+        setting: coefficients of the effects that are asked about.
+    """
+    if not setting:
+        return {}
+    rows = Rows(flights, fixed)
+    fit, left = rows.fit, rows.residual(setting)
+    power, noise = (np.mean(np.square(x[fit]), axis=0) for x in (left, rows.noise()))
+    size = np.sqrt(np.maximum(power - noise, WORTH.noise_known**2 * noise)) + 1e-12
+    nuisances = list(row_nuisances(rows).values())
+    columns = rows.columns(setting, flights.columns_of(setting))
+    out = {}
+    for effect in setting:
+        less = {e: x for e, x in setting.items() if e != effect}
+        part = rows.residual(less) - left
+        # in still air a drag cannot do what it does in a wind
+        still = get(effect).sets_wind
+        others = rows.columns(less, flights.columns_of(less)) if still else columns
+        own = _scaled(flights, others, effect, first)
+        X = np.stack([*nuisances, *own], axis=2)[fit] / size[:, None]
+        y = part[fit] / size
+        most = WORTH.most_in_std
+        done = lsq_linear(X.reshape(-1, X.shape[2]), y.ravel(), (-most, most)).x
+        out[effect] = float(np.sqrt(np.mean(np.square(y - X @ done), axis=0)).max())
+    return out
+
+
+def _scaled(
+    flights: Flights, columns: Mapping[Column, Array], effect: str, first: Collection[str]
+) -> list[Array]:
+    """Return the columns of effects that any set has, and of those of other families, in standard
+    deviations of their priors.
+    """
+    family = get(effect).family
+    return [
+        x * prior_size(c, flights)
+        for c, x in columns.items()
+        if c[0] != effect and (c[0] in first or get(c[0]).family != family)
+    ]

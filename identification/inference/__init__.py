@@ -1,1 +1,0 @@
-"""Which effects explain a residual wrench, with which coefficients, and how surely."""

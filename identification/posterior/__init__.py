@@ -1,1 +1,0 @@
-"""Which effects act, with probabilities: one likelihood of a flight's poses, one posterior."""

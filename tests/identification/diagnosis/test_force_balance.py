@@ -1,0 +1,136 @@
+"""The evidence of the force balance, on flights whose forces are known by construction."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from windwrench.dynamics import load_vehicle
+from windwrench.dynamics.vehicle import EffectSetting
+from windwrench.identification.diagnosis import diagnose
+from windwrench.identification.diagnosis.regression import Flights
+from windwrench.identification.diagnosis.row_noise import ForceNoise, fitted_noise
+from windwrench.identification.diagnosis.rows import Rows
+from windwrench.identification.logs.flight_log import FlightLog
+
+DRAG = 0.12  # N/(m/s)^2
+LAW = EffectSetting("body_drag", dict(dx=0.0, dy=0.0, dz=0.0, cx=DRAG, cy=DRAG, cz=DRAG))
+VEHICLE = replace(load_vehicle("ardrone2"), effects=(LAW,))
+
+
+def flown(wind=(0.0, 0.0, 0.0), seconds=40.0, pose_noise=3e-4, imu=False, seed=1):
+    """A flight in which thrust and attitude are what the forces ask for; rotors by commands."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, seconds, 0.01)
+    rate, size, phase = (0.9, 1.4, 0.5), (1.2, 0.7, 0.4), (0.0, 0.6, 1.1)
+    angle = [np.outer(t, [w, 1.7 * w]) + p for w, p in zip(rate, phase, strict=True)]
+    place = [s * np.sin(a) @ [1.0, 0.5] for s, a in zip(size, angle, strict=True)]
+    place = np.column_stack(place) + np.array([0.0, 0.0, 2.0])
+    speed = np.gradient(place, t, axis=0)
+    gust = 3e-4 * VEHICLE.weight * np.cumsum(rng.standard_normal(place.shape), axis=0)
+    gust -= np.linspace(0.0, 1.0, len(t))[:, None] * gust[-1]
+    past = np.array(wind) - speed
+    air = np.linalg.norm(past, axis=1)[:, None] * DRAG * past
+    need = VEHICLE.mass * np.gradient(speed, t, axis=0) + [0.0, 0.0, VEHICLE.weight] - air - gust
+    thrust = np.linalg.norm(need, axis=1)
+    z = need / thrust[:, None]
+    y = np.cross(z, [1.0, 0.0, 0.0])
+    y /= np.linalg.norm(y, axis=1)[:, None]
+    rotation = np.stack([np.cross(y, z), y, z], axis=2)
+    turned = Rotation.from_rotvec(pose_noise * rng.standard_normal(place.shape))
+    q = (Rotation.from_matrix(rotation) * turned).as_quat(scalar_first=True)
+    speeds = np.sqrt(thrust / np.sum(VEHICLE.k))
+    log = FlightLog(
+        t,
+        place + pose_noise * rng.standard_normal(place.shape),
+        q,
+        np.repeat(speeds[:, None], 4, axis=1),
+        commanded=True,
+        name="flown",
+    )
+    if not imu:
+        return log
+    felt = np.einsum("nji,nj->ni", rotation, need + air + gust) / VEHICLE.mass
+    noisy = felt + [0.15, -0.1, 0.2] + 0.05 * rng.standard_normal(felt.shape)
+    return replace(log, accelerometer=noisy, gyro=np.zeros_like(felt))
+
+
+@pytest.fixture(scope="module")
+def windy():
+    return diagnose([flown(wind=(-4.0, 1.0, 0.0))], VEHICLE)
+
+
+def test_a_wind_is_named_and_no_tilt(windy):
+    found = {e.name: e for e in windy.effects}
+    assert "wind" in found
+    assert "world_tilt" not in found
+    assert "thrust_axis_tilt" not in found
+    wind = found["wind"]
+    for name, true in (("wx", -4.0), ("wy", 1.0)):
+        assert wind.coefficients[name] == pytest.approx(true, abs=3.0 * wind.std[name] + 0.1)
+        assert wind.std[name] < 1.0
+    assert windy.probabilities.names["wind"] > 0.8
+    assert windy.after.force_rms < 0.2 * windy.before.force_rms
+
+
+def test_in_still_air_nothing_is_sure():
+    found = diagnose([flown()], VEHICLE)
+    assert not [e.name for e in found.effects if not e.tentative]
+    winds = [e.coefficients for e in found.effects if e.name == "wind"]
+    assert all(abs(x) < 0.2 for wind in winds for x in (wind["wx"], wind["wy"], wind["wz"]))
+    assert found.after.force_rms < 1.2 * found.before.force_rms
+
+
+def test_a_drag_that_nobody_declared_is_sure():
+    """On five of six flights; on one the gust looks like a part that swings."""
+    bare, sure = replace(VEHICLE, effects=()), 0
+    for seed in (1, 2, 3):
+        found = diagnose([flown(seed=seed)], bare)
+        drags = [e for e in found.effects if e.name in ("body_drag", "rotor_drag")]
+        assert drags
+        sure += any(not e.tentative for e in drags)
+        assert found.after.force_rms < 0.5 * found.before.force_rms
+    assert sure >= 2
+
+
+def test_a_short_flight_names_nothing_surely():
+    found = diagnose([flown(wind=(-4.0, 0.0, 0.0), seconds=9.0)], replace(VEHICLE, effects=()))
+    assert all(e.tentative for e in found.effects)
+    assert "short" in found.doubts
+
+
+def test_the_accelerometer_is_read_beside_the_pose():
+    rows = Rows(Flights([flown(imu=True)], VEHICLE), {})
+    assert rows.channels == 6
+    left = rows.residual({})[rows.fit]
+    # its bias is in its channels, and only there; the gust is in both
+    off = (left[:, 3:] - left[:, :3]).mean(axis=0)
+    np.testing.assert_allclose(off, [0.15, -0.1, 0.2], atol=0.01)
+    both = np.corrcoef(left[:, 0], left[:, 3])[0, 1]
+    assert both > 0.85
+
+
+def test_the_noise_of_an_autoregression_is_found():
+    rng = np.random.default_rng(4)
+    lag = np.array([[0.7, 0.2], [0.0, 0.4]])
+    root = np.array([[1.0, 0.0], [0.8, 0.5]])
+    x = np.zeros((20000, 2))
+    for k in range(1, len(x)):
+        x[k] = lag @ x[k - 1] + root @ rng.standard_normal(2)
+    begins = np.arange(len(x)) == 0
+    begins[5000] = True
+    fit = np.arange(len(x)) % 400 < 300
+    found = fitted_noise(x, begins, fit)
+    np.testing.assert_allclose(found.lags[0], lag, atol=0.06)
+    np.testing.assert_allclose(found.covariance, root @ root.T, atol=0.06)
+    white = found.white(x)[found.known]
+    np.testing.assert_allclose(np.cov(white.T), np.eye(2), atol=0.15)
+    assert not found.known[:3].any()
+    assert not found.known[5000:5003].any()
+
+
+def test_noise_without_memory_only_scales():
+    noise = ForceNoise(np.zeros((0, 1, 1)), np.array([[4.0]]), np.array([True, False, False]))
+    np.testing.assert_allclose(noise.white(np.array([[2.0], [4.0], [6.0]]))[:, 0], [1.0, 2.0, 3.0])
+    assert noise.known.all()

@@ -1,0 +1,101 @@
+"""A short flight's missing effect is the likeliest, and its coefficient within its deviation.
+
+``python -m tests.identification.diagnosis.test_ranking`` writes the golden rankings anew.
+"""
+
+import json
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+
+from tests.support.alike import assert_alike
+from tests.support.flown import DRAG, VEHICLE, settings
+from tests.support.paths import ROOT
+from windwrench.identification.diagnosis.likelihood import LIKELIHOOD, Likelihood
+from windwrench.identification.diagnosis.priors import in_prior_units
+from windwrench.identification.diagnosis.ranking import rank
+from windwrench.identification.diagnosis.regression import Flights
+from windwrench.studies.trials.practice_flights import fly_practice
+
+GOLDEN = ROOT / "tests" / "golden" / "rankings.json"
+MASS = {"mass": {"dm": 0.03}}
+WIND = {"wind": {"wx": 2.0, "wy": 1.0}, "rotor_drag": DRAG}
+LIBRARY = ("rotor_drag", "mass", "inertia", "constant_force", "motor_lag")
+
+
+def flown(**effects):
+    log = fly_practice(VEHICLE, settings(effects), "excite", 20.0, seed=5)
+    return Flights([log], VEHICLE)
+
+
+def numbers(found):
+    """Return of a ranking what is kept: its three likeliest sets, structure and tempering."""
+    return {**asdict(found), "sets": [asdict(one) for one in found.sets[:3]]}
+
+
+def assert_kept(name, found):
+    """Assert that a ranking is the one that was kept, to what optimisers leave."""
+    kept = json.loads(GOLDEN.read_text(encoding="utf-8"))[name]
+    assert_alike(json.loads(json.dumps(numbers(found))), kept, name, rel=1e-3, least=1e-6)
+
+
+def test_a_missing_mass_is_found():
+    found = rank(flown(**MASS), LIBRARY).ranking
+    assert_kept("mass", found)
+    best = found.sets[0]
+    assert best.effects == ("mass",)
+    assert found.probability["mass"] > 0.9
+    off = best.coefficients["mass"]["dm"] - 0.03
+    assert abs(off) < 3.0 * best.std["mass"]["dm"]
+    assert found.structure < 3.0
+
+
+def test_nothing_is_found_in_turbulence_alone():
+    found = rank(flown(), LIBRARY).ranking
+    assert found.sets[0].effects == ()
+    assert max(found.probability.values()) < 0.5
+
+
+def test_a_law_that_the_library_lacks_shows_as_structure():
+    assert rank(flown(rotor_drag=DRAG), ("mass", "inertia")).ranking.structure > 10.0
+
+
+def test_a_wind_is_fitted_without_linearisation():
+    found = rank(flown(**WIND), ("wind", *LIBRARY)).ranking
+    assert_kept("wind", found)
+    best = found.sets[0]
+    assert best.effects == ("rotor_drag", "wind")
+    assert best.coefficients["wind"]["wx"] == pytest.approx(2.0, rel=0.1)
+
+
+def test_equal_offsets_of_mass_and_marker_are_told_by_the_thrust_alone():
+    """Both at one place: the measured point is the centre of mass again, and nothing but the
+    thrust's arm is left; along z it has none.
+    """
+    likelihood = Likelihood(flown(), {})
+    wanted = [("com_offset", "cz"), ("marker_offset", "mz")]
+    sums = likelihood.sums(wanted, {}, unknown=False)
+    at = [sums.columns.index(c) for c in wanted]
+    (a, b), (_, d) = sums.blocks.sum(axis=0)[np.ix_(at, at)]
+    assert a + 2.0 * b + d < 1e-5 * (a - 2.0 * b + d)
+
+
+def test_the_gain_of_a_torque_is_known_where_rotors_leave_their_rounding():
+    sizes = {}
+    for trajectory in ("hover", "excite"):
+        log = fly_practice(VEHICLE, settings({}), trajectory, 12.0, seed=5)
+        flights = Flights([log], VEHICLE)
+        base = in_prior_units(flights, Likelihood(flights, {}).sums([], {}, False), {}, {})
+        sizes[trajectory] = base.size[base.columns["", "model error of torque x"]]
+    assert LIKELIHOOD.model_error <= sizes["excite"] < 0.02
+    assert sizes["hover"] > 5.0 * sizes["excite"]
+
+
+if __name__ == "__main__":
+    made = {
+        "mass": rank(flown(**MASS), LIBRARY).ranking,
+        "wind": rank(flown(**WIND), ("wind", *LIBRARY)).ranking,
+    }
+    text = json.dumps({name: numbers(found) for name, found in made.items()}, indent=1)
+    GOLDEN.write_text(text + "\n", encoding="utf-8")

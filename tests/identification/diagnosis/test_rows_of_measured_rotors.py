@@ -1,0 +1,101 @@
+"""The rows of flights with measured rotors: torques, a pose that was filtered, and an IMU alone."""
+
+import numpy as np
+import pytest
+
+from tests.support.imu_flights import imu_flight, pose_removed
+from windwrench.dynamics import load_vehicle
+from windwrench.dynamics.vehicle import EffectSetting
+from windwrench.identification.diagnosis.likelihood import NUISANCE
+from windwrench.identification.diagnosis.regression import Flights
+from windwrench.identification.diagnosis.row_nuisances import answered, followers
+from windwrench.identification.diagnosis.row_ranking import rank_by_rows
+from windwrench.identification.diagnosis.rows import Rows
+from windwrench.identification.diagnosis.worth import worth
+from windwrench.studies.trials.logged_poses import FILTERS
+from windwrench.studies.trials.practice_flights import fly_practice
+
+VEHICLE = load_vehicle("ardrone2")
+LIBRARY = ["com_offset", "rate_damping", "thrust_scale", "rotor_efficiency", "constant_torque"]
+OFFSET = EffectSetting("com_offset", {"cx": 0.01, "cy": 0.0, "cz": 0.0})
+WEAK = EffectSetting("rotor_efficiency", {"e1": 0.0, "e2": -0.06, "e3": 0.0, "e4": 0.0})
+
+
+@pytest.fixture(scope="module")
+def offset():
+    return Flights(
+        [FILTERS["causal 5 Hz"](fly_practice(VEHICLE, (OFFSET,), "excite", 20.0, 1), VEHICLE)],
+        VEHICLE,
+    )
+
+
+@pytest.fixture(scope="module")
+def weak():
+    return Flights([pose_removed(imu_flight(VEHICLE, (WEAK,), seconds=20.0))], VEHICLE)
+
+
+def test_rows_hold_forces_and_torques(offset):
+    """An effect leaves the residual by as much as its columns say, torques among them."""
+    rows = Rows(offset, {})
+    assert rows.channels == 6
+    without, found = rows.residual({}), rows.residual({"com_offset": dict(OFFSET.coefficients)})
+    assert np.mean(np.square(found[:, 4])) < 0.2 * np.mean(np.square(without[:, 4]))
+    column = rows.columns({}, [("com_offset", "cx")])["com_offset", "cx"]
+    np.testing.assert_allclose(without - found, 0.01 * column, atol=0.03 * abs(without).max())
+
+
+def test_a_centre_of_mass_is_found_behind_a_filter(offset):
+    found = rank_by_rows(offset, LIBRARY, {}, {})
+    best = found.ranking.sets[0]
+    assert best.effects == ("com_offset",)
+    assert found.ranking.probability["com_offset"] > 0.95
+    assert best.coefficients["com_offset"]["cx"] == pytest.approx(0.01, abs=0.001)
+    assert worth(offset, {}, (), found.setting)["com_offset"] > 1.0
+
+
+def test_a_weak_rotor_is_found_by_an_imu_alone(weak):
+    found = rank_by_rows(weak, LIBRARY, {}, {})
+    best = found.ranking.sets[0]
+    assert best.effects == ("rotor_efficiency",)
+    assert best.coefficients["rotor_efficiency"]["e2"] == pytest.approx(
+        -0.06, abs=3.0 * best.std["rotor_efficiency"]["e2"]
+    )
+    assert set(found.sensors) >= {f"accelerometer bias {axis} 0" for axis in "xyz"}
+
+
+def test_a_bias_hides_steady_forces_along_the_body():
+    """In a calm hover they show by little else, and torques do not look like a bias."""
+    log = pose_removed(imu_flight(VEHICLE, seconds=15.0, trajectory="gentle"))
+    flights = Flights([log], VEHICLE)
+    found = rank_by_rows(flights, [*LIBRARY, "thrust_axis_tilt"], {}, {})
+    assert found.ranking.sets[0].effects == ()
+    biases = [("", f"{NUISANCE}{name}") for _, name in flights.biases]
+    shown, known = found.posterior.shown(), found.posterior.shown(biases)
+    assert all(x > 13.0 for x in shown.values())
+    assert {e for e, x in shown.items() if x < 250.0 <= known[e]} == {
+        "thrust_scale",
+        "thrust_axis_tilt",
+    }
+
+
+def test_a_share_of_what_follows_disturbances_counts_as_one(weak):
+    """All of the rotors' answers where disturbances are as large, and next to none where the flight
+    is far from one.
+    """
+    rows = Rows(weak, {})
+    signals = followers(rows)
+    size = np.zeros((len(rows.t), rows.channels))
+    for signal in signals:
+        spread = signal.size[rows.fit].std()
+        calm, rough = (
+            answered(rows, [signal], x * spread * size_like(size))[f"answer by {signal.name}"]
+            for x in (0.1, 1.0)
+        )
+        moved = signal.size - signal.size[rows.fit].mean()
+        np.testing.assert_allclose(rough[:, signal.channels[0]], moved, rtol=0.05)
+        np.testing.assert_allclose(calm, 0.01 * rough, rtol=0.1)
+
+
+def size_like(x):
+    """Return alternating rows of the shape of ``x`` with a standard deviation of one."""
+    return np.where(np.arange(len(x))[:, None] % 2 == 0, 1.0, -1.0) * np.ones_like(x)
