@@ -135,7 +135,6 @@ class Likelihood:
         self.inertias = np.array([flights.vehicle.mass] * 3 + np.diagonal(inertia).tolist())
         # tracks, and the rotors' innovations of them
         self._answers: tuple[list[Track], list[Array]] = [], []
-        self._quiet: tuple[tuple[AxisNoise, ...], list[Array]] | None = None
         self.known: list[Array]  # (n, 6, 3) of each piece, what rotors' innovations say of it
         lengths = [len(piece.t) for piece in self.pieces]
         if near is None or [len(piece.t) for piece in near.pieces] != lengths:
@@ -466,12 +465,10 @@ class Likelihood:
         these coefficients.
 
         What an effect explains counts as a disturbance where the effect is not known. Beside the
-        whole library the noise is that of a flight of which everything is known. It is found once.
+        whole library the noise is that of a flight of which everything is known.
         """
-        if self._quiet is None:
-            self._quiet = self._likeliest(self._explained(coefficients))
         noise, tracks = self.noise, self.tracks
-        self.noise, known = self._quiet
+        self.noise, known = self._likeliest(self._explained(coefficients))
         heard = [track.innovations for track in self._run(self.noise, known)]
         self.tracks = [
             replace(track, innovations=x) for track, x in zip(self.tracks, heard, strict=True)

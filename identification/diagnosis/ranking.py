@@ -79,8 +79,7 @@ def rank(
     near = Likelihood(flights, {})
     nothing = _Beside(flights, library, {}, near)
     loud = nothing.base()
-    explained = _whole_library(loud)
-    quiet = nothing.quieter_base(explained)
+    quiet = nothing.quieter_base(_whole_library(loud))
     found = Posterior(flights, library, (loud, quiet))
     # the best effect first, alone: another set's columns are those of the model that has it
     setting = found.best_setting(1)
@@ -100,13 +99,16 @@ def rank(
         found = Posterior(flights, library, (loud, beside.base()))
         setting = found.best_setting()
     # once more, with the dictionary's columns, that are dear, beside the likeliest set
-    alone = beside is nothing
-    base = nothing.quieter_base(explained, unknown=True) if alone else beside.base(unknown=True)
+    if setting.keys() != beside.setting.keys():
+        beside = _Beside(flights, library, setting, near) if setting else nothing
+    base = beside.base(unknown=True)
     found = Posterior(flights, library, (loud, base), found.tempering())
+    column, size, _ = found.strangest()
+    ranking = found.ranking(beside.quieter_base({column: size}))
     late = {
         name: x for (_, name), x in found.nuisances().items() if ("", name) in flights.time_offsets
     }
-    return Found(found, found.ranking(), found.best_setting(), beside.likelihood.noise, late)
+    return Found(found, ranking, found.best_setting(), beside.likelihood.noise, late)
 
 
 def _fitted(flights: Flights, setting: Setting, near: Likelihood) -> Setting:
@@ -173,10 +175,8 @@ class _Beside:
         sums = self.likelihood.sums(wanted, self.starts, unknown)
         return in_prior_units(self.flights, sums, self.setting, self.starts)
 
-    def quieter_base(self, coefficients: Mapping[Column, float], unknown: bool = False) -> Base:
-        """Return its sums with the noise that is likeliest beside the whole library."""
-        if unknown:
-            self.base(unknown)
+    def quieter_base(self, coefficients: Mapping[Column, float]) -> Base:
+        """Return its sums with the noise that is likeliest beside these coefficients."""
         sums = self.likelihood.quieter(coefficients)
         return in_prior_units(self.flights, sums, self.setting, self.starts)
 

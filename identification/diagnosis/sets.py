@@ -233,30 +233,42 @@ class Posterior:
                 return False
         return True
 
-    def structure(self) -> float:
+    def structure(self, quieter: Base | None = None) -> float:
         """Return the logarithm of the Bayes factor of one more column beside the likeliest set.
 
         Each group of the dictionary is as likely as each other to have it, and in it each column.
-        """
-        normal, right, chosen, size, tried = self._beside_best()
-        names = list(self.bases[-1].columns)
-        groups: dict[str, list[int]] = {}
-        for i in tried.tolist():
-            groups.setdefault(names[i][1].split(": ")[0], []).append(i)
-        found = [
-            evidence_of_one_more(normal, right, chosen, size, np.array(i), DISCREPANCY.sizes)
-            for i in groups.values()
-        ]
-        return log_sum(found) - math.log(len(found))
 
-    def strangest(self) -> tuple[Column, float]:
-        """Return the column of the dictionary that explains most beside the likeliest set, and the
-        deviance that it explains.
+        Args:
+            quieter: the last base with the noise that is likeliest beside the strangest column. The
+                set, and the set with one more column, have the likelier noise of both.
         """
-        score, left = one_more(*self._beside_best())
-        names = list(self.bases[-1].columns)
+        none, more = [], []
+        for base in (self.bases[-1], *((quieter,) if quieter else ())):
+            normal, right, chosen, size, tried = sums = self._beside_best(base)
+            deviance = float(normal[-1, -1]) + self._dictionary_power * base.penalty
+            m = marginal(normal[:-1, :-1], right[:-1], deviance, chosen[:0], chosen, size)
+            names = list(base.columns)
+            groups: dict[str, list[int]] = {}
+            for i in tried.tolist():
+                groups.setdefault(names[i][1].split(": ")[0], []).append(i)
+            found = [
+                evidence_of_one_more(*sums[:4], np.array(i), DISCREPANCY.sizes)
+                for i in groups.values()
+            ]
+            none.append(m.constant)
+            more.append(m.constant + log_sum(found) - math.log(len(found)))
+        return max(more) - max(none)
+
+    def strangest(self) -> tuple[Column, float, float]:
+        """Return the column of the dictionary that explains most beside the likeliest set, its
+        coefficient, and the deviance that it explains.
+        """
+        base = self.bases[-1]
+        score, left = one_more(*self._beside_best(base))
         gains = np.square(score) / left
-        return names[self.bases[-1].dictionary[int(np.argmax(gains))]], float(gains.max())
+        best = int(np.argmax(gains))
+        name = list(base.columns)[base.dictionary[best]]
+        return name, float(score[best] / left[best]), float(gains[best])
 
     def _split(self, base: Base, asked: Index, beside: Sequence[int]) -> Marginal:
         """Return the likelihood of some columns of a base with others integrated out."""
@@ -322,9 +334,11 @@ class Posterior:
         """
         base, best = self._best()
         own = [base.columns[c] for v in best.variants for c in v[1]]
-        m = self._split(base, base.plain, own)
-        normal = m.normal + np.eye(len(base.plain))
-        value, std = np.linalg.solve(normal, m.right), np.sqrt(np.diag(np.linalg.inv(normal)))
+        chosen, count = np.array([*base.plain, *own], dtype=np.intp), len(base.plain)
+        total = self.power * base.blocks.sum(axis=0)
+        normal = total[np.ix_(chosen, chosen)] + np.eye(len(chosen))
+        value = np.linalg.solve(normal, total[chosen, -1])[:count]
+        std = np.sqrt(np.diag(np.linalg.inv(normal)))[:count]
         names = list(base.columns)
         size = base.size[base.plain]
         return {
@@ -351,11 +365,16 @@ class Posterior:
             out[effect] = max(shown, out.get(effect, 0.0))
         return out
 
-    def _beside_best(self) -> tuple[Array, Array, Index, Array, Index]:
-        """Return the sums of the last base, which has the dictionary's columns, those that the
-        likeliest set has there with their sizes, and the dictionary's.
+    @property
+    def _dictionary_power(self) -> float:
+        """Power of the likelihood that the dictionary is asked with."""
+        varied = self.flights.commanded or self.flights.rotor_speeds_vary
+        return self.power * (1.0 if varied else DISCREPANCY.rounded)
+
+    def _beside_best(self, base: Base) -> tuple[Array, Array, Index, Array, Index]:
+        """Return the sums of a base that has the dictionary's columns, those that the likeliest set
+        has there with their sizes, and the dictionary's.
         """
-        base = self.bases[-1]
         best = max(self.scores, key=self.scores.__getitem__)
         own = [
             base.columns[c] for v in self.known[best].variants for c in v[1] if c in base.columns
@@ -363,16 +382,14 @@ class Posterior:
         asked = np.array([i for (e, _), i in base.columns.items() if e], dtype=np.intp)
         little = self._negligible(base, asked)
         chosen = np.array([*base.plain, *asked, *own], dtype=np.intp)
-        total = self.power * base.blocks.sum(axis=0)
-        if not (self.flights.commanded or self.flights.rotor_speeds_vary):
-            total *= DISCREPANCY.rounded
+        total = self._dictionary_power * base.blocks.sum(axis=0)
         # an effect of the set is true to some per cent, whatever it changes with
         names = list(base.columns)
         changing = [i for i in base.dictionary.tolist() if names[i][1].startswith(CHANGING)]
         wrong = np.full(len(changing), DISCREPANCY.model_error / DISCREPANCY.share_of_effect)
         chosen = np.append(chosen, np.array(changing, dtype=np.intp))
         size = np.concatenate([np.ones(len(base.plain)), little, np.ones(len(own)), wrong])
-        return total[:-1, :-1], total[:-1, -1], chosen, size, base.dictionary
+        return total, total[:, -1], chosen, size, base.dictionary
 
     def best_setting(self, most: int = SETS.most_effects) -> Setting:
         """Return the coefficients of the likeliest set of at most so many effects."""
@@ -427,8 +444,8 @@ class Posterior:
             setting[effect], std[effect] = own, off
         return setting, std
 
-    def ranking(self) -> Ranking:
-        """Return probabilities."""
+    def ranking(self, quieter: Base | None = None) -> Ranking:
+        """Return probabilities; ``quieter`` as of ``structure``."""
         total = log_sum(list(self.scores.values()))
         p = {k: math.exp(v - total) for k, v in self.scores.items()}
         probability = {e: sum(x for k, x in p.items() if e in k) for e in self.library}
@@ -439,4 +456,4 @@ class Posterior:
                 break
             setting, std = self._setting(key)
             sets.append(RankedSet(tuple(sorted(key)), p[key], setting, std))
-        return Ranking(probability, tuple(sets), self.structure(), self.power)
+        return Ranking(probability, tuple(sets), self.structure(quieter), self.power)

@@ -347,7 +347,7 @@ def _candidates(found: Found, named: Sequence[str]) -> tuple[Candidate, ...]:
 
 def _sign(found: Found) -> Structure:
     """Return which column of the dictionary explains most beside the likeliest set."""
-    (_, name), gained = found.posterior.strangest()
+    (_, name), _, gained = found.posterior.strangest()
     group, what = name.removeprefix("unknown ").split(": ", 1)
     column, _, channel = what.rpartition(" in ")
     where = f"{CHANNELS[int(channel)]} with {column}" if column else f"the part of {what}"
