@@ -216,14 +216,3 @@ def in_prior_units(
         np.array(dictionary, dtype=np.intp),
         starts,
     )
-
-
-def between(here: Setting, there: Setting, share: float) -> Setting:
-    """Return the setting that lies a share of the way from one to another of the same effects."""
-    return {
-        e: {
-            name: values.get(name, 0.0) + share * (there[e][name] - values.get(name, 0.0))
-            for name in there[e]
-        }
-        for e, values in here.items()
-    }

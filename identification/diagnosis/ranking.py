@@ -8,6 +8,7 @@ beside the best set, because what is not explained counts as a disturbance.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +17,14 @@ from ...dynamics.effects import get
 from ...runtime.errors import InputError
 from ..findings import Ranking
 from .axis_filter import AxisNoise
-from .evidence import marginal, set_evidence
+from .climbing import Height, linear_mode, mode
+from .evidence import marginal
 from .likelihood import WHOLE_PREFIX, Likelihood, declared
-from .priors import Base, Setting, between, in_prior_units, variants_of
+from .priors import Base, Setting, in_prior_units, variants_of
 from .regression import (
     START_PREFIX,
     Column,
     Flights,
-    coefficient,
     moves_time,
     typical_size,
 )
@@ -40,10 +41,6 @@ class RankingSettings:
     # typical sizes at which a lag or a delay is tried as a whole: their columns change with them
     time_starts: tuple[float, ...] = (0.3, 0.6, 1.2)
     rounds: int = 6  # of fitting the noise beside the best set
-    # of fitting coefficients in which a force is not linear, and shares of a step, tried in turn
-    fit_rounds: int = 8
-    shares: tuple[float, ...] = (1.0, 0.5, 0.2, 0.05)
-    least_gain: float = 0.5  # nats; a step that gains less is the last
 
 
 RANKING = RankingSettings()
@@ -92,7 +89,7 @@ def rank(
             if not found.is_elsewhere(setting, tried):
                 break
         report(f"trying {', '.join(setting)}")
-        setting = _fitted(flights, setting, near)
+        setting = mode(setting, partial(_height, flights, near=near))
         tried[frozenset(setting)] = setting
         beside = _Beside(flights, library, setting, near)
         near = beside.likelihood
@@ -111,37 +108,15 @@ def rank(
     return Found(found, ranking, found.best_setting(), beside.likelihood.noise, late)
 
 
-def _fitted(flights: Flights, setting: Setting, near: Likelihood) -> Setting:
-    """Return the mode of the posterior of a setting's effects, with the noise as it is (damped
-    Gauss-Newton).
-    """
-    here, value, target = _step(flights, setting, near)
-    for _ in range(RANKING.fit_rounds):
-        for share in RANKING.shares:
-            moved = between(here, target, share)
-            trial = _step(flights, moved, near)
-            if trial[1] < value:
-                break
-        else:
-            break
-        gained = value - trial[1]
-        here, value, target = trial
-        if gained < RANKING.least_gain:
-            break
-    return here
-
-
-def _step(flights: Flights, setting: Setting, near: Likelihood) -> tuple[Setting, float, Setting]:
-    """Return a setting, minus the logarithm of likelihood and prior there, up to a constant, and
-    the mode of the linearised posterior about it; an infinite value where no vehicle is like that.
-    """
+def _height(flights: Flights, setting: Setting, near: Likelihood) -> Height:
+    """Return how high the posterior is at a setting, with the noise as it is."""
     try:
         likelihood = Likelihood(flights, setting, near, same_noise=True)
         wanted = wanted_columns(flights, list(setting), setting, {})
         sums = likelihood.sums(wanted, {}, unknown=False)
         base = in_prior_units(flights, sums, setting, {})
     except (InputError, np.linalg.LinAlgError):
-        return setting, math.inf, setting
+        return math.inf, lambda: setting
     asked = np.array([i for c, i in base.columns.items() if c in wanted], dtype=np.intp)
     total = base.blocks.sum(axis=0)
     ones = np.ones(len(base.plain))
@@ -150,13 +125,7 @@ def _step(flights: Flights, setting: Setting, near: Likelihood) -> tuple[Setting
     here = np.array([setting[e].get(n, 0.0) - declared((e, n), flights) for e, n in columns])
     z = here / base.size[asked]
     value = -m.constant - float(m.right @ z - 0.5 * z @ m.normal @ z) + 0.5 * float(z @ z)
-    mode = set_evidence(m, range(len(asked)), base.low[asked], base.high[asked]).mode
-    out: Setting = {e: dict(x) for e, x in setting.items()}
-    for (effect, name), x in zip(columns, (mode * base.size[asked]).tolist(), strict=True):
-        limits = coefficient((effect, name))
-        x += declared((effect, name), flights)
-        out[effect][name] = min(max(x, limits.minimum), limits.maximum)
-    return setting, value, out
+    return value, lambda: linear_mode(flights, base, m, asked, columns, setting)
 
 
 class _Beside:

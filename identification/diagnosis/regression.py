@@ -307,7 +307,7 @@ class Flights:
             noisy._pieces, noisy._needs, noisy._offset_signals, noisy._residuals = {}, {}, {}, {}
             noisy.logs = tuple(noisy_logs(self.logs, self.vehicle, hidden=True))
             floor = noisy.residual({}) - self.residual({})
-        lost = frozenset() if self.has_raw_poses else self._lost_in_noise(noisy, floor)
+        lost = self._lost_in_noise(noisy, floor)
         rotors, more = self.rotor_wrench({}), noisy.rotor_wrench({})
         rounded = np.var(more - rotors, axis=0) / np.maximum(np.var(rotors, axis=0), 1e-30)
         rates = self._angular_velocities()
@@ -318,11 +318,10 @@ class Flights:
         return floor, lost | self.explained_by_rounding, rounded
 
     def _lost_in_noise(self, noisy: "Flights", floor: Array) -> frozenset[str]:
-        """Return the effects whose columns are noise to a large part, of logs whose columns are of
-        the measured motion.
+        """Return the effects whose columns are noise to a large part.
 
         Fitted all the same, one would come out too small, or explain the noise of the residual by
-        removing it from the pose.
+        removing it from the pose; of a causal filter, it would mend the filter's gains.
         """
         weight = 1.0 / (np.mean(np.square(floor), axis=0) + 1e-30)
         quietly: set[str] = set()  # of these, what the sensors' noise alone hides

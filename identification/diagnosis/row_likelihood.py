@@ -13,11 +13,12 @@ from scipy.linalg import cho_factor, cho_solve
 from ...dynamics.effects import Role, playing
 from ...runtime.errors import InputError
 from ..motion.smoothing import low_pass
+from .climbing import linear_mode, mode
 from .discrepancy import State, changing_columns, discrepancy_columns, variables
-from .evidence import Index, marginal, set_evidence, tempering
+from .evidence import Index, marginal, tempering
 from .likelihood import NUISANCE, UNKNOWN, Sums, declared
-from .priors import Base, Setting, between, in_prior_units, prior_size
-from .regression import START_PREFIX, Column, Flights, coefficient
+from .priors import Base, Setting, in_prior_units, prior_size
+from .regression import START_PREFIX, Column, Flights
 from .row_noise import RowNoise, fitted_noise, white_noise
 from .row_nuisances import answered, followers, row_nuisances
 from .rows import Rows
@@ -33,10 +34,7 @@ class RowLikelihoodSettings:
     """When fits stop."""
 
     noise_rounds: int = 3
-    rounds: int = 4  # of Gauss-Newton
-    shares: tuple[float, ...] = (1.0, 0.5, 0.2, 0.05)  # of a step, tried in turn
     idle: float = 1e-6  # of the largest residual, up to which an effect does nothing
-    least_gain: float = 0.1  # nats; a step that gains less is the last
 
 
 ROW_LIKELIHOOD = RowLikelihoodSettings()
@@ -276,36 +274,17 @@ class RowLikelihood:
         }
 
     def fitted(self, setting: Setting) -> Setting:
-        """Return the mode of the posterior of a setting's effects (damped Gauss-Newton)."""
-        here, value = setting, self.objective(setting)
+        """Return the mode of the posterior of a setting's effects."""
         wanted = self.flights.columns_of(setting)
-        for _ in range(ROW_LIKELIHOOD.rounds):
-            target = self._linear_mode(here, wanted)
-            for share in ROW_LIKELIHOOD.shares:
-                trial = between(here, target, share)
-                if (after := self.objective(trial)) < value:
-                    break
-            else:
-                break
-            gained, here, value = value - after, trial, after
-            if gained < ROW_LIKELIHOOD.least_gain:
-                break
-        return here
+        return mode(setting, lambda x: (self.objective(x), lambda: self._linear_mode(x, wanted)))
 
     def _linear_mode(self, setting: Setting, wanted: Sequence[Column]) -> Setting:
         base = in_prior_units(self.flights, self.sums(setting, wanted, {}), setting, {})
         asked = np.array([base.columns[c] for c in wanted], dtype=np.intp)
         total = self.power * base.blocks.sum(axis=0)
-        m = marginal(
-            total[:-1, :-1], total[:-1, -1], 0.0, asked, base.plain, np.ones(len(base.plain))
-        )
-        found = set_evidence(m, range(len(asked)), base.low[asked], base.high[asked])
-        mode = found.mode * base.size[asked]
-        out = {e: dict(values) for e, values in setting.items()}
-        for c, x in zip(wanted, mode.tolist(), strict=True):
-            limits, own = coefficient(c), declared(c, self.flights)
-            out[c[0]][c[1]] = min(max(own + x, limits.minimum), limits.maximum)
-        return out
+        ones = np.ones(len(base.plain))
+        m = marginal(total[:-1, :-1], total[:-1, -1], 0.0, asked, base.plain, ones)
+        return linear_mode(self.flights, base, m, asked, wanted, setting)
 
     def tempered(self, setting: Setting) -> float:
         """Return the power of the likelihood that its scatter beside a setting allows."""
