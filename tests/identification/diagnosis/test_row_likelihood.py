@@ -10,7 +10,7 @@ from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.regression import Flights
-from windwrench.identification.diagnosis.row_noise import ForceNoise, fitted_noise
+from windwrench.identification.diagnosis.row_noise import RowNoise, fitted_noise
 from windwrench.identification.diagnosis.rows import Rows
 from windwrench.identification.logs.flight_log import FlightLog
 
@@ -131,6 +131,6 @@ def test_the_noise_of_an_autoregression_is_found():
 
 
 def test_noise_without_memory_only_scales():
-    noise = ForceNoise(np.zeros((0, 1, 1)), np.array([[4.0]]), np.array([True, False, False]))
+    noise = RowNoise(np.zeros((0, 1, 1)), np.array([[4.0]]), np.array([True, False, False]))
     np.testing.assert_allclose(noise.white(np.array([[2.0], [4.0], [6.0]]))[:, 0], [1.0, 2.0, 3.0])
     assert noise.known.all()
