@@ -245,7 +245,6 @@ class Flights:
         self.rotor_noise: (
             Array  # (4,) its share of the variance of what the rotors deliver: thrust and torque
         )
-        self.angular_velocity_noise: Array  # (3,) its share of the variance of angular velocities
         self.sensor_noise, self.not_identifiable, self.rotor_noise = self._repeat_sensor_noise()
 
     def _lay_rows(self) -> None:
@@ -310,11 +309,6 @@ class Flights:
         lost = self._lost_in_noise(noisy, floor)
         rotors, more = self.rotor_wrench({}), noisy.rotor_wrench({})
         rounded = np.var(more - rotors, axis=0) / np.maximum(np.var(rotors, axis=0), 1e-30)
-        rates = self._angular_velocities()
-        noise = noisy._angular_velocities() - rates
-        self.angular_velocity_noise = np.var(noise, axis=0) / np.maximum(
-            np.var(rates, axis=0), 1e-30
-        )
         return floor, lost | self.explained_by_rounding, rounded
 
     def _lost_in_noise(self, noisy: "Flights", floor: Array) -> frozenset[str]:
@@ -435,15 +429,6 @@ class Flights:
                     p.signals.period,
                 )[p.rows]
                 for p in self.pieces(setting)
-            ]
-        )
-
-    def _angular_velocities(self) -> Array:
-        """Return the angular velocities (rows, 3) at the rows, low-passed."""
-        return np.concatenate(
-            [
-                low_pass(p.signals.angular_velocity, self.residual_hz, p.signals.period)[p.rows]
-                for p in self.pieces({})
             ]
         )
 
