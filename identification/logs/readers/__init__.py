@@ -47,6 +47,11 @@ class Reader:
     read: Callable[..., FlightLog]
     signature: tuple[str, ...] = ()  # columns of a table
     begins: tuple[bytes, ...] = ()  # first bytes of a file
+    holds: bytes = b""  # that stands among the first bytes of a file; empty: nothing
+
+    def knows(self, head: bytes) -> bool:
+        """Return whether a file that begins with some bytes is of its form."""
+        return head.startswith(self.begins) or (self.holds != b"" and self.holds in head)
 
 
 # maps of tables that are known by their columns
@@ -67,6 +72,7 @@ READERS = {
         ("rosbag", rosbag),
     )
 }
+READERS["ardupilot_bin"] = replace(READERS["ardupilot_bin"], holds=ardupilot_bin.HOLDS)
 READERS["betaflight_csv"] = Reader(
     "betaflight_csv", "a blackbox_decode table", betaflight.read_table, betaflight.SIGNATURE
 )
@@ -107,7 +113,12 @@ def reader_by_content(path: Path) -> Reader | None:
             head = _head(path)
         except InputError:
             return None  # whoever reads it says what is wrong
-        return next((r for r in READERS.values() if head.startswith(r.begins)), None)
+        known = (
+            r
+            for r in READERS.values()
+            if head.startswith(r.begins) or (r.holds and r.holds in head)
+        )
+        return next(known, None)
     try:
         names = sorted(entry.name for entry in path.iterdir())
     except OSError as error:

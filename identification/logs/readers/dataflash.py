@@ -5,6 +5,9 @@ its length, its name, and the letters and names of its columns. pymavlink reads 
 objects, one by one, with a printed line for each byte that is damaged, and with 100 MB of disk.
 Here compiled code goes through a file, first to count and then to note the places of the messages
 that are wanted, and their columns are read at once, so that any file costs a bounded time.
+
+Ground stations turn such a log into text (``.log``): a message a line, its type's name first, FMT
+among them, and numbers in whole units.
 """
 
 from collections.abc import Collection
@@ -23,6 +26,7 @@ Bytes = NDArray[np.uint8]
 Messages = dict[str, NDArray[Any]]  # (N,) of one type: columns by name, numbers or bytes of texts
 
 BEGINS = (b"\xa3\x95",)
+HOLDS = b"FMT, 128, 89, FMT,"  # of a log as text
 
 WHAT = "an ArduPilot log (DataFlash .BIN)"
 _FMT, _FMT_LENGTH = 128, 89
@@ -43,7 +47,10 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messa
         InputError: the file cannot be read, is no such log, or has more messages of a type than
             ``FileLimits.table_rows``.
     """
-    data = np.frombuffer(read_bytes(path, WHAT, LIMITS.binary_log), np.uint8)
+    content = read_bytes(path, WHAT, LIMITS.binary_log)
+    if HOLDS in content[:4096]:
+        return _of_text(path, content, wanted), 0
+    data = np.frombuffer(content, np.uint8)
     counts, nowhere = np.zeros(256, np.int64), np.empty(0, np.int64)
     used = _walk(data, counts, -1, nowhere)
 
@@ -66,6 +73,46 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messa
     if not kinds and not counts[_FMT]:
         raise InputError(f"{path}: cannot be read as {WHAT}: no FMT message; expected some")
     return found, len(data) - int(used)
+
+
+def _of_text(path: Path, content: bytes, wanted: Collection[str]) -> dict[str, Messages]:
+    """Return the messages of the types that are wanted, of a log as text. The lines before the
+    first FMT, where old ones name the vehicle, count as MSG; lines that are cut are left out.
+    """
+    before, _, lines = content.partition(b"FMT,")
+    names: dict[str, list[str]] = {}
+    rows: dict[str, list[list[bytes]]] = {}
+    for line in (b"FMT," + lines).splitlines():
+        kind, _, rest = line.partition(b",")
+        name = kind.decode("ascii", "replace")
+        if name == "FMT":
+            _, _, stated, *columns = rest.decode("ascii", "replace").replace(" ", "").split(",")
+            names.setdefault(stated, columns[1:])
+        elif name in wanted and name in names:
+            values = rest.split(b",", len(names[name]) - 1)
+            if len(values) == len(names[name]):
+                rows.setdefault(name, []).append(values)
+    found: dict[str, Messages] = {"MSG": {"Message": np.array(before.splitlines() or [b""])}}
+    for name, values in rows.items():
+        check_count(f"{path}: {name}", len(values), LIMITS.table_rows, "messages")
+        columns = {
+            column: np.char.strip(np.array(texts))
+            for column, texts in zip(names[name], zip(*values, strict=True), strict=True)
+        }
+        if name == "MSG":
+            said = [*found["MSG"]["Message"], *columns["Message"]]
+            found["MSG"] = {"Message": np.array(said)}
+        else:
+            found[name] = {column: _numbers(texts) for column, texts in columns.items()}
+    return found
+
+
+def _numbers(texts: NDArray[np.bytes_]) -> NDArray[Any]:
+    """Return the numbers (N,) that texts (N,) are; the texts, where one is none."""
+    try:
+        return texts.astype(np.float64)
+    except ValueError:
+        return texts
 
 
 def _rows(
