@@ -66,6 +66,7 @@ class GuessSettings:
 
     rpm: float = 4500.0  # median above which no unit but rpm is left: no propeller turns at that
     # rate in rad/s
+    fast: float = 2600.0  # median above which rpm is likelier: no hover but a palm-sized vehicle's
     counts: float = 20_000.0  # median above which rpm may also be a command of 16 bits
     fast_gyro: float = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
     slow_gyro: float = 6.0  # below which 99.5 % of a flight's angular velocities lie in rad/s
@@ -148,7 +149,7 @@ def guess_map(table: Table, vehicle: Vehicle | None = None, name: str = "guess")
                 find(part)
     missing = tuple(found.missing())
     parts = [part for part in found.sections.values() if isinstance(part, Columns)]
-    used = {found.clock and found.clock.column, *(c for part in parts for c in part.columns)}
+    used = {*found.time_columns, *(c for part in parts for c in part.columns)}
     unused = tuple(column for column in table.header if column not in used)
     found.sections.setdefault("time", TimeColumn(UNKNOWN))
     return Guess(LogMap(**found.sections, name=name), tuple(found.reasons), unused, missing)
@@ -187,6 +188,16 @@ def _time_column(names: Sequence[Name], data: Mapping[str, Array]) -> Name | Non
     return None
 
 
+def _nanoseconds(names: Sequence[Name], clock: Name) -> str:
+    """Return the column of the nanoseconds beside a clock of whole seconds; empty: there is
+    none.
+    """
+    key = re.sub("(^|_)secs?$", "", clock.base)
+    known = words()["nanoseconds"]
+    fine = {f"{key}_{word}".strip("_") for word in known}
+    return next((name.column for name in names if name.base in fine), "")
+
+
 class _Guessing:
     """What was found so far: the columns of each part, the sections of the map, and reasons."""
 
@@ -200,12 +211,13 @@ class _Guessing:
         self.clock = _time_column(names, data)
         self.t = np.asarray(0.01 * np.arange(table.rows), dtype=np.float64)
         if self.clock is not None:
-            self.t = self.time(self.clock, data)
+            self.t = self.time(self.clock, data, _nanoseconds(names, self.clock))
         self.numbers = Numbers(self.t, data)
-        rest = [name for name in names if name is not self.clock]
+        rest = [name for name in names if name.column not in self.time_columns]
         self.ranked = find_parts(rest, self.numbers)
         self.parts = {p: c[0].group for p, c in self.ranked.items() if c and c[0].score > 0.0}
-        if volts := named_alone(rest, "battery"):
+        volts = [name for name in named_alone(rest, "battery") if name.unit != "percent"]
+        if volts:
             self.parts["battery"] = Group((volts[0].column,), volts[0].base, volts[0].unit)
         if not {"position", "attitude"} <= set(self.parts):
             self.parts = {k: v for k, v in self.parts.items() if k not in ("position", "attitude")}
@@ -287,22 +299,27 @@ class _Guessing:
             choice = choice[0], False, f"{choice[2]}, though the columns' names say {named}"
         return self.take(section, "unit", choice)
 
-    def time(self, clock: Name, data: Mapping[str, Array]) -> Array:
+    @property
+    def time_columns(self) -> tuple[str, ...]:
+        """The columns of the time."""
+        return self.sections["time"].columns if "time" in self.sections else ()
+
+    def time(self, clock: Name, data: Mapping[str, Array], nanoseconds: str) -> Array:
         """Find the unit of the time; return times (N,) in s of the middle of a long flight, NaN
         elsewhere.
         """
-        raw = data[clock.column]
+        raw = TimeColumn(clock.column, nanoseconds=nanoseconds).raw(data)
         steps = np.diff(raw[np.isfinite(raw)])
         step = float(np.median(steps[steps > 0.0]))
         guessed, sure = likely_unit("time", step)
         rate = f"{1.0 / max(step * UNITS['time'][guessed], 1e-300):.4g} rows a second"
         if clock.unit in UNITS["time"]:  # an unusual rate is no reason to doubt a name
             sure &= not within(1.0 / max(step * UNITS["time"][clock.unit], 1e-300), GUESS.rates)
-        unit = self.unit("time", clock.unit, (guessed, sure, rate))
+        unit = self.unit("time", "s" if nanoseconds else clock.unit, (guessed, sure, rate))
         t = np.asarray((raw - raw[np.isfinite(raw)][0]) * UNITS["time"][unit])
         middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
         t[~(np.abs(t - middle) <= 0.5 * LONGEST)] = np.nan
-        self.sections["time"] = TimeColumn(clock.column, unit)
+        self.sections["time"] = TimeColumn(clock.column, unit, nanoseconds)
         return t
 
     def by_motion(self, prop: str) -> _Choice:
@@ -546,6 +563,11 @@ def motor_unit(
             f"the median is {middle:.5g}, too fast for rad/s",
         ),
         (pulses and not speeds, "commands", "us", False, between),
+        (
+            middle > GUESS.fast,
+            *("rotors", "rpm", False),
+            f"the median is {middle:.4g}: few rotors turn as fast in rad/s",
+        ),
     )
     otherwise = f"the median is {middle:.4g}; it might be rpm or Hz"
     return next((rule[1:] for rule in rules if rule[0]), ("rotors", "rad/s", False, otherwise))
@@ -559,6 +581,8 @@ def map_yaml(guess: Guess) -> str:
     sections: dict[str, Any] = {"vehicle": m.vehicle} if m.vehicle else {}
     if m.time.column:
         sections["time"] = {"column": m.time.column, "unit": m.time.unit}
+        if m.time.nanoseconds:
+            sections["time"]["nanoseconds"] = m.time.nanoseconds
     sections |= {"world": m.world, "body": m.body}
     sections |= {name: _fields(part) for name, part in m.sections.items()}
     lines = ["# A map of this table's columns. What is marked GUESS: check it."]

@@ -299,7 +299,7 @@ def fitted(table: Table, log_map: LogMap, vehicle: Vehicle | None, reader: str) 
     """
     header = set(table.header)
     where = f"{table.path}: map {log_map.name}"
-    clocks: list[TimeColumn] = [c for c in log_map.ways("time") if c.column in {*header, ""}]
+    clocks: list[TimeColumn] = [c for c in log_map.ways("time") if header.issuperset(c.columns)]
     missing = [] if clocks else [(log_map.time.column, "time")]
     kept: dict[str, Any] = {"time": clocks[0] if clocks else log_map.time}
     others: dict[str, tuple[Columns, ...]] = {}

@@ -44,7 +44,7 @@ def rows_of(
         t = rows / clock.rate_hz + (clock.offset or 0.0)
         notes.append(f"time: rows at {clock.rate_hz:g} Hz, as the map says")
         return Samples(t, columns, table=table, rows=rows), notes
-    samples = Samples(columns[clock.column], columns, table=table, rows=rows)
+    samples = Samples(clock.raw(columns), columns, table=table, rows=rows)
     if is_whole:
         _refuse(samples, clock.column, samples.t, ~np.isfinite(samples.t))
     samples = samples.cut(np.isfinite(samples.t))

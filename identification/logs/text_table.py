@@ -16,6 +16,7 @@ import zlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from datetime import date
 from itertools import islice
 from pathlib import Path
 from typing import BinaryIO, cast
@@ -35,6 +36,7 @@ MISSING_WORDS = frozenset({"na", "n/a", "null", "none", "nil", "-", "--", "?"})
 _SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "white space"}
 _LATIN = "windwrench-latin-1"  # name of an error handler
 _BUFFER = 2**18  # bytes unpacked at a time
+_DAY_0 = date(1970, 1, 1).toordinal()
 _BLOCK = 20_000  # lines turned into numbers at a time
 _LOOKED_AT = 2**18  # characters in which the layout is found
 _LINES = 600  # of them; what Betaflight's decoder writes before the header has 150
@@ -44,6 +46,10 @@ _LIST = re.compile(  # between separators: numbers in brackets, or nothing
     r'(?:(?<=[,;\t|])|^) {0,9}"?([\[(](?: {0,9}(?:[-+.]?\d|nan)[-+.,; \w]*)?[\])])"?'
     r" {0,9}(?=[,;\t|]|$)",
     re.IGNORECASE,
+)
+_MOMENT = re.compile(  # a date with a time of day, or this alone
+    r"(?:(?P<date>\d{4}[-/]\d\d[-/]\d\d)[T ])?(?P<h>\d\d?):(?P<m>\d\d):(?P<s>\d\d(?:\.\d+)?)"
+    r"(?:Z|[+-]\d\d:?\d\d)?"
 )
 _COMMENT = re.compile(r"^\s*(#|%|//)[#%/ ]*")
 # decimal commas to points; a point beside them may stand for thousands, and is no number's
@@ -57,6 +63,21 @@ _DECIMAL_COMMA = (
 def _items(field: str) -> list[str]:
     """Return the items of a list as people write it, between commas, semicolons or spaces."""
     return re.sub(r"[\[\](),;]", " ", field).split()
+
+
+def _seconds(field: str) -> float | None:
+    """Return the seconds since 1970 of a date, or since midnight of a time of day; None where a
+    field is neither.
+    """
+    found = _MOMENT.fullmatch(field)
+    if found is None:
+        return None
+    day = found["date"]
+    try:
+        days = 0 if day is None else date.fromisoformat(day.replace("/", "-")).toordinal() - _DAY_0
+    except ValueError:  # the 31st of February
+        return None
+    return 86_400.0 * days + 3600.0 * int(found["h"]) + 60.0 * int(found["m"]) + float(found["s"])
 
 
 @dataclass(frozen=True)
@@ -100,8 +121,8 @@ class TextLayout:
         return names
 
     def number(self, field: str) -> float | None:
-        """Return the number in a field, NaN where it is empty, None where it holds something
-        else.
+        """Return the number in a field, the seconds of a date or a time of day, NaN where it is
+        empty, None where it holds something else.
         """
         if not field or field.lower() in MISSING_WORDS:
             return math.nan
@@ -110,7 +131,7 @@ class TextLayout:
         try:
             return float(field.replace("_", "?"))  # Python's numbers may hold underscores
         except ValueError:
-            return None
+            return _seconds(field) if ":" in field else None
 
     def is_blank(self, line: str) -> bool:
         """Return whether a line has no field that holds anything."""

@@ -14,6 +14,7 @@ from ...dynamics.vehicle import Vehicle
 from ...dynamics.vehicle_file import load_vehicle, preset_names
 from ...runtime.errors import InputError, UnreadLogError
 from ..logs.flight_log import FlightLog
+from ..logs.flight_phases import flew
 from ..logs.log_map import MAPS, map_names
 from ..logs.map_guess import Guess, guess_map, map_yaml
 from ..logs.mapped_log import map_table
@@ -42,6 +43,10 @@ class LogCheck:
         seconds = float(self.log.t[-1] - self.log.t[0])
         return f"{len(self.log.t)} rows, {seconds:.1f} s, read by {self.read_by}"
 
+    def what_flew(self) -> list[tuple[str, str, str]]:
+        """Return what is known of the vehicle and its flight: what, its value, what says it."""
+        return [*self.log.flown.rows(), ("flew", *flew(self.log))]
+
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain values."""
         log = self.log
@@ -56,7 +61,7 @@ class LogCheck:
                 for c in self.channels
             },
             "vehicle": log.vehicle or None,
-            "flown": asdict(log.flown),
+            "flown": asdict(log.flown) | dict(zip(("flew", "flew_by"), flew(log), strict=True)),
             "notes": list(log.notes),
             "doubts": list(self.doubts),
             "map": self.map_text or None,
@@ -110,6 +115,9 @@ def check_log(
         for r in (guess.doubts if guess else ())
     ]
     doubts += [note for note in log.notes if note.startswith("warning")]
+    answer, by = flew(log)
+    if not answer.startswith("yes"):
+        doubts.append(f"the log does not show that anything flew: {by}")
     doubts += _doubts(log, vehicle)
     return LogCheck(log, read_by, log_channels(log), tuple(doubts), guess, text)
 
