@@ -18,7 +18,7 @@ columns the log has, with numbers in them.
   one of the log's: one of NaN was lost) or whole (every field of a pose is filled, or all are
   empty; times strictly increase; every row is one of the log's)
 * ``stray_rows``: how many rows at the start are dropped, at most, where a gap follows them
-* ``time``: column (numbers, dates or times of day), unit (s, ms, us, ns, min), nanoseconds (a column
+* ``time``: column (numbers, dates or times of day), unit (s, ms, us, ns, min), nanoseconds (column
   beside one of whole seconds), offset (s; default: the flight begins at 0); or rate_hz alone, where
   the table has no time
 * ``topic`` of any section: the kind of message in which its columns stand, in a log of several
