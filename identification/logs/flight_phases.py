@@ -18,7 +18,7 @@ _WELL_ABOVE = 0.2  # of the typical height
 _CLIMB = 0.1  # m/s: slower is not climbing or sinking
 _CLIMB_WINDOW = 0.25  # s, either side, over which the mean climb rate is taken
 _MOVES = 0.1  # m of way: a vehicle at rest moves by less, whatever the noise of its pose
-_DROVE = 1.0, 0.02  # m of way, over which the height of what flies changes by more than this
+_DROVE = 2.0, 0.003  # m of way, over which the height of what flies changes by more than this
 _TURNS = 0.03  # rad/s, of means over _MEAN: a vehicle at rest turns by less, whatever its vibration
 _MEAN = 0.2  # s
 
@@ -47,14 +47,15 @@ def carrying(total: Array) -> Mask:
 
 def flew(log: FlightLog) -> tuple[str, str]:
     """Return whether a log shows that its vehicle flew, and by what: "no" where the motors never
-    turn, "not shown" where what was measured is that of a vehicle on the ground.
+    turn, "not shown" where what was measured is that of a vehicle on the ground, "unknown" where
+    nothing was measured that tells.
     """
     if log.has_rotor_speeds:
         total = np.square(log.rotor_speeds).sum(axis=1)
     elif log.command is not None:
         total = np.square(np.nan_to_num(log.command)).sum(axis=1)
     else:
-        return "not shown", "neither rotor speeds nor motor commands"
+        return "unknown", "neither rotor speeds nor motor commands"
     if not np.any(total > 0.0):
         return "no", "the motors never turn"
     aloft = carrying(total)
@@ -72,8 +73,8 @@ def flew(log: FlightLog) -> tuple[str, str]:
         means = rates[: len(rates) // count * count].reshape(-1, count, 3).mean(axis=1)
         turns = float(np.std(means, axis=0).max(initial=0.0)) if len(means) else 0.0
         said = f"the motors turn, and the body by {turns:.2g} rad/s"
-        return "not shown" if turns < _TURNS else told, said
-    return "not shown", "the motors turn, and no motion was logged"
+        return "unknown" if turns < _TURNS else told, said
+    return "unknown", "the motors turn, and no motion was logged"
 
 
 class Phase(NamedTuple):

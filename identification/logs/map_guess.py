@@ -264,10 +264,14 @@ class _Guessing:
             for part, first in likely.items():
                 self.say(part, "columns", False, first.why)
                 columns, unit = first.group.columns, first.group.unit
+                most = float(np.max(np.abs(self.numbers.some(columns)), initial=0.0))
                 made: Columns = Columns(columns, unit or "m")
                 if part == "attitude":
                     euler = "zyx" if len(columns) == 3 else ""
-                    made = Attitude(columns, euler and (unit or "rad"), euler=euler)
+                    unit = euler and (unit or ("deg" if most > 2.0 * np.pi else "rad"))
+                    made = Attitude(columns, unit, euler=euler)
+                if made.unit:
+                    self.say(part, "unit", False, f"{made.unit}: values up to {most:.3g}")
                 self.sections[part] = made
         for part in self.further:
             why = rotors_said(self.parts[part].columns, self.further[part])

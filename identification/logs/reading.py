@@ -76,9 +76,8 @@ def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
     """
     check_magnitudes(log)
     vehicle = flown_vehicle(vehicle, log.vehicle)
-    doubts = unit_doubts(log, vehicle)
     log, wrong = check_inertial(log, 9.81 if vehicle is None else vehicle.gravity)
-    doubts += wrong
+    doubts = [*wrong, *unit_doubts(log, vehicle)]
     for doubt in doubts:
         warnings.warn(f"{log.source}: {doubt}", UserWarning, stacklevel=3)
     return replace(log, notes=(*log.notes, *(f"warning: {doubt}" for doubt in doubts)))

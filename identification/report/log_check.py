@@ -116,7 +116,7 @@ def check_log(
     ]
     doubts += [note for note in log.notes if note.startswith("warning")]
     answer, by = flew(log)
-    if not answer.startswith("yes"):
+    if answer in ("no", "not shown"):
         doubts.append(f"the log does not show that anything flew: {by}")
     doubts += _doubts(log, vehicle)
     return LogCheck(log, read_by, log_channels(log), tuple(doubts), guess, text)

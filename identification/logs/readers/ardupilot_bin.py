@@ -27,7 +27,7 @@ from ..flight_log import FlightLog
 from ..log_map import Commands, LogMap, recording_map
 from ..mapped_log import recording_of
 from ..rotor_orders import ORDERS, Order, order_words
-from ..streams import Stream
+from ..streams import MOST_VOLTS, Stream
 from ..table import Array
 from ..what_flew import (
     PLUS,
@@ -77,6 +77,10 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
     log_map, notes = _with_parameters(path, log_map, parameters, vehicle, letter)
     if pulses is not None:
         flown = replace(flown, running=_running(pulses, log_map))
+    volts = messages.get("CURR", {}).get("Volt")
+    if volts is not None and float(np.median(volts)) > MOST_VOLTS:
+        messages["CURR"]["Volt"] = 0.01 * volts
+        notes.append("CURR: hundredths of a volt, as Copter before 3.4 logged them")
     telemetry, telemetry_notes = _telemetry(messages.pop("ESC", {}), parameters)
     notes += telemetry_notes
     columns = {*log_map.wanted, *_PLACE}

@@ -10,7 +10,8 @@ Ground stations turn such a log into text (``.log``): a message a line, its type
 among them, and numbers in whole units.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ BEGINS = (b"\xa3\x95",)
 HOLDS = b"FMT, 128, 89, FMT,"  # of a log as text
 
 WHAT = "an ArduPilot log (DataFlash .BIN)"
+_TEXTS = ("Name", "Message")  # columns, of PARM and MSG
 _FMT, _FMT_LENGTH = 128, 89
 _GATHERED = 10_000  # messages copied at a time
 # types of columns by their letters, those of ``struct`` among them; and what one unit is of
@@ -85,34 +87,33 @@ def _of_text(path: Path, content: bytes, wanted: Collection[str]) -> dict[str, M
     for line in (b"FMT," + lines).splitlines():
         kind, _, rest = line.partition(b",")
         name = kind.decode("ascii", "replace")
-        if name == "FMT":
-            _, _, stated, *columns = rest.decode("ascii", "replace").replace(" ", "").split(",")
-            names.setdefault(stated, columns[1:])
+        if name == "FMT":  # type, length, name, letters, columns
+            stated = rest.decode("ascii", "replace").replace(" ", "").split(",")
+            names.setdefault("".join(stated[2:3]), stated[4:])
         elif name in wanted and name in names:
             values = rest.split(b",", len(names[name]) - 1)
             if len(values) == len(names[name]):
                 rows.setdefault(name, []).append(values)
-    found: dict[str, Messages] = {"MSG": {"Message": np.array(before.splitlines() or [b""])}}
-    for name, values in rows.items():
-        check_count(f"{path}: {name}", len(values), LIMITS.table_rows, "messages")
-        columns = {
-            column: np.char.strip(np.array(texts))
-            for column, texts in zip(names[name], zip(*values, strict=True), strict=True)
+    found: dict[str, Messages] = {}
+    for name, messages in rows.items():
+        check_count(f"{path}: {name}", len(messages), LIMITS.table_rows, "messages")
+        columns = dict(zip(names[name], zip(*messages, strict=True), strict=True))
+        found[name] = {
+            column: np.char.strip(np.array(texts)) if column in _TEXTS else _numbers(texts)
+            for column, texts in columns.items()
         }
-        if name == "MSG":
-            said = [*found["MSG"]["Message"], *columns["Message"]]
-            found["MSG"] = {"Message": np.array(said)}
-        else:
-            found[name] = {column: _numbers(texts) for column, texts in columns.items()}
+    said = found.get("MSG", {}).get("Message", np.empty(0, "S1"))
+    found["MSG"] = {"Message": np.array([*before.splitlines(), *said, b""])}
     return found
 
 
-def _numbers(texts: NDArray[np.bytes_]) -> NDArray[Any]:
-    """Return the numbers (N,) that texts (N,) are; the texts, where one is none."""
-    try:
-        return texts.astype(np.float64)
-    except ValueError:
-        return texts
+def _numbers(texts: Sequence[bytes]) -> NDArray[np.float64]:
+    """Return the numbers (N,) that texts are; NaN where one is none."""
+    found = np.full(len(texts), np.nan)
+    for i, text in enumerate(texts):
+        with suppress(ValueError):
+            found[i] = float(text)
+    return found
 
 
 def _rows(

@@ -86,7 +86,8 @@ def test_a_log_as_text(read, tmp_path):
     """Of old firmware, too, whose outputs have other names; a log without times says so."""
     name, letters, sent = rcou(T)
     sent = {column.replace("C", "Chan"): x for column, x in sent.items()}
-    messages = parm(), *POSE, imu(T), (name, letters, sent)
+    current = "CURR", "Qh", {"TimeUS": micro(T), "Volt": 1600 - np.round(10 * T)}
+    messages = parm(), *POSE, imu(T), current, (name, letters, sent)
     path = tmp_path / "2014-01-01.log"
     path.write_text(dataflash_text(messages) + "\r\nIMU, 11")  # and the last line is cut
     log, binary = read_log(path), read(*messages[:-1], rcou(T))
@@ -94,6 +95,7 @@ def test_a_log_as_text(read, tmp_path):
     np.testing.assert_allclose(log.command, binary.command, atol=1e-9)
     np.testing.assert_allclose(log.position, binary.position, atol=1e-6)
     np.testing.assert_allclose(log.gyro, binary.gyro, atol=1e-6)
+    np.testing.assert_allclose(log.voltage, 16.0 - 0.1 * T, atol=0.01)
     path.write_text(dataflash_text(messages, "ArduPlane V3.4"))
     with pytest.raises(InputError, match=r"MSG 'ArduPlane V3\.4' says a fixed-wing plane"):
         read_log(path)
