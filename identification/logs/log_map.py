@@ -13,10 +13,10 @@ columns the log has, with numbers in them.
 * ``notes``: said of every log
 * ``world``: enu (z up; also nwu, flu), ned (z down; also frd), y_up (motion capture)
 * ``body``: flu (forward, left, up) or frd (forward, right, down)
-* ``rows``: mixed (default: fields may be empty where a channel has no sample), streams (as mixed,
-  and rows that go back in time are left out), messages (as streams, and every row of a position is
-  one of the log's: one of NaN was lost) or whole (every field of a pose is filled, or all are
-  empty; times strictly increase; every row is one of the log's)
+* ``rows``: mixed (default: fields may be empty where a channel has no sample; streams is another
+  word for it), messages (as mixed, and every row of a position is one of the log's: one of NaN was
+  lost) or whole (every field of a pose is filled, or all are empty; times strictly increase; every
+  row is one of the log's)
 * ``stray_rows``: how many rows at the start are dropped, at most, where a gap follows them
 * ``time``: column (numbers, dates or times of day), unit (s, ms, us, ns, min), nanoseconds (column
   beside one of whole seconds), offset (s; default: the flight begins at 0); or rate_hz alone, where

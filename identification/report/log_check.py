@@ -103,7 +103,7 @@ def check_log(
             log = read_log(path, reader, vehicle, log_map, piece)
             read_by, text = f"the map {log_map}", _map_text(log_map)
         elif reader is None and (table := unknown_table(path)) is not None:
-            log, guess = _guessed(table, vehicle)
+            log, guess = _guessed(table, vehicle, piece)
             read_by, text = "a map that was guessed", map_yaml(guess)
         else:
             log = read_log(path, reader, vehicle, piece=piece)
@@ -134,7 +134,7 @@ def _read_by(path: Path, log: FlightLog) -> tuple[str, str]:
     return "this kit's own format", ""
 
 
-def _guessed(table: Table, vehicle: Vehicle | None) -> tuple[FlightLog, Guess]:
+def _guessed(table: Table, vehicle: Vehicle | None, piece: int | None) -> tuple[FlightLog, Guess]:
     guess = guess_map(table, vehicle)
     if vehicle is not None:
         guess = replace(guess, log_map=replace(guess.log_map, vehicle=vehicle.name))
@@ -142,7 +142,7 @@ def _guessed(table: Table, vehicle: Vehicle | None) -> tuple[FlightLog, Guess]:
         raise UnreadLogError(f"{table.path}: {guess.lacks}", map_yaml(guess))
     try:
         with np.errstate(over="ignore", invalid="ignore"):
-            log = map_table(table, guess.log_map, vehicle)
+            log = map_table(table, guess.log_map, vehicle, piece=piece)
         return finished(log, vehicle), guess
     except InputError as refused:
         raise UnreadLogError(str(refused), map_yaml(guess)) from refused

@@ -3,11 +3,11 @@ in the log's notes.
 
 A table needs no code: a file in ``identification/logs/maps/`` that says what its columns mean, and
 its name in ``TABLES``. A reader of another form is a file in this folder with a function
-``read(path, vehicle)`` that returns a FlightLog, and a line in ``READERS``; of a table, it takes
-the open table. It decodes the file into named columns, each group with its clock; a map in
+``read(path, vehicle, piece)`` that returns a FlightLog, and a line in ``READERS``; of a table, it
+takes the open table. It decodes the file into named columns, each group with its clock; a map in
 ``maps/recordings/`` says what they mean. The vehicle, which may be None, turns commands into rotor
-speeds where none were measured; a reader with a ``piece`` reads the part of that number, from 1, of
-a file whose clock started anew or that holds several logs, and the longest by default.
+speeds where none were measured; of a file whose clock started anew or that holds several logs the
+part of the number ``piece`` is read, from 1, and the longest by default.
 
 Which reader a log needs is told from what is in it: the first bytes of a file, or the columns of a
 table. A file's name decides nothing but how a table is packed.

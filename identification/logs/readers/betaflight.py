@@ -60,7 +60,9 @@ def read(
     return _log(path, "betaflight", fields, set(), headers, option, vehicle, notes)
 
 
-def read_table(table: Table, vehicle: Vehicle | None = None, option: str = "") -> FlightLog:
+def read_table(
+    table: Table, vehicle: Vehicle | None = None, option: str = "", piece: int | None = None
+) -> FlightLog:
     """Read a table of blackbox_decode; ``option``: number of the motors' magnet poles, for eRPM.
 
     Raises:
@@ -77,7 +79,8 @@ def read_table(table: Table, vehicle: Vehicle | None = None, option: str = "") -
                 scales[field] = _UNITS[unit]
     read = table.read(list(names.values()))
     fields = {field: scales.get(field, 1.0) * read[name] for field, name in names.items()}
-    return _log(path, "betaflight_csv", fields, {*scales}, {}, option, vehicle, [*table.notes])
+    notes = [*table.notes]
+    return _log(path, "betaflight_csv", fields, {*scales}, {}, option, vehicle, notes, piece)
 
 
 def _log(
@@ -89,6 +92,7 @@ def _log(
     option: str,
     vehicle: Vehicle | None,
     notes: list[str],
+    piece: int | None = None,
 ) -> FlightLog:
     """Return the log of a blackbox's fields (N,), of which those ``stated`` are in the map's units.
 
@@ -130,8 +134,8 @@ def _log(
                 f"{name}: {volts:.4g} V is more than a vehicle's battery has: taken as a tenth, as "
                 "blackbox_decode writes logs of Betaflight before 4.3"
             )
-    recording = recording_of(path, [Samples(t, fields)], log_map, reader, said, flown=flown)
-    return recording.log(vehicle)
+    samples = [Samples(t, fields)]
+    return recording_of(path, samples, log_map, reader, said, piece, flown).log(vehicle)
 
 
 def _range(path: Path, motors: list[Array], headers: Mapping[str, str]) -> tuple[float, float, str]:

@@ -50,7 +50,7 @@ _RUN = 4096  # events looked at together
 _TIMES = {1: ("<u4", 1e-3), 2: ("<u8", 1e-6)}  # of a version: type, and s per unit
 
 
-def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
+def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -> FlightLog:
     """Read an SD-card log; ``vehicle`` turns motor set points into rotor speeds.
 
     Raises:
@@ -92,7 +92,7 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
             "no pose, no gyro and no accelerometer in the log: it shows how the rotors share the "
             "work, and nothing else"
         )
-    return recording_of(path, events, log_map, "crazyflie_sd", notes).log(vehicle)
+    return recording_of(path, events, log_map, "crazyflie_sd", notes, piece).log(vehicle)
 
 
 def _header(path: Path, data: bytes) -> tuple[int, dict[int, Layout], int]:
