@@ -17,7 +17,6 @@ from itertools import permutations, product
 from typing import Any
 
 import numpy as np
-import yaml
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
@@ -48,13 +47,8 @@ from .log_map import (
     Sensor,
     TimeColumn,
 )
-from .magnitudes import (
-    MAGNITUDES,
-    carrying_units,
-    likely_unit,
-    thrust_by_weight,
-    within,
-)
+from .magnitudes import MAGNITUDES, likely_unit, within
+from .motor_units import motor_unit
 from .readings import DECLARED, OTHER, ROTORS, rotations, table_readings
 from .rotor_orders import ORDERS, Order, order_names, order_words
 from .table import Array, Table
@@ -64,16 +58,9 @@ from .table import Array, Table
 class GuessSettings:
     """When a field is certain."""
 
-    rpm: float = 4500.0  # median above which no unit but rpm is left: no propeller turns at that
-    # rate in rad/s
-    fast: float = 2600.0  # median above which rpm is likelier: no hover but a palm-sized vehicle's
-    counts: float = 20_000.0  # median above which rpm may also be a command of 16 bits
     fast_gyro: float = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
     slow_gyro: float = 6.0  # below which 99.5 % of a flight's angular velocities lie in rad/s
     rates: tuple[float, float] = (0.5, 20_000.0)  # Hz of rows, beyond which no name is believed
-    # power by which the specific force grows: of rotor speeds, and from which on of pulses
-    squares: tuple[float, float] = (1.5, 2.5)
-    offset: float = 2.8
 
 
 GUESS = GuessSettings()
@@ -509,120 +496,3 @@ class _Guessing:
         guessed = *likely_unit("battery", middle), f"its median is {middle:.4g}"
         unit = self.unit("battery", group.unit, guessed)
         self.sections["battery"] = Battery(group.columns, unit)
-
-
-def motor_unit(
-    group: Group, values: Array, vehicle: Vehicle | None, power: float = np.nan
-) -> tuple[str, str, bool, str]:
-    """Return whether columns are rotors or commands, their unit, if that is certain, and why: by
-    the first rule that holds. ``power`` is that by which the specific force grows with them; NaN:
-    unknown.
-    """
-    # of a path such as /fmu/out/esc_status/rotor_speed.00 the last word
-    names = " ".join(re.sub(r"^.*/(?=.*[a-z])", "", name.lower()) for name in group.columns)
-    turning = np.abs(values[np.isfinite(values) & (values != 0.0)])
-    if not turning.size:
-        return "commands", "normalised", False, "all are zero"
-    low, middle, high = (float(x) for x in np.quantile(turning, [0.01, 0.5, 1.0]))
-    named = group.unit or next((unit for unit in ("eRPM", "rpm") if unit.lower() in names), "")
-    commanded = any(word in names for word in words()["command_words"])
-    speeds = any(word in names for word in ("omega", "speed", "rotor", "rpm"))
-    speeds |= within(power, GUESS.squares) and not commanded
-    pulses = low >= 850.0 and high <= 2250.0
-    carrying: list[str] = []
-    if vehicle is not None and not commanded:
-        there = values[np.isfinite(values).all(axis=1)]
-        carrying = [
-            u for u in carrying_units(thrust_by_weight(there, vehicle)) if u in UNITS["rotors"]
-        ]
-    # numbers of 1000 to 2000 may be pulses as well, whatever they would carry
-    doubt = "pulses in us" if pulses else "percents" if high <= 100.0 else ""
-    doubt = "" if speeds else doubt
-    by_names, between = "by the columns' names", f"values from {low:.4g} to {high:.4g}"
-    if not np.isnan(power):
-        between += f", and the specific force grows with their power of {power:.2g}"
-    up_to = f"values up to {high:.6g}"
-    carries = f"in it the rotors carry the weight of {vehicle.name if vehicle else ''}"
-    carries += f", though they may be {doubt}" if doubt else ""
-    # by the vehicle's weight a name may be wrong, but poles of eRPM are unknown
-    lifts = len(carrying) == 1 and named in UNITS["rotors"] and named not in ("eRPM", *carrying)
-    rules = (
-        (lifts, "rotors", "".join(carrying), False, f"{carries}, not in {named} as names say"),
-        (named in UNITS["rotors"], "rotors", named, True, by_names),
-        (high <= 1.0, "commands", "normalised", "omega" not in names, up_to),
-        (named in ("us", "percent"), "commands", named, True, by_names),
-        (commanded and pulses, "commands", "us", True, between),
-        (commanded and high <= 100.0, "commands", "percent", False, up_to),
-        (commanded and high <= 65535.0, "commands", "counts", False, up_to),
-        (pulses and power >= GUESS.offset, "commands", "us", True, between),
-        (len(carrying) == 1, "rotors", "".join(carrying), not doubt, carries),
-        (
-            not commanded and middle > GUESS.counts and high <= 65535.5,
-            *("commands", "counts", False),
-            f"{up_to}, which may be 16 bits of a command, or rpm",
-        ),
-        (
-            not commanded and middle > GUESS.rpm,
-            *("rotors", "rpm", True),
-            f"the median is {middle:.5g}, too fast for rad/s",
-        ),
-        (pulses and not speeds, "commands", "us", False, between),
-        (
-            middle > GUESS.fast,
-            *("rotors", "rpm", False),
-            f"the median is {middle:.4g}: few rotors turn as fast in rad/s",
-        ),
-    )
-    otherwise = f"the median is {middle:.4g}; it might be rpm or Hz"
-    return next((rule[1:] for rule in rules if rule[0]), ("rotors", "rad/s", False, otherwise))
-
-
-def map_yaml(guess: Guess) -> str:
-    """Return a guessed map as a YAML file; comments say what is certain, what is a guess, and among
-    which columns to choose where it says ``?``.
-    """
-    m = guess.log_map
-    sections: dict[str, Any] = {"vehicle": m.vehicle} if m.vehicle else {}
-    if m.time.column:
-        sections["time"] = {"column": m.time.column, "unit": m.time.unit}
-        if m.time.nanoseconds:
-            sections["time"]["nanoseconds"] = m.time.nanoseconds
-    sections |= {"world": m.world, "body": m.body}
-    sections |= {name: _fields(part) for name, part in m.sections.items()}
-    lines = ["# A map of this table's columns. What is marked GUESS: check it."]
-    if guess.missing:
-        lines.append(f"# {UNKNOWN}: choose, and write it here. Still missing: {guess.lacks}")
-    for lack in guess.missing:
-        several = [UNKNOWN] * (4 if lack.section in ("attitude", "rotors") else 3)
-        sections[lack.section] = {lack.field: several if lack.field == "columns" else UNKNOWN}
-    for name, value in sections.items():
-        for r in (r for r in guess.reasons if r.section == name):
-            mark = "certain" if r.certain else "GUESS"
-            lines.append(f"# {mark}: {f'{r.field}: ' if r.field else ''}{r.why}")
-        for lack in (lack for lack in guess.missing if lack.section == name):
-            listed = "; ".join(lack.candidates) or "columns of the table"
-            lines.append(f"# choose {name}.{lack.field}: {listed}")
-        flow = False if isinstance(value, str) else None
-        text = yaml.safe_dump(
-            {name: value}, default_flow_style=flow, sort_keys=False, width=1000, allow_unicode=True
-        )
-        lines.append(text.rstrip())
-    if guess.unused:
-        lines.append(f"# columns that are not used: {', '.join(guess.unused)}")
-    return "\n".join(lines) + "\n"
-
-
-def _fields(part: Columns) -> dict[str, Any]:
-    """Return a section as its fields stand in the file: those that are not as usual."""
-    fields = {
-        name: list(value) if isinstance(value, tuple) else value
-        for name, value in vars(part).items()
-        if value not in ("", (), None, False, 1, (0.0, 1.0))
-    }
-    if isinstance(part, Battery):
-        fields = {"column": fields.pop("columns")[0], **fields}
-    if isinstance(part, Rotors | Commands):
-        fields["order"] = [*order_names(part.order), list(part.order)][0]
-    if fields.get("euler"):
-        del fields["order"]  # of a quaternion
-    return fields

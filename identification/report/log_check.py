@@ -16,7 +16,8 @@ from ...runtime.errors import InputError, UnreadLogError
 from ..logs.flight_log import FlightLog
 from ..logs.flight_phases import flew
 from ..logs.log_map import MAPS, map_names
-from ..logs.map_guess import Guess, guess_map, map_yaml
+from ..logs.map_guess import Guess, guess_map
+from ..logs.map_text import map_yaml
 from ..logs.mapped_log import map_table
 from ..logs.reading import finished, read_log, unknown_table
 from ..logs.screening import screen_log
