@@ -275,10 +275,12 @@ def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream
     u = commands.values[np.isfinite(commands.values)]
     if np.mean((u < -0.01) | (u > 1.01)) > _OUTSIDE if u.size else False:
         raw = low + (high - low) * u
+        what, hint = ("", ": state the range in the map")
+        if u.max() < 0.0 and part.topic:  # an autopilot's, which knows its range
+            what, hint = "no motors that turn: ", ""
         raise InputError(
-            f"{path}: columns {', '.join(part.columns)}: values from {raw.min():.6g} to "
-            f"{raw.max():.6g}; expected motor commands from {low:g} to {high:g}: state the range "
-            "in the map"
+            f"{path}: {what}columns {', '.join(part.columns)}: values from {raw.min():.6g} to "
+            f"{raw.max():.6g}; expected motor commands from {low:g} to {high:g}{hint}"
         )
     notes = []
     if not log_map.is_own:

@@ -31,6 +31,7 @@ from . import ardupilot_bin, betaflight, crazyflie_sd, px4_ulog, rosbag
 _HEAD = 4096  # bytes of a file that are looked at
 _LISTED = 8  # entries of a folder that a message lists
 _GZIP = b"\x1f\x8b"
+_MAVLINK = b"\xfe\xfd"  # one of these follows the eight bytes of a telemetry log's first time
 _BAG_FOLDER = ("metadata.yaml", ".db3", ".mcap")  # one of these is in a ROS 2 bag's folder
 
 
@@ -152,6 +153,11 @@ def unknown_content(path: Path) -> InputError:
     if head.startswith(_GZIP):
         return InputError(
             f"{path}: is packed (gzip); expected a table, .csv.gz by name, or the log unpacked"
+        )
+    if len(head) > 8 and head[8] in _MAVLINK and path.suffix.lower() in (".tlog", ".rlog"):
+        return InputError(
+            f"{path}: is telemetry (MAVLink), which has the motors a few times a second; expected "
+            "the log that the vehicle wrote itself (.BIN, .ulg)"
         )
     start = head[:16]
     is_text = all(32 <= byte < 127 or byte in b"\t\r\n" for byte in start)

@@ -105,6 +105,14 @@ def test_a_log_as_text(read, tmp_path):
         read_log(path)
 
 
+def test_motors_that_stand_still(read):
+    """Disarmed outputs lie below the range, which is no reason to state another one."""
+    name, letters, sent = rcou(T)
+    sent = {column: 0.0 * x + 990.0 * ("C" in column) for column, x in sent.items()}
+    with pytest.raises(InputError, match=r"no motors that turn: columns C9, .* from 990 to 990"):
+        read(parm(), *POSE, imu(T), (name, letters, sent | {"TimeUS": micro(T)}))
+
+
 def test_a_slow_pose_beside_a_fast_imu(read):
     log = read(parm(), xkf1(SLOW), att(T), imu(FAST), rcou(T))
     assert len(log.t) > 2000
