@@ -62,7 +62,12 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
             inertial sensors.
     """
     log_map = recording_map("ardupilot")
-    messages, skipped = read_dataflash(path, {*log_map.topics, "PARM", "MSG", "MOT"})
+    messages, skipped = read_dataflash(path, {*log_map.topics, "PARM", "MSG", "MOT", "TIME"})
+    if "StartTime" in messages.pop("TIME", {}):
+        raise InputError(
+            f"{path}: is a PX4 log of before 2016 (sdlog2), which has the same first bytes; "
+            f"expected {WHAT}, or a PX4 log as ULog"
+        )
     parameters = _parameters(messages.pop("PARM", {}))
     flown = _what_flew(parameters, messages.pop("MSG", {}))
     check_flown(path, flown)

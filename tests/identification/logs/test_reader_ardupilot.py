@@ -105,6 +105,11 @@ def test_a_log_as_text(read, tmp_path):
         read_log(path)
 
 
+def test_a_log_of_old_px4_is_named(read):
+    with pytest.raises(InputError, match="is a PX4 log of before 2016"):
+        read(imu(T), ("TIME", "Q", {"StartTime": micro(T)}))
+
+
 def test_motors_that_stand_still(read):
     """Disarmed outputs lie below the range, which is no reason to state another one."""
     name, letters, sent = rcou(T)
