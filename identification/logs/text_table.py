@@ -87,6 +87,7 @@ class TextLayout:
     separator: str = ","  # " ": any white space
     decimal: str = "."  # or ","
     lists: tuple[tuple[int, int], ...] = ()  # fields (from 0) that hold lists, and their lengths
+    moments: tuple[int, ...] = ()  # fields that hold dates or times of day
 
     def opened(self, line: str) -> str:
         """Return a line with the items of its lists as fields; as many empty ones of none."""
@@ -95,6 +96,14 @@ class TextLayout:
             if i < len(fields):
                 fields[i] = self.separator.join(_items(fields[i]) or [""] * count)
         return self.separator.join(fields)
+
+    def timed(self, line: str) -> str:
+        """Return a line with its dates and times of day as seconds."""
+        fields = [] if '"' in line else self.fields(line)
+        for i in (i for i in self.moments if i < len(fields)):
+            if (seconds := _seconds(fields[i])) is not None:
+                fields[i] = repr(seconds).replace(".", self.decimal)
+        return self.separator.join(fields) if fields else line
 
     def fields(self, line: str) -> list[str]:
         """Return the fields of a line, without the space around them; none where its quotation
@@ -186,6 +195,8 @@ def open_text(path: Path) -> Table:
             lines = (line for line in lines if not layout.is_blank(line))
         if layout.lists:
             lines = map(layout.opened, lines)
+        if layout.moments:
+            lines = map(layout.timed, lines)
         kept, done = islice(lines, rows), 0
         while block := list(islice(kept, _BLOCK)):
             columns[:, done : done + len(block)] = _numbers(table, layout, block, done, where).T
@@ -196,6 +207,8 @@ def open_text(path: Path) -> Table:
     units = tuple(layout.fields(between[0])) if len(between) == 1 and not layout.lists else ()
     seen = [layout.fields(layout.opened(line)) for line in written[first:] if line.strip()]
     seen = [fields for fields in seen if len(fields) >= len(names)]
+    moments = [i for i, text in enumerate(seen[0] if seen else ()) if _seconds(text) is not None]
+    layout = replace(layout, moments=tuple(moments))
     numeric = tuple(
         name
         for i, name in enumerate(names)
