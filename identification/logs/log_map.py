@@ -12,7 +12,7 @@ columns the log has, with numbers in them.
 * ``recognise``: columns by which a table of this kind is known without being told
 * ``notes``: said of every log
 * ``world``: enu (z up; also nwu, flu), ned (z down; also frd), y_up (motion capture)
-* ``body``: flu (forward, left, up) or frd (forward, right, down)
+* ``body``: flu (forward, left, up), frd (forward, right, down) or y_up (forward, up, right)
 * ``rows``: mixed (default: fields may be empty where a channel has no sample; streams is another
   word for it), messages (as mixed, and every row of a position is one of the log's: one of NaN was
   lost) or whole (every field of a pose is filled, or all are empty; times strictly increase; every
@@ -77,7 +77,7 @@ OWN_MAP = "windwrench"  # of this kit's own columns
 UNKNOWN = "?"  # what a guessed map leaves to a person to choose
 
 WORLDS = {"enu": "enu", "nwu": "enu", "flu": "enu", "ned": "ned", "frd": "ned", "y_up": "y_up"}
-BODIES = ("flu", "frd")
+BODIES = ("flu", "frd", "y_up")
 # units of each section in the kit's; the first is taken where a section states none. A rotor's of
 # eRPM is divided by the pairs of poles
 UNITS: dict[str, dict[str, float]] = {

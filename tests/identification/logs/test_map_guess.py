@@ -201,6 +201,25 @@ def test_what_a_pilot_or_a_controller_wants_is_no_part(tmp_path: Path, flown: Fl
     assert found.log_map.rotors.columns == ("r1", "r2", "r3", "r4")
 
 
+def test_motion_capture_with_y_up(tmp_path: Path, flown: FlightLog) -> None:
+    """As OptiTrack writes poses: y up in the world and in the body, millimetres, w last."""
+    x, y, z = 1e3 * flown.position.T
+    w, qx, qy, qz = flown.quaternion.T
+    columns = {"Frame": np.arange(len(flown.t)), "Time (Seconds)": flown.t}
+    columns |= {"UAV Rotation X": qx, "UAV Rotation Y": qz, "UAV Rotation Z": -qy}
+    columns |= {"UAV Rotation W": w, "UAV Position X": x}
+    columns |= {"UAV Position Y": z, "UAV Position Z": -y}
+    columns |= {f"w{i}": speed for i, speed in enumerate(flown.rotor_speeds.T, 1)}
+    path = table_of(columns, tmp_path / "a.csv")
+    found = guessed(path, "ardrone2")
+    assert not found.doubts
+    assert (found.log_map.world, found.log_map.body) == ("y_up", "y_up")
+    log = map_table(open_table(path), found.log_map)
+    np.testing.assert_allclose(log.position, flown.position, atol=1e-9)
+    alike = np.abs(np.sum(log.quaternion * flown.quaternion, axis=1))
+    np.testing.assert_allclose(alike, 1.0, atol=1e-9)
+
+
 def test_more_than_four_rotors_that_move_are_refused(tmp_path: Path, flown: FlightLog) -> None:
     columns = columns_of(flown, f"t x y z {_QUATERNION} {_SENSORS} w1 w2 w3 w4")
     rng = np.random.default_rng(0)
