@@ -23,6 +23,7 @@ def compare(
     example: bool = False,
     reader: str | None = None,
     map: str | None = None,
+    piece: int | None = None,
     vehicle: str | None = None,
     out: Path = Path("results/compare"),
 ) -> dict[str, Any]:
@@ -39,28 +40,29 @@ def compare(
             resources.files("windwrench.identification.comparison") / "example"
         ) as flown:
             normal = sorted(flown.glob("normal-*.csv.gz"))
-            return _compare([flown / "cut.csv.gz"], normal, None, None, None, out)
+            return _compare([flown / "cut.csv.gz"], normal, out)
     if not logs or not against:
         raise InputError(
             f"compare: expected logs after the change and {_AGAINST} logs before it, or --example"
         )
-    return _compare(logs, against, reader, map, vehicle, out)
+    return _compare(logs, against, out, reader, vehicle, map, piece)
 
 
 def _compare(
     logs: Sequence[Path],
     against: Sequence[Path],
-    reader: str | None,
-    map: str | None,
-    vehicle: str | None,
     out: Path,
+    reader: str | None = None,
+    vehicle: str | None = None,
+    log_map: str | None = None,
+    piece: int | None = None,
 ) -> dict[str, Any]:
     """Compare two sets of flights; write the result."""
     from ..identification.comparison.change import compare as find_change
     from ..identification.comparison.trim import trim_of_log
     from ..identification.comparison.words import change_data, change_headline, write_change
 
-    every, model = read_flights([*logs, *against], reader, vehicle, map)
+    every, model = read_flights([*logs, *against], reader, vehicle, log_map, piece)
     folder = results_folder(out)
     trims = [trim_of_log(log, model) for log in every]
     change = find_change(trims[: len(logs)], trims[len(logs) :])

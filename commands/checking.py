@@ -62,8 +62,7 @@ def check(
         written.append(write_map)
     flight = found.log
     console.print(f"{flight.name}: {found.sentence()}")
-    if known := flight.flown.rows():
-        show_table(("what flew", "", "by"), known)
+    show_table(("what flew", "", "by"), found.what_flew())
     show_table(
         ("channel", "rate (Hz)", "gaps", "longest (s)", "from", "to", "unit"),
         [

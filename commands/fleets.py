@@ -16,6 +16,7 @@ def fleet(
     vehicle: str | None = None,
     reader: str | None = None,
     map: str | None = None,
+    piece: int | None = None,
     without: list[str] | None = None,
     cluster: str | None = None,
     jobs: int | None = None,
@@ -48,7 +49,7 @@ def fleet(
         load_map(map)
     if cluster is not None:
         need("ray", "cluster")
-    found, doubts = find_logs(logs, manifest, vehicle, reader, out, map)
+    found, doubts = find_logs(logs, manifest, vehicle, reader, out, map, piece)
     folder = results_folder(out, logs=len(found), jobs=jobs, cluster=cluster)
     for text in doubts:
         note(text)

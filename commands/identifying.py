@@ -33,6 +33,7 @@ def identify(
     geometry: str | None = None,
     reader: str | None = None,
     map: str | None = None,
+    piece: int | None = None,
     begin: float = 0.0,
     end: float | None = None,
     test: list[str] | None = None,
@@ -63,7 +64,7 @@ def identify(
     if not common[0] < common[1]:
         raise InputError(f"--to {end:g}: expected a time after --from {begin:g}")
     parts = [parse_window(text) for text in (*logs, *(test or ()))]
-    flights = read_logs([path for path, _ in parts], reader, None, map)
+    flights = read_logs([path for path, _ in parts], reader, None, map, piece)
     flights, unseen = flights[: len(logs)], flights[len(logs) :]
     windows = [w if math.isfinite(w[1]) else common for _, w in parts]
     with working("identifying") as progress:

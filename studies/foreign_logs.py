@@ -11,12 +11,17 @@ from typing import Annotated
 
 import typer
 
+from windwrench.identification.logs.readers import reader_by_content
 from windwrench.identification.report.log_check import check_log
 from windwrench.runtime.errors import InputError
 
 from .runner import start
 
-_KINDS = "ulg", "bin", "bbl", "bfl", "bag", "mcap", "db3", "csv", "csv.gz", "parquet", "mat", "npz"
+# of names; a file of another is a log where a reader knows its first bytes, as those of SD cards
+_KINDS = (
+    *("ulg", "bin", "log", "tlog", "bbl", "bfl", "bag", "mcap", "db3"),
+    *("csv", "csv.gz", "tsv", "parquet", "mat", "npz"),
+)
 ENDINGS = tuple(f".{kind}" for kind in _KINDS)
 SHOWN = 160  # letters of a reason
 
@@ -40,7 +45,8 @@ def study(folder: Annotated[Path, typer.Argument(help="Folder that holds the log
     """Print one line a log of a folder and of those in it, and how many were read."""
     counts: Counter[str] = Counter()
     for path in sorted(folder.rglob("*")):
-        if not path.is_file() or not path.name.lower().endswith(ENDINGS):
+        named = path.name.lower().endswith(ENDINGS)
+        if not path.is_file() or not (named or reader_by_content(path)):
             continue
         begun = time.process_time()
         kind, line = told(path)

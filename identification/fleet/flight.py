@@ -32,7 +32,7 @@ _KEPT = (
 
 def key_of(log: FleetLog, without: tuple[str, ...]) -> str:
     """Return what an outcome depends on, as a digest (32 hexadecimal digits): the log's bytes, the
-    vehicle, the reader or map, the effects that are left out, and the code.
+    vehicle, the reader or map, the piece, the effects that are left out, and the code.
 
     Args:
         log: the log.
@@ -48,6 +48,7 @@ def key_of(log: FleetLog, without: tuple[str, ...]) -> str:
         reader,
         option.read_text(encoding="utf-8", errors="replace") if option.is_file() else "",
         "" if log.map is None else repr(load_map(log.map)),
+        log.piece,
         *sorted(without),
         code_digest(_CODE, (), _NOT_CODE),
     )
@@ -100,7 +101,7 @@ def _read(log: FleetLog) -> tuple[FlightLog, Vehicle]:
         InputError: it cannot be read, or its vehicle is not known.
     """
     model = None if log.vehicle is None else load_vehicle(log.vehicle)
-    flight = read_log(log.path, log.reader, model, log.map)
+    flight = read_log(log.path, log.reader, model, log.map, log.piece)
     if model is not None:
         return flight, model
     if flight.vehicle not in preset_names():

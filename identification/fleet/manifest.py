@@ -10,9 +10,10 @@ log itself. The manifest is YAML::
         vehicle: racer.yaml   # a preset, or a file beside the manifest
         id: alpha             # the individual; default: the log's folder, else the vehicle's name
         reader: nanobench     # or map: map.yaml, for a table of other columns
+        piece: 2              # of a file with several; default: the longest
         time: 2026-03-01T10:00
 
-or CSV with these columns, ``log,vehicle,id,reader,map,time``. The first entry that fits a log
+or CSV with these columns, ``log,vehicle,id,reader,map,piece,time``. The first entry that fits a log
 counts.
 """
 
@@ -55,6 +56,7 @@ class FleetLog:
     id: str = ""  # the individual that flew; empty: the vehicle's name
     reader: str | None = None
     map: str | None = None  # a map's name or file, in place of a reader
+    piece: int | None = None  # which part of the file, from 1
     time: float | None = None  # s; orders the flights of an individual; None: their names do
     key: str = ""  # of its outcome
 
@@ -90,6 +92,7 @@ class ManifestEntry:
     id: str | None = None
     reader: str | None = None
     map: str | None = None  # a map's name or file, in place of a reader
+    piece: int | None = None  # which part of the file, from 1
     time: _Moment | None = None  # s
 
 
@@ -148,6 +151,7 @@ def find_logs(
     reader: str | None = None,
     without: Path | None = None,
     log_map: str | None = None,
+    piece: int | None = None,
 ) -> tuple[list[FleetLog], list[str]]:
     """Return all logs of a fleet, in the order of their names, and a warning of each entry of the
     manifest that fits none.
@@ -159,6 +163,7 @@ def find_logs(
         reader: likewise.
         without: a folder that is left out, the results'.
         log_map: name or file of a map, likewise.
+        piece: which part of a file, likewise.
 
     Raises:
         InputError: there is no such file, there is no log, or a vehicle cannot be used.
@@ -179,6 +184,7 @@ def find_logs(
                 below.parts[0] if below is not None and len(below.parts) > 1 else "",
                 reader,
                 log_map,
+                piece,
                 os.path.getmtime(path) if said.order == "modified" else None,
             )
             name = os.path.relpath(path, above).replace(os.sep, "/")
@@ -259,5 +265,6 @@ def _with_entry(log: FleetLog, entry: ManifestEntry) -> FleetLog:
         id=entry.id or log.id,
         reader=entry.reader or (None if entry.map else log.reader),
         map=entry.map or (None if entry.reader else log.map),
+        piece=entry.piece or log.piece,
         time=log.time if entry.time is None else entry.time,
     )

@@ -17,12 +17,9 @@ from .table import Array, Mask, Rows, Table
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])
 # from the log's world, or its body axes, to the kit's
-WORLD_TURNS: dict[str, Array] = {
-    "enu": np.eye(3),
-    "ned": _HALF_TURN,
-    "y_up": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
-}
-BODY_TURNS: dict[str, Array] = {"flu": np.eye(3), "frd": _HALF_TURN}
+_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+WORLD_TURNS: dict[str, Array] = {"enu": np.eye(3), "ned": _HALF_TURN, "y_up": _Y_UP}
+BODY_TURNS: dict[str, Array] = {"flu": np.eye(3), "frd": _HALF_TURN, "y_up": _Y_UP}
 
 
 @dataclass(frozen=True, eq=False)

@@ -124,7 +124,9 @@ def groups_of(names: Iterable[Name], endings: Sequence[str]) -> list[Group]:
             group = Group(tuple(name.column for name in named), key, unit, tuple(endings))
             if group not in out:
                 out.append(group)
-    return [group for group in out if not re.search(words()["not_measured"], group.key)]
+    wanted = words()["not_measured"]
+    wanted += "" if endings[0].isdigit() else f"|{words()['sticks']}"
+    return [group for group in out if not re.search(wanted, group.key)]
 
 
 def named_alone(names: Sequence[Name], part: str) -> list[Name]:

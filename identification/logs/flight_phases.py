@@ -1,5 +1,5 @@
-"""The phases of a flight, told from its rotors and height: on the ground, take-off, flight and
-landing.
+"""Whether a log shows a flight, and the phases of one, told from its rotors and height: on the
+ground, take-off, flight and landing.
 """
 
 from typing import NamedTuple
@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
+from .flight_log import FlightLog
 from .table import Array, Mask
 
 GROUND, TAKE_OFF, FLIGHT, LANDING = "ground", "take-off", "flight", "landing"
@@ -16,6 +17,10 @@ _CLEARANCE = 0.05  # m above the place of rest: the vehicle is off the ground
 _WELL_ABOVE = 0.2  # of the typical height
 _CLIMB = 0.1  # m/s: slower is not climbing or sinking
 _CLIMB_WINDOW = 0.25  # s, either side, over which the mean climb rate is taken
+_MOVES = 0.1  # m of way: a vehicle at rest moves by less, whatever the noise of its pose
+_DROVE = 2.0, 0.003  # m of way, over which the height of what flies changes by more than this
+_TURNS = 0.03  # rad/s, of means over _MEAN: a vehicle at rest turns by less, whatever its vibration
+_MEAN = 0.2  # s
 
 
 def flying(total: Array) -> Mask:
@@ -38,6 +43,38 @@ def carrying(total: Array) -> Mask:
     their thrust (N,) in any unit: above half of the usual one.
     """
     return np.asarray(total > 0.5 * usual_thrust(total))
+
+
+def flew(log: FlightLog) -> tuple[str, str]:
+    """Return whether a log shows that its vehicle flew, and by what: "no" where the motors never
+    turn, "not shown" where what was measured is that of a vehicle on the ground, "unknown" where
+    nothing was measured that tells.
+    """
+    if log.has_rotor_speeds:
+        total = np.square(log.rotor_speeds).sum(axis=1)
+    elif log.command is not None:
+        total = np.square(np.nan_to_num(log.command)).sum(axis=1)
+    else:
+        return "unknown", "neither rotor speeds nor motor commands"
+    if not np.any(total > 0.0):
+        return "no", "the motors never turn"
+    aloft = carrying(total)
+    told = f"yes, {float(aloft.sum()) * log.period:.3g} s"
+    place = log.position[aloft & np.isfinite(log.position).all(axis=1)]
+    if len(place) > 1:
+        way = np.ptp(np.quantile(place, [0.01, 0.99], axis=0), axis=0)
+        far = float(np.linalg.norm(way))
+        said = f"the motors turn, and the position spans {far:.3g} m, {way[2]:.3g} m of height"
+        drove = float(np.hypot(*way[:2])) > _DROVE[0] and way[2] < _DROVE[1]
+        return "not shown" if far < _MOVES or drove else told, said
+    if log.gyro is not None:
+        rates = log.gyro[aloft & np.isfinite(log.gyro).all(axis=1)]
+        count = max(1, round(_MEAN / log.period))
+        means = rates[: len(rates) // count * count].reshape(-1, count, 3).mean(axis=1)
+        turns = float(np.std(means, axis=0).max(initial=0.0)) if len(means) else 0.0
+        said = f"the motors turn, and the body by {turns:.2g} rad/s"
+        return "unknown" if turns < _TURNS else told, said
+    return "unknown", "the motors turn, and no motion was logged"
 
 
 class Phase(NamedTuple):

@@ -12,14 +12,15 @@ columns the log has, with numbers in them.
 * ``recognise``: columns by which a table of this kind is known without being told
 * ``notes``: said of every log
 * ``world``: enu (z up; also nwu, flu), ned (z down; also frd), y_up (motion capture)
-* ``body``: flu (forward, left, up) or frd (forward, right, down)
-* ``rows``: mixed (default: fields may be empty where a channel has no sample), streams (as mixed,
-  and rows that go back in time are left out), messages (as streams, and every row of a position is
-  one of the log's: one of NaN was lost) or whole (every field of a pose is filled, or all are
-  empty; times strictly increase; every row is one of the log's)
+* ``body``: flu (forward, left, up), frd (forward, right, down) or y_up (forward, up, right)
+* ``rows``: mixed (default: fields may be empty where a channel has no sample; streams is another
+  word for it), messages (as mixed, and every row of a position is one of the log's: one of NaN was
+  lost) or whole (every field of a pose is filled, or all are empty; times strictly increase; every
+  row is one of the log's)
 * ``stray_rows``: how many rows at the start are dropped, at most, where a gap follows them
-* ``time``: column, unit (s, ms, us, ns, min), offset (s; default: the flight begins at 0); or
-  rate_hz alone, where the table has no time
+* ``time``: column (numbers, dates or times of day), unit (s, ms, us, ns, min), nanoseconds (column
+  beside one of whole seconds), offset (s; default: the flight begins at 0); or rate_hz alone, where
+  the table has no time
 * ``topic`` of any section: the kind of message in which its columns stand, in a log of several
 * ``position``: columns (x, y, z), unit (m, mm, cm, ft), held (true: a position that repeats the one
   before is no measurement)
@@ -53,6 +54,7 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import (
     AfterValidator,
     BeforeValidator,
@@ -68,13 +70,14 @@ from ...runtime.forms import STRICT, Number, Positive, checked, expected
 from ...runtime.yaml_file import read_yaml
 from .column_names import unit_spelled
 from .rotor_orders import ORDERS, Order, rotor_order
+from .table import Array
 
 MAPS = Path(__file__).parent / "maps"  # those that ship with the kit
 OWN_MAP = "windwrench"  # of this kit's own columns
 UNKNOWN = "?"  # what a guessed map leaves to a person to choose
 
 WORLDS = {"enu": "enu", "nwu": "enu", "flu": "enu", "ned": "ned", "frd": "ned", "y_up": "y_up"}
-BODIES = ("flu", "frd")
+BODIES = ("flu", "frd", "y_up")
 # units of each section in the kit's; the first is taken where a section states none. A rotor's of
 # eRPM is divided by the pairs of poles
 UNITS: dict[str, dict[str, float]] = {
@@ -180,9 +183,22 @@ class TimeColumn:
 
     column: _Name = ""
     unit: Annotated[str, one_of(UNITS["time"])] = "s"
+    nanoseconds: str = ""  # column, of what is beyond the whole seconds of the other
     offset: Number | None = None  # s, added; None: so that the flight begins at 0
     rate_hz: Positive = 0.0  # of rows, where there is no column
     note: str = ""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The columns that stand in the table."""
+        return tuple(filter(None, (self.column, self.nanoseconds)))
+
+    def raw(self, columns: Mapping[str, Array]) -> Array:
+        """Return times (N,) in its unit."""
+        raw = columns[self.column]
+        if not self.nanoseconds:
+            return raw
+        return np.asarray(raw + 1e-9 / UNITS["time"][self.unit] * columns[self.nanoseconds])
 
 
 @dataclass(frozen=True)
@@ -336,7 +352,7 @@ class LogMap:
         """The columns that the map asks for, each once."""
         parts = [way for section in self.sections for way in self.ways(section)]
         names = [name for part in (*parts, *self.extra.values()) for name in part.named]
-        return [name for name in dict.fromkeys([*names, self.time.column]) if name]
+        return [name for name in dict.fromkeys([*names, *self.time.columns]) if name]
 
     @property
     def topics(self) -> set[str]:

@@ -35,6 +35,7 @@ class Magnitudes:
     flies: tuple[float, float] = (0.2, 5.0)  # its median, beyond which a log is of another vehicle
     doubtful: tuple[float, float] = (0.5, 2.0)  # the same, beyond which it may be
     gravity: tuple[float, float] = (0.85, 1.15)  # specific force by 1 g: the unit is certain
+    fastest_gyro: float = 70.0  # rad/s, the range of the fastest gyros (4000 deg/s)
 
 
 MAGNITUDES = Magnitudes()
@@ -120,6 +121,20 @@ def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
             doubts.append(
                 f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected "
                 f"metres"
+            )
+    if log.accelerometer is not None:
+        size = float(np.nanmedian(np.linalg.norm(log.accelerometer, axis=1)))
+        if within(size, MAGNITUDES.gravity):
+            doubts.append(
+                f"ax, ay, az look like g: their median size is {size:.3g}; expected m/s2: "
+                f"multiply by {UNITS['accelerometer']['g']:g}"
+            )
+    if log.gyro is not None:
+        fast = float(np.nanquantile(np.abs(log.gyro), 0.99))
+        if fast > MAGNITUDES.fastest_gyro:
+            doubts.append(
+                f"gx, gy, gz look like degrees per second: a hundredth is above {fast:.3g}; "
+                f"expected rad/s: multiply by {UNITS['gyro']['deg/s']:.6g}"
             )
     if vehicle is not None and log.has_rotor_speeds:
         doubts.append(rotor_doubt(thrust_by_weight(log.rotor_speeds, vehicle), vehicle))

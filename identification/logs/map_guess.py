@@ -17,7 +17,6 @@ from itertools import permutations, product
 from typing import Any
 
 import numpy as np
-import yaml
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
@@ -48,13 +47,8 @@ from .log_map import (
     Sensor,
     TimeColumn,
 )
-from .magnitudes import (
-    MAGNITUDES,
-    carrying_units,
-    likely_unit,
-    thrust_by_weight,
-    within,
-)
+from .magnitudes import MAGNITUDES, likely_unit, within
+from .motor_units import motor_unit
 from .readings import DECLARED, OTHER, ROTORS, rotations, table_readings
 from .rotor_orders import ORDERS, Order, order_names, order_words
 from .table import Array, Table
@@ -64,15 +58,9 @@ from .table import Array, Table
 class GuessSettings:
     """When a field is certain."""
 
-    rpm: float = 4500.0  # median above which no unit but rpm is left: no propeller turns at that
-    # rate in rad/s
-    counts: float = 20_000.0  # median above which rpm may also be a command of 16 bits
     fast_gyro: float = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
     slow_gyro: float = 6.0  # below which 99.5 % of a flight's angular velocities lie in rad/s
     rates: tuple[float, float] = (0.5, 20_000.0)  # Hz of rows, beyond which no name is believed
-    # power by which the specific force grows: of rotor speeds, and from which on of pulses
-    squares: tuple[float, float] = (1.5, 2.5)
-    offset: float = 2.8
 
 
 GUESS = GuessSettings()
@@ -148,7 +136,7 @@ def guess_map(table: Table, vehicle: Vehicle | None = None, name: str = "guess")
                 find(part)
     missing = tuple(found.missing())
     parts = [part for part in found.sections.values() if isinstance(part, Columns)]
-    used = {found.clock and found.clock.column, *(c for part in parts for c in part.columns)}
+    used = {*found.time_columns, *(c for part in parts for c in part.columns)}
     unused = tuple(column for column in table.header if column not in used)
     found.sections.setdefault("time", TimeColumn(UNKNOWN))
     return Guess(LogMap(**found.sections, name=name), tuple(found.reasons), unused, missing)
@@ -187,6 +175,16 @@ def _time_column(names: Sequence[Name], data: Mapping[str, Array]) -> Name | Non
     return None
 
 
+def _nanoseconds(names: Sequence[Name], clock: Name) -> str:
+    """Return the column of the nanoseconds beside a clock of whole seconds; empty: there is
+    none.
+    """
+    key = re.sub("(^|_)secs?$", "", clock.base)
+    known = words()["nanoseconds"]
+    fine = {f"{key}_{word}".strip("_") for word in known}
+    return next((name.column for name in names if name.base in fine), "")
+
+
 class _Guessing:
     """What was found so far: the columns of each part, the sections of the map, and reasons."""
 
@@ -200,12 +198,13 @@ class _Guessing:
         self.clock = _time_column(names, data)
         self.t = np.asarray(0.01 * np.arange(table.rows), dtype=np.float64)
         if self.clock is not None:
-            self.t = self.time(self.clock, data)
+            self.t = self.time(self.clock, data, _nanoseconds(names, self.clock))
         self.numbers = Numbers(self.t, data)
-        rest = [name for name in names if name is not self.clock]
+        rest = [name for name in names if name.column not in self.time_columns]
         self.ranked = find_parts(rest, self.numbers)
         self.parts = {p: c[0].group for p, c in self.ranked.items() if c and c[0].score > 0.0}
-        if volts := named_alone(rest, "battery"):
+        volts = [name for name in named_alone(rest, "battery") if name.unit != "percent"]
+        if volts:
             self.parts["battery"] = Group((volts[0].column,), volts[0].base, volts[0].unit)
         if not {"position", "attitude"} <= set(self.parts):
             self.parts = {k: v for k, v in self.parts.items() if k not in ("position", "attitude")}
@@ -252,10 +251,14 @@ class _Guessing:
             for part, first in likely.items():
                 self.say(part, "columns", False, first.why)
                 columns, unit = first.group.columns, first.group.unit
+                most = float(np.max(np.abs(self.numbers.some(columns)), initial=0.0))
                 made: Columns = Columns(columns, unit or "m")
                 if part == "attitude":
                     euler = "zyx" if len(columns) == 3 else ""
-                    made = Attitude(columns, euler and (unit or "rad"), euler=euler)
+                    unit = euler and (unit or ("deg" if most > 2.0 * np.pi else "rad"))
+                    made = Attitude(columns, unit, euler=euler)
+                if made.unit:
+                    self.say(part, "unit", False, f"{made.unit}: values up to {most:.3g}")
                 self.sections[part] = made
         for part in self.further:
             why = rotors_said(self.parts[part].columns, self.further[part])
@@ -287,22 +290,27 @@ class _Guessing:
             choice = choice[0], False, f"{choice[2]}, though the columns' names say {named}"
         return self.take(section, "unit", choice)
 
-    def time(self, clock: Name, data: Mapping[str, Array]) -> Array:
+    @property
+    def time_columns(self) -> tuple[str, ...]:
+        """The columns of the time."""
+        return self.sections["time"].columns if "time" in self.sections else ()
+
+    def time(self, clock: Name, data: Mapping[str, Array], nanoseconds: str) -> Array:
         """Find the unit of the time; return times (N,) in s of the middle of a long flight, NaN
         elsewhere.
         """
-        raw = data[clock.column]
+        raw = TimeColumn(clock.column, nanoseconds=nanoseconds).raw(data)
         steps = np.diff(raw[np.isfinite(raw)])
         step = float(np.median(steps[steps > 0.0]))
         guessed, sure = likely_unit("time", step)
         rate = f"{1.0 / max(step * UNITS['time'][guessed], 1e-300):.4g} rows a second"
         if clock.unit in UNITS["time"]:  # an unusual rate is no reason to doubt a name
             sure &= not within(1.0 / max(step * UNITS["time"][clock.unit], 1e-300), GUESS.rates)
-        unit = self.unit("time", clock.unit, (guessed, sure, rate))
+        unit = self.unit("time", "s" if nanoseconds else clock.unit, (guessed, sure, rate))
         t = np.asarray((raw - raw[np.isfinite(raw)][0]) * UNITS["time"][unit])
         middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
         t[~(np.abs(t - middle) <= 0.5 * LONGEST)] = np.nan
-        self.sections["time"] = TimeColumn(clock.column, unit)
+        self.sections["time"] = TimeColumn(clock.column, unit, nanoseconds)
         return t
 
     def by_motion(self, prop: str) -> _Choice:
@@ -488,113 +496,3 @@ class _Guessing:
         guessed = *likely_unit("battery", middle), f"its median is {middle:.4g}"
         unit = self.unit("battery", group.unit, guessed)
         self.sections["battery"] = Battery(group.columns, unit)
-
-
-def motor_unit(
-    group: Group, values: Array, vehicle: Vehicle | None, power: float = np.nan
-) -> tuple[str, str, bool, str]:
-    """Return whether columns are rotors or commands, their unit, if that is certain, and why: by
-    the first rule that holds. ``power`` is that by which the specific force grows with them; NaN:
-    unknown.
-    """
-    # of a path such as /fmu/out/esc_status/rotor_speed.00 the last word
-    names = " ".join(re.sub(r"^.*/(?=.*[a-z])", "", name.lower()) for name in group.columns)
-    turning = np.abs(values[np.isfinite(values) & (values != 0.0)])
-    if not turning.size:
-        return "commands", "normalised", False, "all are zero"
-    low, middle, high = (float(x) for x in np.quantile(turning, [0.01, 0.5, 1.0]))
-    named = group.unit or next((unit for unit in ("eRPM", "rpm") if unit.lower() in names), "")
-    commanded = any(word in names for word in words()["command_words"])
-    speeds = any(word in names for word in ("omega", "speed", "rotor", "rpm"))
-    speeds |= within(power, GUESS.squares) and not commanded
-    pulses = low >= 850.0 and high <= 2250.0
-    carrying: list[str] = []
-    if vehicle is not None and not commanded:
-        there = values[np.isfinite(values).all(axis=1)]
-        carrying = [
-            u for u in carrying_units(thrust_by_weight(there, vehicle)) if u in UNITS["rotors"]
-        ]
-    # numbers of 1000 to 2000 may be pulses as well, whatever they would carry
-    doubt = "pulses in us" if pulses else "percents" if high <= 100.0 else ""
-    doubt = "" if speeds else doubt
-    by_names, between = "by the columns' names", f"values from {low:.4g} to {high:.4g}"
-    if not np.isnan(power):
-        between += f", and the specific force grows with their power of {power:.2g}"
-    up_to = f"values up to {high:.6g}"
-    carries = f"in it the rotors carry the weight of {vehicle.name if vehicle else ''}"
-    carries += f", though they may be {doubt}" if doubt else ""
-    # by the vehicle's weight a name may be wrong, but poles of eRPM are unknown
-    lifts = len(carrying) == 1 and named in UNITS["rotors"] and named not in ("eRPM", *carrying)
-    rules = (
-        (lifts, "rotors", "".join(carrying), False, f"{carries}, not in {named} as names say"),
-        (named in UNITS["rotors"], "rotors", named, True, by_names),
-        (high <= 1.0, "commands", "normalised", "omega" not in names, up_to),
-        (named in ("us", "percent"), "commands", named, True, by_names),
-        (commanded and pulses, "commands", "us", True, between),
-        (commanded and high <= 100.0, "commands", "percent", False, up_to),
-        (commanded and high <= 65535.0, "commands", "counts", False, up_to),
-        (pulses and power >= GUESS.offset, "commands", "us", True, between),
-        (len(carrying) == 1, "rotors", "".join(carrying), not doubt, carries),
-        (
-            not commanded and middle > GUESS.counts and high <= 65535.5,
-            *("commands", "counts", False),
-            f"{up_to}, which may be 16 bits of a command, or rpm",
-        ),
-        (
-            not commanded and middle > GUESS.rpm,
-            *("rotors", "rpm", True),
-            f"the median is {middle:.5g}, too fast for rad/s",
-        ),
-        (pulses and not speeds, "commands", "us", False, between),
-    )
-    otherwise = f"the median is {middle:.4g}; it might be rpm or Hz"
-    return next((rule[1:] for rule in rules if rule[0]), ("rotors", "rad/s", False, otherwise))
-
-
-def map_yaml(guess: Guess) -> str:
-    """Return a guessed map as a YAML file; comments say what is certain, what is a guess, and among
-    which columns to choose where it says ``?``.
-    """
-    m = guess.log_map
-    sections: dict[str, Any] = {"vehicle": m.vehicle} if m.vehicle else {}
-    if m.time.column:
-        sections["time"] = {"column": m.time.column, "unit": m.time.unit}
-    sections |= {"world": m.world, "body": m.body}
-    sections |= {name: _fields(part) for name, part in m.sections.items()}
-    lines = ["# A map of this table's columns. What is marked GUESS: check it."]
-    if guess.missing:
-        lines.append(f"# {UNKNOWN}: choose, and write it here. Still missing: {guess.lacks}")
-    for lack in guess.missing:
-        several = [UNKNOWN] * (4 if lack.section in ("attitude", "rotors") else 3)
-        sections[lack.section] = {lack.field: several if lack.field == "columns" else UNKNOWN}
-    for name, value in sections.items():
-        for r in (r for r in guess.reasons if r.section == name):
-            mark = "certain" if r.certain else "GUESS"
-            lines.append(f"# {mark}: {f'{r.field}: ' if r.field else ''}{r.why}")
-        for lack in (lack for lack in guess.missing if lack.section == name):
-            listed = "; ".join(lack.candidates) or "columns of the table"
-            lines.append(f"# choose {name}.{lack.field}: {listed}")
-        flow = False if isinstance(value, str) else None
-        text = yaml.safe_dump(
-            {name: value}, default_flow_style=flow, sort_keys=False, width=1000, allow_unicode=True
-        )
-        lines.append(text.rstrip())
-    if guess.unused:
-        lines.append(f"# columns that are not used: {', '.join(guess.unused)}")
-    return "\n".join(lines) + "\n"
-
-
-def _fields(part: Columns) -> dict[str, Any]:
-    """Return a section as its fields stand in the file: those that are not as usual."""
-    fields = {
-        name: list(value) if isinstance(value, tuple) else value
-        for name, value in vars(part).items()
-        if value not in ("", (), None, False, 1, (0.0, 1.0))
-    }
-    if isinstance(part, Battery):
-        fields = {"column": fields.pop("columns")[0], **fields}
-    if isinstance(part, Rotors | Commands):
-        fields["order"] = [*order_names(part.order), list(part.order)][0]
-    if fields.get("euler"):
-        del fields["order"]  # of a quaternion
-    return fields

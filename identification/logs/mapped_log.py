@@ -50,7 +50,11 @@ _OUTSIDE = 0.5  # share of commands beyond their range from which on the range i
 
 
 def map_table(
-    table: Table, log_map: LogMap, vehicle: Vehicle | None = None, reader: str = ""
+    table: Table,
+    log_map: LogMap,
+    vehicle: Vehicle | None = None,
+    reader: str = "",
+    piece: int | None = None,
 ) -> FlightLog:
     """Return the flight log that a map makes of a table.
 
@@ -60,6 +64,7 @@ def map_table(
         vehicle: that flew, to turn commands into rotor speeds; None: the map's, where that comes
             with the kit.
         reader: name of the reader that the map serves.
+        piece: as of ``recording_of``.
 
     Raises:
         InputError: the map does not fit the table, or a number is none that a flight has; the
@@ -78,7 +83,7 @@ def map_table(
     notes = [*table.notes, *log_map.notes, *([log_map.time.note] if log_map.time.note else [])]
     if not log_map.is_own or log_map.rows == "mixed":
         notes.insert(0, f"columns: by the map {log_map.name}")
-    samples, words = rows_of(table, columns, log_map)
+    samples, words = rows_of(table, columns, log_map, piece)
     log_map, _ = chosen([samples], log_map)
     notes += [*words, *check_rows(samples, log_map)]
     return recording_of(table.path, [samples], log_map, reader, notes).log(vehicle)
@@ -270,10 +275,12 @@ def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream
     u = commands.values[np.isfinite(commands.values)]
     if np.mean((u < -0.01) | (u > 1.01)) > _OUTSIDE if u.size else False:
         raw = low + (high - low) * u
+        what, hint = ("", ": state the range in the map")
+        if u.max() < 0.0 and part.topic:  # an autopilot's, which knows its range
+            what, hint = "no motors that turn: ", ""
         raise InputError(
-            f"{path}: columns {', '.join(part.columns)}: values from {raw.min():.6g} to "
-            f"{raw.max():.6g}; expected motor commands from {low:g} to {high:g}: state the range "
-            "in the map"
+            f"{path}: {what}columns {', '.join(part.columns)}: values from {raw.min():.6g} to "
+            f"{raw.max():.6g}; expected motor commands from {low:g} to {high:g}{hint}"
         )
     notes = []
     if not log_map.is_own:
@@ -299,7 +306,7 @@ def fitted(table: Table, log_map: LogMap, vehicle: Vehicle | None, reader: str) 
     """
     header = set(table.header)
     where = f"{table.path}: map {log_map.name}"
-    clocks: list[TimeColumn] = [c for c in log_map.ways("time") if c.column in {*header, ""}]
+    clocks: list[TimeColumn] = [c for c in log_map.ways("time") if header.issuperset(c.columns)]
     missing = [] if clocks else [(log_map.time.column, "time")]
     kept: dict[str, Any] = {"time": clocks[0] if clocks else log_map.time}
     others: dict[str, tuple[Columns, ...]] = {}

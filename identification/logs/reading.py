@@ -5,14 +5,12 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from inspect import signature
 from pathlib import Path
 
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from .clocks import check_piece
 from .commanded_speeds import flown_vehicle
 from .flight_log import ACCELEROMETER, COMMANDS, GYRO, POSE, REQUIRED, ROTORS, FlightLog
 from .inertial import check_inertial
@@ -76,9 +74,8 @@ def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
     """
     check_magnitudes(log)
     vehicle = flown_vehicle(vehicle, log.vehicle)
-    doubts = unit_doubts(log, vehicle)
     log, wrong = check_inertial(log, 9.81 if vehicle is None else vehicle.gravity)
-    doubts += wrong
+    doubts = [*wrong, *unit_doubts(log, vehicle)]
     for doubt in doubts:
         warnings.warn(f"{log.source}: {doubt}", UserWarning, stacklevel=3)
     return replace(log, notes=(*log.notes, *(f"warning: {doubt}" for doubt in doubts)))
@@ -118,30 +115,27 @@ def _read(
     if map is not None:
         if reader is not None:
             raise InputError(f"{path}: both a reader and a map; expected one of them")
-        return map_table(open_table(path), load_map(map), vehicle)
+        return map_table(open_table(path), load_map(map), vehicle, piece=piece)
     chosen = reader_by_content(path) if reader is None else find_reader(reader)
-    if chosen is not None and "piece" in signature(chosen.read).parameters:
-        return chosen.read(path, vehicle, piece=piece)
-    check_piece(path, piece, 1)
     if chosen is not None and not chosen.signature:
-        return chosen.read(path, vehicle)
+        return chosen.read(path, vehicle, piece=piece)
     if chosen is None and not is_table(path):
         raise unknown_content(path)
     table = open_table(path)
     if chosen is None and is_own(table.header):
-        return map_table(table, load_map(OWN_MAP), vehicle)
+        return map_table(table, load_map(OWN_MAP), vehicle, piece=piece)
     chosen = chosen or reader_by_columns(path, table.header)
     if chosen is not None:
         if missing := [name for name in chosen.signature if name not in table.header]:
             raise InputError(
                 f"{path}: missing column(s) {', '.join(missing)}; expected those of {chosen.what}"
             )
-        return chosen.read(table, vehicle=vehicle)
+        return chosen.read(table, vehicle=vehicle, piece=piece)
     from .map_guess import guess_map  # the guess is dear, and few logs need it
 
     guess = guess_map(table, vehicle)
     if not guess.missing and not guess.doubts:
-        log = map_table(table, guess.log_map, vehicle)
+        log = map_table(table, guess.log_map, vehicle, piece=piece)
         said = "columns: by a map that was guessed without a doubt; windwrench check shows it"
         return replace(log, notes=(said, *log.notes))
     known = ", ".join(f"{r.name} ({r.signature[0]} ...)" for r in table_readers())

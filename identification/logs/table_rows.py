@@ -12,6 +12,7 @@ import numpy as np
 
 from ...runtime.errors import InputError
 from .channels import Samples
+from .clocks import check_piece, on_one_clock
 from .log_map import UNITS, Columns, LogMap
 from .table import Array, Mask, Rows, Table
 
@@ -21,18 +22,19 @@ _STRAY_GAP = 5.0  # median time steps; shorter gaps leave no stray rows
 _LONGEST_GAP = 0.06
 LONGEST_STEPS = 3.5
 _FINITE = "a finite number"
+_BACK = 0.2  # share of the steps that go back, above which times are none
 _DENSE = 0.5  # share of the rows from which on a channel counts as one of every row
 _FEWEST = 10  # samples of a channel that tell in which rows it stands
 
 
 def rows_of(
-    table: Table, columns: Mapping[str, Array], log_map: LogMap
+    table: Table, columns: Mapping[str, Array], log_map: LogMap, piece: int | None = None
 ) -> tuple[Samples, list[str]]:
     """Return what the map's columns hold, in the order of time, and notes.
 
     Raises:
-        InputError: times go back, cannot be told apart, or are fewer than two; or, of whole rows, a
-            row lacks a number.
+        InputError: many times go back, they cannot be told apart, or are fewer than two; of whole
+            rows, one goes back, or a row lacks a number; or there is no such piece (``clocks``).
     """
     clock, is_whole = log_map.time, log_map.rows == "whole"
     notes = []
@@ -44,7 +46,7 @@ def rows_of(
         t = rows / clock.rate_hz + (clock.offset or 0.0)
         notes.append(f"time: rows at {clock.rate_hz:g} Hz, as the map says")
         return Samples(t, columns, table=table, rows=rows), notes
-    samples = Samples(columns[clock.column], columns, table=table, rows=rows)
+    samples = Samples(clock.raw(columns), columns, table=table, rows=rows)
     if is_whole:
         _refuse(samples, clock.column, samples.t, ~np.isfinite(samples.t))
     samples = samples.cut(np.isfinite(samples.t))
@@ -54,14 +56,10 @@ def rows_of(
         raise InputError(
             f"{table.path}: column {clock.column}: {len(samples.t)} time(s); expected at least two"
         )
-    early = samples.t < np.maximum.accumulate(samples.t)
-    if log_map.rows == "streams" and early.any():
-        notes.append(f"{int(early.sum())} row(s) go back in time and were left out")
-        samples = samples.cut(~early)
     raw = samples.t
     step = np.diff(raw)
     back = np.flatnonzero(step <= 0.0 if is_whole else step < 0.0)
-    if back.size:
+    if back.size and (is_whole or back.size > _BACK * len(step)):
         i, unit = int(back[0]), clock.unit
         raise InputError(
             f"{table.path}: column {clock.column}, {samples.place(i + 1)}: {raw[i + 1]:.9g} {unit} "
@@ -77,6 +75,7 @@ def rows_of(
         )
     samples = replace(samples, t=t)
     if is_whole:
+        check_piece(table.path, piece, 1)
         _check_whole(samples, log_map)
         stray, words = _stray_rows(t, log_map.stray_rows)
         return samples.cut(slice(stray, None)), notes + words
@@ -85,7 +84,8 @@ def rows_of(
         notes.append(f"{len(t) - len(first)} row(s) repeat a time and were joined to the one row")
         joined = {name: _last_of(column, first) for name, column in samples.columns.items()}
         samples = replace(samples.cut(np.append(first[1:], len(t)) - 1), columns=joined)
-    return samples, notes
+    (samples,), words = on_one_clock(table.path, [samples], piece)
+    return samples, notes + words
 
 
 def _refuse(samples: Samples, name: str, column: Array, bad: Mask, expected: str = _FINITE) -> None:

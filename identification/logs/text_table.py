@@ -16,6 +16,7 @@ import zlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from datetime import date
 from itertools import islice
 from pathlib import Path
 from typing import BinaryIO, cast
@@ -35,6 +36,7 @@ MISSING_WORDS = frozenset({"na", "n/a", "null", "none", "nil", "-", "--", "?"})
 _SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "white space"}
 _LATIN = "windwrench-latin-1"  # name of an error handler
 _BUFFER = 2**18  # bytes unpacked at a time
+_DAY_0 = date(1970, 1, 1).toordinal()
 _BLOCK = 20_000  # lines turned into numbers at a time
 _LOOKED_AT = 2**18  # characters in which the layout is found
 _LINES = 600  # of them; what Betaflight's decoder writes before the header has 150
@@ -44,6 +46,10 @@ _LIST = re.compile(  # between separators: numbers in brackets, or nothing
     r'(?:(?<=[,;\t|])|^) {0,9}"?([\[(](?: {0,9}(?:[-+.]?\d|nan)[-+.,; \w]*)?[\])])"?'
     r" {0,9}(?=[,;\t|]|$)",
     re.IGNORECASE,
+)
+_MOMENT = re.compile(  # a date with a time of day, or this alone
+    r"(?:(?P<date>\d{4}[-/]\d\d[-/]\d\d)[T ])?(?P<h>\d\d?):(?P<m>\d\d):(?P<s>\d\d(?:\.\d+)?)"
+    r"(?:Z|[+-]\d\d:?\d\d)?"
 )
 _COMMENT = re.compile(r"^\s*(#|%|//)[#%/ ]*")
 # decimal commas to points; a point beside them may stand for thousands, and is no number's
@@ -59,6 +65,21 @@ def _items(field: str) -> list[str]:
     return re.sub(r"[\[\](),;]", " ", field).split()
 
 
+def _seconds(field: str) -> float | None:
+    """Return the seconds since 1970 of a date, or since midnight of a time of day; None where a
+    field is neither.
+    """
+    found = _MOMENT.fullmatch(field)
+    if found is None:
+        return None
+    day = found["date"]
+    try:
+        days = 0 if day is None else date.fromisoformat(day.replace("/", "-")).toordinal() - _DAY_0
+    except ValueError:  # the 31st of February
+        return None
+    return 86_400.0 * days + 3600.0 * int(found["h"]) + 60.0 * int(found["m"]) + float(found["s"])
+
+
 @dataclass(frozen=True)
 class TextLayout:
     """How the lines of a text table are written."""
@@ -66,6 +87,7 @@ class TextLayout:
     separator: str = ","  # " ": any white space
     decimal: str = "."  # or ","
     lists: tuple[tuple[int, int], ...] = ()  # fields (from 0) that hold lists, and their lengths
+    moments: tuple[int, ...] = ()  # fields that hold dates or times of day
 
     def opened(self, line: str) -> str:
         """Return a line with the items of its lists as fields; as many empty ones of none."""
@@ -74,6 +96,14 @@ class TextLayout:
             if i < len(fields):
                 fields[i] = self.separator.join(_items(fields[i]) or [""] * count)
         return self.separator.join(fields)
+
+    def timed(self, line: str) -> str:
+        """Return a line with its dates and times of day as seconds."""
+        fields = [] if '"' in line else self.fields(line)
+        for i in (i for i in self.moments if i < len(fields)):
+            if (seconds := _seconds(fields[i])) is not None:
+                fields[i] = repr(seconds).replace(".", self.decimal)
+        return self.separator.join(fields) if fields else line
 
     def fields(self, line: str) -> list[str]:
         """Return the fields of a line, without the space around them; none where its quotation
@@ -100,8 +130,8 @@ class TextLayout:
         return names
 
     def number(self, field: str) -> float | None:
-        """Return the number in a field, NaN where it is empty, None where it holds something
-        else.
+        """Return the number in a field, the seconds of a date or a time of day, NaN where it is
+        empty, None where it holds something else.
         """
         if not field or field.lower() in MISSING_WORDS:
             return math.nan
@@ -110,7 +140,7 @@ class TextLayout:
         try:
             return float(field.replace("_", "?"))  # Python's numbers may hold underscores
         except ValueError:
-            return None
+            return _seconds(field) if ":" in field else None
 
     def is_blank(self, line: str) -> bool:
         """Return whether a line has no field that holds anything."""
@@ -165,6 +195,8 @@ def open_text(path: Path) -> Table:
             lines = (line for line in lines if not layout.is_blank(line))
         if layout.lists:
             lines = map(layout.opened, lines)
+        if layout.moments:
+            lines = map(layout.timed, lines)
         kept, done = islice(lines, rows), 0
         while block := list(islice(kept, _BLOCK)):
             columns[:, done : done + len(block)] = _numbers(table, layout, block, done, where).T
@@ -175,6 +207,8 @@ def open_text(path: Path) -> Table:
     units = tuple(layout.fields(between[0])) if len(between) == 1 and not layout.lists else ()
     seen = [layout.fields(layout.opened(line)) for line in written[first:] if line.strip()]
     seen = [fields for fields in seen if len(fields) >= len(names)]
+    moments = [i for i, text in enumerate(seen[0] if seen else ()) if _seconds(text) is not None]
+    layout = replace(layout, moments=tuple(moments))
     numeric = tuple(
         name
         for i, name in enumerate(names)

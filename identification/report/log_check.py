@@ -14,8 +14,10 @@ from ...dynamics.vehicle import Vehicle
 from ...dynamics.vehicle_file import load_vehicle, preset_names
 from ...runtime.errors import InputError, UnreadLogError
 from ..logs.flight_log import FlightLog
+from ..logs.flight_phases import flew
 from ..logs.log_map import MAPS, map_names
-from ..logs.map_guess import Guess, guess_map, map_yaml
+from ..logs.map_guess import Guess, guess_map
+from ..logs.map_text import map_yaml
 from ..logs.mapped_log import map_table
 from ..logs.reading import finished, read_log, unknown_table
 from ..logs.screening import screen_log
@@ -42,6 +44,10 @@ class LogCheck:
         seconds = float(self.log.t[-1] - self.log.t[0])
         return f"{len(self.log.t)} rows, {seconds:.1f} s, read by {self.read_by}"
 
+    def what_flew(self) -> list[tuple[str, str, str]]:
+        """Return what is known of the vehicle and its flight: what, its value, what says it."""
+        return [*self.log.flown.rows(), ("flew", *flew(self.log))]
+
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain values."""
         log = self.log
@@ -56,7 +62,7 @@ class LogCheck:
                 for c in self.channels
             },
             "vehicle": log.vehicle or None,
-            "flown": asdict(log.flown),
+            "flown": asdict(log.flown) | dict(zip(("flew", "flew_by"), flew(log), strict=True)),
             "notes": list(log.notes),
             "doubts": list(self.doubts),
             "map": self.map_text or None,
@@ -98,7 +104,7 @@ def check_log(
             log = read_log(path, reader, vehicle, log_map, piece)
             read_by, text = f"the map {log_map}", _map_text(log_map)
         elif reader is None and (table := unknown_table(path)) is not None:
-            log, guess = _guessed(table, vehicle)
+            log, guess = _guessed(table, vehicle, piece)
             read_by, text = "a map that was guessed", map_yaml(guess)
         else:
             log = read_log(path, reader, vehicle, piece=piece)
@@ -110,6 +116,9 @@ def check_log(
         for r in (guess.doubts if guess else ())
     ]
     doubts += [note for note in log.notes if note.startswith("warning")]
+    answer, by = flew(log)
+    if answer in ("no", "not shown"):
+        doubts.append(f"the log does not show that anything flew: {by}")
     doubts += _doubts(log, vehicle)
     return LogCheck(log, read_by, log_channels(log), tuple(doubts), guess, text)
 
@@ -126,7 +135,7 @@ def _read_by(path: Path, log: FlightLog) -> tuple[str, str]:
     return "this kit's own format", ""
 
 
-def _guessed(table: Table, vehicle: Vehicle | None) -> tuple[FlightLog, Guess]:
+def _guessed(table: Table, vehicle: Vehicle | None, piece: int | None) -> tuple[FlightLog, Guess]:
     guess = guess_map(table, vehicle)
     if vehicle is not None:
         guess = replace(guess, log_map=replace(guess.log_map, vehicle=vehicle.name))
@@ -134,7 +143,7 @@ def _guessed(table: Table, vehicle: Vehicle | None) -> tuple[FlightLog, Guess]:
         raise UnreadLogError(f"{table.path}: {guess.lacks}", map_yaml(guess))
     try:
         with np.errstate(over="ignore", invalid="ignore"):
-            log = map_table(table, guess.log_map, vehicle)
+            log = map_table(table, guess.log_map, vehicle, piece=piece)
         return finished(log, vehicle), guess
     except InputError as refused:
         raise UnreadLogError(str(refused), map_yaml(guess)) from refused

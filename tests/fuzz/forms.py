@@ -25,10 +25,19 @@ from tests.fuzz.spoiling import Draw, places, spoiled_bytes, spoiled_table, spoi
 from tests.support.blackbox_writer import blackbox
 from tests.support.blackbox_writer import flight as blackbox_rows
 from tests.support.converted_flights import write_bag
-from tests.support.dataflash_writer import dataflash, imu, micro, parm, rcou, xkf1, xkq
+from tests.support.dataflash_writer import (
+    dataflash,
+    dataflash_text,
+    imu,
+    micro,
+    parm,
+    rcou,
+    xkf1,
+    xkq,
+)
 from tests.support.map_tables import hover_columns, table_text, vehicle_of
 from tests.support.paths import ROOT
-from tests.support.sd_card_writer import sd_card
+from tests.support.sd_card_writer import sd_card, sd_card_before_2021
 from tests.support.ulog_writer import battery, control, esc, odometry, sensor_combined, ulog_bytes
 from windwrench.controllers import make_controller
 from windwrench.controllers.features import Features
@@ -316,11 +325,20 @@ def _ulog() -> bytes:
     return ulog_bytes(topics, {"THR_MDL_FAC": 0.3, "CA_ROTOR_COUNT": 4})
 
 
-@cache
-def _dataflash() -> bytes:
+def _dataflash_messages() -> list[Any]:
     t = 10.0 + _times()
     volts = {"TimeUS": micro(t), "Inst": 0.0 * t, "Volt": 0.0 * t + 11.1}
-    return dataflash([parm(), xkf1(t), xkq(t), imu(t), rcou(t), ("BAT", "QBf", volts)])
+    return [parm(), xkf1(t), xkq(t), imu(t), rcou(t), ("BAT", "QBf", volts)]
+
+
+@cache
+def _dataflash() -> bytes:
+    return dataflash(_dataflash_messages())
+
+
+@cache
+def _dataflash_text() -> bytes:
+    return dataflash_text(_dataflash_messages()).encode()
 
 
 @cache
@@ -328,16 +346,24 @@ def _blackbox() -> bytes:
     return blackbox(blackbox_rows(_COUNT))
 
 
-@cache
-def _sd_card() -> bytes:
+def _sd_card_variables() -> dict[str, Array]:
     columns = hover_columns("cflib", _COUNT, _PERIOD)
     del columns["timestamp"]  # each event has its own
-    variables = {
+    return {
         f"{name}({'H' if name.startswith('motor.') else 'f'})": np.broadcast_to(values, _COUNT)
         for name, values in columns.items()
         if not name.startswith("rpm.")
     }
-    return sd_card({"fixedFrequency": (30.0 + _times(), variables)})
+
+
+@cache
+def _sd_card() -> bytes:
+    return sd_card({"fixedFrequency": (30.0 + _times(), _sd_card_variables())})
+
+
+@cache
+def _old_sd_card() -> bytes:
+    return sd_card_before_2021(30.0 + _times(), _sd_card_variables())
 
 
 def _zipped(spoiled: Way) -> Way:
@@ -407,8 +433,10 @@ def forms() -> dict[str, Form]:
         ),
         log("betaflight_csv", "log.csv", _betaflight_table, _CELLS),
         log("ardupilot_bin", "log.BIN", _dataflash, _BYTES, "ardupilot_bin"),
+        log("ardupilot_bin, text", "flight.log", _dataflash_text, _WORDS, "ardupilot_bin"),
         log("betaflight", "log.bbl", _blackbox, _BYTES, "betaflight"),
         log("crazyflie_sd", "log00", _sd_card, _BYTES, "crazyflie_sd", "crazyflie"),
+        log("crazyflie_sd, old", "log01", _old_sd_card, _BYTES, "crazyflie_sd", "crazyflie"),
         Form("vehicle", "v.yaml", _preset, _WORDS, _use_vehicle, flown),
         Form("vehicle with effects", "v.yaml", _effects_of_vehicle, _WORDS, _use_vehicle, flown),
         Form(

@@ -43,6 +43,20 @@ def dataflash(
     return b"".join(out)
 
 
+def dataflash_text(
+    messages: Sequence[tuple[str, str, Mapping[str, Sequence[float | bytes]]]],
+    first: str = "ArduCopter V3.4",
+) -> str:
+    """Return the same log as a ground station writes it as text."""
+    lines = [first, "", "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns"]
+    for number, (name, letters, columns) in enumerate(messages, 10):
+        lines.append(f"FMT, {number}, 89, {name}, {letters}, {','.join(columns)}")
+        for row in zip(*columns.values(), strict=True):
+            values = [x.decode() if isinstance(x, bytes) else f"{x:.12g}" for x in row]
+            lines.append(", ".join([name, *values]))
+    return "\r\n".join(lines)
+
+
 def _stored(letter: str, value: float | bytes) -> float | bytes:
     if isinstance(value, bytes) or letter == "f":
         return value

@@ -19,3 +19,28 @@ def sd_card(events, version=2, checksum=True):
             records.append((at, struct.pack(layout, number, stamp, *values)))
     out += b"".join(record for _, record in sorted(records, key=lambda r: r[0]))
     return out + struct.pack("<I", zlib.crc32(out)) if checksum else out
+
+
+def sd_card_before_2021(t, variables, block=20):
+    """Return the bytes of a log whose variables ``{name with letter: (N,)}`` were sampled
+    together.
+    """
+
+    def sealed(part):
+        return part + struct.pack("<I", zlib.crc32(part) ^ 0xFFFFFFFF)
+
+    names = "".join(f"{name}," for name in ("tick(I)", *variables))
+    out = sealed(bytes([1 + len(variables)]) + names.encode())
+    layout = "<I" + "".join(name[-2] for name in variables)
+    rows = [
+        struct.pack(
+            layout,
+            round(1e3 * at),
+            *(float(c[k]) if name[-2] == "f" else int(c[k]) for name, c in variables.items()),
+        )
+        for k, at in enumerate(t)
+    ]
+    for first in range(0, len(rows), block):
+        part = rows[first : first + block]
+        out += sealed(bytes([len(part)]) + b"".join(part))
+    return out

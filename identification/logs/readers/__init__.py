@@ -3,11 +3,11 @@ in the log's notes.
 
 A table needs no code: a file in ``identification/logs/maps/`` that says what its columns mean, and
 its name in ``TABLES``. A reader of another form is a file in this folder with a function
-``read(path, vehicle)`` that returns a FlightLog, and a line in ``READERS``; of a table, it takes
-the open table. It decodes the file into named columns, each group with its clock; a map in
+``read(path, vehicle, piece)`` that returns a FlightLog, and a line in ``READERS``; of a table, it
+takes the open table. It decodes the file into named columns, each group with its clock; a map in
 ``maps/recordings/`` says what they mean. The vehicle, which may be None, turns commands into rotor
-speeds where none were measured; a reader with a ``piece`` reads the part of that number, from 1, of
-a file whose clock started anew or that holds several logs, and the longest by default.
+speeds where none were measured; of a file whose clock started anew or that holds several logs the
+part of the number ``piece`` is read, from 1, and the longest by default.
 
 Which reader a log needs is told from what is in it: the first bytes of a file, or the columns of a
 table. A file's name decides nothing but how a table is packed.
@@ -31,6 +31,7 @@ from . import ardupilot_bin, betaflight, crazyflie_sd, px4_ulog, rosbag
 _HEAD = 4096  # bytes of a file that are looked at
 _LISTED = 8  # entries of a folder that a message lists
 _GZIP = b"\x1f\x8b"
+_MAVLINK = b"\xfe\xfd"  # one of these follows the eight bytes of a telemetry log's first time
 _BAG_FOLDER = ("metadata.yaml", ".db3", ".mcap")  # one of these is in a ROS 2 bag's folder
 
 
@@ -47,6 +48,11 @@ class Reader:
     read: Callable[..., FlightLog]
     signature: tuple[str, ...] = ()  # columns of a table
     begins: tuple[bytes, ...] = ()  # first bytes of a file
+    holds: bytes = b""  # that stands among the first bytes of a file; empty: nothing
+
+    def knows(self, head: bytes) -> bool:
+        """Return whether a file that begins with some bytes is of its form."""
+        return head.startswith(self.begins) or (self.holds != b"" and self.holds in head)
 
 
 # maps of tables that are known by their columns
@@ -67,6 +73,7 @@ READERS = {
         ("rosbag", rosbag),
     )
 }
+READERS["ardupilot_bin"] = replace(READERS["ardupilot_bin"], holds=ardupilot_bin.HOLDS)
 READERS["betaflight_csv"] = Reader(
     "betaflight_csv", "a blackbox_decode table", betaflight.read_table, betaflight.SIGNATURE
 )
@@ -107,7 +114,12 @@ def reader_by_content(path: Path) -> Reader | None:
             head = _head(path)
         except InputError:
             return None  # whoever reads it says what is wrong
-        return next((r for r in READERS.values() if head.startswith(r.begins)), None)
+        known = (
+            r
+            for r in READERS.values()
+            if head.startswith(r.begins) or (r.holds and r.holds in head)
+        )
+        return next(known, None)
     try:
         names = sorted(entry.name for entry in path.iterdir())
     except OSError as error:
@@ -141,6 +153,11 @@ def unknown_content(path: Path) -> InputError:
     if head.startswith(_GZIP):
         return InputError(
             f"{path}: is packed (gzip); expected a table, .csv.gz by name, or the log unpacked"
+        )
+    if len(head) > 8 and head[8] in _MAVLINK and path.suffix.lower() in (".tlog", ".rlog"):
+        return InputError(
+            f"{path}: is telemetry (MAVLink), which has the motors a few times a second; expected "
+            "the log that the vehicle wrote itself (.BIN, .ulg)"
         )
     start = head[:16]
     is_text = all(32 <= byte < 127 or byte in b"\t\r\n" for byte in start)

@@ -27,7 +27,7 @@ from ..flight_log import FlightLog
 from ..log_map import Commands, LogMap, recording_map
 from ..mapped_log import recording_of
 from ..rotor_orders import ORDERS, Order, order_words
-from ..streams import Stream
+from ..streams import MOST_VOLTS, Stream
 from ..table import Array
 from ..what_flew import (
     PLUS,
@@ -40,6 +40,7 @@ from ..what_flew import (
     slots_of_motors,
 )
 from .dataflash import BEGINS as BEGINS
+from .dataflash import HOLDS as HOLDS
 from .dataflash import WHAT as WHAT
 from .dataflash import Messages, read_dataflash
 
@@ -61,15 +62,30 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
             inertial sensors.
     """
     log_map = recording_map("ardupilot")
-    messages, skipped = read_dataflash(path, {*log_map.topics, "PARM", "MSG"})
+    messages, skipped = read_dataflash(path, {*log_map.topics, "PARM", "MSG", "MOT", "TIME"})
+    if "StartTime" in messages.pop("TIME", {}):
+        raise InputError(
+            f"{path}: is a PX4 log of before 2016 (sdlog2), which has the same first bytes; "
+            f"expected {WHAT}, or a PX4 log as ULog"
+        )
     parameters = _parameters(messages.pop("PARM", {}))
     flown = _what_flew(parameters, messages.pop("MSG", {}))
     check_flown(path, flown)
     pulses = messages.get("RCOU")
-    letter = "Ch" if pulses is not None and "Ch1" in pulses else "C"  # before Copter 3.4
+    if "MOT" in messages and pulses is None:
+        raise InputError(
+            f"{path}: MOT has the motors' outputs without their times, as Copter before 3.2 logged "
+            "them; expected RCOU with TimeMS or TimeUS"
+        )
+    # Ch before Copter 3.4, Chan before 3.3
+    letter = next((x for x in ("Ch", "Chan") if pulses is not None and f"{x}1" in pulses), "C")
     log_map, notes = _with_parameters(path, log_map, parameters, vehicle, letter)
     if pulses is not None:
         flown = replace(flown, running=_running(pulses, log_map))
+    volts = messages.get("CURR", {}).get("Volt")
+    if volts is not None and float(np.median(volts)) > MOST_VOLTS:
+        messages["CURR"]["Volt"] = 0.01 * volts
+        notes.append("CURR: hundredths of a volt, as Copter before 3.4 logged them")
     telemetry, telemetry_notes = _telemetry(messages.pop("ESC", {}), parameters)
     notes += telemetry_notes
     columns = {*log_map.wanted, *_PLACE}
@@ -147,7 +163,7 @@ def _running(pulses: Messages, log_map: LogMap) -> int | None:
     sent = log_map.commands
     assert sent is not None
     assert sent.range is not None
-    names = [name for name in pulses if re.fullmatch(r"Ch?\d+", name)]
+    names = [name for name in pulses if re.fullmatch(r"C(h|han)?\d+", name)]
     if not set(sent.columns) <= set(names):
         return None
     outputs = np.column_stack([pulses[name] for name in names])

@@ -40,6 +40,7 @@ _UNITS = {"g": 1.0, "m/s2": 1.0 / 9.80665, "deg/s": 1.0, "rad/s": np.degrees(1.0
 _UNITS |= {"V": 1.0, "mV": 1e-3}
 _POLES = 14  # of most motors of 5 inch quadrotors
 _STANDING = 0.5  # s after arming in which a vehicle stands
+_RADIANS = 1e-5  # a gyro's scale below is in rad/us
 _ONE_G = 2.0 ** np.arange(8, 15)  # counts
 _DSHOT, _PWM = (48.0, 2047.0), (1000.0, 2000.0)
 _MORE_MOTORS = tuple(f"motor[{i}]" for i in range(4, 8))  # of vehicles that are no quadrotors
@@ -60,7 +61,9 @@ def read(
     return _log(path, "betaflight", fields, set(), headers, option, vehicle, notes)
 
 
-def read_table(table: Table, vehicle: Vehicle | None = None, option: str = "") -> FlightLog:
+def read_table(
+    table: Table, vehicle: Vehicle | None = None, option: str = "", piece: int | None = None
+) -> FlightLog:
     """Read a table of blackbox_decode; ``option``: number of the motors' magnet poles, for eRPM.
 
     Raises:
@@ -77,7 +80,8 @@ def read_table(table: Table, vehicle: Vehicle | None = None, option: str = "") -
                 scales[field] = _UNITS[unit]
     read = table.read(list(names.values()))
     fields = {field: scales.get(field, 1.0) * read[name] for field, name in names.items()}
-    return _log(path, "betaflight_csv", fields, {*scales}, {}, option, vehicle, [*table.notes])
+    notes = [*table.notes]
+    return _log(path, "betaflight_csv", fields, {*scales}, {}, option, vehicle, notes, piece)
 
 
 def _log(
@@ -89,6 +93,7 @@ def _log(
     option: str,
     vehicle: Vehicle | None,
     notes: list[str],
+    piece: int | None = None,
 ) -> FlightLog:
     """Return the log of a blackbox's fields (N,), of which those ``stated`` are in the map's units.
 
@@ -106,7 +111,7 @@ def _log(
         for kind in ("motor", "eRPM", "gyro", "acc", "vbat")
     }
     said = [*notes, *log_map.notes]
-    scales = {"gyro": 0.1 if headers.get("blackbox_high_resolution") == "1" else 1.0, "vbat": 0.01}
+    scales = {"gyro": _gyro_scale(headers), "vbat": 0.01}
     low = 0.0
     if groups["motor"]:
         low, high, whence = _range(path, [fields[name] for name in groups["motor"]], headers)
@@ -130,8 +135,23 @@ def _log(
                 f"{name}: {volts:.4g} V is more than a vehicle's battery has: taken as a tenth, as "
                 "blackbox_decode writes logs of Betaflight before 4.3"
             )
-    recording = recording_of(path, [Samples(t, fields)], log_map, reader, said, flown=flown)
-    return recording.log(vehicle)
+    samples = [Samples(t, fields)]
+    return recording_of(path, samples, log_map, reader, said, piece, flown).log(vehicle)
+
+
+def _gyro_scale(headers: Mapping[str, str]) -> float:
+    """Return what one count of the gyro is in deg/s: the bits of a number in the header, of degrees
+    per second, or of radians per microsecond in Baseflight's.
+    """
+    fine = 0.1 if headers.get("blackbox_high_resolution") == "1" else 1.0
+    try:
+        bits = int(headers.get("gyro_scale") or headers.get("gyro.scale") or "", 16)
+        scale = float(np.array(bits, "<u4").view("<f4"))
+    except (ValueError, OverflowError):
+        return fine
+    if not 1e-12 < scale < 1e3:
+        return fine
+    return fine * scale * (1e6 * np.degrees(1.0) if scale < _RADIANS else 1.0)
 
 
 def _range(path: Path, motors: list[Array], headers: Mapping[str, str]) -> tuple[float, float, str]:
@@ -151,6 +171,9 @@ def _range(path: Path, motors: list[Array], headers: Mapping[str, str]) -> tuple
                 f"{path}: header motorOutput: {stated[:60]!r}; expected two rising numbers"
             )
         return low, high, "motorOutput of the header"
+    ends = [headers.get(name, "") for name in ("minthrottle", "maxthrottle")]
+    if all(end.isdecimal() for end in ends) and 0 < int(ends[0]) < int(ends[1]):
+        return float(ends[0]), float(ends[1]), "minthrottle and maxthrottle of the header"
     outside = any(np.any((x > _PWM[1]) | ((x < _PWM[0]) & (x > 0.0))) for x in motors)
     low, high = _DSHOT if outside else _PWM
     return low, high, f"assumed: {'DShot' if outside else 'pulses in us'}, no header says it"

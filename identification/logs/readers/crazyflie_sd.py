@@ -7,6 +7,11 @@ brackets as in Python's ``struct`` (``acc.x(f)``), all texts ended by a zero byt
 number, time (version 1: 32 bits of milliseconds, version 2: 64 bits of microseconds), variables.
 The last four bytes are a CRC-32 of all before them.
 
+Before 2021 (firmware's ``tools/usdlog`` of 2018) all variables were sampled together: the number of
+columns (one byte) and their names, each with its letter in brackets and a comma (``acc.x(f),``), of
+which the first is ``tick``, 32 bits of milliseconds; then blocks of a count (one byte) and as many
+rows. The header and each block end in a CRC-32, inverted.
+
 The map ``cflib`` says what the variables become.
 """
 
@@ -29,7 +34,8 @@ from ..flight_log import FlightLog
 from ..log_map import load_map
 from ..mapped_log import chosen, recording_of
 
-BEGINS = (b"\xbc\x01\x00", b"\xbc\x02\x00")
+_FIRST = b"tick(I),"  # of the columns of a log before 2021
+BEGINS = (b"\xbc\x01\x00", b"\xbc\x02\x00", *(bytes([n]) + _FIRST for n in range(2, 256)))
 
 Layout = np.dtype[Any]  # of one event: its number, time and variables
 
@@ -37,12 +43,14 @@ WHAT = "a Crazyflie's SD-card log"
 _START = re.compile(rb"\xbc([\x01\x02])\0(..)", re.DOTALL)
 _EVENT = re.compile(rb"(..)([^\0]{0,200})\0(..)", re.DOTALL)
 _VARIABLE = re.compile(rb"([^\0]{1,200})\(([bBhHiIqQefd])\)\0")
+_COLUMN = re.compile(rb"([^\0,]{1,200})\(([bBhHiIqQefd])\),")
+_CHECKED = 0xFFFFFFFF  # CRC-32 of a block and its own, inverted
 _VARIABLES = "a variable's name and the letter of its type, one of b B h H i I q Q e f d"
 _RUN = 4096  # events looked at together
 _TIMES = {1: ("<u4", 1e-3), 2: ("<u8", 1e-6)}  # of a version: type, and s per unit
 
 
-def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
+def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -> FlightLog:
     """Read an SD-card log; ``vehicle`` turns motor set points into rotor speeds.
 
     Raises:
@@ -50,9 +58,13 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
             sensors.
     """
     data = read_bytes(path, WHAT, LIMITS.binary_log)
-    version, kinds, begin = _header(path, data)
-    found, end = _events(path, data, kinds, begin)
-    notes = [f"{WHAT}, version {version}"]
+    if data[1:].startswith(_FIRST):
+        version, (rows, end) = 1, _rows(path, data)
+        found, notes = [rows], [f"{WHAT}, of firmware before 2021"]
+    else:
+        version, kinds, begin = _header(path, data)
+        found, end = _events(path, data, kinds, begin)
+        notes = [f"{WHAT}, version {version}"]
     # behind the last event stands nothing, or the checksum (CRC-32) of all before
     if data[end:] not in (b"", zlib.crc32(data[:end]).to_bytes(4, "little")):
         notes.append(
@@ -80,7 +92,7 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
             "no pose, no gyro and no accelerometer in the log: it shows how the rotors share the "
             "work, and nothing else"
         )
-    return recording_of(path, events, log_map, "crazyflie_sd", notes).log(vehicle)
+    return recording_of(path, events, log_map, "crazyflie_sd", notes, piece).log(vehicle)
 
 
 def _header(path: Path, data: bytes) -> tuple[int, dict[int, Layout], int]:
@@ -119,6 +131,36 @@ def _header(path: Path, data: bytes) -> tuple[int, dict[int, Layout], int]:
             )
         kinds[key] = np.dtype([("event", "<u2"), ("time", _TIMES[version][0]), *fields])
     return version, kinds, place
+
+
+def _rows(path: Path, data: bytes) -> tuple[NDArray[Any], int]:
+    """Return the rows of a log before 2021, as events, and the place of the first byte that is
+    none.
+
+    Raises:
+        InputError: the header is cut or says something else.
+    """
+    fields, place = [("event", "V0"), ("time", "<u4")], 1 + len(_FIRST)
+    for _ in range(data[0] - 1):
+        found = _COLUMN.match(data, place)
+        if found is None:
+            raise InputError(f"{path}: byte {place} of its header: expected {_VARIABLES}")
+        place = found.end()
+        fields.append((found[1].decode("ascii", "replace").strip(), f"<{found[2].decode()}"))
+    names = [name for name, _ in fields]
+    if len(set(names)) < len(names):
+        raise InputError(f"{path}: a variable stands in its header twice; expected each once")
+    layout, blocks, count, end = np.dtype(fields), [], 0, place + 4
+    while end < len(data):
+        behind = end + 1 + data[end] * layout.itemsize + 4
+        if not data[end] or zlib.crc32(data[end:behind]) != _CHECKED:
+            break
+        blocks.append(data[end + 1 : behind - 4])
+        count += data[end]
+        end = behind
+    check_count(path, count, LIMITS.table_rows, "rows")
+    check_count(path, count * len(fields), LIMITS.table_numbers, "numbers")
+    return np.frombuffer(b"".join(blocks), layout), end
 
 
 def _events(

@@ -5,9 +5,13 @@ its length, its name, and the letters and names of its columns. pymavlink reads 
 objects, one by one, with a printed line for each byte that is damaged, and with 100 MB of disk.
 Here compiled code goes through a file, first to count and then to note the places of the messages
 that are wanted, and their columns are read at once, so that any file costs a bounded time.
+
+Ground stations turn such a log into text (``.log``): a message a line, its type's name first, FMT
+among them, and numbers in whole units.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +27,10 @@ Bytes = NDArray[np.uint8]
 Messages = dict[str, NDArray[Any]]  # (N,) of one type: columns by name, numbers or bytes of texts
 
 BEGINS = (b"\xa3\x95",)
+HOLDS = b"FMT, 128, 89, FMT,"  # of a log as text
 
 WHAT = "an ArduPilot log (DataFlash .BIN)"
+_TEXTS = ("Name", "Message")  # columns, of PARM and MSG
 _FMT, _FMT_LENGTH = 128, 89
 _GATHERED = 10_000  # messages copied at a time
 # types of columns by their letters, those of ``struct`` among them; and what one unit is of
@@ -43,7 +49,10 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messa
         InputError: the file cannot be read, is no such log, or has more messages of a type than
             ``FileLimits.table_rows``.
     """
-    data = np.frombuffer(read_bytes(path, WHAT, LIMITS.binary_log), np.uint8)
+    content = read_bytes(path, WHAT, LIMITS.binary_log)
+    if HOLDS in content[:4096]:
+        return _of_text(path, content, wanted), 0
+    data = np.frombuffer(content, np.uint8)
     counts, nowhere = np.zeros(256, np.int64), np.empty(0, np.int64)
     used = _walk(data, counts, -1, nowhere)
 
@@ -66,6 +75,45 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messa
     if not kinds and not counts[_FMT]:
         raise InputError(f"{path}: cannot be read as {WHAT}: no FMT message; expected some")
     return found, len(data) - int(used)
+
+
+def _of_text(path: Path, content: bytes, wanted: Collection[str]) -> dict[str, Messages]:
+    """Return the messages of the types that are wanted, of a log as text. The lines before the
+    first FMT, where old ones name the vehicle, count as MSG; lines that are cut are left out.
+    """
+    before, _, lines = content.partition(b"FMT,")
+    names: dict[str, list[str]] = {}
+    rows: dict[str, list[list[bytes]]] = {}
+    for line in (b"FMT," + lines).splitlines():
+        kind, _, rest = line.partition(b",")
+        name = kind.decode("ascii", "replace")
+        if name == "FMT":  # type, length, name, letters, columns
+            stated = rest.decode("ascii", "replace").replace(" ", "").split(",")
+            names.setdefault("".join(stated[2:3]), stated[4:])
+        elif name in wanted and name in names:
+            values = rest.split(b",", len(names[name]) - 1)
+            if len(values) == len(names[name]):
+                rows.setdefault(name, []).append(values)
+    found: dict[str, Messages] = {}
+    for name, messages in rows.items():
+        check_count(f"{path}: {name}", len(messages), LIMITS.table_rows, "messages")
+        columns = dict(zip(names[name], zip(*messages, strict=True), strict=True))
+        found[name] = {
+            column: np.char.strip(np.array(texts)) if column in _TEXTS else _numbers(texts)
+            for column, texts in columns.items()
+        }
+    said = found.get("MSG", {}).get("Message", np.empty(0, "S1"))
+    found["MSG"] = {"Message": np.array([*before.splitlines(), *said, b""])}
+    return found
+
+
+def _numbers(texts: Sequence[bytes]) -> NDArray[np.float64]:
+    """Return the numbers (N,) that texts are; NaN where one is none."""
+    found = np.full(len(texts), np.nan)
+    for i, text in enumerate(texts):
+        with suppress(ValueError):
+            found[i] = float(text)
+    return found
 
 
 def _rows(

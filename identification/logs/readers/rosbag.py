@@ -65,7 +65,9 @@ _SAME_CLOCK = 1_000_000_000  # ns between a header's time and the recording's
 _NANOSECOND = 1e-9  # s
 
 
-def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> FlightLog:
+def read(
+    path: Path, vehicle: Vehicle | None = None, option: str = "", piece: int | None = None
+) -> FlightLog:
     """Read a bag; ``option`` is the path of a topic map, the default ``NAME.topics.yaml`` beside
     the bag if it is there.
 
@@ -96,8 +98,8 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
         Samples(_NANOSECOND * (times - origin).astype(float), columns, name)
         for times, columns, name in decoded
     ]
-    found = recording_of(path, recorded, joined(topics), "rosbag", (*notes, *doubts), flown=flown)
-    return found.log(vehicle)
+    said = (*notes, *doubts)
+    return recording_of(path, recorded, joined(topics), "rosbag", said, piece, flown).log(vehicle)
 
 
 def _notes(topic: Topic, kind: str) -> Iterator[str]:

@@ -60,7 +60,8 @@ def test_the_key_is_of_all_that_an_outcome_depends_on(tmp_path):
     assert key() == key() == key(other) == key(id="x", time=3.0)
     keys = {key(), key(vehicle="ardrone2"), key(vehicle="crazyflie"), key(reader="nanobench")}
     keys |= {key(without=("mass",)), key(reader="nanobench", without=("mass",))}
-    assert len(keys) == 6
+    keys.add(key(piece=2))
+    assert len(keys) == 7
     path.write_text("2")
     assert key() not in keys
     with pytest.raises(InputError, match=r"gone\.csv: is no regular file"):

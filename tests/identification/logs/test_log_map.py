@@ -223,12 +223,27 @@ def test_rows_of_one_time_are_one_row(tmp_path: Path) -> None:
     assert any("joined" in note for note in found.notes)
 
 
-def test_times_that_go_back_are_refused_with_their_row(tmp_path: Path) -> None:
+def test_a_time_that_goes_back_costs_its_row_and_many_are_refused(tmp_path: Path) -> None:
     t = [f"{0.01 * k:.2f}" for k in range(40)]
     t[7] = "0.01"
-    words = r"column t, row 8 \(line 9\): 0.01 s goes back from 0.06 s"
+    log = map_table(open_table(table(tmp_path / "a.csv", {"t": t})), parse_map(GOOD, "m"))
+    assert len(log.t) == 39
+    assert any("1 of 40 samples repeat a time or have one" in note for note in log.notes)
+    t[1::3], t[2::3] = t[2::3], t[1::3]
+    words = r"column t, row 3 \(line 4\): 0.01 s goes back from 0.02 s"
     with pytest.raises(InputError, match=words):
         map_table(open_table(table(tmp_path / "a.csv", {"t": t})), parse_map(GOOD, "m"))
+
+
+def test_a_table_of_two_boots_is_read_by_the_piece(tmp_path: Path) -> None:
+    t = [f"{0.1 * k:.2f}" for k in [*range(60), *range(40)]]
+    opened = open_table(table(tmp_path / "a.csv", {"t": t}, 100))
+    log = map_table(opened, parse_map(GOOD, "m"))
+    assert len(log.t) == 60
+    assert any("2 pieces of 5.9, 3.9 s; the longest, piece 1, was read" in x for x in log.notes)
+    assert len(map_table(opened, parse_map(GOOD, "m"), piece=2).t) == 40
+    with pytest.raises(InputError, match="piece 3: it has 2; expected 1 to 2"):
+        map_table(opened, parse_map(GOOD, "m"), piece=3)
 
 
 COMMANDED = {

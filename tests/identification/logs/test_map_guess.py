@@ -15,8 +15,10 @@ from windwrench.identification.logs import table as table_module
 from windwrench.identification.logs.column_names import Group
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.log_map import parse_map
-from windwrench.identification.logs.map_guess import Guess, guess_map, map_yaml, motor_unit
+from windwrench.identification.logs.map_guess import Guess, guess_map
+from windwrench.identification.logs.map_text import map_yaml
 from windwrench.identification.logs.mapped_log import map_table
+from windwrench.identification.logs.motor_units import motor_unit
 from windwrench.identification.logs.tables import open_table
 from windwrench.runtime.errors import InputError
 
@@ -158,6 +160,64 @@ def test_of_a_huge_table_columns_are_read_whose_names_say_something(
     for module in (map_guess, table_module):
         monkeypatch.setattr(module, "LIMITS", replace(module.LIMITS, table_numbers=most))
     assert not guessed(path).missing
+
+
+@pytest.mark.parametrize("way", ["date", "time of day", "seconds and nanoseconds"])
+def test_clocks_as_people_write_them(tmp_path: Path, flown: FlightLog, way: str) -> None:
+    columns = columns_of(flown, f"t x y z {_QUATERNION} {_SENSORS} rpm1 rpm2 rpm3 rpm4")
+    t = columns.pop("t")
+    stamps = np.datetime64("2024-02-29T23:10:00", "us") + np.round(1e6 * t).astype("m8[us]")
+    clock = {"time": [str(x).replace("T", " ") for x in stamps]}
+    if way == "time of day":
+        clock = {"time": [str(x).partition("T")[2] for x in stamps]}
+    if way == "seconds and nanoseconds":
+        whole = stamps.astype("M8[s]")
+        clock = {"header.stamp.sec": [str(x) for x in whole.astype(np.int64)]}
+        clock["header.stamp.nanosec"] = [f"{1000 * x}" for x in (stamps - whole).astype(np.int64)]
+    rows = [",".join([*clock, *columns])]
+    values = zip(*clock.values(), np.column_stack(list(columns.values())).tolist(), strict=True)
+    rows += [",".join([*map(str, first), *map(repr, rest)]) for *first, rest in values]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(rows))
+    found = guessed(path)
+    assert not found.missing
+    log = map_table(open_table(path), parse_map(yaml.safe_load(map_yaml(found)), "map"))
+    np.testing.assert_allclose(log.t, flown.t - flown.t[0], atol=2e-6)
+
+
+def test_what_a_pilot_or_a_controller_wants_is_no_part(tmp_path: Path, flown: FlightLog) -> None:
+    """As RotorPy and the racing dataset of TII write them; rotors may be called r1 to r4."""
+    columns = columns_of(flown, f"t x y z {_QUATERNION} {_SENSORS} r1 r2 r3 r4")
+    for name in ("ax", "ay", "az", "gx", "gy", "gz"):
+        del columns[name]
+    columns |= {f"{name}des": columns[name] for name in ("x", "qw", "qx", "qy", "qz", "r1")}
+    columns |= {f"channels_{name}": 1500.0 + flown.t for name in ("roll", "pitch", "yaw")}
+    found = guessed(table_of(columns | {"battery_percent": 80.0 - flown.t}, tmp_path / "a.csv"))
+    assert found.log_map.attitude is not None
+    assert found.log_map.attitude.columns == ("qw", "qx", "qy", "qz")
+    assert found.log_map.accelerometer is None
+    assert found.log_map.battery is None
+    assert found.log_map.rotors is not None
+    assert found.log_map.rotors.columns == ("r1", "r2", "r3", "r4")
+
+
+def test_motion_capture_with_y_up(tmp_path: Path, flown: FlightLog) -> None:
+    """As OptiTrack writes poses: y up in the world and in the body, millimetres, w last."""
+    x, y, z = 1e3 * flown.position.T
+    w, qx, qy, qz = flown.quaternion.T
+    columns = {"Frame": np.arange(len(flown.t)), "Time (Seconds)": flown.t}
+    columns |= {"UAV Rotation X": qx, "UAV Rotation Y": qz, "UAV Rotation Z": -qy}
+    columns |= {"UAV Rotation W": w, "UAV Position X": x}
+    columns |= {"UAV Position Y": z, "UAV Position Z": -y}
+    columns |= {f"w{i}": speed for i, speed in enumerate(flown.rotor_speeds.T, 1)}
+    path = table_of(columns, tmp_path / "a.csv")
+    found = guessed(path, "ardrone2")
+    assert not found.doubts
+    assert (found.log_map.world, found.log_map.body) == ("y_up", "y_up")
+    log = map_table(open_table(path), found.log_map)
+    np.testing.assert_allclose(log.position, flown.position, atol=1e-9)
+    alike = np.abs(np.sum(log.quaternion * flown.quaternion, axis=1))
+    np.testing.assert_allclose(alike, 1.0, atol=1e-9)
 
 
 def test_more_than_four_rotors_that_move_are_refused(tmp_path: Path, flown: FlightLog) -> None:

@@ -17,6 +17,7 @@ from tests.support.dataflash_writer import (
     COMMAND,
     att,
     dataflash,
+    dataflash_text,
     imu,
     micro,
     parm,
@@ -79,6 +80,42 @@ def test_frames_motors_and_commands(read, vehicle):
     np.testing.assert_allclose(thrust[9].sum(), needed, rtol=1e-3)
     assert log.commanded
     assert any("e = 0.5 (MOT_THST_EXPO)" in note for note in log.notes)
+
+
+def test_a_log_as_text(read, tmp_path):
+    """Of old firmware, too, whose outputs have other names; a log without times says so."""
+    name, letters, sent = rcou(T)
+    sent = {column.replace("C", "Chan"): x for column, x in sent.items()}
+    current = "CURR", "Qh", {"TimeUS": micro(T), "Volt": 1600 - np.round(10 * T)}
+    messages = parm(), *POSE, imu(T), current, (name, letters, sent)
+    path = tmp_path / "2014-01-01.log"
+    path.write_text(dataflash_text(messages) + "\r\nIMU, 11")  # and the last line is cut
+    log, binary = read_log(path), read(*messages[:-1], rcou(T))
+    assert "reader ardupilot_bin" in log.source
+    np.testing.assert_allclose(log.command, binary.command, atol=1e-9)
+    np.testing.assert_allclose(log.position, binary.position, atol=1e-6)
+    np.testing.assert_allclose(log.gyro, binary.gyro, atol=1e-6)
+    np.testing.assert_allclose(log.voltage, 16.0 - 0.1 * T, atol=0.01)
+    path.write_text(dataflash_text(messages, "ArduPlane V3.4"))
+    with pytest.raises(InputError, match=r"MSG 'ArduPlane V3\.4' says a fixed-wing plane"):
+        read_log(path)
+    motors = "MOT", "HHHH", {f"Mot{i}": np.full(len(T), 1500) for i in range(1, 5)}
+    path.write_text(dataflash_text((*messages[:-1], motors)))
+    with pytest.raises(InputError, match="MOT has the motors' outputs without their times"):
+        read_log(path)
+
+
+def test_a_log_of_old_px4_is_named(read):
+    with pytest.raises(InputError, match="is a PX4 log of before 2016"):
+        read(imu(T), ("TIME", "Q", {"StartTime": micro(T)}))
+
+
+def test_motors_that_stand_still(read):
+    """Disarmed outputs lie below the range, which is no reason to state another one."""
+    name, letters, sent = rcou(T)
+    sent = {column: 0.0 * x + 990.0 * ("C" in column) for column, x in sent.items()}
+    with pytest.raises(InputError, match=r"no motors that turn: columns C9, .* from 990 to 990"):
+        read(parm(), *POSE, imu(T), (name, letters, sent | {"TimeUS": micro(T)}))
 
 
 def test_a_slow_pose_beside_a_fast_imu(read):

@@ -1,4 +1,4 @@
-"""Blackboxes of Betaflight: synthetic ones alone, decoded by this kit and, where it is installed,
+"""Blackboxes of Betaflight: synthetic ones, decoded by this kit and, where it is installed,
 by orangebox.
 """
 
@@ -44,6 +44,28 @@ def test_a_blackbox_is_read_field_by_field(bbl):
     np.testing.assert_allclose(log.rotor_speeds, speeds, rtol=1e-12)
     np.testing.assert_allclose(log.voltage, [0.01 * row["vbatLatest"] for row in rows])
     assert any("motor_poles of the header" in note for note in log.notes)
+
+
+@pytest.mark.parametrize(
+    ("header", "bits", "scale"),
+    [
+        ("gyro_scale", "0x3f800000", 1.0),  # Betaflight
+        ("gyro_scale", "0x3d79c190", 0.06098),  # Cleanflight: degrees per second a count
+        ("gyro.scale", "0x3092419a", 1.0642e-9 * 1e6 * np.degrees(1.0)),  # rad/us
+        ("gyro_scale", "none", 1.0),
+    ],
+)
+def test_counts_of_a_gyro_have_the_size_that_the_header_says(bbl, header, bits, scale):
+    rows = flight(100)
+    log = read_log(bbl(blackbox(rows, {header: bits})))
+    wanted = scale * np.radians(column(rows, "gyroADC"))
+    np.testing.assert_allclose(log.gyro, wanted, rtol=1e-3, atol=1e-12)
+
+
+def test_pulses_lie_between_the_throttles_that_the_header_says(bbl):
+    old = {"motorOutput": "", "minthrottle": "150", "maxthrottle": "1850"}
+    log = read_log(bbl(blackbox(flight(100), old)))
+    assert any("150 to 1850 (minthrottle and maxthrottle of the header)" in x for x in log.notes)
 
 
 def test_the_magnet_poles_are_an_option(bbl):

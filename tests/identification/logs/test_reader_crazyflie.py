@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.autopilot_flight import inertial, motion
 from tests.support.data_paths import data_file
-from tests.support.sd_card_writer import sd_card
+from tests.support.sd_card_writer import sd_card, sd_card_before_2021
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.logs.readers import crazyflie_sd
 from windwrench.identification.logs.reading import read_log
@@ -67,6 +67,25 @@ def test_events_of_several_rates(write, version):
     np.testing.assert_allclose(log.voltage, 4.1 - 0.01 * log.t, atol=1e-4)
     assert not any("damaged" in note for note in log.notes)
     assert any("stood at 30 s at the first event" in note for note in log.notes)
+
+
+def test_a_log_before_2021(write):
+    """All variables share their rows; a block that is cut or spoiled ends the log with a note."""
+    data = sd_card_before_2021(T, fast(T) | slow(T))
+    log = read_log(write(data))
+    assert any("firmware before 2021" in note for note in log.notes)
+    assert not any("damaged" in note for note in log.notes)
+    position, _ = motion(log.t + T[0])
+    np.testing.assert_allclose(log.position, position, atol=1e-6)
+    np.testing.assert_allclose(log.gyro, inertial(log.t + T[0])[0], atol=1e-6)
+    np.testing.assert_allclose(log.command[5], OURS / 65535, atol=1e-9)
+    spoiled = bytearray(data)
+    spoiled[-3000] ^= 1
+    log = read_log(write(bytes(spoiled)))
+    assert any("is damaged or was cut" in note for note in log.notes)
+    assert 0.9 * len(T) < len(log.t) < len(T)
+    with pytest.raises(InputError, match="byte 9 of its header: expected a variable's name"):
+        read_log(write(b"\x03tick(I),acc.x(f" + bytes(40)))
 
 
 def test_set_points_become_rotor_speeds(write):

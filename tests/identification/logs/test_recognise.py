@@ -113,3 +113,10 @@ def test_a_table_whose_guess_leaves_no_doubt_is_read_at_once(tmp_path):
     assert any("guessed without a doubt" in note for note in read.notes)
     np.testing.assert_allclose(read.position, log.position, atol=1e-9)
     np.testing.assert_allclose(read.rotor_speeds, log.rotor_speeds, atol=1e-6)
+
+
+def test_telemetry_is_named(tmp_path):
+    path = tmp_path / "flight.tlog"
+    path.write_bytes(bytes(8) + b"\xfd" + bytes(40))
+    with pytest.raises(InputError, match=r"is telemetry .MAVLink., which has the motors a few"):
+        read_log(path)

@@ -9,6 +9,8 @@ from tests.support.dataflash_writer import dataflash, imu, parm
 from tests.support.sd_card_writer import sd_card
 from tests.support.ulog_writer import sensor_combined, stamps, ulog_bytes
 from windwrench.dynamics import InputError, load_vehicle
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.logs.flight_phases import flew
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.what_flew import order_by_places, running
 from windwrench.identification.report.log_check import check_log
@@ -228,3 +230,28 @@ def test_a_log_of_motor_requests_alone_serves_to_compare(tmp_path):
     assert not log.has_pose
     np.testing.assert_allclose(log.command, SHARES[:, [3, 2, 1, 0]], atol=1e-4)
     assert any("how the rotors share the work, and nothing else" in note for note in log.notes)
+
+
+def test_whether_anything_flew():
+    """By the motors and what was measured, whatever the vehicle."""
+    t = 0.01 * np.arange(2000)
+    hover, still = np.full((2000, 4), 390.0), np.zeros((2000, 3))
+    turned = np.tile([1.0, 0.0, 0.0, 0.0], (2000, 1))
+    noise = np.random.default_rng(0).standard_normal((2000, 3))
+    moving = 0.3 * np.sin(np.outer(t, [0.5, 0.7, 0.9]))
+    way = still + np.outer(t, [0.3, 0.0, 0.0])
+
+    def answer(position=still, speeds=hover, **sensors):
+        return flew(FlightLog(t, position, turned, speeds, **sensors))[0]
+
+    assert answer(moving) == "yes, 20 s"
+    assert answer(moving, 0.0 * hover) == "no"
+    assert answer(1e-3 * noise) == "not shown"  # on a bench
+    assert answer(way) == "not shown"  # it drove
+    missing = np.full((2000, 3), np.nan)
+    assert answer(missing, gyro=moving) == "yes, 20 s"
+    assert answer(missing, gyro=0.05 * noise) == "unknown"  # vibration alone
+    assert answer(missing) == "unknown"
+    lost = 0.0 * hover + np.nan
+    assert answer(moving, lost, command=np.full((2000, 4), 0.4)) == "yes, 20 s"
+    assert answer(moving, lost) == "unknown"

@@ -1,0 +1,62 @@
+"""A guessed map as a YAML file, with comments on what is certain, what is a guess, and what to
+choose.
+"""
+
+from typing import Any
+
+import yaml
+
+from .log_map import UNKNOWN, Battery, Columns, Commands, Rotors
+from .map_guess import Guess
+from .rotor_orders import order_names
+
+
+def map_yaml(guess: Guess) -> str:
+    """Return a guessed map as a YAML file; comments say what is certain, what is a guess, and among
+    which columns to choose where it says ``?``.
+    """
+    m = guess.log_map
+    sections: dict[str, Any] = {"vehicle": m.vehicle} if m.vehicle else {}
+    if m.time.column:
+        sections["time"] = {"column": m.time.column, "unit": m.time.unit}
+        if m.time.nanoseconds:
+            sections["time"]["nanoseconds"] = m.time.nanoseconds
+    sections |= {"world": m.world, "body": m.body}
+    sections |= {name: _fields(part) for name, part in m.sections.items()}
+    lines = ["# A map of this table's columns. What is marked GUESS: check it."]
+    if guess.missing:
+        lines.append(f"# {UNKNOWN}: choose, and write it here. Still missing: {guess.lacks}")
+    for lack in guess.missing:
+        several = [UNKNOWN] * (4 if lack.section in ("attitude", "rotors") else 3)
+        sections[lack.section] = {lack.field: several if lack.field == "columns" else UNKNOWN}
+    for name, value in sections.items():
+        for r in (r for r in guess.reasons if r.section == name):
+            mark = "certain" if r.certain else "GUESS"
+            lines.append(f"# {mark}: {f'{r.field}: ' if r.field else ''}{r.why}")
+        for lack in (lack for lack in guess.missing if lack.section == name):
+            listed = "; ".join(lack.candidates) or "columns of the table"
+            lines.append(f"# choose {name}.{lack.field}: {listed}")
+        flow = False if isinstance(value, str) else None
+        text = yaml.safe_dump(
+            {name: value}, default_flow_style=flow, sort_keys=False, width=1000, allow_unicode=True
+        )
+        lines.append(text.rstrip())
+    if guess.unused:
+        lines.append(f"# columns that are not used: {', '.join(guess.unused)}")
+    return "\n".join(lines) + "\n"
+
+
+def _fields(part: Columns) -> dict[str, Any]:
+    """Return a section as its fields stand in the file: those that are not as usual."""
+    fields = {
+        name: list(value) if isinstance(value, tuple) else value
+        for name, value in vars(part).items()
+        if value not in ("", (), None, False, 1, (0.0, 1.0))
+    }
+    if isinstance(part, Battery):
+        fields = {"column": fields.pop("columns")[0], **fields}
+    if isinstance(part, Rotors | Commands):
+        fields["order"] = [*order_names(part.order), list(part.order)][0]
+    if fields.get("euler"):
+        del fields["order"]  # of a quaternion
+    return fields
