@@ -126,6 +126,7 @@ def main() -> None:
             code = app(sys.argv[1:] or ["--help"], standalone_mode=False)
             sys.stdout.flush()
         except (KeyboardInterrupt, typer.Abort):
+            interrupted()
             code = INTERRUPTED
         except (InputError, _UsageError) as error:
             code = INTERRUPTED if interrupted() else _refused(error)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rich.live import Live
 
 from ..runtime.errors import InputError
-from ..runtime.interrupts import INTERRUPTED
+from ..runtime.interrupts import INTERRUPTED, taken
 from .terminal import console, errors, gate_of, note, run, working
 
 if TYPE_CHECKING:
@@ -131,6 +131,7 @@ def _watch(session: "Session") -> bool:
                 session.tallies.fail("not drawn", "the terminal", error)
             wait([running])
         except KeyboardInterrupt:
+            taken()
             interrupted = True
         finally:
             session.stop()

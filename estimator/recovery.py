@@ -15,6 +15,12 @@ A Kalman filter's model knows none of four events. Each breaks something else:
   there after ``Recovery.patience``, without a gate at once. Poses that do not even agree with each
   other restart it after ``Recovery.give_up``, known no better than they disagree.
 
+After a restart attitude and rate may be so little known that a pose which contradicts them would be
+explained by a spin, and then by a torque. So the filter restarts again at poses that come back to
+an attitude that is a guess, and for ``Recovery.patience`` at each unlikely one that goes on. What
+unlikely poses leave in the wrench is not known either: while they are taken in, and as the filter
+forgets them, the stated variances are widened by their NIS.
+
 So a filter is in one of three phases, and each measured pose has one verdict, its ``Status``:
 
     phase               pose                              verdict     next phase
@@ -79,6 +85,8 @@ BELIEVING, ONE_REFUSED, REFUSING = map(float, Phase)  # as a record holds them, 
 MEMORY = np.dtype(
     [
         ("phase", "f8"),
+        ("strain", "f8"),  # NIS, of 1 expected, of unlikely poses that were taken in; falls
+        ("settling", "f8"),  # s for which a restart still explains what contradicts it
         ("seen", "f8", (7,)),  # position and quaternion that were believed last
         ("position_age", "f8"),  # s since a position was believed
         ("attitude_age", "f8"),  # s since an attitude was
@@ -193,6 +201,8 @@ def largest_nis(probability: float, dof: int) -> float:
 def grow_older(f: Record, dt: float) -> None:
     """Count the time since poses were believed and refused."""
     m = f.poses
+    m.settling -= dt
+    m.strain -= min(dt / f.patience, 1.0) * m.strain
     m.position_age += dt
     m.attitude_age += dt
     m.doubted_position_age += dt
@@ -268,11 +278,19 @@ def lost_attitude(f: Record) -> bool:
     from sigma points that reach half a turn: rates run away and rounding errors grow.
     """
     P, lost, m = f.P, f.lost, f.poses
-    guessed = (P[0, 0] > lost[0]) | (P[1, 1] > lost[1]) | (P[2, 2] > lost[2])
+    guessed = _is_guessed(f)
     wide = guessed | (P[3, 3] > lost[3]) | (P[4, 4] > lost[4]) | (P[5, 5] > lost[5])
     unseen = m.attitude_age > f.patience
     lost_now: bool = (wide & unseen) | (guessed & (m.position_age < m.attitude_age))
     return lost_now
+
+
+@compiled
+def _is_guessed(f: Record) -> bool:
+    """Return whether the attitude is known no better than ``Recovery.attitude_std``."""
+    P, lost = f.P, f.lost
+    guessed: bool = (P[0, 0] > lost[0]) | (P[1, 1] > lost[1]) | (P[2, 2] > lost[2])
+    return guessed
 
 
 @compiled
@@ -310,6 +328,8 @@ def believable(
     believed = measured & opposite(verdict == REJECTED)
     remember(f, pose, believed & with_position, believed & with_attitude)
     taken: bool = measured & (verdict == TRACKING)
+    strain = nis / choose(with_position & with_attitude, 6.0, 3.0)
+    m.strain = choose(taken & unlikely, max(m.strain, strain), m.strain)
     return taken
 
 
@@ -323,7 +343,9 @@ def _judge(
     m = f.poses
     measured, believing = with_position | with_attitude, m.phase == BELIEVING
     lost = (with_position & lost_position(f)) | (with_attitude & lost_attitude(f))
-    beyond = _is_beyond(f, with_attitude, nis)
+    beyond = (unlikely & _is_beyond(f, with_attitude, nis)) | (
+        opposite(believing) & with_attitude & _is_guessed(f)
+    )
     explained = continues(
         f, pose, m.seen, m.position_age, m.attitude_age, with_position, with_attitude
     )
@@ -334,7 +356,7 @@ def _judge(
         explained = choose(believing, explained, back)
     # among refused ones a likely pose too has to come back first
     refused = (unlikely | (measured & opposite(believing))) & opposite(lost | explained)
-    restarted = measured & (lost | (unlikely & explained & beyond))
+    restarted = measured & (lost | (explained & beyond))
     if f.gated > 0:
         _remember_refused(f, pose, refused & with_position, refused & with_attitude)
         lasting = _outlasts(f, with_position, refused)  # writes: asked whatever else holds
@@ -351,8 +373,13 @@ def _judge(
 
 @compiled
 def _is_beyond(f: Record, with_attitude: bool, nis: float) -> bool:
-    """Return whether an unlikely pose is beyond what a linear correction can follow."""
-    beyond: bool = opposite(nis <= f.restart_at) | (with_attitude & _turns_between(f))
+    """Return whether an unlikely pose is beyond what a linear correction can follow.
+
+    Just after a restart, where a wrench of any size is likely, it is an attitude or a rate that was
+    wrong by more than a linear model holds, and with it what was concluded since.
+    """
+    far = _turns_between(f) | (f.poses.settling > 0.0)
+    beyond: bool = opposite(nis <= f.restart_at) | (with_attitude & far)
     return beyond
 
 
@@ -577,6 +604,7 @@ def _restart(f: Record, pose: Array, at_position: bool, at_attitude: bool) -> No
         doubt = prior[i] + x[1 + i] * x[1 + i]
         P[i, i] = choose(restarted & (P[i, i] < doubt), doubt, P[i, i])
     f.restarts = choose(restarted, f.restarts + 1.0, f.restarts)
+    f.poses.settling = choose(restarted, f.patience, f.poses.settling)
 
 
 @compiled

@@ -344,16 +344,20 @@ def _step_with_biases(record: Record, parts: int, dt: float, voltage: float) -> 
 
 @compiled
 def _add_doubt(record: Record, diagonal: Array) -> None:
-    """Add to the variances (18,) in ``diagonal`` what refused poses add."""
+    """Add to the variances (18,) in ``diagonal`` what refused and unlikely poses add."""
     f = record[0]
     doubted_variance(f, f.mean)
     for i in range(N):
-        diagonal[i] += f.mean[i]
+        diagonal[i] += f.poses.strain * diagonal[i] + f.mean[i]
 
 
 def _step_at(pointer: Any, parts: int, dt: float, voltage: float) -> int:
     f = carray(pointer, 1, FILTER)[0]
     return step(f, f.z, parts, dt, voltage)
+
+
+_POSES = FILTER.fields["poses"][1]  # type: ignore[index]  # where their memory begins
+_STRAINED = 0.01  # of a variance: less is not told
 
 
 class WrenchUKF:
@@ -431,15 +435,15 @@ class WrenchUKF:
         """Lay what Python reads and writes in a step over the record."""
         self._sample = Sample(self.record["z"][0])
         self._now: Array = np.ndarray(ESTIMATE_SIZE, buffer=self.record, offset=ESTIMATE)
-        # read at a third of an array's cost
-        self._phase = memoryview(np.asarray(self.record["poses"]["phase"]))  # type: ignore[arg-type]
+        # phase and strain, read at a third of an array's cost
+        self._doubts = memoryview(np.ndarray(2, buffer=self.record, offset=_POSES))  # type: ignore[arg-type]
         self._call: Callable[..., int] | None = None
 
     def __getstate__(self) -> dict[str, object]:
         return {
             name: value
             for name, value in self.__dict__.items()
-            if name not in ("_sample", "_now", "_phase", "_call")
+            if name not in ("_sample", "_now", "_doubts", "_call")
         } | {"record": without_addresses(self.record)}
 
     def __setstate__(self, state: dict[str, object]) -> None:
@@ -578,9 +582,11 @@ class WrenchUKF:
 
     @property
     def estimate(self) -> WrenchEstimate:
-        """What the filter believes now. While poses are refused, its covariance widens."""
-        numbers = self._now.copy()
-        if self._phase[0] > BELIEVING:
+        """What the filter believes now. While poses are refused, or unlikely ones taken in, its
+        covariance widens.
+        """
+        numbers, doubts = self._now.copy(), self._doubts
+        if doubts[0] > BELIEVING or doubts[1] > _STRAINED:
             _add_doubt(self.record, numbers[WITHOUT_COVARIANCE :: N + 1])
         return WrenchEstimate(numbers)
 

@@ -8,7 +8,6 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any
 
 INTERRUPTED = 130  # exit code
 _AGAIN = 0.02  # s until an interrupt that was lost comes again
@@ -40,35 +39,56 @@ def leaving_at_once(active: bool = True) -> Iterator[None]:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+class _Interrupt(KeyboardInterrupt):
+    """An interrupt that comes again where something loses it: callbacks of Python's own do, as
+    every import has them, and modules in C that import others, as MuJoCo's.
+    """
+
+    taken = True  # by who answers it, or no command runs
+
+    def __del__(self) -> None:
+        if not self.taken:
+            threading.Timer(_AGAIN, _come_again).start()
+
+
+def _come_again() -> None:
+    if not _Interrupt.taken:
+        _thread.interrupt_main()
+
+
+def taken() -> None:
+    """Say that an interrupt has its answer, and does not come again."""
+    _Interrupt.taken = True
+
+
 @contextmanager
 def noted() -> Iterator[Callable[[], bool]]:
-    """Give a function that says whether an interrupt came in the block.
+    """Give a function that says whether an interrupt came in the block, and is its answer.
 
-    One that comes within the import of a module in C ends as an error of that import. One within a
-    callback of Python's own, as every import has them, is lost there, and comes again.
+    One that comes within the import of a module in C may end as an error of that import.
     """
     came: list[int] = []
     told = sys.unraisablehook
 
-    def again(lost: Any) -> None:
-        if lost.exc_type is KeyboardInterrupt:
-            threading.Timer(_AGAIN, _thread.interrupt_main).start()
-        else:
-            told(lost)
-
     def note(number: int, frame: FrameType | None) -> None:
         came.append(number)
-        signal.default_int_handler(number, frame)
+        _Interrupt.taken = False
+        raise _Interrupt
+
+    def answer() -> bool:
+        taken()
+        return bool(came)
 
     usual = threading.current_thread() is threading.main_thread() and (
         signal.getsignal(signal.SIGINT) is signal.default_int_handler
     )
     if usual:
         signal.signal(signal.SIGINT, note)
-        sys.unraisablehook = again
+        sys.unraisablehook = lambda lost: lost.exc_type is _Interrupt or told(lost)
     try:
-        yield lambda: bool(came)
+        yield answer
     finally:
+        taken()
         if usual:
             sys.unraisablehook = told
             signal.signal(signal.SIGINT, signal.default_int_handler)

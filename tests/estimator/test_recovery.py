@@ -192,39 +192,6 @@ def test_an_imu_does_not_lock_good_poses_out(kind, fault):
     live_through(kind, vehicle, 0.005, 0.9999, fault, imu=True)
 
 
-SPELLS = (
-    "gap",
-    "jump",
-    "jump for good",
-    "back and forth",
-    "tilted",
-    "random attitudes",
-    "random poses",
-)
-
-
-@pytest.mark.parametrize("examples", [5, pytest.param(300, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("kind", FILTERS)
-def test_good_poses_are_taken_in_after_any_spell_of_bad_ones(kind, examples):
-    """Spells of 5 ms to 3 s, of jumps by 10 cm to 30 m and of turns by up to 180 degrees."""
-
-    @settings(max_examples=examples, **LENIENT)
-    @given(
-        vehicle=st.sampled_from(sorted(VEHICLES)),
-        fault=st.tuples(
-            st.sampled_from(SPELLS),
-            st.integers(1, 600),
-            st.floats(-1.0, 1.5).map(lambda power: 10.0**power),
-            st.integers(0, 2**32 - 1),
-        ),
-        imu=st.booleans(),
-    )
-    def live(vehicle, fault, imu):
-        live_through(kind, vehicle, 0.005, 0.9999, fault, imu=imu and kind != "constant gain")
-
-    live()
-
-
 def test_poses_that_never_agree_restart_the_filter_as_uncertain_as_they_are():
     """Poses that jump by 10 m each are not believed before ``give_up``, 1.5 s."""
     flight, rng = Flight("ukf", "ardrone2", 0.005, 0.9999, imu=True), np.random.default_rng(0)

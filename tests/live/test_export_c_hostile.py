@@ -9,11 +9,12 @@ from tests.support.exported_c.hostile import PERIOD, hostile
 from windwrench.dynamics import load_vehicle
 from windwrench.live.export_c import export_c
 
-SEEDS = range(8)
+SEEDS, MANY = range(8), range(8, 92)  # 1,008 sequences in all
 # of a standard deviation, by which estimates may differ: rounding
 LARGEST = {"single": 0.05, "double": 1e-6}
 
 
+@pytest.mark.parametrize("seeds", [SEEDS, pytest.param(MANY, marks=pytest.mark.slow)], ids=len)
 @pytest.mark.parametrize("precision", LARGEST)
 @pytest.mark.parametrize(
     ("estimator", "gate", "imu"),
@@ -26,14 +27,16 @@ LARGEST = {"single": 0.05, "double": 1e-6}
         ("ukf", 0.9999, False),
     ],
 )
-def test_c_and_python_agree_along_hostile_sequences(estimator, gate, imu, precision, tmp_path):
+def test_c_and_python_agree_along_hostile_sequences(
+    estimator, gate, imu, precision, seeds, tmp_path
+):
     """Statuses and counts of restarts at every step, estimates within rounding."""
     if lacking := missing("gcc"):
         pytest.skip(f"not installed: {', '.join(lacking)}")
     vehicle = load_vehicle("ardrone2")
     exported = export_c(vehicle, estimator, rate=1.0 / PERIOD, gate=gate, precision=precision)
     c, restarts = CompiledFilter(exported, tmp_path), 0.0
-    for seed in SEEDS:
+    for seed in seeds:
         flown = hostile(vehicle, seed)
         if not imu:
             del flown["gyro"], flown["accelerometer"]

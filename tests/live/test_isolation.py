@@ -1,8 +1,11 @@
 """Whatever fails or stalls beside a stream, its estimates go on: one line, and a count."""
 
 import os
+import pty
 import resource
 import socket
+import subprocess
+import sys
 import threading
 import time
 from contextlib import ExitStack, contextmanager, suppress
@@ -118,6 +121,28 @@ def test_a_reader_who_reads_nothing_stalls_nobody(outputs):
     told._thread.join()
     with suppress(BrokenPipeError):
         file.close()
+
+
+def test_a_terminal_that_stalls_costs_no_estimate(tmp_path):
+    """Nobody reads on after the first page, as after Ctrl-S: the flight goes on to its end."""
+    path, (terminal, end) = tmp_path / "flight.csv", pty.openpty()
+    words = ["live", "sim:static", "--seconds", "5", "--record", path]
+    child = subprocess.Popen(
+        [sys.executable, "-m", "windwrench", *words], stdout=end, stderr=subprocess.PIPE
+    )
+    os.close(end)
+    told = b""
+    while b"status" not in told:
+        told += os.read(terminal, 4096)
+    until(lambda: path.exists() and path.read_text().count("\n") >= 1000)
+    assert child.poll() is None
+    with suppress(OSError):  # of a terminal whose other end is closed
+        while piece := os.read(terminal, 4096):
+            told += piece
+    os.close(terminal)
+    assert child.wait() == 0, child.stderr.read()
+    child.stderr.close()
+    np.testing.assert_allclose(read_log(path).t[-1], 5.0)
 
 
 def test_a_pipe_that_is_closed_ends_the_telling_and_not_the_estimates(outputs):

@@ -3,6 +3,7 @@
 import signal
 import time
 import weakref
+from contextlib import suppress
 
 import pytest
 
@@ -21,12 +22,21 @@ def lose(things):
     assert reference() is None
 
 
-def test_one_that_a_callback_loses_comes_again():
+def swallow(_):
+    """Have an interrupt come within code that goes on whatever happens, as imports in C do."""
+    with suppress(BaseException):
+        signal.raise_signal(signal.SIGINT)
+    time.sleep(5.0)
+
+
+@pytest.mark.parametrize("loses", [lose, swallow])
+def test_one_that_is_lost_comes_again_until_it_has_an_answer(loses):
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with noted() as came:
             with pytest.raises(KeyboardInterrupt):
-                lose([Thing()])
+                loses([Thing()])
             assert came()
+            time.sleep(0.1)
     finally:
         signal.signal(signal.SIGINT, before)
