@@ -179,7 +179,9 @@ class WrenchUKFBatch:
 
     @property
     def covariance(self) -> Array:
-        """Covariances (n, 18, 18) of the error states, as of ``WrenchUKF``."""
+        """Covariances (n, 18, 18) of the error states, as of ``WrenchUKF``; refused and unlikely
+        poses do not widen it.
+        """
         return self._memory.covariance
 
     @property

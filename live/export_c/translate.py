@@ -321,7 +321,7 @@ class Function(Expressions):
                 if len(given) == 2 or name == "abs":
                     return Number(f"{_FUNCTIONS[name]}({self.floats(given)})")
             case ast.Call(func=ast.Name(id=name)):
-                function = self.globals.get(name)
+                function: Any = self.globals.get(name)
                 if getattr(function, "targetoptions", {}).get("inline") == "always":
                     return self.inlined(function, [self.evaluated(one) for one in node.args])
                 count = (
@@ -365,7 +365,7 @@ class Function(Expressions):
     def callee(self, node: ast.Call) -> "Function | None":
         """Return the function that is called, translated; None: it is written by hand."""
         name = cast(ast.Name, node.func).id
-        function = self.globals.get(name)
+        function: Any = self.globals.get(name)
         if function in self.library.refused:
             raise UntranslatableError(self.library.refused[function])
         if name in self.library.by_hand:

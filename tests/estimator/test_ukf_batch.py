@@ -69,7 +69,7 @@ def test_each_is_the_single_filter_bit_for_bit(samples, vehicles, gate):
             np.testing.assert_array_equal(
                 together.state[n], ukf.step(rotors[k, n], position[k, n], quaternion[k, n]).state
             )
-    np.testing.assert_array_equal(batch.covariance, [ukf.covariance for ukf in singles])
+    np.testing.assert_array_equal(batch.covariance, [ukf.record["P"][0] for ukf in singles])
     assert together.restarts.tolist() == [ukf.estimate.restarts for ukf in singles]
     assert together.status == [ukf.estimate.status for ukf in singles]
     assert together.restarts[4] == 1
