@@ -253,7 +253,7 @@ def _draw_plane(axes: Any, estimates: Array, clusters: Sequence[Cluster]) -> Non
     means = np.array([cluster.mean for cluster in clusters]) * scale
     label = "mixture: mean, 1 and 2 standard deviations"
     axes.plot(*means.T, "o", color="white", mec="black", ms=5, zorder=7, label=label)
-    axes.margins(x=0.16)
+    axes.margins(x=0.45)
     low = axes.get_ylim()[0]
     axes.set_ylim(low, tops[-1] + 0.16 * (tops[-1] - low))  # room for the topmost name
     axes.axhline(0.0, color=PALE, lw=0.8, zorder=0)
@@ -262,4 +262,4 @@ def _draw_plane(axes: Any, estimates: Array, clusters: Sequence[Cluster]) -> Non
         ylabel="estimated pitch torque (mNm)",
         title="53 g on a thread: the estimates of three flights",
     )
-    axes.legend(loc="upper right")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15))

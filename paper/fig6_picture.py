@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from ..runtime.drawing import BLACK, ESTIMATE, SERIES, TRUTH, new_figure, styled
+from ..runtime.drawing import BLACK, ESTIMATE, SERIES, TRUTH, new_figure, room_above, styled
 
 Array = NDArray[np.float64]
 
@@ -90,7 +90,7 @@ def _heat(
     axes.add_patch(Rectangle((0.0, -0.45), 0.22, 0.9, color="0.35"))
     arrow = {"arrowstyle": "->", "color": "0.35", "lw": 1.5}
     axes.annotate("", (0.68, 0.0), (0.28, 0.0), arrowprops=arrow)
-    axes.text(0.11, 0.0, "fan", rotation=90, color="white", ha="center", va="center")
+    axes.text(0.0, -0.55, "fan", va="top")
     axes.set(xlim=(-0.1, 4.27), ylim=(-1.77, 1.77), aspect="equal")
     axes.set(xlabel="x (m), away from the fan", ylabel="y (m)")
 
@@ -105,6 +105,7 @@ def _profile(axes: Any, label: str, y: Array, estimate: Array, truth: Array, cal
     axes.plot(y, mean, "o-", color=ESTIMATE, ms=3.5, lw=1, label="estimated")
     axes.axhline(0, color="black", lw=0.5)
     axes.axvline(0, color="black", lw=0.5)
+    room_above(axes, 0.5)
     axes.legend(loc="upper left")
     axes.set(title=f"across, at x = 2.3 m: {label}", xlabel="y (m)", ylabel=label)
 
@@ -125,6 +126,7 @@ def _agreement(
         label = f"{name}, correlation {correlation:.3f}"
         axes.plot(x, y, ".", color=colour, ms=5, alpha=0.6, label=label)
     axes.plot([-1.1, 1.1], [-1.1, 1.1], color="black", lw=0.7)
+    room_above(axes, 0.3)
     axes.legend(loc="upper left")
     axes.set_title("in the jet, shares of the largest")
     axes.set(xlabel="true", ylabel="estimated")
