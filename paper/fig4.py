@@ -219,7 +219,8 @@ def draw(steps: Sequence[Step]) -> Figure:
     """Draw force, torque and lateral force (rows) over time at each noise level, and the sweep's
     three curves beside.
     """
-    figure = new_figure(6.8)
+    figure = new_figure(7.0)
+    figure.suptitle(f"53 g hung on at {HANG:g} s")
     grid = figure.subplots(3, 3, width_ratios=[1, 1, 1.05])
     for column, noise in enumerate(NOISES):
         shown = [step for step in steps if step.noise == noise and step.actuator]
@@ -227,7 +228,7 @@ def draw(steps: Sequence[Step]) -> Figure:
         for row, axes in enumerate(grid[:, column]):
             axes.sharey(grid[row, 0])
             _draw_response(axes, row, shown)
-        grid[0, column].set_title(f"53 g hung on at {HANG:g} s; pose noise {_words(noise)}")
+        grid[0, column].set_title(f"pose noise {_words(noise)}")
     for row, name in enumerate(
         ("force z (N)", "pitch torque (mNm)", "lateral force of the mass (N)")
     ):
@@ -287,7 +288,7 @@ def _draw_choice(column: Sequence[Any], steps: Sequence[Step]) -> None:
     )
     for axes, (x, x_label, y, y_label) in zip(column, panels, strict=True):
         scale = 1.0 if y == "lateral_N" else 1e3
-        for colour, noise in zip(SERIES[3:], NOISES, strict=True):
+        for colour, noise in zip(SERIES[3:], NOISES, strict=False):
             for actuator, style in (
                 (True, {"ls": "-", "lw": 1.6}),
                 (False, {"ls": "--", "lw": 1.2, "mfc": "white"}),
@@ -313,7 +314,7 @@ def _draw_choice(column: Sequence[Any], steps: Sequence[Step]) -> None:
     for axes, ticks in zip(column, ((2, 5, 10, 20, 50), (0.1, 0.3, 1, 3, 10)), strict=False):
         axes.set_yscale("log")
         only_ticks(axes.yaxis, ticks)
-    column[0].set_title("choosing a tuning: noise against rise time")
+    column[0].set_title("noise against rise time")
     column[0].legend()
     column[2].axhline(_LATERAL_BOUND, color="black", lw=0.8, ls="--")
     column[2].set_ylim(0, None)

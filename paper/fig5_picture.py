@@ -112,7 +112,6 @@ def _draw_ratios(
         axes.set_title(title, loc="center")
         axes.grid(axis="x", color="0.9", lw=0.6)
         axes.set_axisbelow(True)
-        axes.set_xlabel("first better  |  second better")
     panels[0].set_yticks(range(len(labels)), labels)
     for noise in NOISES:
         for flight in FLIGHTS:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ..evaluation.episodes import Episode
-from ..runtime.drawing import BLACK, ESTIMATE, GREY, JET, SERIES, TRUTH, new_figure, styled
+from ..runtime.drawing import BLACK, ESTIMATE, JET, PALE, SERIES, TRUTH, new_figure, styled
 
 Array = NDArray[np.float64]
 _GAINS = {6.0: SERIES[2], 18.0: SERIES[1], 36.0: SERIES[3]}
@@ -49,13 +49,13 @@ def draw_tracking(
     for column, rise_time in enumerate(rise_times):
         first = axes = figure.add_subplot(grid[0, column], sharey=first)
         _capture(axes, {gain: some for (rise, gain), some in captures.items() if rise == rise_time})
-        axes.set_title(f"capture from 0.8 m, filter rise time {rise_time:g} s")
+        axes.set_title(f"from 0.8 m off, rise time {rise_time:g} s")
     # all of every trace, and the legend above them
     offsets = np.concatenate([_signed_offset(e) for some in captures.values() for e in some])
     axes.set_ylim(min(offsets.min(), -_RADIUS) - 0.1, max(offsets.max(), _RADIUS) + 0.35)
     axes = figure.add_subplot(grid[0, 2])
     _torque(axes, captures[rise_times[0], 18.0][0], largest)
-    axes.set_title(f"its torque, gain 18, rise time {rise_times[0]:g} s, one flight")
+    axes.set_title(f"its torque, rise time {rise_times[0]:g} s")
     first = second = None
     for column, speed in enumerate(sorted({speed for speed, _ in tracks})):
         flights = {gain: some for (fan, gain), some in tracks.items() if fan == speed}
@@ -72,8 +72,8 @@ def draw_tracking(
     axes.set(title="the same as a share of the bound", ylim=(0, 130), ylabel="% of the bound")
     axes.set_xlabel("gain k (m/s per Nm)")
     figure.suptitle(
-        f"Following a fan 2.3 m away by its torque. The jet's largest torque, {1e3 * largest:.0f} "
-        f"mNm, acts {at:.2f} m off the axis; a fan counts as held while the offset stays below "
+        f"Following a fan 2.3 m away by its torque.\nThe jet's largest torque, {1e3 * largest:.0f} "
+        f"mNm, acts {at:.2f} m off the axis;\na fan counts as held while the offset stays below "
         f"{held_offset:g} m"
     )
     return figure
@@ -96,8 +96,8 @@ def _capture(axes: Any, flights: Mapping[float, list[Episode]]) -> None:
         time = some[0].time[:shortest]
         axes.plot(time, median, color=_GAINS[gain], lw=2.2, label=f"gain {gain:g}")
     axes.axhline(0, ls="--", color=BLACK, lw=1.2)
-    axes.legend(ncols=3, loc="upper right")
-    axes.set(xlabel="time (s)", ylabel="y - fan, on the side it started (m)")
+    axes.legend(ncols=2, loc="upper right")
+    axes.set(xlabel="time (s)", ylabel="y - fan (m), start positive")
 
 
 def _follow(axes: Any, flights: Mapping[float, list[Episode]]) -> None:
@@ -162,7 +162,8 @@ def _speeds(axes: Any, fastest: Sequence[Any], largest: float) -> None:
     )
     label = r"bound $k\,\tau_{max}$ (and the largest command, 1 m/s)"
     entries = axes.plot(line, bound, color="black", lw=1.6, label=label)
-    axes.fill_between(line, bound, 1.3, color="0.93", lw=0)
+    words = "beyond it no fan can be followed"
+    entries.append(axes.fill_between(line, bound, 1.3, color=PALE, lw=0, label=words))
     entries += _held(axes, fastest, lambda f: 1.0)
     for gain in gains:
         some = sorted((f for f in fastest if f.gain == gain), key=lambda f: f.rise_time)
@@ -172,8 +173,6 @@ def _speeds(axes: Any, fastest: Sequence[Any], largest: float) -> None:
             " / ".join(f"{f.held:.2f}" for f in some),
             ha="left" if gain < gains[-1] else "center",
         )
-    words = "beyond the bound no fan can be followed"
-    axes.text(0.55 * line[-1], 1.08, words, color=GREY)
     # in the order drawn; a legend of its own making has bars with intervals last
     axes.legend(handles=entries, loc="upper left")
     axes.set(title="the fastest fan held by four flights of five", ylabel="speed of the fan (m/s)")
