@@ -8,7 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from ...runtime.drawing import AFTER, BEFORE, BLACK, GREY, PALE, SERIES, new_figure, styled
+from ...runtime.drawing import (
+    AFTER,
+    BEFORE,
+    BLACK,
+    GREY,
+    PALE,
+    SERIES,
+    new_figure,
+    room_above,
+    styled,
+)
 from ...runtime.page_files import write_json, write_png
 from ...runtime.plain_values import plain
 from .change import CHANGES, NOWHERE, SOMETHING_ELSE, Change
@@ -228,13 +238,15 @@ def _draw_faults(found: Sequence[tuple[RotorFault, Samples]]) -> Any:
                 label=f"about {'xyz'[axis]}",
             )  # fmt: skip
         left.set_ylabel("angular acceleration, rad/s2")
-        left.legend(loc="upper left")
+        room_above(left)
+        left.legend(loc="upper left", ncols=3)
         command = samples.channels.command
         for i in range(4):
             u = np.interp(samples.t, samples.channels.command_times, command[:, i])
             right.plot(samples.t, u, lw=1, label=f"rotor {i + 1}")
         right.set_ylabel("command")
-        right.legend(loc="upper left")
+        room_above(right)
+        right.legend(loc="upper left", ncols=4)
         for axis_ in (left, right):
             axis_.set_xlabel("t, s (the log's clock)")
             if fault.likeliest in ("1", "2", "3", "4"):
