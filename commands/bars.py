@@ -6,9 +6,23 @@ import threading
 from typing import Any
 
 from rich.console import Console
-from rich.progress import Progress, ProgressColumn
+from rich.progress import Progress, ProgressColumn, Task, TextColumn
+from rich.text import Text
+
+from ..runtime.compile_notice import notice
 
 _LINE_EVERY = 10.0  # s between two lines where bars cannot move
+
+
+class What(TextColumn):
+    """What is being done; while functions are compiled, how many."""
+
+    def __init__(self) -> None:
+        super().__init__("{task.description}")
+
+    def render(self, task: Task) -> Text:
+        """Return the text beside a bar."""
+        return Text(notice.words) if notice.words else super().render(task)
 
 
 class Bars(Progress):
@@ -51,4 +65,4 @@ def _line(task: Any) -> str:
         if task.total > 1.0:
             done = f", {task.completed:.0f} of {task.total:.0f}"
     left = "" if not task.time_remaining else f", {task.time_remaining:.0f} s left"
-    return f"{task.description}{done}, {task.elapsed or 0.0:.0f} s so far{left}"
+    return f"{notice.words or task.description}{done}, {task.elapsed or 0.0:.0f} s so far{left}"

@@ -25,7 +25,7 @@ from rich.table import Table
 
 from ..runtime.errors import InputError
 from ..runtime.printable import printable
-from .bars import Bars
+from .bars import Bars, What
 
 
 class _Terminal(Console):
@@ -162,7 +162,7 @@ def working(text: str, total: float = 1.0) -> Iterator[Callable[..., None]]:
     """
     columns = (
         SpinnerColumn(),
-        TextColumn("{task.description}"),
+        What(),
         BarColumn(),
         *([MofNCompleteColumn()] if total > 1.0 else []),
         TimeElapsedColumn(),

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ..controllers import make_controller
@@ -22,6 +21,7 @@ from ..identification.findings import Diagnosis
 from ..identification.logs.flight_log import FlightLog, write_log
 from ..identification.report.files import write_report
 from ..identification.report.headline import headline
+from ..runtime.drawing import AFTER, BEFORE, BLACK, JET, new_figure, room_above, styled
 from ..runtime.page_files import write_png
 from .steps import Step
 
@@ -29,7 +29,6 @@ CONTROLLER, SCENARIO = "admittance", "base"
 LAWS = ("hover", "admittance", "ratio", "oracle")  # of the leaderboard
 SECONDS = 25.0  # of the flight that is diagnosed
 TRAJECTORY = "excite"
-_BEFORE, _AFTER, _JET = "#d1495b", "#30638e", "#cfe5f5"
 
 Report = Callable[[float], None]  # takes the share that is done
 
@@ -224,20 +223,19 @@ def compare(request: Request, rows: Sequence[Standing], folder: Path) -> Step:
     )
 
 
+@styled()
 def _draw(before: Episode, after: Episode, path: Path) -> None:
-    figure = Figure(figsize=(9, 4.2), layout="constrained")
+    figure = new_figure(4.0)
     axes: Any = figure.subplots()
     longest = max((before, after), key=lambda e: len(e.time))
     fan: NDArray[np.float64] = longest.fan_y
-    axes.fill_between(longest.time, fan - 0.45, fan + 0.45, color=_JET, label="width of the fan")
-    axes.plot(longest.time, fan, "--", color="#222222", lw=1.5, label="fan")
-    axes.plot(before.time, before.y, color=_BEFORE, lw=2, label="vehicle, declared model")
-    axes.plot(after.time, after.y, color=_AFTER, lw=2, label="vehicle, amended model")
+    axes.fill_between(longest.time, fan - 0.45, fan + 0.45, color=JET, label="width of the fan")
+    axes.plot(longest.time, fan, "--", color=BLACK, lw=1.5, label="fan")
+    axes.plot(before.time, before.y, color=BEFORE, lw=2, label="vehicle, declared model")
+    axes.plot(after.time, after.y, color=AFTER, lw=2, label="vehicle, amended model")
     axes.set_title(f"RMSE {before.rmse:.3f} m before, {after.rmse:.3f} m after")
     axes.set_xlabel("time (s)")
     axes.set_ylabel("y (m)")
-    low, high = axes.get_ylim()
-    axes.set_ylim(low, high + 0.25 * (high - low))
-    axes.legend(loc="upper left", ncols=2, frameon=False)
-    axes.spines[["top", "right"]].set_visible(False)
+    room_above(axes)
+    axes.legend(loc="upper left", ncols=2)
     write_png(figure, path)

@@ -5,29 +5,31 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from ..runtime.whole_files import replaced
+from ..runtime.drawing import (
+    BLACK,
+    ESTIMATE,
+    GREY,
+    JET,
+    MOST_ROWS,
+    SERIES,
+    TRUTH,
+    new_figure,
+    room_above,
+    styled,
+)
+from ..runtime.page_files import write_png
 from .benchmark import Results
 from .episodes import Episode
 from .leaderboard import Standing, shown
 from .tasks import short_names
 
-COLOURS = {
-    "hover": "#8c8c8c",
-    "admittance": "#d1495b",
-    "ratio": "#edae49",
-    "lead": "#f2811d",
-    "admittance-pid": "#a4243b",
-    "tracker": "#3d5a80",
-    "tracker-informed": "#98c1d9",
-    "limit": "#293241",
-    "oracle": "#30638e",
-}
-_OTHERS = ("#2a9d8f", "#8d5a97", "#6a994e", "#bc6c25", "#00798c", "#5f0f40")
-_JET = "#cfe5f5"
+# of controllers in every picture; all others take turns
+COLOURS = {"hover": GREY, "admittance": SERIES[1], "limit": BLACK, "oracle": SERIES[0]}
+_OTHERS = (*SERIES[2:], "#5f0f40", "#6a994e", "#8c564b")
 
 
+@styled()
 def draw_episode(episode: Episode, title: str, path: Path) -> None:
     """Draw an episode over time. In the jet of a fan on one path: fan and vehicle, torque, force
     and command, as the paper's Fig. 7; in other tasks: the error and the three forces.
@@ -39,48 +41,41 @@ def draw_episode(episode: Episode, title: str, path: Path) -> None:
         if episode.in_jet
         else tuple((i, f"force $f_{axis}$ (N)") for i, axis in enumerate("xyz"))
     )
-    figure = Figure(figsize=(9, 8), layout="constrained")
+    figure = new_figure(7.0)
     top, *others = figure.subplots(4, 1, sharex=True, height_ratios=[2, 1, 1, 1])
     end = "lost" if episode.lost else "never lost"
     told = f" ({episode.motion}, seed {episode.seed})"
     top.set_title(f"{title}: RMSE {episode.rmse:.3f} m, {end}{told}")
     if episode.in_jet:
         fan, command = episode.fan_y, others.pop()
-        top.fill_between(t, fan - 0.45, fan + 0.45, color=_JET, label="width of the fan")
-        top.plot(t, fan, "--", color="#222222", lw=1.5, label="fan")
+        top.fill_between(t, fan - 0.45, fan + 0.45, color=JET, label="width of the fan")
+        top.plot(t, fan, "--", color=BLACK, lw=1.5, label="fan")
         top.plot(t, episode.y, color=COLOURS["admittance"], lw=2, label="vehicle")
         top.set_ylabel("y (m)")
         _legend(top, 3)
-        command.step(t, episode.command, where="post", color="#444444")
-        command.axhline(0, color="black", lw=0.5)
+        command.step(t, episode.command, where="post", color=BLACK)
+        command.axhline(0, color=BLACK, lw=0.5)
         command.set_ylabel("command (m/s)")
     else:
         top.plot(t, episode.error, color=COLOURS["admittance"], lw=2)
         top.set_ylabel("error (m)")
         top.set_ylim(bottom=0)
     for axes, (i, label) in zip(others, wrench, strict=True):
-        axes.plot(t, true[:, i], color="#9a9a9a", lw=1, label="true")
-        axes.plot(t, estimate[:, i], color=COLOURS["oracle"], lw=1.8, label="estimated")
-        axes.axhline(0, color="black", lw=0.5)
+        axes.plot(t, true[:, i], color=TRUTH, lw=1, label="true")
+        axes.plot(t, estimate[:, i], color=ESTIMATE, lw=1.6, label="estimated")
+        axes.axhline(0, color=BLACK, lw=0.5)
         axes.set_ylabel(label)
         _legend(axes, 2)
     figure.axes[-1].set_xlabel("time (s)")
-    _write(figure, path)
+    write_png(figure, path)
 
 
 def _legend(axes: Any, columns: int) -> None:
-    low, high = axes.get_ylim()
-    axes.set_ylim(low, high + 0.25 * (high - low))
-    axes.legend(loc="upper left", ncols=columns, frameon=False)
+    room_above(axes)
+    axes.legend(loc="upper left", ncols=columns)
 
 
-def _write(figure: Figure, path: Path) -> None:
-    for axes in figure.axes:
-        axes.spines[["top", "right"]].set_visible(False)
-    with replaced(path) as partial:
-        figure.savefig(partial, dpi=120, format="png")
-
-
+@styled()
 def draw_leaderboard(rows: Sequence[Standing], results: Results, path: Path) -> None:
     """Draw the RMSE of every episode and the mean with its interval, and the rival's median
     episode, a scenario a row; of a kind, the episodes of all policies, and the first one's path.
@@ -89,10 +84,11 @@ def draw_leaderboard(rows: Sequence[Standing], results: Results, path: Path) -> 
     scenarios = list(dict.fromkeys(row.scenario for row in rows))
     names = short_names(list(dict.fromkeys(row.controller for row in rows)))
     colours = {name: COLOURS.get(name, _OTHERS[i % len(_OTHERS)]) for i, name in enumerate(names)}
-    figure = Figure(figsize=(11, 1.0 + 3.0 * len(scenarios)), layout="constrained")
+    figure = new_figure(len(scenarios) * (1.4 + 0.24 * min(len(names), MOST_ROWS)))
     grid = figure.subplots(len(scenarios), 2, squeeze=False, width_ratios=[1.25, 1])
     for (left, right), scenario in zip(grid, scenarios, strict=True):
-        some = [row for row in rows if row.scenario == scenario]
+        all_of_it = [row for row in rows if row.scenario == scenario]
+        some = all_of_it[:MOST_ROWS]
         rival = results[some[0].rival, scenario]
         middle = int(np.argsort([e.rmse for e in rival])[len(rival) // 2])
         for i, row in enumerate(some):
@@ -106,36 +102,31 @@ def draw_leaderboard(rows: Sequence[Standing], results: Results, path: Path) -> 
             jitter = np.random.default_rng(0).uniform(-0.24, 0.24, len(values))
             colour = colours[row.controller]
             left.scatter(values, i + jitter, s=11, color=colour, alpha=0.4, lw=0)
-            left.plot(
-                row.rmse_ci95_m, [i, i], color="black", lw=2.2, solid_capstyle="butt", zorder=4
-            )
-            left.plot(row.rmse_m, i, "o", color=colour, mec="black", ms=8, zorder=5)
+            left.plot(row.rmse_ci95_m, [i, i], color=BLACK, lw=2.2, solid_capstyle="butt", zorder=4)
+            left.plot(row.rmse_m, i, "o", color=colour, mec=BLACK, ms=8, zorder=5)
             lost = f", {100 * row.lost_fraction:.1f} % lost" if row.lost_fraction else ""
             left.annotate(
                 f"{row.rmse_m:.3f} m{lost}",
                 (1.01, i),
                 xycoords=("axes fraction", "data"),
                 va="center",
-                fontsize=9,
             )
             episode = flown[0][middle]
             way = episode.y if episode.in_jet else episode.error
-            right.plot(episode.time, way, color=colour, lw=1.5, label=names[row.controller])
+            right.plot(episode.time, way, color=colour)
         longest = max(
             (each[middle] for (_, world), each in results.items() if world == scenario),
             key=lambda episode: len(episode.time),
         )
-        right.plot(longest.time, longest.fan_y, "--", color="black", lw=1.3)
+        right.plot(longest.time, longest.fan_y, "--", color=BLACK, lw=1.3)
         left.set_yticks(range(len(some)), [names[row.controller] for row in some])
         left.invert_yaxis()
         left.set_xlim(left=0)
-        left.set_title(
-            f"{scenario}: RMSE of each episode, mean, 95 % interval", loc="left", fontsize=10
-        )
+        of = f", the best {len(some)} of {len(all_of_it)}" if len(some) < len(all_of_it) else ""
+        left.set_title(f"{scenario}{of}: RMSE of each episode, mean, 95 % interval")
         left.set_xlabel("RMSE (m)")
-        told = "y, and of the fan (dashed)" if longest.in_jet else "error"
-        right.set_title(f"{some[0].rival}'s median episode", loc="left", fontsize=10)
+        told = "y (m), fan dashed" if longest.in_jet else "error (m)"
+        right.set_title(f"median episode of {some[0].rival}")
         right.set_xlabel("time (s)")
-        right.set_ylabel(f"{told} (m)")
-        right.legend(frameon=False, fontsize=8, ncols=2)
-    _write(figure, path)
+        right.set_ylabel(told)
+    write_png(figure, path)

@@ -7,15 +7,13 @@ Run:      python examples/fan_path.py
 
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 
 from windwrench.controllers import make_controller
 from windwrench.envs import FanTrackingEnv
 from windwrench.evaluation.episodes import fly_episode
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
+from windwrench.runtime.drawing import BLACK, SERIES, new_figure, styled
+from windwrench.runtime.page_files import write_png
 
 
 def chirp(t):
@@ -33,21 +31,23 @@ def steps(t):
 PATHS = {"chirp": chirp, "steps": steps}
 
 
+@styled()
 def main(out="results/fan_path", controller="admittance", seed=4):
     """Fly each path, save ``fan_path.png`` in the folder ``out``, print and return the RMSE of the
     offset in m by path.
     """
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
-    figure, axes = plt.subplots(len(PATHS), 1, sharex=True, figsize=(7, 5), layout="constrained")
+    figure = new_figure(5.0)
+    axes = figure.subplots(len(PATHS), 1, sharex=True)
     found = {}
     for ax, (name, path) in zip(axes, PATHS.items(), strict=True):
         flown = fly_episode(
             FanTrackingEnv("base", fan_path=path), make_controller(controller), seed
         )
         found[name] = flown.rmse
-        ax.plot(flown.time, flown.fan_y, label="fan")
-        ax.plot(flown.time, flown.y, label=f"vehicle, {controller}")
+        ax.plot(flown.time, flown.fan_y, "--", color=BLACK, label="fan")
+        ax.plot(flown.time, flown.y, color=SERIES[1], label=f"vehicle, {controller}")
         ax.set(
             title=f"{name}: {flown.rmse:.2f} m RMSE" + (", lost" if flown.lost else ""),
             ylabel="y (m)",
@@ -55,8 +55,7 @@ def main(out="results/fan_path", controller="admittance", seed=4):
         print(f"{name}: {flown.rmse:.3f} m off the axis (RMSE){', lost' if flown.lost else ''}")
     axes[0].legend()
     axes[-1].set_xlabel("time (s)")
-    figure.savefig(folder / "fan_path.png", dpi=120)
-    plt.close(figure)
+    write_png(figure, folder / "fan_path.png")
     print(folder / "fan_path.png")
     return found
 

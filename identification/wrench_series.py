@@ -78,7 +78,7 @@ def estimate_log(
     log: FlightLog,
     vehicle: Vehicle,
     tuning: UKFTuning | None = None,
-    report: Callable[[float], None] = lambda share: None,
+    report: Callable[[float], None] | None = None,
     smooth: bool = False,
     gate: float | None = GATE,
 ) -> WrenchSeries:
@@ -111,6 +111,7 @@ def estimate_log(
             (``screen_for_estimate``), or its rotor speeds make the filter's numbers overflow.
     """
     log, doubts = screen_for_estimate(log, vehicle)
+    report = report or (lambda share: None)
     return _estimate(log, vehicle, tuning, report, smooth, gate, doubts)
 
 

@@ -20,8 +20,8 @@ from ..dynamics.vehicle import Vehicle
 from ..dynamics.vehicle_file import load_vehicle
 from ..envs.plant import PlantSettings
 from ..envs.suspended_load import SuspendedLoad
+from ..runtime.drawing import BLACK, GREY, PALE, SERIES, new_figure, styled
 from ..runtime.errors import InputError
-from .drawing import COLOURS, styled
 from .hanging_mass import CALM, CENTRE_LOAD, FORCE, ROTOR_LOAD, TORQUE, hover
 from .result import Progress, Result, compared, table
 
@@ -52,7 +52,7 @@ SOURCES = {
     "without 8-bit rotor speeds": (True, False, True),
     "without actuator noise": (True, True, False),
 }
-_LOAD_COLOURS = ("#6f6f6f", COLOURS[1], COLOURS[0])
+_LOAD_COLOURS = (GREY, *SERIES[:2])
 
 
 @dataclass(frozen=True)
@@ -206,19 +206,19 @@ def _figures(clusters: Sequence[Cluster], spread: dict[str, Array], added: Array
     return {"clusters": rows, "limits": limits}
 
 
-@styled
+@styled()
 def draw(estimates: Array, clusters: Sequence[Cluster], spread: dict[str, Array]) -> Figure:
     """Draw the estimates (3 loads, seeds, n, 2) with the mixture, and the parts of the spread."""
-    figure = Figure(figsize=(13, 5.6))
+    figure = new_figure(4.6)
     plane, *panels = figure.subplots(1, 3, width_ratios=[2.1, 1, 1])
     _draw_plane(plane, estimates, clusters)
-    colours = ["#222222"] + [COLOURS[1]] * 3 + ["#b8c9d9"] * 3
+    colours = [BLACK] + [SERIES[0]] * 3 + [PALE] * 3
     for i, (axes, label, unit) in enumerate(
         zip(panels, ("force z", "pitch torque"), ("mN", "mNm"), strict=True)
     ):
         values = [1e3 * std[i] for std in spread.values()]
         bars = axes.barh(list(spread), values, 0.62, color=colours)
-        axes.bar_label(bars, fmt=f"%.{1 + i}f {unit}", padding=3, fontsize=9)
+        axes.bar_label(bars, fmt=f"%.{1 + i}f {unit}", padding=3)
         axes.invert_yaxis()
         axes.margins(x=0.4)
         axes.set_xlabel(f"std of {label} ({unit})")
@@ -246,20 +246,20 @@ def _draw_plane(axes: Any, estimates: Array, clusters: Sequence[Cluster]) -> Non
         text = f"{force:+.3f} ± {std_force:.3f} N\n{torque:+.1f} ± {std_torque:.1f} mNm"
         above = {"ha": "center", "textcoords": "offset points"}
         top = TARGETS[i] * scale + [0.0, 4.2 * std_torque]  # above its cloud
-        axes.annotate(text, top, (0, 0), fontsize=9, **above)
+        axes.annotate(text, top, (0, 0), **above)
         axes.annotate(load, top, (0, 26), color=colour, weight="bold", **above)
         tops.append(top[1])
     axes.plot(*(TARGETS * scale).T, "k+", ms=17, mew=1.8, zorder=6, label="target")
     means = np.array([cluster.mean for cluster in clusters]) * scale
     label = "mixture: mean, 1 and 2 standard deviations"
     axes.plot(*means.T, "o", color="white", mec="black", ms=5, zorder=7, label=label)
-    axes.margins(x=0.16)
+    axes.margins(x=0.45)
     low = axes.get_ylim()[0]
     axes.set_ylim(low, tops[-1] + 0.16 * (tops[-1] - low))  # room for the topmost name
-    axes.axhline(0.0, color="#cccccc", lw=0.8, zorder=0)
+    axes.axhline(0.0, color=PALE, lw=0.8, zorder=0)
     axes.set(
         xlabel="estimated force along z (N)",
         ylabel="estimated pitch torque (mNm)",
         title="53 g on a thread: the estimates of three flights",
     )
-    axes.legend(loc="upper right")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15))

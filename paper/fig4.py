@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ..dynamics.vehicle import Vehicle
 from ..dynamics.vehicle_file import load_vehicle
 from ..envs.plant import PlantSettings
-from .drawing import COLOURS, only_ticks, styled
+from ..runtime.drawing import SERIES, TRUTH, new_figure, only_ticks, styled
 from .hanging_mass import CALM, ROTOR_LOAD, THREAD, hover
 from .result import Progress, Result, compared, table
 
@@ -214,12 +214,13 @@ def _with_error(number: Callable[[Array], float], responses: Array) -> tuple[flo
     return value, float(np.sqrt((count - 1) * np.var(left_out)))
 
 
-@styled
+@styled()
 def draw(steps: Sequence[Step]) -> Figure:
     """Draw force, torque and lateral force (rows) over time at each noise level, and the sweep's
     three curves beside.
     """
-    figure = Figure(figsize=(13.5, 8.2))
+    figure = new_figure(7.0)
+    figure.suptitle(f"53 g hung on at {HANG:g} s")
     grid = figure.subplots(3, 3, width_ratios=[1, 1, 1.05])
     for column, noise in enumerate(NOISES):
         shown = [step for step in steps if step.noise == noise and step.actuator]
@@ -227,7 +228,7 @@ def draw(steps: Sequence[Step]) -> Figure:
         for row, axes in enumerate(grid[:, column]):
             axes.sharey(grid[row, 0])
             _draw_response(axes, row, shown)
-        grid[0, column].set_title(f"53 g hung on at {HANG:g} s; pose noise {_words(noise)}")
+        grid[0, column].set_title(f"pose noise {_words(noise)}")
     for row, name in enumerate(
         ("force z (N)", "pitch torque (mNm)", "lateral force of the mass (N)")
     ):
@@ -247,8 +248,8 @@ def _draw_response(axes: Any, row: int, shown: Sequence[Step]) -> None:
     # the truth of the middle tuning: the flights differ a little
     for step in shown[len(shown) // 2 :][:1]:
         pull = step.pull[:, row] * scale
-        axes.plot(step.time, pull, color="#a0a0a0", lw=1, label="true pull of the thread")
-    for step, colour in zip(shown, (COLOURS[2], *COLOURS[:2]), strict=False):
+        axes.plot(step.time, pull, color=TRUTH, lw=1, label="true pull of the thread")
+    for step, colour in zip(shown, SERIES, strict=False):
         label = f"tuned to {step.tuned:g} s"
         if row < 2:
             label += f": {step.merits[('force_rise_s', 'torque_rise_s')[row]]:.2f} s"
@@ -262,9 +263,7 @@ def _draw_response(axes: Any, row: int, shown: Sequence[Step]) -> None:
         axes.tick_params(labelbottom=False)
         return
     axes.axhline(_LATERAL_BOUND, color="black", lw=0.8, ls="--")
-    axes.annotate(
-        "allowed", (_SPAN[0], _LATERAL_BOUND), (3, 3), textcoords="offset points", fontsize=8
-    )
+    axes.annotate("allowed", (_SPAN[0], _LATERAL_BOUND), (3, 3), textcoords="offset points")
     axes.set_xlabel("time (s)")
 
 
@@ -289,7 +288,7 @@ def _draw_choice(column: Sequence[Any], steps: Sequence[Step]) -> None:
     )
     for axes, (x, x_label, y, y_label) in zip(column, panels, strict=True):
         scale = 1.0 if y == "lateral_N" else 1e3
-        for colour, noise in zip(COLOURS[3:], NOISES, strict=True):
+        for colour, noise in zip(SERIES[3:], NOISES, strict=False):
             for actuator, style in (
                 (True, {"ls": "-", "lw": 1.6}),
                 (False, {"ls": "--", "lw": 1.2, "mfc": "white"}),
@@ -315,7 +314,7 @@ def _draw_choice(column: Sequence[Any], steps: Sequence[Step]) -> None:
     for axes, ticks in zip(column, ((2, 5, 10, 20, 50), (0.1, 0.3, 1, 3, 10)), strict=False):
         axes.set_yscale("log")
         only_ticks(axes.yaxis, ticks)
-    column[0].set_title("choosing a tuning: noise against rise time")
+    column[0].set_title("noise against rise time")
     column[0].legend()
     column[2].axhline(_LATERAL_BOUND, color="black", lw=0.8, ls="--")
     column[2].set_ylim(0, None)

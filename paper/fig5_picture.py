@@ -10,21 +10,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from ..envs.plant import TICK
-from .drawing import COLOURS, only_ticks, styled
+from ..runtime.drawing import ESTIMATE, HELD_OUT, SERIES, new_figure, only_ticks, styled
 from .fig5_estimators import ERRORS
 from .fig5_flights import FLIGHTS, NOISES, Array
 
-_NOISE_COLOURS = {"low": "#7fb0d8", "high": "#17375e"}
+_NOISE_COLOURS = {"low": SERIES[0], "high": SERIES[1]}
 _MARKERS = {"hover": "o", "yawing": "^"}
 _LINES = {
-    "observer low": (COLOURS[0], "observer, tuned at low noise"),
-    "observer anew": (COLOURS[2], "observer, re-tuned"),
-    "UKF low": (COLOURS[1], "UKF, tuned at low noise"),
+    "observer low": (SERIES[1], "observer, tuned at low noise"),
+    "observer anew": (SERIES[4], "observer, re-tuned"),
+    "UKF low": (ESTIMATE, "UKF, tuned at low noise"),
 }
 _PLANT_TITLES = {"exact": "exact plant", "disturbed": "standard plant (unmodelled disturbance)"}
 
 
-@styled
+@styled()
 def draw(
     ratios: Mapping[tuple[str, str, str, str, str], tuple[float, float, float]],
     labels: Sequence[str],
@@ -41,7 +41,7 @@ def draw(
         examples: (noise, estimator) -> states (n, 20) of the example flight.
         seeds: that the ratios are over.
     """
-    figure = Figure(figsize=(14, 13.5))
+    figure = new_figure(10.5)
     parts: Any = figure.subfigures(3, 1)
     top, middle, bottom = parts
     _draw_examples(top, truth, examples)
@@ -91,7 +91,7 @@ def _draw_ratios(
     for axes, error in zip(panels, ERRORS, strict=True):
         axes.set_xscale("log")
         axes.set_xlim(lowest, highest)
-        axes.axvspan(lowest, 1.0, color="#eef5ea", lw=0)
+        axes.axvspan(lowest, 1.0, color=HELD_OUT, lw=0)
         axes.axvline(1.0, color="black", lw=0.9)
         for i, label in enumerate(labels):
             _draw_pair(
@@ -107,13 +107,12 @@ def _draw_ratios(
         ticks = [
             v for v in (0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10, 20) if lowest < v < highest
         ]
-        only_ticks(axes.xaxis, ticks, fontsize=8)
+        only_ticks(axes.xaxis, ticks)
         title = error.replace("_", ", ") + (" state" if "steady" in error else "")
         axes.set_title(title, loc="center")
         axes.grid(axis="x", color="0.9", lw=0.6)
         axes.set_axisbelow(True)
-        axes.set_xlabel("first better  |  second better", fontsize=8)
-    panels[0].set_yticks(range(len(labels)), labels, fontsize=9)
+    panels[0].set_yticks(range(len(labels)), labels)
     for noise in NOISES:
         for flight in FLIGHTS:
             panels[-1].plot(

@@ -10,12 +10,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ..evaluation.episodes import Episode
-from ..evaluation.pictures import COLOURS as CONTROLLER_COLOURS
-from .drawing import BLACK, COLOURS, GREY, styled
+from ..runtime.drawing import BLACK, ESTIMATE, JET, PALE, SERIES, TRUTH, new_figure, styled
 
 Array = NDArray[np.float64]
-_GAINS = {6.0: COLOURS[3], 18.0: CONTROLLER_COLOURS["admittance"], 36.0: COLOURS[4]}
-_JET = "#cfe5f5"
+_GAINS = {6.0: SERIES[2], 18.0: SERIES[1], 36.0: SERIES[3]}
 _RADIUS = 0.45  # m, of the fan
 # field of a row of the search -> line, its style, and its entry in the legend
 _HELD = (
@@ -25,7 +23,7 @@ _HELD = (
 )
 
 
-@styled
+@styled()
 def draw_tracking(
     captures: Mapping[tuple[float, float], list[Episode]],
     tracks: Mapping[tuple[float, float], list[Episode]],
@@ -44,20 +42,20 @@ def draw_tracking(
         at: the offset where it acts, m.
         held_offset: offset that ends a flight of that search, m.
     """
-    figure = Figure(figsize=(13.5, 14.5))
+    figure = new_figure(11.0)
     grid = figure.add_gridspec(4, 3, height_ratios=[1, 1.05, 0.7, 1.15])
     rise_times = sorted({rise for rise, _ in captures})
     first = None
     for column, rise_time in enumerate(rise_times):
         first = axes = figure.add_subplot(grid[0, column], sharey=first)
         _capture(axes, {gain: some for (rise, gain), some in captures.items() if rise == rise_time})
-        axes.set_title(f"capture from 0.8 m, filter rise time {rise_time:g} s")
+        axes.set_title(f"from 0.8 m off, rise time {rise_time:g} s")
     # all of every trace, and the legend above them
     offsets = np.concatenate([_signed_offset(e) for some in captures.values() for e in some])
     axes.set_ylim(min(offsets.min(), -_RADIUS) - 0.1, max(offsets.max(), _RADIUS) + 0.35)
     axes = figure.add_subplot(grid[0, 2])
     _torque(axes, captures[rise_times[0], 18.0][0], largest)
-    axes.set_title(f"its torque, gain 18, rise time {rise_times[0]:g} s, one flight")
+    axes.set_title(f"its torque, rise time {rise_times[0]:g} s")
     first = second = None
     for column, speed in enumerate(sorted({speed for speed, _ in tracks})):
         flights = {gain: some for (fan, gain), some in tracks.items() if fan == speed}
@@ -74,8 +72,8 @@ def draw_tracking(
     axes.set(title="the same as a share of the bound", ylim=(0, 130), ylabel="% of the bound")
     axes.set_xlabel("gain k (m/s per Nm)")
     figure.suptitle(
-        f"Following a fan 2.3 m away by its torque. The jet's largest torque, {1e3 * largest:.0f} "
-        f"mNm, acts {at:.2f} m off the axis; a fan counts as held while the offset stays below "
+        f"Following a fan 2.3 m away by its torque.\nThe jet's largest torque, {1e3 * largest:.0f} "
+        f"mNm, acts {at:.2f} m off the axis;\na fan counts as held while the offset stays below "
         f"{held_offset:g} m"
     )
     return figure
@@ -88,7 +86,7 @@ def _signed_offset(episode: Episode) -> Array:
 
 def _capture(axes: Any, flights: Mapping[float, list[Episode]]) -> None:
     """Draw the distance of every flight from the axis, and the median flight of each gain."""
-    axes.axhspan(-_RADIUS, _RADIUS, color=_JET, lw=0)
+    axes.axhspan(-_RADIUS, _RADIUS, color=JET, lw=0)
     for gain, some in flights.items():
         signed = [_signed_offset(e) for e in some]
         for e, offset in zip(some, signed, strict=True):
@@ -98,15 +96,15 @@ def _capture(axes: Any, flights: Mapping[float, list[Episode]]) -> None:
         time = some[0].time[:shortest]
         axes.plot(time, median, color=_GAINS[gain], lw=2.2, label=f"gain {gain:g}")
     axes.axhline(0, ls="--", color=BLACK, lw=1.2)
-    axes.legend(ncols=3, loc="upper right")
-    axes.set(xlabel="time (s)", ylabel="y - fan, on the side it started (m)")
+    axes.legend(ncols=2, loc="upper right")
+    axes.set(xlabel="time (s)", ylabel="y - fan (m), start positive")
 
 
 def _follow(axes: Any, flights: Mapping[float, list[Episode]]) -> None:
     """Draw fan and vehicle of the first seed, with the RMSE over all."""
     longest = max((some[0] for some in flights.values()), key=lambda e: len(e.time))
     fan = longest.fan_y
-    axes.fill_between(longest.time, fan - _RADIUS, fan + _RADIUS, color=_JET, lw=0)
+    axes.fill_between(longest.time, fan - _RADIUS, fan + _RADIUS, color=JET, lw=0)
     axes.plot(longest.time, fan, "--", color=BLACK, lw=1.5, label="fan")
     for gain, some in flights.items():
         lost = float(np.mean([e.lost for e in some]))
@@ -120,11 +118,9 @@ def _follow(axes: Any, flights: Mapping[float, list[Episode]]) -> None:
 def _torque(axes: Any, episode: Episode, largest: float) -> None:
     for bound in (-largest, largest):
         axes.axhline(1e3 * bound, color="black", lw=0.8, ls=":")
-    axes.plot(episode.time, 1e3 * episode.torque[:, 2], color=GREY, lw=0.8, label="true")
+    axes.plot(episode.time, 1e3 * episode.torque[:, 2], color=TRUTH, lw=0.8, label="true")
     estimated = 1e3 * episode.observation[:, 5]
-    axes.plot(
-        episode.time, estimated, color=CONTROLLER_COLOURS["oracle"], lw=1.6, label="estimated"
-    )
+    axes.plot(episode.time, estimated, color=ESTIMATE, lw=1.6, label="estimated")
     axes.axhline(0, color="black", lw=0.5)
     axes.legend(ncols=2, loc="upper right")
     axes.set(xlabel="time (s)", ylabel=r"$\tau_z$ (mNm)", ylim=(-62, 62))
@@ -135,7 +131,7 @@ def _held(axes: Any, fastest: Sequence[Any], scale: Any) -> list[Any]:
     what the legend names.
     """
     entries = []
-    for rise, colour in zip(sorted({f.rise_time for f in fastest}), COLOURS, strict=False):
+    for rise, colour in zip(sorted({f.rise_time for f in fastest}), SERIES, strict=False):
         some = [f for f in fastest if f.rise_time == rise]
         scales = np.array([scale(f) for f in some])
         held = np.array([f.held for f in some])
@@ -166,7 +162,8 @@ def _speeds(axes: Any, fastest: Sequence[Any], largest: float) -> None:
     )
     label = r"bound $k\,\tau_{max}$ (and the largest command, 1 m/s)"
     entries = axes.plot(line, bound, color="black", lw=1.6, label=label)
-    axes.fill_between(line, bound, 1.3, color="0.93", lw=0)
+    words = "beyond it no fan can be followed"
+    entries.append(axes.fill_between(line, bound, 1.3, color=PALE, lw=0, label=words))
     entries += _held(axes, fastest, lambda f: 1.0)
     for gain in gains:
         some = sorted((f for f in fastest if f.gain == gain), key=lambda f: f.rise_time)
@@ -174,11 +171,8 @@ def _speeds(axes: Any, fastest: Sequence[Any], largest: float) -> None:
             gain + 0.4,
             min(f.held_interval[0] for f in some) - 0.06,
             " / ".join(f"{f.held:.2f}" for f in some),
-            fontsize=8,
             ha="left" if gain < gains[-1] else "center",
         )
-    words = "beyond the bound no fan can be followed"
-    axes.text(0.55 * line[-1], 1.08, words, color="0.45", fontsize=9)
     # in the order drawn; a legend of its own making has bars with intervals last
     axes.legend(handles=entries, loc="upper left")
     axes.set(title="the fastest fan held by four flights of five", ylabel="speed of the fan (m/s)")

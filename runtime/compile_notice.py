@@ -1,18 +1,21 @@
-"""One line on standard error where compiling takes more than a moment.
+"""One line on standard error where compiling takes more than a moment, and words for a progress.
 
 ``runtime.compiled`` reports when Numba compiles. This module imports nothing heavy, so that a
 command can silence the notice at its start.
 """
 
+import math
 import sys
 import threading
+import time
 
 PATIENCE = 2.0  # s of compiling until the line
+_PAUSE = 1.0  # s between two functions, while which the words stay
 LINE = "windwrench: compiling, once for this installation; later starts load it"
 
 
 class CompileNotice:
-    """Prints the line once, 2 s after compiling began, where it still goes on."""
+    """Prints the line once, 2 s after compiling began, where it still goes on; counts functions."""
 
     def __init__(self, patience: float = PATIENCE) -> None:
         self.quiet = False
@@ -20,10 +23,20 @@ class CompileNotice:
         self._depth = 0  # a function compiles those that it calls
         self._timer: threading.Timer | None = None
         self._told = False
+        self._functions = 0
+        self._ended = -math.inf  # s, when the last one was compiled
+
+    @property
+    def words(self) -> str:
+        """What a progress says in place of its own text while functions are compiled, or ``""``."""
+        if not self._depth and time.monotonic() - self._ended > _PAUSE:
+            return ""
+        return f"compiling, once for this installation: {self._functions} functions"
 
     def begin(self) -> None:
         """Note that a function is compiled from now on."""
         self._depth += 1
+        self._functions += 1
         if self._timer is None and not self._told:
             self._timer = threading.Timer(self._patience, self._tell)
             self._timer.daemon = True
@@ -32,6 +45,7 @@ class CompileNotice:
     def end(self) -> None:
         """Note that the function that began last is compiled."""
         self._depth -= 1
+        self._ended = time.monotonic()
 
     def _tell(self) -> None:
         self._timer = None

@@ -16,7 +16,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 import typer
 from numpy.typing import NDArray
@@ -42,6 +41,7 @@ from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.sensing_effects import undo_log_sensing
 from windwrench.identification.motion.signals import Signals, log_signals
 from windwrench.identification.motion.smoothing import low_pass
+from windwrench.runtime.drawing import AFTER, BEFORE, new_figure, styled
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.page_files import write_json, write_png
 from windwrench.runtime.provenance import commit
@@ -361,36 +361,29 @@ def commanded_fault(path: Path) -> dict[str, Any] | None:
     return None
 
 
+@styled()
 def _picture(kept: Mapping[str, tuple[FlightLog, Diagnosis]], path: Path) -> None:
-    figure, panels = plt.subplots(
-        len(kept),
-        3,
-        figsize=(11, 2.0 * len(kept)),
-        sharex="col",
-        squeeze=False,
-        layout="constrained",
-    )
+    figure = new_figure(1.6 * len(kept))
+    panels = figure.subplots(len(kept), 3, sharex="col", squeeze=False)
     for row, (name, (log, diagnosis)) in zip(panels, kept.items(), strict=True):
         mass = diagnosis.declared.mass
         before, after = (
             acceleration_residual(log, v, mass) for v in (diagnosis.declared, diagnosis.amended)
         )
         for i, (panel, axis) in enumerate(zip(row, "xyz", strict=True)):
-            for x, words in ((before, "declared"), (after, "amended")):
+            for x, colour, words in ((before, BEFORE, "declared"), (after, AFTER, "amended")):
                 panel.plot(
                     np.arange(len(x)) / 100.0,
                     x[:, i] - x[:, i].mean() * (i < 2),
+                    color=colour,
                     lw=0.8,
                     label=words,
                 )
-            panel.set_title(
-                f"{name.split('_')[0]}, {axis}" + (", mean removed" if i < 2 else ""), fontsize=9
-            )
-    panels[0, 0].legend(fontsize=8)
+            panel.set_title(f"{name.split('_')[0]}, {axis}" + (", mean removed" if i < 2 else ""))
+    panels[0, 0].legend()
     figure.supylabel("residual (m/s2)")
     figure.supxlabel("time in the air (s)")
     write_png(figure, path)
-    plt.close(figure)
 
 
 def nanobench(folder: Path, picture: Path) -> list[dict[str, Any]]:

@@ -18,6 +18,7 @@ import gymnasium as gym
 import matplotlib.pyplot as plt
 
 import windwrench  # noqa: F401  # registers the environments
+from windwrench.runtime.drawing import GREY, SERIES
 
 env = gym.make("windwrench/FanTracking-v0", scenario="base")
 print(env.observation_space, env.action_space)
@@ -66,10 +67,9 @@ rmse = {name: (sum(x * x for x in y) / len(y)) ** 0.5 for name, y in flights.ite
 
 # %%
 figure, ax = plt.subplots(figsize=(7, 3.2), layout="constrained")
-for name, offsets in flights.items():
-    ax.plot(
-        [k / 12.5 for k in range(len(offsets))], offsets, label=f"{name}: {rmse[name]:.2f} m RMSE"
-    )
+for (name, offsets), colour in zip(flights.items(), (GREY, SERIES[1]), strict=True):
+    told = f"{name}: {rmse[name]:.2f} m RMSE"
+    ax.plot([k / 12.5 for k in range(len(offsets))], offsets, color=colour, label=told)
     print(f"{name}: {rmse[name]:.3f} m")
 ax.set(xlabel="time (s)", ylabel="distance from the axis (m)", title="One episode, two controllers")
 ax.legend()

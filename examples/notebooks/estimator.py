@@ -25,6 +25,7 @@ import numpy as np
 from windwrench.dynamics import load_vehicle
 from windwrench.envs.recording import record_flight
 from windwrench.estimator import UKFTuning, WrenchUKF
+from windwrench.runtime.drawing import SERIES, TRUTH
 
 # %% [markdown]
 # ## A flight
@@ -72,10 +73,10 @@ for name, tuning in tunings.items():
 # %%
 settled = (flight["t"] > 3.5) & (flight["t"] < 5.0)
 figure, ax = plt.subplots(figsize=(7, 3.2), layout="constrained")
-ax.plot(flight["t"], flight["force"][:, 1], color="0.6", lw=0.8, label="true force")
+ax.plot(flight["t"], flight["force"][:, 1], color=TRUTH, lw=0.8, label="true force")
 print(f"true force: {flight['force'][settled, 1].mean():.2f} N")
-for name, force in estimates.items():
-    ax.plot(flight["t"], force, lw=1.2, label=f"estimate, {name}")
+for (name, force), colour in zip(estimates.items(), SERIES, strict=False):
+    ax.plot(flight["t"], force, color=colour, lw=1.2, label=f"estimate, {name}")
     print(f"{name}: {force[settled].mean():.2f} N")
 ax.set(xlabel="time (s)", ylabel="force along y (N)", title="A force from rotor speeds and pose")
 ax.legend()

@@ -27,6 +27,7 @@ from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.envs.recording import record_flight
 from windwrench.identification import diagnose, read_log
 from windwrench.identification.logs.flight_log import FlightLog, write_log
+from windwrench.runtime.drawing import AFTER, BEFORE, HELD_OUT
 
 # %%
 vehicle = load_vehicle("ardrone2")
@@ -61,13 +62,13 @@ trace = found.traces[0]
 names = ", ".join(effect.name for effect in found.effects) or "nothing"
 figure, axes = plt.subplots(2, 1, figsize=(7, 4.2), sharex=True, layout="constrained")
 for ax, channel, label in zip(axes, (0, 1), "xy", strict=True):
-    ax.plot(trace.t, trace.before[:, channel], color="#c95400", lw=1.2, label="before")
-    ax.plot(trace.t, trace.after[:, channel], color="#0068a8", lw=1.2, label="after")
+    ax.plot(trace.t, trace.before[:, channel], color=BEFORE, lw=1.2, label="before")
+    ax.plot(trace.t, trace.after[:, channel], color=AFTER, lw=1.2, label="after")
     ax.fill_between(
         trace.t,
         *ax.get_ylim(),
         where=np.asarray(trace.held_out, dtype=bool),
-        color="#e6edda",
+        color=HELD_OUT,
         label="held out",
         zorder=0,
     )
@@ -76,7 +77,7 @@ axes[0].set_title(
     f"The model lacked {names}: force error {found.before.force_rms:.2f} → "
     f"{found.after.force_rms:.2f} N (noise floor {found.floor_force_rms:.2f} N)"
 )
-axes[0].legend(ncols=3, fontsize="small")
+figure.legend(*axes[0].get_legend_handles_labels(), ncols=3, loc="outside lower center")
 axes[1].set_xlabel("time (s)")
 figure.savefig("your_log.png", dpi=110)
 

@@ -8,6 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from ...runtime.drawing import (
+    AFTER,
+    BEFORE,
+    BLACK,
+    GREY,
+    PALE,
+    SERIES,
+    new_figure,
+    room_above,
+    styled,
+)
 from ...runtime.page_files import write_json, write_png
 from ...runtime.plain_values import plain
 from .change import CHANGES, NOWHERE, SOMETHING_ELSE, Change
@@ -17,7 +28,6 @@ from .trim import Trim
 
 _PLACES = ("front-left", "rear-left", "rear-right", "front-right")
 _NAMED = 0.05  # probability from which a rival is mentioned
-_RED, _BLUE, _GREY, _DARK = "#d1495b", "#30638e", "#8a8a8a", "#4a4a4a"
 
 
 def _cannot_tell(chances: Mapping[str, float], likeliest: str, name: Callable[[str], str]) -> str:
@@ -117,33 +127,32 @@ def write_change(change: Change, folder: Path) -> tuple[Path, Path]:
     return data, picture
 
 
+@styled()
 def _draw_change(change: Change) -> Any:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11.0, 4.8), layout="constrained")
+    figure = new_figure(4.0)
     left, right = figure.subplots(1, 2)
     for trims, colour, label in (
-        (change.before, _BLUE, "before"),
-        (change.after, _RED, "after"),
+        (change.before, BEFORE, "before"),
+        (change.after, AFTER, "after"),
     ):
         # as seen from above, front up: what lies to the left is drawn to the left
         x = [-100 * trim.shares[0] for trim in trims]
         y = [100 * trim.shares[1] for trim in trims]
         left.plot(x, y, "o", color=colour, label=label, ms=7, alpha=0.8)
-    left.axhline(0.0, color="#c9c9c9", lw=1)
-    left.axvline(0.0, color="#c9c9c9", lw=1)
+    left.axhline(0.0, color=PALE, lw=1)
+    left.axvline(0.0, color=PALE, lw=1)
     left.set_xlabel("left  -  thrust asked for, % of the total  -  right")
     left.set_ylabel("rear  -  % of the total  -  front")
-    left.set_title("how each flight's rotors share the work", fontsize=10)
-    left.legend(frameon=False)
+    left.set_title("how each flight's rotors share the work")
+    left.legend()
     left.axis("equal")
     names = sorted(change.places, key=change.places.__getitem__)
     chances = [change.places[name] for name in names]
-    right.barh(names, chances, color=[_RED if n == change.place else _GREY for n in names])
+    right.barh(names, chances, color=[AFTER if n == change.place else GREY for n in names])
     right.set_xlim(0.0, 1.0)
-    right.axvline(CHANGES.sure, color=_DARK, lw=1, ls="--")
+    right.axvline(CHANGES.sure, color=BLACK, lw=1, ls="--")
     right.set_xlabel("probability that something changed there")
-    right.set_title(f"sure from {CHANGES.sure:g} (dashed)", fontsize=10)
+    right.set_title(f"sure from {CHANGES.sure:g} (dashed)")
     return figure
 
 
@@ -218,31 +227,32 @@ def write_faults(found: Sequence[tuple[RotorFault, Samples]], folder: Path) -> t
     return data, picture
 
 
+@styled()
 def _draw_faults(found: Sequence[tuple[RotorFault, Samples]]) -> Any:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11.0, 4.2 * len(found)), layout="constrained")
+    figure = new_figure(3.4 * len(found))
     axes = np.atleast_2d(figure.subplots(len(found), 2, squeeze=False))
     for (fault, samples), (left, right) in zip(found, axes, strict=True):
-        for axis, colour in zip(range(3), (_RED, _BLUE, _GREY), strict=True):
+        for axis, colour in zip(range(3), SERIES, strict=False):
             left.plot(
                 samples.t, samples.angular_acceleration[:, axis], color=colour, lw=1,
                 label=f"about {'xyz'[axis]}",
             )  # fmt: skip
         left.set_ylabel("angular acceleration, rad/s2")
-        left.legend(frameon=False, loc="upper left", fontsize=8)
+        room_above(left)
+        left.legend(loc="upper left", ncols=3)
         command = samples.channels.command
         for i in range(4):
             u = np.interp(samples.t, samples.channels.command_times, command[:, i])
             right.plot(samples.t, u, lw=1, label=f"rotor {i + 1}")
         right.set_ylabel("command")
-        right.legend(frameon=False, loc="upper left", fontsize=8)
+        room_above(right)
+        right.legend(loc="upper left", ncols=4)
         for axis_ in (left, right):
             axis_.set_xlabel("t, s (the log's clock)")
             if fault.likeliest in ("1", "2", "3", "4"):
-                axis_.axvline(fault.onset[0], color=_DARK, lw=1, ls="--")
+                axis_.axvline(fault.onset[0], color=BLACK, lw=1, ls="--")
                 axis_.set_xlim(fault.onset[0] - 3.0, samples.t[-1] + 0.1)
-        left.set_title(Path(fault.name).name, fontsize=9)
+        left.set_title(Path(fault.name).name)
         chance = fault.probabilities[fault.likeliest]
-        right.set_title(f"{_finding(fault, fault.likeliest)}: {chance:.3f}", fontsize=9)
+        right.set_title(f"{_finding(fault, fault.likeliest)}: {chance:.3f}")
     return figure

@@ -37,7 +37,7 @@ def diagnose(
     vehicle: Vehicle,
     test: Sequence[FlightLog] = (),
     without: Sequence[str] = (),
-    report: Callable[[str], None] = lambda text: None,
+    report: Callable[[str], None] | None = None,
     settings: DiagnosisSettings = DIAGNOSIS,
 ) -> Diagnosis:
     """Return what the logs of one vehicle say about its model.
@@ -58,6 +58,7 @@ def diagnose(
     for name in without:
         if name not in names():
             raise unknown_name("effect", name, names(), "--without")
+    report = report or (lambda text: None)
     if not logs:
         raise InputError("diagnose: no log was given; expected at least one")
     report("looking at the logs")

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ...runtime.whole_files import replaced
+from ...runtime.drawing import SERIES, new_figure, styled
+from ...runtime.page_files import write_png
 from ..logs.flight_log import FlightLog
 
 Array = NDArray[np.float64]
 
 _GAP = 3.0  # of a channel's own median steps
-_COLOURS = ("#0072b2", "#d55e00", "#007f5f", "#cc79a7")
 _AXES = ("x", "y", "z")
 _ROTORS = ("1 front-left", "2 rear-left", "3 rear-right", "4 front-right")
 
@@ -68,10 +68,10 @@ def log_channels(log: FlightLog) -> list[Channel]:
         rows = np.flatnonzero(np.isfinite(values).all(axis=1))
         if len(rows) < 2:
             continue
-        t, title, drawn = log.t[rows], f"{name}\n({unit})", values[rows]
+        t, title, drawn = log.t[rows], f"{name} ({unit})", values[rows]
         low, high = float(drawn.min()), float(drawn.max())
         if values is tilt:
-            drawn, title = axis[rows, :2], "thrust axis\n(x, y of 1)"
+            drawn, title = axis[rows, :2], "thrust axis (x, y of 1)"
         steps = np.diff(t)
         step = float(np.median(steps))
         rate = min(log.rates.get(section) or np.inf, 1.0 / step)
@@ -81,26 +81,23 @@ def log_channels(log: FlightLog) -> list[Channel]:
     return out
 
 
+@styled()
 def plot_channels(name: str, channels: list[Channel], path: Path) -> Path:
     """Draw a log's channels over time, a panel each, into a PNG.
 
     Raises:
         InputError: the file cannot be written.
     """
-    # matplotlib takes half a second to import, and most of the kit never draws
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10.0, 1.1 + 1.55 * len(channels)), layout="constrained")
+    figure = new_figure(0.9 + 1.35 * len(channels))
     panels = np.atleast_1d(figure.subplots(len(channels), 1, sharex=True))
-    figure.suptitle(name)
+    figure.suptitle(name, parse_math=False)
     for panel, channel in zip(panels, channels, strict=True):
-        for column, label, colour in zip(channel.drawn.T, channel.series, _COLOURS, strict=False):
+        for column, label, colour in zip(channel.drawn.T, channel.series, SERIES, strict=False):
             panel.plot(channel.t, column, color=colour, lw=0.8, label=label)
-        panel.set_ylabel(channel.title, fontsize=8)
-        panel.grid(alpha=0.3)
+        panel.set_title(channel.title)
+        panel.grid()
         if len(channel.series) > 1:
-            panel.legend(loc="upper right", fontsize=7, ncols=len(channel.series))
+            panel.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(channel.series))
     panels[-1].set_xlabel("time (s)")
-    with replaced(path) as partial:  # no page shows it, so that its colours need not be few
-        figure.savefig(partial, format="png", dpi=90)
+    write_png(figure, path)
     return path

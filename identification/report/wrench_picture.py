@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
+from ...runtime.drawing import BLACK, GREY, PALE, SERIES, new_figure, room_above, styled
 from ...runtime.page_files import write_png
 from ..logs.flight_log import FlightLog
 from ..logs.flight_phases import FLIGHT, GROUND, LANDING, TAKE_OFF, Phase, flight_phases
@@ -20,11 +21,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_SHADES = {GROUND: "#d9d9d9", TAKE_OFF: "#cfe8cf", FLIGHT: "#ffffff", LANDING: "#fbe3c4"}
-_AXES = (("x", "#0072b2"), ("y", "#d55e00"), ("z", "#007f5f"))
+_SHADES = {GROUND: PALE, TAKE_OFF: "#cfe8cf", FLIGHT: "#ffffff", LANDING: "#fbe3c4"}
+_THRUST = SERIES[3]
 _LASTING = 0.1  # s without a pose that is worth hatching
 
 
+@styled()
 def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
     """Draw height, force and torque with their 2-sigma bands, and the truth where the log has it,
     into a PNG.
@@ -37,19 +39,16 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
     Raises:
         InputError: the file cannot be written.
     """
-    # matplotlib takes half a second to import, and most of the kit never draws
-    from matplotlib.figure import Figure
-
     path, vehicle = Path(path), series.vehicle
     known = bool(np.isfinite(series.position).all())
     phases = (
         flight_phases(series.t, series.position[:, 2], log.rotor_speeds, vehicle) if known else []
     )
-    figure = Figure(figsize=(12.0, 9.0), layout="constrained")
+    figure = new_figure(7.0)
     height, force, torque = figure.subplots(3, 1, sharex=True, height_ratios=[1.0, 1.5, 1.5])
-    figure.suptitle(f"External wrench: {log.name}, {vehicle.name}")
+    figure.suptitle(f"External wrench: {log.name}, {vehicle.name}", parse_math=False)
 
-    height.plot(series.t, series.position[:, 2], color="black", lw=1.2)
+    height.plot(series.t, series.position[:, 2], color=BLACK, lw=1.2)
     height.set_ylabel("height (m)" if known else "height (not known)")
     if not known:
         height.set_yticks([])
@@ -65,20 +64,19 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
     torque.set_xlabel("time (s)")
     if any(phase.name == GROUND for phase in phases):
         weight = f"weight {vehicle.weight:.3g} N"
-        force.axhline(vehicle.weight, color="black", lw=0.8, ls=":", label=weight)
+        force.axhline(vehicle.weight, color=BLACK, lw=0.8, ls=":", label=weight)
     columns, room = (4, 0.14) if log.force is None else (3, 0.26)
     for panel in (height, force, torque):
-        panel.grid(alpha=0.3)
+        panel.grid()
         panel.margins(x=0.0)
         _shade(backdrop if panel is height else panel, phases, log)
         if panel is not height and panel.get_legend_handles_labels()[0]:
-            panel.legend(loc="upper center", ncols=columns, fontsize=9, framealpha=0.9)
-            low, high = panel.get_ylim()
-            panel.set_ylim(low, high + room * (high - low))  # for the legend
+            panel.legend(loc="upper center", ncols=columns)
+            room_above(panel, room)
     for phase in phases:
         middle = 0.5 * (phase.start + phase.end)
         place = height.get_xaxis_transform()
-        height.text(middle, 1.03, phase.name, transform=place, ha="center", fontsize=9)
+        height.text(middle, 1.03, phase.name, transform=place, ha="center")
     write_png(figure, path)
     return path
 
@@ -87,9 +85,9 @@ def _draw_thrust(panel: "Axes", t: Array, log: FlightLog, vehicle: Vehicle) -> "
     """Draw the rotors' thrust, in weights, behind the height; return the axes behind."""
     thrust = panel.twinx()
     weights = np.square(log.rotor_speeds) @ vehicle.k / vehicle.weight
-    thrust.plot(t, weights, color="#a35db5", lw=0.6, alpha=0.6)
-    thrust.set_ylabel("rotor thrust / weight", color="#7d3c8c")
-    thrust.tick_params(axis="y", labelcolor="#7d3c8c")
+    thrust.plot(t, weights, color=_THRUST, lw=0.6, alpha=0.6)
+    thrust.set_ylabel("rotor thrust / weight", color=_THRUST)
+    thrust.tick_params(axis="y", labelcolor=_THRUST)
     thrust.set_ylim(bottom=0.0)
     panel.set_zorder(thrust.get_zorder() + 1)
     panel.set_facecolor("none")
@@ -104,12 +102,12 @@ def _draw_vectors(
     """
     if not np.isfinite(mean).any():
         words = "not estimated: the rotors were measured too seldom"
-        panel.text(0.5, 0.5, words, transform=panel.transAxes, ha="center", fontsize=11)
+        panel.text(0.5, 0.5, words, transform=panel.transAxes, ha="center")
         panel.set_yticks([])
         return
     symbol, unit = what
     low, high = mean - 2 * std, mean + 2 * std
-    for i, (axis, colour) in enumerate(_AXES):
+    for i, (axis, colour) in enumerate(zip("xyz", SERIES, strict=False)):
         name = f"{symbol}$_{axis}$"
         panel.fill_between(t, low[:, i], high[:, i], color=colour, alpha=0.18, lw=0)
         if truth is not None:
@@ -137,6 +135,6 @@ def _shade(panel: "Axes", phases: Sequence[Phase], log: FlightLog) -> None:
     lost = after - poses[np.searchsorted(poses, log.t, "right") - 1] > _LASTING
     if lost.any() and log.has_pose:
         lost[1:] |= lost[:-1]  # up to the next pose
-        look: dict[str, Any] = {"facecolor": "none", "edgecolor": "#999999", "hatch": "///"}
+        look: dict[str, Any] = {"facecolor": "none", "edgecolor": GREY, "hatch": "///"}
         place = panel.get_xaxis_transform()
         panel.fill_between(log.t, 0.0, 1.0, where=lost, transform=place, zorder=0, lw=0, **look)

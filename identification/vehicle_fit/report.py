@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.vehicle_file import save_vehicle
+from ...runtime.drawing import ESTIMATE, TRUTH, new_figure, styled
 from ...runtime.page_files import write_png, write_text
 from ...runtime.plain_values import plain
 from ..motion.smoothing import low_pass
@@ -148,9 +149,8 @@ def explained(found: Identified) -> Array:
     return np.clip(1.0 - left / np.where(total > 0.0, total, np.nan), 0.0, 1.0)
 
 
+@styled()
 def _picture(found: Identified) -> "Figure":
-    from matplotlib.figure import Figure
-
     mass, inertia = found.vehicle.mass, np.diag(found.vehicle.inertia)
     scale = np.concatenate([np.full(3, mass), inertia])
     longest = max(found.pieces, key=lambda p: len(p.t))
@@ -158,35 +158,37 @@ def _picture(found: Identified) -> "Figure":
     share, band = explained(found), found.fit.drive.band
     middle = longest.t[len(longest.t) // 2]
     shown = np.abs(longest.t - middle) <= 0.5 * _SHOWN_SECONDS
-    figure = Figure(figsize=(11, 6), layout="constrained")
+    figure = new_figure(4.8)
     axes = figure.subplots(2, 3, sharex=True)
     for i, axis in enumerate("xyz"):
         for row, (what, unit) in enumerate((("force", "N"), ("torque", "Nm"))):
             j = 3 * row + i
             plot = axes[row, i]
-            plot.plot(longest.t[shown], scale[j] * measured[shown, j], lw=1.4, label="measured")
-            plot.plot(longest.t[shown], scale[j] * model[shown, j], lw=1.0, label="fitted")
+            plot.plot(
+                longest.t[shown], scale[j] * measured[shown, j], TRUTH, lw=1.6, label="measured"
+            )
+            plot.plot(
+                longest.t[shown], scale[j] * model[shown, j], ESTIMATE, lw=1.0, label="fitted"
+            )
             told = "not measured" if np.isnan(share[j]) else f"{share[j]:.0%} explained"
-            plot.set_title(f"{what} {axis} ({unit}), {told}", fontsize=9)
+            plot.set_title(f"{what} {axis} ({unit}), {told}")
         axes[1, i].set_xlabel("time (s)")
-    axes[0, 0].legend(fontsize=8)
+    axes[0, 0].legend()
     figure.suptitle(
         f"explained: of the power from {_LEAST_HZ:g} to {band:g} Hz, each frequency by its noise; "
-        f"drawn: up to {min(_SHOWN_HZ, band):g} Hz",
-        fontsize=9,
+        f"drawn: up to {min(_SHOWN_HZ, band):g} Hz"
     )
     return figure
 
 
+@styled()
 def _prediction_picture(errors: PredictionErrors) -> "Figure":
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11, 3), layout="constrained")
+    figure = new_figure(2.6)
     rows = zip(figure.subplots(1, 4), QUANTITIES.items(), errors.model, errors.still, strict=True)
     for axes, (name, unit), model, still in rows:
-        axes.plot(errors.horizon, still, color="0.6", label="if nothing changes")
-        axes.plot(errors.horizon, model, label="of the vehicle")
+        axes.plot(errors.horizon, still, TRUTH, label="if nothing changes")
+        axes.plot(errors.horizon, model, ESTIMATE, label="of the vehicle")
         axes.set(title=f"{name} ({unit})", xlabel="time after the start (s)", ylim=(0.0, None))
-    axes.legend(fontsize=9)
-    figure.suptitle(f"mean error of predictions, {errors.starts} starts", fontsize=10)
+    axes.legend()
+    figure.suptitle(f"mean error of predictions, {errors.starts} starts")
     return figure
