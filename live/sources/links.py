@@ -5,6 +5,7 @@ import os
 import select
 import socket
 from abc import ABC, abstractmethod
+from contextlib import ExitStack
 from typing import Any
 
 from ...runtime.errors import InputError
@@ -86,15 +87,17 @@ class Datagrams(Link):
             family, kind, protocol, _, address = socket.getaddrinfo(
                 self._host, self._port, type=socket.SOCK_DGRAM, flags=flags
             )[0]
-            self.opened = socket.socket(family, kind, protocol)
-            self.opened.setblocking(False)
-            if self._calls:
-                self.peer = address
-            else:
-                self.opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
-                self.opened.bind(address)
+            with ExitStack() as unless_open:
+                opened = unless_open.enter_context(socket.socket(family, kind, protocol))
+                opened.setblocking(False)
+                if self._calls:
+                    self.peer = address
+                else:
+                    opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
+                    opened.bind(address)
+                unless_open.pop_all()
+            self.opened = opened
         except (OSError, OverflowError, UnicodeError) as error:
-            self.close()
             reason = getattr(error, "strerror", None) or error
             does = "call" if self._calls else "listen at"
             raise InputError(f"{self._text}: cannot {does} {where}: {reason}") from error
