@@ -1,4 +1,4 @@
-"""Which effects act: the posterior over sets of up to four, and what they leave unexplained.
+"""Which effects act: the posterior over sets of up to five, and what they leave unexplained.
 
 Every effect of the library is as likely as every other before the flight, and one is expected to be
 missing. A set's evidence is that of the likelier noise of two: that beside no effect, and that

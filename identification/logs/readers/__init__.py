@@ -114,12 +114,7 @@ def reader_by_content(path: Path) -> Reader | None:
             head = _head(path)
         except InputError:
             return None  # whoever reads it says what is wrong
-        known = (
-            r
-            for r in READERS.values()
-            if head.startswith(r.begins) or (r.holds and r.holds in head)
-        )
-        return next(known, None)
+        return next((r for r in READERS.values() if r.knows(head)), None)
     try:
         names = sorted(entry.name for entry in path.iterdir())
     except OSError as error:
