@@ -13,6 +13,12 @@ EQUIVALENTS: Mapping[str, tuple[str, ...]] = {
     "thrust_scale": ("rotor_efficiency",),
     "world_tilt": ("constant_force",),
 }
+# Effects that leave the log that this one leaves with another inertia, or at a bound: a load on a
+# cable of no length is a mass. Where this one is left out of the library, they are too
+STAND_INS: Mapping[str, tuple[str, ...]] = {
+    "mass": ("thrust_scale", "rotor_efficiency", "slung_payload"),
+    "thrust_scale": ("rotor_efficiency", "mass", "slung_payload"),
+}
 
 
 def share(count: int, whole: int) -> str:
