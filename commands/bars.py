@@ -1,8 +1,10 @@
-"""Bars of progress: in a terminal they move; elsewhere, such as in a log of a build, a line comes
-now and then.
+"""Progress: in a terminal bars move; elsewhere, such as in a log of a build, a line comes now and
+then.
 """
 
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from rich.console import Console
@@ -25,36 +27,24 @@ class What(TextColumn):
         return Text(notice.words) if notice.words else super().render(task)
 
 
-class Bars(Progress):
-    """Bars, or lines where there is no terminal.
+@contextmanager
+def bars(*columns: ProgressColumn, console: Console) -> Iterator[Progress]:
+    """Show bars of these columns, or lines where there is no terminal; nothing on a quiet one."""
+    moving, over = console.is_terminal and not console.quiet, threading.Event()
+    with Progress(*columns, console=console, transient=True, disable=not moving) as progress:
 
-    Args:
-        columns: of each bar.
-        console: of standard error.
-    """
+        def write_lines() -> None:
+            while not over.wait(_LINE_EVERY):
+                for task in progress.tasks:
+                    if not task.finished:
+                        console.print(_line(task), highlight=False, markup=False, soft_wrap=True)
 
-    def __init__(self, *columns: ProgressColumn, console: Console) -> None:
-        moving = console.is_terminal and not console.quiet
-        super().__init__(*columns, console=console, transient=True, disable=not moving)
-        self._over = threading.Event()
-        self._in_lines = not (moving or console.quiet)
-
-    def start(self) -> None:
-        """Show the bars."""
-        super().start()
-        if self._in_lines:
-            threading.Thread(target=self._write_lines, name="progress", daemon=True).start()
-
-    def stop(self) -> None:
-        """Take the bars away."""
-        self._over.set()
-        super().stop()
-
-    def _write_lines(self) -> None:
-        while not self._over.wait(_LINE_EVERY):
-            for task in self.tasks:
-                if not task.finished:
-                    self.console.print(_line(task), highlight=False, markup=False, soft_wrap=True)
+        if not (moving or console.quiet):
+            threading.Thread(target=write_lines, name="progress", daemon=True).start()
+        try:
+            yield progress
+        finally:
+            over.set()
 
 
 def _line(task: Any) -> str:

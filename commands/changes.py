@@ -8,7 +8,7 @@ from typing import Any
 from typer.core import TyperCommand
 
 from ..runtime.errors import InputError
-from .flight_logs import log_notes, read_flights
+from .flight_logs import AS_THEY_ARE, Reading, log_notes, read_flights
 from .terminal import console, results_folder, say, show_table
 
 _AGAINST = "--against"
@@ -21,10 +21,7 @@ def compare(
     logs: list[Path] | None = None,
     against: list[Path] | None = None,
     example: bool = False,
-    reader: str | None = None,
-    map: str | None = None,
-    piece: int | None = None,
-    vehicle: str | None = None,
+    reading: Reading = AS_THEY_ARE,
     out: Path = Path("results/compare"),
 ) -> dict[str, Any]:
     """Find what changed between two sets of flights. Which rotor, which side: no model has to be
@@ -40,29 +37,23 @@ def compare(
             resources.files("windwrench.identification.comparison") / "example"
         ) as flown:
             normal = sorted(flown.glob("normal-*.csv.gz"))
-            return _compare([flown / "cut.csv.gz"], normal, out)
+            return _compare([flown / "cut.csv.gz"], normal, AS_THEY_ARE, out)
     if not logs or not against:
         raise InputError(
             f"compare: expected logs after the change and {_AGAINST} logs before it, or --example"
         )
-    return _compare(logs, against, out, reader, vehicle, map, piece)
+    return _compare(logs, against, reading, out)
 
 
 def _compare(
-    logs: Sequence[Path],
-    against: Sequence[Path],
-    out: Path,
-    reader: str | None = None,
-    vehicle: str | None = None,
-    log_map: str | None = None,
-    piece: int | None = None,
+    logs: Sequence[Path], against: Sequence[Path], reading: Reading, out: Path
 ) -> dict[str, Any]:
     """Compare two sets of flights; write the result."""
     from ..identification.comparison.change import compare as find_change
     from ..identification.comparison.trim import trim_of_log
     from ..identification.comparison.words import change_data, change_headline, write_change
 
-    every, model = read_flights([*logs, *against], reader, vehicle, log_map, piece)
+    every, model = read_flights([*logs, *against], reading)
     folder = results_folder(out)
     trims = [trim_of_log(log, model) for log in every]
     change = find_change(trims[: len(logs)], trims[len(logs) :])

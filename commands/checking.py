@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import InputError, UnreadLogError
 from ..runtime.page_files import write_text
+from .flight_logs import AS_THEY_ARE, Reading
 from .terminal import console, note, results_folder, say, show_table, working
 
 if TYPE_CHECKING:
@@ -14,10 +15,7 @@ if TYPE_CHECKING:
 
 def check(
     log: Path,
-    map: str | None = None,
-    piece: int | None = None,
-    reader: str | None = None,
-    vehicle: str | None = None,
+    reading: Reading = AS_THEY_ARE,
     write_map: Path | None = None,
     write: Path | None = None,
     out: Path = Path("results/check"),
@@ -32,10 +30,10 @@ def check(
     from ..identification.report.log_channels import plot_channels
     from ..identification.report.log_check import check_log
 
-    model = None if vehicle is None else load_vehicle(vehicle)
+    model = None if reading.vehicle is None else load_vehicle(reading.vehicle)
     try:
         with working("reading"):
-            found = check_log(log, reader, model, map, piece)
+            found = check_log(log, reading.reader, model, reading.map, reading.piece)
     except UnreadLogError as error:
         if write_map is None:
             console.print(error.map_text, soft_wrap=True, highlight=False)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import InputError
-from .flight_logs import log_notes, read_flights
+from .flight_logs import AS_THEY_ARE, Reading, log_notes, read_flights
 from .terminal import command_line, console, results_folder, say, show_page, show_table, working
 
 if TYPE_CHECKING:
@@ -33,12 +33,9 @@ def diagnose(
     example: bool = False,
     no_open: bool = False,
     test: list[Path] | None = None,
-    reader: str | None = None,
-    map: str | None = None,
-    piece: int | None = None,
+    reading: Reading = AS_THEY_ARE,
     rotor_faults: bool = False,
     without: list[str] | None = None,
-    vehicle: str | None = None,
     out: Path = Path("results/diagnose"),
 ) -> dict[str, Any]:
     """Find effects that a vehicle's model lacks. From flight logs; write report.json, report.html
@@ -50,13 +47,18 @@ def diagnose(
         from ..identification.logs.example import example_flight
         from .example import conclude, introduce
 
-        given = {"LOGS": logs, "--vehicle": vehicle, "--reader": reader, "--map": map}
-        for option, value in {**given, "--test": test, "--rotor-faults": rotor_faults}.items():
+        how = {"--vehicle": reading.vehicle, "--reader": reading.reader, "--map": reading.map}
+        for option, value in {
+            "LOGS": logs,
+            **how,
+            "--test": test,
+            "--rotor-faults": rotor_faults,
+        }.items():
             if value:
                 raise InputError(f"--example: has a log of its own; expected it without {option}")
         with example_flight() as flight:
             introduce(flight)
-            read = read_flights([flight.log], None, flight.vehicle)
+            read = read_flights([flight.log], Reading(vehicle=flight.vehicle))
             result = _diagnose(read, [flight.log], without, out)
         result["known"] = conclude(flight, result["effects"])
         show_page(out / "report.html", not no_open)
@@ -64,11 +66,11 @@ def diagnose(
     if not logs:
         raise InputError("diagnose: expected at least one flight log, or --example")
     if rotor_faults:
-        if test or piece:
+        if test or reading.piece:
             unwanted = "--test" if test else "--piece"
             raise InputError(f"--rotor-faults: expected no {unwanted} with it")
-        return _rotor_faults(logs, reader, vehicle, out, map)
-    read = read_flights([*logs, *(test or [])], reader, vehicle, map, piece)
+        return _rotor_faults(logs, reading, out)
+    read = read_flights([*logs, *(test or [])], reading)
     return _diagnose(read, logs, without, out)
 
 
@@ -144,7 +146,7 @@ def _with_rotor_faults(
     found: "Diagnosis", paths: Sequence[Path], flights: "Sequence[FlightLog]"
 ) -> "Diagnosis":
     """Add whether a rotor lost thrust during a flight, for the logs that can show it."""
-    from ..identification.comparison.fault_channels import channels_of
+    from ..identification.comparison.fault_channels import read_channels
     from ..identification.comparison.fault_detection import find_fault
     from ..identification.comparison.words import fault_data
 
@@ -152,39 +154,34 @@ def _with_rotor_faults(
     with working("looking for a rotor that lost thrust"):
         for path, log in zip(paths, flights, strict=True):
             try:
-                faults.append(fault_data(find_fault(channels_of(path, log))))
+                faults.append(fault_data(find_fault(read_channels(path, log=log)[0])))
             except InputError:
                 continue  # no gyro, no accelerometer, no command, or too little flight
     notes = tuple(data["headline"] for data in faults if data["rotor"] is not None)
     return replace(found, rotor_faults=tuple(faults), notes=(*found.notes, *notes))
 
 
-def _rotor_faults(
-    logs: Sequence[Path],
-    reader: str | None,
-    vehicle: str | None,
-    out: Path,
-    log_map: str | None,
-) -> dict[str, Any]:
+def _rotor_faults(logs: Sequence[Path], reading: Reading, out: Path) -> dict[str, Any]:
     """Look for rotors that lost thrust during flights; write rotor_faults.json and a picture."""
     from ..dynamics.vehicle_file import load_vehicle
-    from ..identification.comparison.fault_channels import read_channels, sample
+    from ..identification.comparison.fault_channels import read_channels
     from ..identification.comparison.fault_detection import find_fault
     from ..identification.comparison.words import fault_data, fault_headline, write_faults
 
-    model = None if vehicle is None else load_vehicle(vehicle)
-    read = [read_channels(path, reader, model, log_map) for path in logs]
+    model = None if reading.vehicle is None else load_vehicle(reading.vehicle)
+    read = [read_channels(path, reading.reader, model, reading.map) for path in logs]
     folder = results_folder(out)
     found = []
     with working("looking for a rotor that lost thrust") as progress:
         for i, (channels, _) in enumerate(read):
             progress(i / len(read))
-            found.append((find_fault(channels), sample(channels)))
+            found.append(find_fault(channels))
     written = write_faults(found, folder)
     log_notes(text for _, notes in read for text in notes)
-    for fault, samples in found:
+    for fault in found:
+        samples = fault.samples
         ended = f"; nothing later: {samples.ended}" if samples.ended else ""
-        console.print(f"{fault.name}: {fault.seconds:.1f} s in flight{ended}")
+        console.print(f"{samples.channels.name}: {fault.seconds:.1f} s in flight{ended}")
         console.print(fault_headline(fault))
     say(*written)
-    return {"rotor_faults": [fault_data(fault) for fault, _ in found]}
+    return {"rotor_faults": [fault_data(fault) for fault in found]}

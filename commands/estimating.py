@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import InputError
 from ..runtime.extras import need
-from .flight_logs import log_notes, read_flights
+from .flight_logs import AS_THEY_ARE, Reading, log_notes, read_flights
 from .terminal import (
     console,
     film_kinds,
@@ -43,10 +43,7 @@ _TOO_SLOW = (
 
 def estimate(
     log: Path,
-    reader: str | None = None,
-    map: str | None = None,
-    piece: int | None = None,
-    vehicle: str | None = None,
+    reading: Reading = AS_THEY_ARE,
     smooth: bool | None = None,
     gate: float | None = None,
     tune: bool | None = None,
@@ -81,7 +78,7 @@ def estimate(
 
     level = gate_of(gate)
     kinds = film_kinds(view, video, gif)
-    (flight,), model = read_flights([log], reader, vehicle, map, piece)
+    (flight,), model = read_flights([log], reading)
     rows = shown_rows(flight, log, film_from, film_seconds) if kinds or view else None
     track = result_file(out, "wrench.csv", _TRACKS)
     if needed := _TRACKS[track.suffix]:

@@ -7,26 +7,6 @@ from ..runtime.errors import InputError
 from .terminal import command_line, console, gate_of, results_folder, say, working
 
 
-def _policy_path(name: str) -> Path | None:
-    """Return the file of a trained policy, by its path or its name; None for a law.
-
-    Raises:
-        InputError: there is none of this name.
-    """
-    from ..controllers.registry import shipped_policies
-    from ..live.export_c.policies import LAWS
-
-    known = {**dict.fromkeys(LAWS), **shipped_policies()}
-    if name.endswith((".npz", ".json")):
-        return Path(name)
-    if name not in known:
-        raise InputError(
-            f"--policy {name}: no such policy; expected {', '.join(known)}, or the path of a "
-            "trained one"
-        )
-    return known[name]
-
-
 def export_c(
     vehicle: str,
     estimator: str = "ekf",
@@ -55,7 +35,7 @@ def export_c(
     model = load_vehicle(vehicle)
     if effects == "none":
         model = replace(model, effects=())
-    flown = None if policy is None else exportable_policy(policy, _policy_path(policy))
+    flown = None if policy is None else exportable_policy(policy)
     there = [out / name for name in FILES if (out / name).exists()]
     if there and not overwrite:
         raise InputError(f"{there[0]}: is there already; expected a new folder, or --overwrite")

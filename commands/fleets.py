@@ -1,10 +1,10 @@
 """Fleets: many logs of many vehicles, one diagnosis each."""
 
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 from ..runtime.errors import InputError
+from .flight_logs import AS_THEY_ARE, Reading
 from .terminal import command_line, console, note, results_folder, say, show_table, working
 
 _MOST_ROWS = 20  # of the table in the terminal
@@ -13,10 +13,7 @@ _MOST_ROWS = 20  # of the table in the terminal
 def fleet(
     logs: list[Path],
     manifest: Path | None = None,
-    vehicle: str | None = None,
-    reader: str | None = None,
-    map: str | None = None,
-    piece: int | None = None,
+    reading: Reading = AS_THEY_ARE,
     without: list[str] | None = None,
     cluster: str | None = None,
     jobs: int | None = None,
@@ -43,27 +40,27 @@ def fleet(
     for name in without or ():
         if name not in names():
             raise unknown_name("effect", name, names(), "--without")
-    if reader is not None:
-        find_reader(reader)
-    if map is not None:
-        load_map(map)
+    if reading.reader is not None:
+        find_reader(reading.reader)
+    if reading.map is not None:
+        load_map(reading.map)
     if cluster is not None:
         need("ray", "cluster")
-    found, doubts = find_logs(logs, manifest, vehicle, reader, out, map, piece)
+    found, doubts = find_logs(logs, manifest, out, **vars(reading))
     folder = results_folder(out, logs=len(found), jobs=jobs, cluster=cluster)
     for text in doubts:
         note(text)
-    with closing(Outcomes(folder / OUTCOMES)) as outcomes:
-        with working("diagnosing logs", len(found)) as progress:
+    outcomes = Outcomes(folder / OUTCOMES)
+    with working("diagnosing logs", len(found)) as progress:
 
-            def report(counts: Any) -> None:
-                text = f"diagnosing logs ({counts['refused']} refused)"
-                progress(sum(counts.values()), text)
+        def report(counts: Any) -> None:
+            text = f"diagnosing logs ({counts['refused']} refused)"
+            progress(sum(counts.values()), text)
 
-            done = run_fleet(
-                found, outcomes, tuple(without or ()), limit or LIMIT_S, jobs, cluster, report
-            )
-        flights = rows(done, outcomes)
+        done = run_fleet(
+            found, outcomes, tuple(without or ()), limit or LIMIT_S, jobs, cluster, report
+        )
+    flights = rows(done, outcomes)
     flown = fleet_of(flights)
     written = write_fleet(flown, flights, folder, command_line())
     for sentence in (headline(flown), *(change_in_words(one) for one in changes(flown))):

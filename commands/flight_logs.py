@@ -3,6 +3,7 @@
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,12 +15,21 @@ if TYPE_CHECKING:
     from ..identification.logs.flight_log import FlightLog
 
 
+@dataclass(frozen=True)
+class Reading:
+    """How logs are read: the options of every command that reads some."""
+
+    reader: str | None = None
+    map: str | None = None
+    piece: int | None = None
+    vehicle: str | None = None
+
+
+AS_THEY_ARE = Reading()
+
+
 def read_flights(
-    paths: Sequence[Path],
-    reader: str | None,
-    vehicle: str | None,
-    log_map: str | None = None,
-    piece: int | None = None,
+    paths: Sequence[Path], reading: Reading = AS_THEY_ARE
 ) -> "tuple[list[FlightLog], Vehicle]":
     """Read flights of one vehicle, the one given or the one that the logs name.
 
@@ -29,8 +39,8 @@ def read_flights(
     """
     from ..dynamics.vehicle_file import load_vehicle, preset_names
 
-    model = None if vehicle is None else load_vehicle(vehicle)
-    flights = read_logs(paths, reader, model, log_map, piece)
+    model = None if reading.vehicle is None else load_vehicle(reading.vehicle)
+    flights = read_logs(paths, reading, model)
     if model is not None:
         return flights, model
     expected = f"--vehicle {', '.join(preset_names())} or the path of a YAML file"
@@ -51,11 +61,7 @@ def read_flights(
 
 
 def read_logs(
-    paths: Iterable[Path],
-    reader: str | None,
-    vehicle: "Vehicle | None",
-    log_map: str | None,
-    piece: int | None = None,
+    paths: Iterable[Path], reading: Reading, vehicle: "Vehicle | None" = None
 ) -> "list[FlightLog]":
     """Read flight logs. What a reader warns of stands in the notes of its log.
 
@@ -66,7 +72,8 @@ def read_logs(
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
-        return [read_log(path, reader, vehicle, log_map, piece) for path in paths]
+        how = reading.reader, vehicle, reading.map, reading.piece
+        return [read_log(path, *how) for path in paths]
 
 
 def log_notes(texts: Iterable[str]) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ..runtime.errors import InputError
-from .flight_logs import log_notes, read_logs
+from .flight_logs import Reading, log_notes, read_logs
 from .terminal import console, result_file, run, say, show_table, working
 
 _WINDOW = re.compile(r"(.+):(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?)")
@@ -64,7 +64,7 @@ def identify(
     if not common[0] < common[1]:
         raise InputError(f"--to {end:g}: expected a time after --from {begin:g}")
     parts = [parse_window(text) for text in (*logs, *(test or ()))]
-    flights = read_logs([path for path, _ in parts], reader, None, map, piece)
+    flights = read_logs([path for path, _ in parts], Reading(reader, map, piece))
     flights, unseen = flights[: len(logs)], flights[len(logs) :]
     windows = [w if math.isfinite(w[1]) else common for _, w in parts]
     with working("identifying") as progress:
@@ -76,9 +76,8 @@ def identify(
     run.record = out.with_name(f"{out.stem}.run.json")
     written = write_identified(found, out, errors)
     log_notes([*(text for flight in flights for text in flight.notes), *found.notes])
-    console.print(
-        f"{found.seconds:.0f} s of flight, mass {mass:g} kg: {headline(found)}.",
-    )
+    seconds = found.fit.balance.seconds
+    console.print(f"{seconds:.0f} s of flight, mass {mass:g} kg: {headline(found)}.")
     show_table(
         ("quantity", "value", "95 % interval", "unit", ""),
         [

@@ -2,12 +2,15 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import InputError
 from ..runtime.extras import need
 from .running import expensive
 from .terminal import command_line, console, results_folder, say, show_table, working
+
+if TYPE_CHECKING:
+    from ..training.sweep import Job
 
 
 @expensive
@@ -28,6 +31,9 @@ def train(
 
     Example: windwrench train sac --scenario base --seed 0 --steps 60000 --out results/sac-0
     """
+    from ..training.configuration import load_config
+    from ..training.sweep import jobs_of
+
     need("stable_baselines3", "rl")
     if algorithm == "recurrent-ppo":
         need("sb3_contrib", "rl")
@@ -36,33 +42,25 @@ def train(
     if algorithm == "tune":
         if several:
             raise InputError("train tune: expected no --seeds, --search or --cluster")
-        return _tune(scenario, seed, overrides, config, out)
+        return _tune(load_config("tune", overrides, config), scenario, seed, out)
     from ..training.training_envs import check_training_env
 
     check_training_env(scenario)
-    if several:
-        runs = range(seed, seed + seeds)
-        return _sweep(algorithm, scenario, runs, overrides, search or [], config, cluster, out)
-    return _learn(algorithm, scenario, seed, overrides, config, out)
-
-
-def _sweep(
-    algorithm: str,
-    scenario: str,
-    seeds: range,
-    overrides: Sequence[str],
-    search: list[str],
-    config: Path | None,
-    cluster: str | None,
-    out: Path,
-) -> dict[str, Any]:
-    from ..training.sweep import jobs_of, run_job, run_jobs
-
+    told = f"{algorithm}, {scenario}"
+    if not several:
+        return _learn(load_config(algorithm, overrides, config), told, scenario, seed, out)
     if cluster:
         need("ray", "cluster")
-    jobs = jobs_of(algorithm, scenario, seeds, overrides, search, config)
+    runs = range(seed, seed + seeds)
+    jobs = jobs_of(algorithm, scenario, runs, overrides, search or [], config)
+    return _sweep(jobs, told, cluster, out)
+
+
+def _sweep(jobs: "Sequence[Job]", told: str, cluster: str | None, out: Path) -> dict[str, Any]:
+    from ..training.sweep import run_job, run_jobs
+
     folder = results_folder(out, runs=[job.name for job in jobs], cluster=cluster)
-    with working(f"{algorithm}, {scenario}", len(jobs)) as progress:
+    with working(told, len(jobs)) as progress:
         if cluster:
             found = run_jobs(jobs, folder, cluster)
         else:
@@ -82,42 +80,26 @@ def _sweep(
     return {"runs": found}
 
 
-def _learn(
-    algorithm: str,
-    scenario: str,
-    seed: int,
-    overrides: Sequence[str],
-    config: Path | None,
-    out: Path,
-) -> dict[str, Any]:
-    from ..training.configuration import load_config
+def _learn(given: dict[str, Any], told: str, scenario: str, seed: int, out: Path) -> dict[str, Any]:
     from ..training.run import Progress, read_progress
     from ..training.train import train
 
-    given = load_config(algorithm, overrides, config)
     folder = results_folder(
         out,
-        algorithm=algorithm,
+        algorithm=given["algorithm"],
         scenario=scenario,
         seed=seed,
         decisions=given["steps"],
         config=given,
     )
-    with working(f"{algorithm}, {scenario}", given["steps"]) as progress:
+    with working(told, given["steps"]) as progress:
 
         def report(now: Progress) -> None:
-            told = f"validation RMSE {now.rmse_m[-1]:.3f} m"
-            progress(text=f"{algorithm}, {scenario}: {told}")
-            console.print(f"{now.steps[-1]:8d} decisions: {told}, {now.lost[-1]} lost")
+            error = f"validation RMSE {now.rmse_m[-1]:.3f} m"
+            progress(text=f"{told}: {error}")
+            console.print(f"{now.steps[-1]:8d} decisions: {error}, {now.lost[-1]} lost")
 
-        path = train(
-            given,
-            scenario,
-            seed,
-            folder,
-            progress,
-            report,
-        )
+        path = train(given, scenario, seed, folder, progress, report)
     done = read_progress(folder)
     assert done is not None
     console.print(
@@ -132,15 +114,10 @@ def _learn(
     }
 
 
-def _tune(
-    scenario: str, seed: int, overrides: Sequence[str], config: Path | None, out: Path
-) -> dict[str, Any]:
-    from ..training.configuration import load_config
-
+def _tune(given: dict[str, Any], scenario: str, seed: int, out: Path) -> dict[str, Any]:
     need("optuna", "rl")
     from ..training.tune import check_request, keep_gains, tune
 
-    given = load_config("tune", overrides, config)
     task, law, trials, episodes = (
         given[name] for name in ("task", "controller", "trials", "episodes")
     )

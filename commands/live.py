@@ -11,6 +11,7 @@ from rich.live import Live
 
 from ..runtime.errors import InputError
 from ..runtime.interrupts import INTERRUPTED, taken
+from .flight_logs import Reading
 from .terminal import console, errors, gate_of, note, run, working
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ def live(
             raise InputError("--diagnose-after: nothing was recorded to diagnose")
         from .diagnosing import diagnose
 
-        result["diagnosis"] = diagnose([recorder.path], vehicle=flown, out=out)
+        result["diagnosis"] = diagnose([recorder.path], reading=Reading(vehicle=flown), out=out)
     if interrupted:
         run.code = INTERRUPTED
     return result

@@ -2,11 +2,13 @@
 
 import shlex
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..runtime.errors import InputError, UnreadLogError
 from ..runtime.page_files import write_text
+from .flight_logs import AS_THEY_ARE, Reading
 from .terminal import (
     command_line,
     console,
@@ -17,9 +19,6 @@ from .terminal import (
     show_page,
     silently,
 )
-
-if TYPE_CHECKING:
-    from ..identification.report.log_check import LogCheck
 
 _MAKE_A_VEHICLE = """Force and torque need a vehicle. Make its file from this log and a mass:
 windwrench identify {log} --mass KG --out my_drone.yaml
@@ -33,10 +32,7 @@ def is_path(word: str) -> bool:
 
 def look(
     log: Path,
-    vehicle: str | None = None,
-    map: str | None = None,
-    reader: str | None = None,
-    piece: int | None = None,
+    reading: Reading = AS_THEY_ARE,
     no_open: bool = False,
     out: Path = Path("results/log"),
 ) -> dict[str, Any]:
@@ -46,31 +42,48 @@ def look(
     Example: windwrench look flight.csv --vehicle crazyflie
     """
     from ..demo.steps import Step, write_page
+    from ..dynamics.vehicle_file import preset_names
+    from .checking import check
     from .diagnosing import diagnose
     from .estimating import estimate
 
     folder = results_folder(out)
-    found, used = _checked(log, reader, vehicle, map, piece, folder)
-    options = {"--map": used, "--reader": reader, "--piece": piece}
-    steps = [_what_it_holds(found, _typed("check", log, options | {"--vehicle": vehicle}), folder)]
+    own_map = folder / "map.yaml"
+    try:
+        with silently():
+            found = check(log, reading, out=folder)
+    except InputError as refused:
+        unread = refused.__cause__
+        if not isinstance(unread, UnreadLogError):
+            raise
+        write_text(unread.map_text, own_map)
+        raise InputError(
+            f"{unread}. The map so far is {own_map}: edit it, then windwrench {log} --map {own_map}"
+        ) from unread
+    if found["fields"]:  # its map was guessed
+        write_text(found["map"], own_map)
+        reading = replace(reading, map=str(own_map))
+        for text in found["doubts"]:
+            note(f"warning: {text}")
+    drawn, said = folder / "check.png", _what_it_holds(found)
+    steps = [Step("What the log holds", said, _typed("check", log, reading), drawn)]
     _tell(steps[0])
     sentence, then = f"{steps[0].sentences[0]} No vehicle is known.", ""
-    flew = vehicle or _preset(found)
-    results: dict[str, Any] = {"check": found.as_dict()}
-    if flew is None:
+    if reading.vehicle is None and found["vehicle"] in preset_names():
+        reading = replace(reading, vehicle=found["vehicle"])
+    results: dict[str, Any] = {"check": found}
+    if reading.vehicle is None:
         then = _MAKE_A_VEHICLE.format(log=shlex.quote(str(log)))
     else:
-        options["--vehicle"] = flew
-        given = {"reader": reader, "map": used, "piece": piece, "vehicle": flew}
         ways: tuple[tuple[str, str, Callable[..., Any], Any, Callable[..., Any]], ...] = (
             ("estimate", "Which force and torque act", estimate, log, _what_acts),
             ("diagnose", "What the model lacks", diagnose, [log], _what_lacks),
         )
         for name, title, work, logs, told in ways:
-            command = _typed(name, log, options)
+            command = _typed(name, log, reading)
             try:
                 with silently():
-                    results[name] = work(logs, out=folder / name, **given)
+                    results[name] = work(logs, reading=reading, out=folder / name)
             except InputError as refused:
                 steps.append(Step(title, (f"Not from this log: {refused}",), command))
             else:
@@ -80,7 +93,7 @@ def look(
                 steps.append(Step(title, (sentence, *rest), command, picture, report))
             _tell(steps[-1])
     page = folder / "log.html"
-    write_page(found.log.name, sentence, steps, then, command_line(), page)
+    write_page(found["log"], sentence, steps, then, command_line(), page)
     run.record = folder / "run.json"
     for line in then.splitlines():
         console.print(line, soft_wrap=True)
@@ -90,51 +103,11 @@ def look(
     return {**results, "sentence": sentence, "page": page}
 
 
-def _checked(
-    log: Path,
-    reader: str | None,
-    vehicle: str | None,
-    map: str | None,
-    piece: int | None,
-    folder: Path,
-) -> "tuple[LogCheck, str | None]":
-    """Return what is in a log, and the map by which it is read from now on.
-
-    Raises:
-        InputError: it cannot be read; a map that lacks something is written.
-    """
-    from ..dynamics.vehicle_file import load_vehicle
-    from ..identification.report.log_check import check_log
-
-    model = None if vehicle is None else load_vehicle(vehicle)
-    path = folder / "map.yaml"
-    try:
-        with silently():
-            found = check_log(log, reader, model, map, piece)
-    except UnreadLogError as error:
-        write_text(error.map_text, path)
-        raise InputError(
-            f"{error}. The map so far is {path}: edit it, then windwrench {log} --map {path}"
-        ) from error
-    if found.guess is None:
-        return found, map
-    write_text(found.map_text, path)
-    for text in found.doubts:
-        note(f"warning: {text}")
-    return found, str(path)
-
-
-def _preset(found: "LogCheck") -> str | None:
-    """Return the vehicle that a log names, where it comes with the kit."""
-    from ..dynamics.vehicle_file import preset_names
-
-    return found.log.vehicle if found.log.vehicle in preset_names() else None
-
-
-def _typed(command: str, log: Path, options: Mapping[str, object]) -> str:
+def _typed(command: str, log: Path, reading: Reading) -> str:
     """Return what a user types for one step alone."""
-    given = [str(x) for flag, value in options.items() if value is not None for x in (flag, value)]
-    return shlex.join(["windwrench", command, str(log), *given])
+    given = vars(reading).items()
+    options = [str(x) for name, value in given if value is not None for x in (f"--{name}", value)]
+    return shlex.join(["windwrench", command, str(log), *options])
 
 
 def _tell(step: Any) -> None:
@@ -142,16 +115,13 @@ def _tell(step: Any) -> None:
     console.print(f"  {step.command}", soft_wrap=True, style="dim")
 
 
-def _what_it_holds(found: "LogCheck", command: str, folder: Path) -> Any:
-    from ..demo.steps import Step
-    from ..identification.report.log_channels import plot_channels
-
-    with silently():
-        picture = plot_channels(found.log.name, found.channels, folder / "check.png")
-    said = [f"{len(found.doubts)} doubts: the command below tells them."] if found.doubts else []
-    names = ", ".join(f"{c.name} {c.rate_hz:.3g} Hz" for c in found.channels)
-    sentences = (f"{found.sentence()}.", f"Channels: {names}.", *said)
-    return Step("What the log holds", sentences, command, picture)
+def _what_it_holds(found: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return what ``check`` found as sentences."""
+    read = f"{found['samples']} rows, {found['seconds']:.1f} s, read by {found['read_by']}."
+    rates = (f"{name} {c['rate_hz']:.3g} Hz" for name, c in found["channels"].items())
+    doubts = len(found["doubts"])
+    said = [f"{doubts} doubts: the command below tells them."] if doubts else []
+    return (read, f"Channels: {', '.join(rates)}.", *said)
 
 
 def _what_acts(result: Mapping[str, Any]) -> tuple[str, list[str]]:

@@ -7,6 +7,7 @@ import inspect
 import json
 import platform
 from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import Any, TypeVar
@@ -59,7 +60,7 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
         notice.quiet = quiet
         try:
             check_values(name, options)
-            outcome: dict[str, Any] = {"result": work(**options)}
+            outcome: dict[str, Any] = {"result": work(**_grouped(signature, options))}
             if run.record is not None:
                 write_run(run.record, name, options)
         except DryRun as stopped:
@@ -85,7 +86,7 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
     signature = inspect.signature(work, eval_str=True)
     flags = ("as_json", "quiet", *(["dry_run"] if can_stop else []))
     given = [
-        *signature.parameters.values(),
+        *(each for one in signature.parameters.values() for each in _single(one)),
         *(
             inspect.Parameter(flag, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=bool)
             for flag in flags
@@ -98,6 +99,24 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
     )
     command.__annotations__ = kinds
     return command
+
+
+def _single(one: inspect.Parameter) -> list[inspect.Parameter]:
+    """Return the options that a group of options, a data class, stands for; else the one itself."""
+    if not is_dataclass(one.annotation):
+        return [one]
+    each = fields(one.annotation)
+    return [one.replace(name=f.name, default=f.default, annotation=f.type) for f in each]
+
+
+def _grouped(signature: inspect.Signature, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the arguments of a command whose options are given one by one."""
+    given = {}
+    for name, one in signature.parameters.items():
+        group: Callable[..., Any] = one.annotation
+        each = {single.name: options[single.name] for single in _single(one)}
+        given[name] = each[name] if name in each else group(**each)
+    return given
 
 
 def _words(value: object) -> str:

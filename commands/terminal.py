@@ -25,7 +25,7 @@ from rich.table import Table
 
 from ..runtime.errors import InputError
 from ..runtime.printable import printable
-from .bars import Bars, What
+from .bars import What, bars
 
 
 class _Terminal(Console):
@@ -169,7 +169,7 @@ def working(text: str, total: float = 1.0) -> Iterator[Callable[..., None]]:
         TextColumn("left:"),
         TimeRemainingColumn(),
     )
-    with Bars(*columns, console=errors) as progress:
+    with bars(*columns, console=errors) as progress:
         task = progress.add_task(text, total=None)
 
         def report(

@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import toeplitz
 from scipy.ndimage import maximum_filter1d
 
-from ...runtime.compiled import compiled
 from .fault_channels import STEP, Samples
 from .fault_noise import Noise, fit_noise
 
@@ -81,10 +81,13 @@ class FaultBalance:
         share: Array = np.diff(area) / STEP
         return share
 
-    def residuals(self, row: int | None = None, begin: Begin = AT_ONCE) -> Array:
-        """Return residuals (N, 4) where nothing happens, or with a step in each channel."""
-        step = [] if row is None else [self._share(row, begin)[:, None]]
-        return np.column_stack([self._left(c, *step) for c in range(CHANNELS)])
+    def noises(self, row: int | None = None, begin: Begin = AT_ONCE) -> list[Noise]:
+        """Return each channel's noise, fitted to what is left where nothing happens, or beside a
+        step.
+        """
+        step = [] if row is None else [self._share(row, begin)]
+        left = [self._left(c, *step) for c in range(CHANNELS)]
+        return [fit_noise(x, self.activity, self.follows) for x in left]
 
     def _share(self, row: int, begin: Begin) -> Array:
         """Return the share (N,) of something that begins at a row that has come."""
@@ -103,17 +106,13 @@ class FaultBalance:
             beta = np.linalg.lstsq(x, y, rcond=None)[0]
         return np.asarray(y - x @ beta)
 
-    def noises(self, residuals: Array) -> list[Noise]:
-        """Return each channel's noise, fitted to residuals (N, 4)."""
-        return [fit_noise(residuals[:, c], self.activity, self.follows) for c in range(CHANNELS)]
-
     def nothing(self, noises: list[Noise]) -> float:
         """Return the log-likelihood where nothing happens."""
         total = 0.0
         for c, noise in enumerate(noises):
             fixed = _Fixed(noise, self.free_columns[c], self.y[:, c], self.moment[:, c])
             gain = max(fixed.my, 0.0) ** 2 / fixed.mm
-            total += float(_log_likelihood(np.array(fixed.yy - gain), noise))
+            total += float(noise.log_likelihood(np.array(fixed.yy - gain)))
         return total
 
     def losses(
@@ -157,14 +156,14 @@ class FaultBalance:
         total = np.zeros(len(rows))
         for c, noise in enumerate(noises):
             fixed = _Fixed(noise, self.free_columns[c], self.y[:, c], self.moment[:, c])
-            sy, sm, ss = fixed.beginning(np.ones(len(self.y)), rows, self.ramp(begin))
+            sy, sm, ss = fixed.beginning(rows, self.ramp(begin))
             a = max(fixed.my, 0.0) / fixed.mm
             own_share = np.maximum(ss - sm * sm / fixed.mm, 1e-12 * ss + 1e-300)
             gain = np.square(sy - sm * fixed.my / fixed.mm) / own_share
             n = int(noise.whole.sum())
             width = np.log(np.maximum(gain / noise.variance, 1.0))
             price = 0.5 * np.maximum(1.0 + width, math.log(n))
-            total += _log_likelihood(fixed.yy - a * fixed.my - gain, noise) - price
+            total += noise.log_likelihood(fixed.yy - a * fixed.my - gain) - price
         return total
 
 
@@ -180,59 +179,27 @@ class _Fixed:
         (self.yy, self.my), (_, self.mm) = (self.both.T @ self.both).tolist()
         self.mm = max(self.mm, 1e-300)
 
-    def beginning(self, column: Array, rows: NDArray[np.int64], ramp: Array) -> Array:
-        """Return products (3, K) of a column (N,) that begins at each of ``rows`` (K,) by a ramp:
+    def beginning(self, rows: NDArray[np.int64], ramp: Array) -> Array:
+        """Return products (3, K) of a share of 1 that begins at each of ``rows`` (K,) by a ramp:
         with y, with the moment, with itself; after projection.
         """
-        noise = self.noise
-        n, order = len(column), len(noise.filter) - 1
-        against = np.zeros((n, 2 + self.basis.shape[1]))
+        noise, early = self.noise, len(self.noise.filter) - 1 + len(ramp)
+
+        def padded(x: Array) -> Array:
+            return np.concatenate([x, np.zeros((early + 1, *x.shape[1:]))])
+
+        against = np.zeros((len(noise.whole), 2 + self.basis.shape[1]))
         against[noise.whole] = np.column_stack([self.both, self.basis])
-        full = np.where(noise.whole, noise.filtered(column), 0.0)
-        early = order + len(ramp)  # intervals in which the ramp still shows
+        full = np.where(noise.whole, noise.filtered(np.ones(len(against))), 0.0)
         late = np.column_stack([full[:, None] * against, full**2])
-        late = np.cumsum(late[::-1], axis=0)[::-1]
-        late = np.concatenate([late, np.zeros((early + 1, late.shape[1]))])
-        sums = late[rows + early].copy()
-        weight = np.concatenate([ramp, np.ones(early)])
-        weighted = column / noise.scale
-        _add_beginnings(sums, rows, weight, early, weighted, noise.filter, noise.whole, against)
+        sums = padded(np.cumsum(late[::-1], axis=0)[::-1])[rows + early]
+        # the first outputs of the filter after each beginning, while it has begun in part only
+        at = rows[:, None] + np.arange(early)
+        begun = padded(1.0 / noise.scale)[at]
+        begun[:, : len(ramp)] *= ramp
+        taps = toeplitz(np.append(noise.filter, np.zeros(len(ramp) - 1)), np.zeros(early))
+        values = begun @ taps.T * padded(noise.whole.astype(np.float64))[at]
+        sums[:, :-1] += np.einsum("kj,kjq->kq", values, padded(against)[at])
         p = sums[:, 2:-1]
-        return np.array([sums[:, 0], sums[:, 1], sums[:, -1] - (p * p).sum(axis=1)])
-
-
-@compiled
-def _add_beginnings(
-    sums: Array,
-    rows: NDArray[np.int64],
-    weight: Array,
-    early: int,
-    weighted: Array,
-    taps: Array,
-    whole: NDArray[np.bool_],
-    against: Array,
-) -> None:
-    """Add to ``sums`` (K, q + 1) what the first ``early`` outputs of the filter bring after each
-    beginning: there the column has begun in part only.
-    """
-    count, width = len(weighted), against.shape[1]
-    for r in range(len(rows)):
-        for j in range(early):
-            at = rows[r] + j
-            if at >= count or not whole[at]:
-                continue
-            value = 0.0
-            for k in range(min(j, len(taps) - 1) + 1):
-                value += taps[k] * weight[j - k] * weighted[at - k]
-            for q in range(width):
-                sums[r, q] += value * against[at, q]
-            sums[r, width] += value * value
-
-
-def _log_likelihood(rest: Array, noise: Noise) -> Array:
-    """Return the log-likelihood of a channel whose innovations' squares sum to ``rest``, with their
-    variance at its best.
-    """
-    n = int(noise.whole.sum())
-    found: Array = -0.5 * n * np.log(np.maximum(rest, 1e-300) / n) - noise.log_scale
-    return found
+        own = sums[:, -1] + np.square(values).sum(axis=1) - np.square(p).sum(axis=1)
+        return np.array([sums[:, 0], sums[:, 1], own])

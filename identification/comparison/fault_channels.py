@@ -19,7 +19,7 @@ from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from ..logs.readers import px4_ulog, reader_by_content
 from ..logs.reading import read_log
-from ..logs.streams import readable
+from ..logs.streams import Stream, readable
 from ..motion.smoothing import lagged, resampled, runs_of
 
 Array = NDArray[np.float64]
@@ -48,15 +48,12 @@ class Channels:
     """The three streams, in this kit's axes and order of rotors."""
 
     name: str
-    gyro_times: Array  # (N,) s
-    gyro: Array  # (N, 3) rad/s, body
-    accelerometer_times: Array  # (M,) s
-    accelerometer: Array  # (M, 3) m/s2, body: +g along z in a hover
-    command_times: Array  # (K,) s
-    command: Array  # (K, 4) motor commands, in any unit that grows with thrust, 0: none
+    gyro: Stream  # (N, 3) rad/s, body
+    accelerometer: Stream  # (M, 3) m/s2, body: +g along z in a hover
+    command: Stream  # (K, 4) motor commands, in any unit that grows with thrust, 0: none
     # the command is thrust itself but for a factor (rotor speeds squared): no curve is looked for
     thrust_known: bool = False
-    motor_names: tuple[str, str, str, str] | None = None  # the log's own, of rotors 1 to 4
+    motor_names: tuple[str, ...] | None = None  # the log's own, of rotors 1 to 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,10 +82,9 @@ class Samples:
             bend: 0, thrust is linear in the command, to 1, it goes with the square.
             dead: command at which thrust vanishes, in parts of the median.
         """
-        source = self.channels
-        first, last = source.command_times[0], source.command_times[-1]
-        fine = np.arange(first, last + FINE, FINE)
-        u = resampled(fine, source.command_times, source.command)
+        command = self.channels.command
+        fine = np.arange(command.t[0], command.t[-1] + FINE, FINE)
+        u = resampled(fine, command.t, command.values)
         u /= np.median(np.interp(self.t, fine, u.mean(axis=1)))
         x = np.maximum(u - dead, 0.0) / (1.0 - dead)
         return _means(fine, lagged(bend * x * x + (1.0 - bend) * x, lag, FINE), self.t)
@@ -99,28 +95,19 @@ def read_channels(
     reader: str | None = None,
     vehicle: Vehicle | None = None,
     log_map: str | None = None,
+    log: FlightLog | None = None,
 ) -> tuple[Channels, tuple[str, ...]]:
     """Return a file's gyro, accelerometer and commands, and notes on where they came from: those of
-    a PX4 log at their own rates, others as their reader gives them.
+    a PX4 log at their own rates, which are in the file alone, others as their reader gives them;
+    ``log`` is what was read already.
 
     Raises:
         InputError: the file cannot be read, or lacks one of the three.
     """
     if log_map is None and reader in (None, "px4_ulog") and (found := _of_ulog(path)):
         return found
-    log = read_log(path, reader, vehicle, log_map)
+    log = log or read_log(path, reader, vehicle, log_map)
     return channels_of_log(log), log.notes
-
-
-def channels_of(path: Path, log: FlightLog) -> Channels:
-    """Return the channels of a log that was read from a file: a PX4 log's own rates are in the file
-    alone.
-
-    Raises:
-        InputError: gyro, accelerometer or commands are missing.
-    """
-    found = _of_ulog(path)
-    return found[0] if found else channels_of_log(log)
 
 
 def _of_ulog(path: Path) -> tuple[Channels, tuple[str, ...]] | None:
@@ -135,17 +122,8 @@ def _of_ulog(path: Path) -> tuple[Channels, tuple[str, ...]] | None:
         missing = [part for part, stream in zip(_CHANNELS, streams, strict=True) if stream is None]
         raise InputError(f"{path}: no {' and no '.join(missing)}; expected all of them")
     assert recording.log_map.commands is not None
-    first, second, third, fourth = (f"PX4 motor {i}" for i in recording.log_map.commands.order)
-    found = Channels(
-        str(path),
-        gyro.t,
-        gyro.values,
-        accelerometer.t,
-        accelerometer.values,
-        command.t,
-        command.values,
-        motor_names=(first, second, third, fourth),
-    )
+    names = tuple(f"PX4 motor {i}" for i in recording.log_map.commands.order)
+    found = Channels(str(path), gyro, accelerometer, command, motor_names=names)
     return found, tuple(recording.notes)
 
 
@@ -168,18 +146,14 @@ def channels_of_log(log: FlightLog) -> Channels:
         command, known = np.square(log.rotor_speeds), True
     else:
         raise InputError(f"{name}: no motor commands and no rotor speeds; expected one of them")
-    read = [np.isfinite(sensor).all(axis=1) for sensor in (log.gyro, log.accelerometer)]
     # a command that is held between two of its own samples says so by its changes
     new = np.any(np.diff(command, axis=0, prepend=np.nan) != 0.0, axis=1)
     new[-1] = True
     return Channels(
         name,
-        log.t[read[0]],
-        log.gyro[read[0]],
-        log.t[read[1]],
-        log.accelerometer[read[1]],
-        log.t[new],
-        command[new],
+        Stream("gyro", log.t, log.gyro).whole(),
+        Stream("accelerometer", log.t, log.accelerometer).whole(),
+        Stream("commands", log.t[new], command[new]),
         known,
     )
 
@@ -191,30 +165,26 @@ def sample(channels: Channels) -> Samples:
         InputError: fewer than 3 s of flight, or samples that come too seldom.
     """
     c = channels
-    streams = (c.gyro_times, c.accelerometer_times, c.command_times)
-    if min(map(len, streams)) < 10:
+    times = (c.gyro.t, c.accelerometer.t, c.command.t)
+    if min(map(len, times)) < 10:
         raise InputError(f"{c.name}: fewer than ten samples of gyro, accelerometer or commands")
-    for what, stream in zip(_CHANNELS[:2], streams, strict=False):
-        if (step := float(np.median(np.diff(stream)))) > LONGEST_GAP:
+    for what, at in zip(_CHANNELS[:2], times, strict=False):
+        if (step := float(np.median(np.diff(at)))) > LONGEST_GAP:
             raise InputError(
                 f"{c.name}: {what}: {1.0 / step:.3g} samples a second; expected at least "
                 f"{1.0 / LONGEST_GAP:g}, to see a rotor fail"
             )
-    begin, end = max(s[0] for s in streams), min(s[-1] for s in streams)
-    edges = np.arange(begin, end, STEP)
+    edges = np.arange(max(at[0] for at in times), min(at[-1] for at in times), STEP)
     if len(edges) < 3:
         raise InputError(f"{c.name}: gyro, accelerometer and commands do not overlap in time")
     t = 0.5 * (edges[1:] + edges[:-1])
-    gyro = resampled(edges, c.gyro_times, c.gyro)
-    force = _means(c.accelerometer_times, c.accelerometer, t)
-    total = np.interp(t, c.command_times, c.command.sum(axis=1))
-    flying = total > _least(c)
-    there = np.ones(len(t), dtype=np.bool_)
-    for stream in (c.gyro_times, c.accelerometer_times):
-        after = np.clip(np.searchsorted(stream, t), 1, len(stream) - 1)
-        there &= stream[after] - stream[after - 1] < LONGEST_GAP
-    stop, why = _end(c, t)
-    keep = flying & there & (t < stop)
+    gyro = resampled(edges, c.gyro.t, c.gyro.values)
+    force = _means(c.accelerometer.t, c.accelerometer.values, t)
+    stop, why = _end(c)
+    keep = (np.interp(t, c.command.t, c.command.values.sum(axis=1)) > _least(c)) & (t < stop)
+    for at in times[:2]:
+        after = np.clip(np.searchsorted(at, t), 1, len(at) - 1)
+        keep &= at[after] - at[after - 1] < LONGEST_GAP
     if keep.any():
         keep &= t > t[np.argmax(keep)] + SETTLED
     for a, b in runs_of(keep):
@@ -239,18 +209,19 @@ def sample(channels: Channels) -> Samples:
 
 def _least(c: Channels) -> float:
     """Return the total command above which the rotors carry the vehicle."""
-    total = c.command.sum(axis=1)
+    total = c.command.values.sum(axis=1)
     busy = total[total > IDLE * total.max()]
     return FLYING * float(np.median(busy)) if len(busy) else np.inf
 
 
 def _between(c: Channels, t: Array) -> Array:
     """Return how far a command may be off between its samples (N,); see ``Samples``."""
-    after = np.clip(np.searchsorted(c.command_times, t), 1, len(c.command_times) - 1)
-    start, end = c.command_times[after - 1], c.command_times[after]
+    at, command = c.command.t, c.command.values
+    after = np.clip(np.searchsorted(at, t), 1, len(at) - 1)
+    start, end = at[after - 1], at[after]
     part = np.clip((t - start) / (end - start), 0.0, 1.0)
-    change = np.abs(c.command[after] - c.command[after - 1]).mean(axis=1)
-    usual = np.median(np.interp(t, c.command_times, c.command.mean(axis=1)))
+    change = np.abs(command[after] - command[after - 1]).mean(axis=1)
+    usual = np.median(np.interp(t, at, command.mean(axis=1)))
     coarse = end - start > 1.5 * STEP
     found: Array = np.where(coarse, change / usual * np.sqrt(part * (1.0 - part)), 0.0)
     return found
@@ -266,11 +237,11 @@ def _means(times: Array, values: Array, middles: Array) -> Array:
     return np.asarray((high - low) / STEP)
 
 
-def _end(c: Channels, t: Array) -> tuple[float, str]:
+def _end(c: Channels) -> tuple[float, str]:
     """Return when the model ends to hold, and why: a gyro that clips, or an impact."""
     found = [(np.inf, "")]
-    count = max(3, round(CLIPPED_SECONDS / float(np.median(np.diff(c.gyro_times)))))
-    for axis in c.gyro.T:
+    count = max(3, round(CLIPPED_SECONDS / float(np.median(np.diff(c.gyro.t)))))
+    for axis in c.gyro.values.T:
         size = np.abs(axis)
         at_limit = np.abs(size[:, None] / RANGES - 1.0).min(axis=1) < RANGE_SHARE
         at_limit |= (size > (1.0 - CLIPPED_SHARE) * size.max()) & (size > RANGES[0])
@@ -279,13 +250,11 @@ def _end(c: Channels, t: Array) -> tuple[float, str]:
         if clipped.any():
             # the filters look half their width to either side
             first = max(0, int(np.argmax(clipped)) - count // 2)
-            found.append((float(c.gyro_times[first]), "the gyro was at its limit"))
-    hit = np.linalg.norm(c.accelerometer, axis=1) > IMPACT
+            found.append((float(c.gyro.t[first]), "the gyro was at its limit"))
+    hit = np.linalg.norm(c.accelerometer.values, axis=1) > IMPACT
     # take-off may be hard: an impact counts once the rotors carry the vehicle
-    flying = c.command_times[c.command.sum(axis=1) > _least(c)]
-    hit &= c.accelerometer_times > flying[0] + SETTLED if len(flying) else False
+    flying = c.command.t[c.command.values.sum(axis=1) > _least(c)]
+    hit &= c.accelerometer.t > flying[0] + SETTLED if len(flying) else False
     if hit.any():
-        found.append(
-            (float(c.accelerometer_times[np.argmax(hit)]) - STEP, "the vehicle hit something")
-        )
+        found.append((float(c.accelerometer.t[np.argmax(hit)]) - STEP, "the vehicle hit something"))
     return min(found)

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
+from scipy.stats import norm
 
 from .fault_balance import AT_ONCE, Begin, FaultBalance
 from .fault_channels import STEP, Channels, Samples, sample
@@ -63,16 +64,18 @@ FAULTS = FaultSettings()
 class RotorFault:
     """What a search found in one flight."""
 
-    name: str  # of the log
+    samples: Samples  # of the flight
     # of "nothing", rotors "1" to "4", "all rotors" and "another force or torque"; they sum to one
     probabilities: dict[str, float]
     # of the likeliest rotor: median and the ends of a 95 % interval
     rotor: int
     onset: tuple[float, float, float]  # s, of the log's clock
     remaining: tuple[float, float, float]  # share of its thrust that is left
-    seconds: float  # of flight that were looked at
-    ended: str  # why nothing later was looked at; empty: the log's end
-    motor_names: tuple[str, str, str, str] | None
+
+    @property
+    def seconds(self) -> float:
+        """Seconds of flight that were looked at."""
+        return len(self.samples.t) * STEP
 
     @property
     def likeliest(self) -> str:
@@ -108,17 +111,12 @@ def find_fault(channels: Channels) -> RotorFault:
     every = np.concatenate([whole, happened + shape])
     chances = np.exp(every - logsumexp(every))
     rotor = 1 + int(np.argmax(logs[:4]))
-    when = _quantiles(starts, start_weights, STEP)
-    remaining = _remaining(shares, weights[rotor - 1])
     return RotorFault(
-        channels.name,
+        samples,
         dict(zip([NOTHING, *names], chances.tolist(), strict=True)),
         rotor,
-        when,
-        remaining,
-        len(samples.t) * STEP,
-        samples.ended,
-        channels.motor_names,
+        _quantiles(starts, start_weights, STEP),
+        _remaining(shares, weights[rotor - 1]),
     )
 
 
@@ -129,38 +127,24 @@ def _patterns(best: "_Tried") -> tuple[Array, Array, Array]:
     """
     use = FAULTS
     shares = np.linspace(*use.losses, use.steps)
-    log_evidence, weights = [], []
-    # only what speaks under every hypothesis, so that all explain the same numbers
-    losses = [best.balance.losses(best.noise, r, best.row, best.begin) for r in range(4)]
+    lost = shares[shares <= use.all_lose, None]
     jumps = best.balance.jumps(best.noise, best.row, best.begin)
-    every = [std for _, std in (*losses, jumps)]
-    silent = ~np.isfinite(every).all(axis=0)
-    for seen, std in losses:
-        std = np.where(silent, np.inf, std)
-        log = _normal(seen[None], shares[:, None], np.hypot(std, use.error * shares[:, None]))
-        log_evidence.append(float(logsumexp(log)) - math.log(len(shares)))
-        weights.append(np.exp(log - logsumexp(log)))
-    seen, std = jumps
-    std = np.where(silent, np.inf, std)
-    lost = shares[shares <= use.all_lose]
-    means = lost[:, None] * np.array([0.0, 0.0, 0.0, 4.0])
-    spread = use.error * lost[:, None] * np.array([2.0, 2.0, 2.0, 4.0])
-    log = _normal(seen[None], means, np.hypot(std, spread))
-    log_evidence.append(float(logsumexp(log)) - math.log(len(lost)))
-    wide = np.hypot(std, np.array(use.other))
-    log_evidence.append(float(_normal(seen[None], np.zeros((1, 4)), wide[None])[0]))
-    return np.array(log_evidence), shares, np.array(weights)
-
-
-def _normal(seen: Array, means: Array, std: Array) -> Array:
-    """Return the log-densities (E,) of what the channels say (1, 4); a channel that says nothing
-    (infinite standard deviation) is left out.
-    """
-    says = np.isfinite(std)
-    use = np.where(says, std, 1.0)
-    each = -0.5 * np.square((seen - means) / use) - np.log(use) - 0.5 * math.log(2.0 * math.pi)
-    total: Array = np.where(says, each, 0.0).sum(axis=1)
-    return total
+    # what each channel sees, its standard deviation, and by the hypothesis: means and their spread
+    tried: list[tuple[Array, Array, Array, Array]] = []
+    for rotor in range(4):
+        loss = best.balance.losses(best.noise, rotor, best.row, best.begin)
+        tried.append((*loss, shares[:, None] * np.ones(4), use.error * shares[:, None]))
+    means, spread = lost * [0.0, 0.0, 0.0, 4.0], use.error * lost * [2.0, 2.0, 2.0, 4.0]
+    tried.append((*jumps, means, spread))
+    tried.append((*jumps, np.zeros((1, 4)), np.array([use.other])))
+    # only what speaks under every hypothesis, so that all explain the same numbers
+    says = np.isfinite([std for _, std, *_ in tried]).all(axis=0)
+    logs = [
+        norm.logpdf(seen[says], means[:, says], np.hypot(std, spread)[:, says]).sum(axis=1)
+        for seen, std, means, spread in tried
+    ]
+    evidence = np.array([logsumexp(log) - math.log(len(log)) for log in logs])
+    return evidence, shares, np.array([np.exp(log - logsumexp(log)) for log in logs[:4]])
 
 
 def _rows(count: int) -> NDArray[np.int64]:
@@ -216,11 +200,11 @@ class _Search:
         if key in self.tried:
             return
         one = FaultBalance(self.samples, self.samples.thrust(*key), key[0])
-        usual = one.noises(one.residuals())
+        usual = one.noises()
         noise = usual
         for _ in range(FAULTS.rounds):
             _, row, begin = self._jump(one, noise)
-            noise = one.noises(one.residuals(row, begin))
+            noise = one.noises(row, begin)
         self.tried[key] = _Tried(one, usual, noise, *self._jump(one, noise))
 
     def _jump(self, one: FaultBalance, noise: list[Noise]) -> tuple[float, int, Begin]:

@@ -6,10 +6,10 @@ innovations (Willsky and Jones, *A generalized likelihood ratio approach to the 
 estimation of jumps in linear systems*, IEEE Transactions on Automatic Control 21, 1976).
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -40,10 +40,13 @@ class Noise:
             out[k:] += weight * weighted[: len(weighted) - k]
         return out
 
-    @property
-    def log_scale(self) -> float:
-        """Sum of the logarithms of ``scale`` over the rows ``whole``."""
-        return float(np.log(self.scale[self.whole]).sum())
+    def log_likelihood(self, rest: Array) -> Array:
+        """Return the log-likelihood of innovations whose squares sum to ``rest``, with their
+        variance at its best.
+        """
+        n = int(self.whole.sum())
+        log_scale = float(np.log(self.scale[self.whole]).sum())
+        return np.asarray(-0.5 * n * np.log(np.maximum(rest, 1e-300) / n) - log_scale)
 
 
 def fit_noise(residual: Array, activity: Array, follows: Mask) -> Noise:
@@ -54,27 +57,17 @@ def fit_noise(residual: Array, activity: Array, follows: Mask) -> Noise:
         activity: (N,) what the rotors do besides the mean, relative.
         follows: (N,) the sample before is there.
     """
-    whole = follows.copy()
-    for k in range(1, ORDER):
-        whole[k:] &= follows[:-k]
+    whole = np.convolve(follows, np.ones(ORDER))[: len(follows)] == ORDER
     whole[:ORDER] = False
-    lags = np.column_stack([np.roll(np.arange(len(residual)), k) for k in range(1, ORDER + 1)])
-    best: tuple[float, Noise] | None = None
+    tried: list[tuple[float, Noise]] = []
     for share in SHARES:
         scale = np.hypot(1.0, share * activity)
-        weighted = residual / scale
-        past = weighted[lags[whole]]
-        present = weighted[whole]
+        windows = sliding_window_view(residual / scale, ORDER + 1)[whole[ORDER:], ::-1]
+        present, past = windows[:, 0], windows[:, 1:]
         # a ridge keeps the filter tame where a residual is next to nothing
         gram = past.T @ past + 1e-6 * (present @ present) * np.eye(ORDER)
         poles = np.linalg.solve(gram, past.T @ present)
-        left = present - past @ poles
-        n = len(present)
-        score = -0.5 * n * math.log(max(float(left @ left), 1e-300) / n) - float(
-            np.log(scale[whole]).sum()
-        )
-        if best is None or score > best[0]:
-            weights = np.concatenate([[1.0], -poles])
-            best = (score, Noise(scale, weights, whole, float(left @ left / n)))
-    assert best is not None
-    return best[1]
+        rest = np.square(present - past @ poles).sum()
+        noise = Noise(scale, np.append(1.0, -poles), whole, float(rest / len(present)))
+        tried.append((float(noise.log_likelihood(rest)), noise))
+    return max(tried, key=lambda one: one[0])[1]

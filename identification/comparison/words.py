@@ -22,7 +22,6 @@ from ...runtime.drawing import (
 from ...runtime.page_files import write_json, write_png
 from ...runtime.plain_values import plain
 from .change import CHANGES, NOWHERE, SOMETHING_ELSE, Change
-from .fault_channels import Samples
 from .fault_detection import ALL, NOTHING, OTHER, RotorFault
 from .trim import Trim
 
@@ -158,7 +157,8 @@ def _draw_change(change: Change) -> Any:
 
 def place_of(fault: RotorFault, rotor: int) -> str:
     """Return the name of a rotor (1 to 4), and the log's own name where it has one."""
-    own = "" if fault.motor_names is None else f"; {fault.motor_names[rotor - 1]} in the log"
+    names = fault.samples.channels.motor_names
+    own = "" if names is None else f"; {names[rotor - 1]} in the log"
     return f"rotor {rotor} ({_PLACES[rotor - 1]}{own})"
 
 
@@ -197,41 +197,42 @@ def _finding(fault: RotorFault, name: str) -> str:
 def fault_data(fault: RotorFault) -> dict[str, Any]:
     """Return the finding as plain data."""
     names = {str(i): f"rotor {i}" for i in range(1, 5)}
-    found = fault.likeliest in names
+    found, motors = fault.likeliest in names, fault.samples.channels.motor_names
     return {
-        "log": fault.name,
+        "log": fault.samples.channels.name,
         "headline": fault_headline(fault),
         "found": names.get(fault.likeliest, fault.likeliest),
         "sure": fault.sure,
         "probabilities": {names.get(k, k): p for k, p in fault.probabilities.items()},
         "rotor": fault.rotor if found else None,
-        "motor": fault.motor_names[fault.rotor - 1] if found and fault.motor_names else None,
+        "motor": motors[fault.rotor - 1] if found and motors else None,
         "onset_s": fault.onset[0] if found else None,
         "onset_ci95_s": list(fault.onset[1:]) if found else None,
         "remaining": fault.remaining[0] if found else None,
         "remaining_ci95": list(fault.remaining[1:]) if found else None,
         "flight_s": fault.seconds,
-        "ended_because": fault.ended or None,
+        "ended_because": fault.samples.ended or None,
     }
 
 
-def write_faults(found: Sequence[tuple[RotorFault, Samples]], folder: Path) -> tuple[Path, Path]:
+def write_faults(found: Sequence[RotorFault], folder: Path) -> tuple[Path, Path]:
     """Write ``rotor_faults.json`` and ``rotor_faults.png`` into a folder and return their paths.
 
     Raises:
         InputError: a file cannot be written.
     """
     data, picture = folder / "rotor_faults.json", folder / "rotor_faults.png"
-    write_json([fault_data(fault) for fault, _ in found], data)
+    write_json([fault_data(fault) for fault in found], data)
     write_png(_draw_faults(found), picture)
     return data, picture
 
 
 @styled()
-def _draw_faults(found: Sequence[tuple[RotorFault, Samples]]) -> Any:
+def _draw_faults(found: Sequence[RotorFault]) -> Any:
     figure = new_figure(3.4 * len(found))
     axes = np.atleast_2d(figure.subplots(len(found), 2, squeeze=False))
-    for (fault, samples), (left, right) in zip(found, axes, strict=True):
+    for fault, (left, right) in zip(found, axes, strict=True):
+        samples = fault.samples
         for axis, colour in zip(range(3), SERIES, strict=False):
             left.plot(
                 samples.t, samples.angular_acceleration[:, axis], color=colour, lw=1,
@@ -242,7 +243,7 @@ def _draw_faults(found: Sequence[tuple[RotorFault, Samples]]) -> Any:
         left.legend(loc="upper left", ncols=3)
         command = samples.channels.command
         for i in range(4):
-            u = np.interp(samples.t, samples.channels.command_times, command[:, i])
+            u = np.interp(samples.t, command.t, command.values[:, i])
             right.plot(samples.t, u, lw=1, label=f"rotor {i + 1}")
         right.set_ylabel("command")
         room_above(right)
@@ -252,7 +253,7 @@ def _draw_faults(found: Sequence[tuple[RotorFault, Samples]]) -> Any:
             if fault.likeliest in ("1", "2", "3", "4"):
                 axis_.axvline(fault.onset[0], color=BLACK, lw=1, ls="--")
                 axis_.set_xlim(fault.onset[0] - 3.0, samples.t[-1] + 0.1)
-        left.set_title(Path(fault.name).name)
+        left.set_title(Path(samples.channels.name).name)
         chance = fault.probabilities[fault.likeliest]
         right.set_title(f"{_finding(fault, fault.likeliest)}: {chance:.3f}")
     return figure

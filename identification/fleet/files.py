@@ -64,17 +64,8 @@ def fleet_data(fleet: Fleet) -> dict[str, Any]:
                     "flights": one.points[:, 0].astype(int).tolist(),
                     "named_in": len(one.points),
                     "sure_in": one.sure_in,
-                    "among": one.among,
-                    "mean": one.mean,
-                    "mean_ci95": one.mean_ci95,
-                    "between_std": one.between_std,
-                    "per_flight": one.per_flight,
-                    "per_flight_ci95": one.per_flight_ci95,
-                    "p": one.p,
-                    "adjusted_p": one.adjusted_p,
                     "drifts": one.told,
-                    "tentative": one.tentative,
-                    "ends": one.ends,
+                    **{k: x for k, x in vars(one).items() if k not in ("of", "points")},
                 }
                 for one in fleet.trends
             ],

@@ -26,9 +26,9 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter
+from pydantic import AfterValidator, ConfigDict, Field
 
 from ...dynamics.vehicle_file import load_vehicle
 from ...runtime.errors import InputError
@@ -61,22 +61,16 @@ class FleetLog:
     key: str = ""  # of its outcome
 
 
-_MOMENT: TypeAdapter[float | datetime] = TypeAdapter(
-    Annotated[float | datetime, Field(union_mode="left_to_right")]
-)
-
-
-def _seconds(value: object) -> float:
-    moment = _MOMENT.validate_python(value)
+def _seconds(moment: float | datetime) -> float:
     if isinstance(moment, datetime):
         return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
     return moment
 
 
 _Moment = Annotated[
-    float,
-    BeforeValidator(_seconds),
-    Field(allow_inf_nan=False),
+    Annotated[float, Field(allow_inf_nan=False)] | datetime,
+    Field(union_mode="left_to_right"),
+    AfterValidator(_seconds),
     expected("a number or a date such as 2026-03-01T10:00"),
 ]
 
@@ -147,11 +141,9 @@ def _csv_entries(path: Path) -> list[dict[str, str]]:
 def find_logs(
     given: Sequence[Path],
     manifest: Path | None = None,
-    vehicle: str | None = None,
-    reader: str | None = None,
     without: Path | None = None,
-    log_map: str | None = None,
-    piece: int | None = None,
+    vehicle: str | None = None,
+    **how: Any,
 ) -> tuple[list[FleetLog], list[str]]:
     """Return all logs of a fleet, in the order of their names, and a warning of each entry of the
     manifest that fits none.
@@ -159,11 +151,9 @@ def find_logs(
     Args:
         given: files, and folders that are searched through.
         manifest: its file; default: ``fleet.yaml`` in the first folder that has one.
-        vehicle: of the logs of which the manifest names none.
-        reader: likewise.
         without: a folder that is left out, the results'.
-        log_map: name or file of a map, likewise.
-        piece: which part of a file, likewise.
+        vehicle: of the logs of which the manifest names none.
+        how: ``reader``, ``map`` and ``piece`` of a ``FleetLog``, likewise.
 
     Raises:
         InputError: there is no such file, there is no log, or a vehicle cannot be used.
@@ -182,10 +172,8 @@ def find_logs(
                 below.as_posix() if below is not None and len(given) == 1 else str(path),
                 vehicle or _vehicle_beside(path, root),
                 below.parts[0] if below is not None and len(below.parts) > 1 else "",
-                reader,
-                log_map,
-                piece,
-                os.path.getmtime(path) if said.order == "modified" else None,
+                time=os.path.getmtime(path) if said.order == "modified" else None,
+                **how,
             )
             name = os.path.relpath(path, above).replace(os.sep, "/")
             for entry in said.logs:
@@ -259,12 +247,8 @@ def _vehicle_beside(path: Path, root: Path) -> str | None:
 
 
 def _with_entry(log: FleetLog, entry: ManifestEntry) -> FleetLog:
-    return replace(
-        log,
-        vehicle=entry.vehicle or log.vehicle,
-        id=entry.id or log.id,
-        reader=entry.reader or (None if entry.map else log.reader),
-        map=entry.map or (None if entry.reader else log.map),
-        piece=entry.piece or log.piece,
-        time=log.time if entry.time is None else entry.time,
-    )
+    """Return a log of which an entry says more: its reader or map takes the place of the other."""
+    said = {k: x for k, x in vars(entry).items() if k != "log" and x not in (None, "")}
+    if {"reader", "map"} & said.keys():
+        log = replace(log, reader=None, map=None)
+    return replace(log, **said)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ...runtime.errors import InputError
+from ...runtime.regular_files import open_regular
 
 Outcome = dict[str, Any]
 
@@ -17,25 +18,19 @@ class Outcomes(dict[str, Outcome]):
     """Outcomes by their keys, and the file that holds them; a later line of a key counts."""
 
     def __init__(self, path: Path) -> None:
-        """Open the file, or begin it.
+        """Read the file, or begin it.
 
         Raises:
             InputError: it cannot be read or written.
         """
         super().__init__()
         self._path = path
-        try:
-            self._file = open(path, "a+b", buffering=0)  # noqa: SIM115 - closed by ``close``
-            self._file.seek(0)
-            *lines, torn = self._file.read().split(b"\n")
-            if torn:  # a killed run's
-                self._append(b"\n")
-        except OSError as error:
-            raise self._refused(error) from error
-        for line in (*lines, torn):
-            outcome = _parsed(line)
-            if outcome is not None:
-                self[outcome["key"]] = outcome
+        self._append(b"")
+        with open_regular(path, "a fleet's outcomes") as file:
+            *lines, torn = file.read().split(b"\n")
+        if torn:  # a killed run's
+            self._append(b"\n")
+        self.update((found["key"], found) for x in (*lines, torn) if (found := _parsed(x)))
 
     def add(self, outcome: Outcome) -> None:
         """Append an outcome, which has its ``key``; it is on the disk when this returns.
@@ -43,24 +38,18 @@ class Outcomes(dict[str, Outcome]):
         Raises:
             InputError: it cannot be written.
         """
-        line = json.dumps(outcome, separators=(",", ":"), allow_nan=False).encode() + b"\n"
-        try:
-            self._append(line)
-        except OSError as error:
-            raise self._refused(error) from error
+        self._append(json.dumps(outcome, separators=(",", ":"), allow_nan=False).encode() + b"\n")
         self[outcome["key"]] = outcome
 
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
-
-    def _append(self, line: bytes) -> None:
-        if self._file.write(line) < len(line):
-            raise OSError("the disk is full")
-        os.fsync(self._file.fileno())
-
-    def _refused(self, error: OSError) -> InputError:
-        return InputError(f"{self._path}: cannot be written: {error.strerror or error}")
+    def _append(self, data: bytes) -> None:
+        try:
+            with open(self._path, "ab", buffering=0) as file:
+                if file.write(data) < len(data):
+                    raise OSError("the disk is full")
+                os.fsync(file.fileno())
+        except OSError as error:
+            reason = error.strerror or error
+            raise InputError(f"{self._path}: cannot be written: {reason}") from error
 
 
 def _parsed(line: bytes) -> Outcome | None:

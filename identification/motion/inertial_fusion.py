@@ -11,18 +11,21 @@ result.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from ...runtime.compiled import compiled
 from .smoothing import resampled
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-# kind, knot, s behind the knot, vector (3,), matrix (3, 3) and variance of each
-Measurements = tuple[Index, Index, Array, Array, Array, Array]
+# knot, first of three states, s behind the knot, distance (3,) from the nominal motion and variance
+# of each, sorted by knot
+Measurements = tuple[Index, Index, Array, Array, Array]
 # s between knots, m/s2 of gravity; at each knot rotation (3, 3) and the twelve numbers behind the
 # attitude's; from each to the next the IMU's turn, velocity and way
 Nominal = tuple[float, float, Array, Array, Array, Array, Array]
@@ -58,6 +61,7 @@ class FusionSettings:
 
 FUSION = FusionSettings()
 N = FUSION.states
+ATTITUDE, VELOCITY, POSITION = 0, 3, 6  # the first of their three
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,13 +180,13 @@ def _predict(k: int, nominal: Nominal, F: Array, defect: Array) -> None:
 
 @compiled
 def _update(x: Array, P: Array, first: int, late: float, z: Array, variance: float) -> None:
-    """Take in a measurement (3,) of three of the states from ``first`` on, ``late`` s after the
-    knot (of positions).
+    """Take in a measurement (3,) of three of the states from ``first`` on; of positions, ``late`` s
+    after the knot.
     """
     for i in range(3):
         h = np.zeros(N)
         h[first + i] = 1.0
-        if first == 6:
+        if first == POSITION:
             h[3 + i] = late
         c = P @ h
         gain = c / (h @ c + variance)
@@ -193,7 +197,6 @@ def _update(x: Array, P: Array, first: int, late: float, z: Array, variance: flo
 @compiled
 def _smooth(
     nominal: Nominal,
-    rates: Array,
     noise: Array,
     prior: Array,
     prior_std: Array,
@@ -201,13 +204,9 @@ def _smooth(
     change: Array,
     std: Array,
 ) -> None:
-    """Write the smoothed error state (m, 15) about a nominal motion, and its standard deviations.
-
-    ``kinds`` of the measurements: 0 attitude, 1 velocity, 2 position; sorted by knot.
-    """
-    rotation, linear = nominal[2], nominal[3]
-    kinds, knots, late, vectors, matrices, variances = measured
-    m = len(rotation)
+    """Write the smoothed error state (m, 15) about a nominal motion and its standard deviations."""
+    knots, firsts, late, off, variances = measured
+    m = len(nominal[2])
     means, covariances = np.empty((m, N)), np.empty((m, N, N))
     before, spreads = np.empty((m, N)), np.empty((m, N, N))
     F, defect = np.zeros((N, N)), np.zeros(N)
@@ -223,23 +222,12 @@ def _smooth(
         before[k], spreads[k] = x, P
         P = P.copy()
         while at < len(knots) and knots[at] == k:
-            z = np.empty(3)
-            if kinds[at] == 0:
-                w = rates[k] * late[at]
-                z[:] = _log((rotation[k] @ _exp(w[0], w[1], w[2])).T @ matrices[at])
-                _update(x, P, 0, 0.0, z, variances[at])
-            elif kinds[at] == 1:
-                z[:] = vectors[at] - linear[k, 0:3]
-                _update(x, P, 3, 0.0, z, variances[at])
-            else:
-                z[:] = vectors[at] - linear[k, 3:6] - late[at] * linear[k, 0:3]
-                _update(x, P, 6, late[at], z, variances[at])
+            _update(x, P, firsts[at], late[at], off[at], variances[at])
             at += 1
         P = 0.5 * (P + P.T)
         means[k], covariances[k] = x, P
     change[m - 1] = x
-    for i in range(N):
-        std[m - 1, i] = math.sqrt(max(P[i, i], 0.0))
+    std[m - 1] = np.sqrt(np.maximum(np.diag(P), 0.0))
     for k in range(m - 2, -1, -1):
         _predict(k, nominal, F, defect)
         gain = np.linalg.solve(spreads[k + 1], F @ covariances[k]).T.copy()
@@ -247,20 +235,7 @@ def _smooth(
         P = covariances[k] + gain @ (P - spreads[k + 1]) @ gain.T
         P = 0.5 * (P + P.T)
         change[k] = x
-        for i in range(N):
-            std[k, i] = math.sqrt(max(P[i, i], 0.0))
-
-
-@compiled
-def _fold(rotation: Array, linear: Array, change: Array) -> float:
-    """Add an error state (m, 15) to the nominal motion in place; return its largest angle."""
-    most = 0.0
-    for k in range(len(rotation)):
-        x = change[k]
-        most = max(most, math.sqrt(x[0] ** 2 + x[1] ** 2 + x[2] ** 2))
-        rotation[k] = rotation[k] @ _exp(x[0], x[1], x[2])
-        linear[k] += x[3:15]
-    return most
+        std[k] = np.sqrt(np.maximum(np.diag(P), 0.0))
 
 
 def fuse(
@@ -296,17 +271,14 @@ def fuse(
     linear = np.zeros((count + 1, 12))
     if positions is not None:
         linear[:, 3:6] = resampled(times, positions.t, positions.values)
-    measured = _measurements(times, positions, attitudes)
+    bound = np.arange(times[0], times[-1], FUSION.velocity_every)
+    still = Readings(bound, np.zeros((len(bound), 3)), FUSION.velocity_std)
+    readings = {VELOCITY: still} if positions is None else {POSITION: positions}
+    readings |= {} if attitudes is None else {ATTITUDE: attitudes}
     sizes = np.maximum(noise, [FUSION.least_gyro_noise, FUSION.least_accelerometer_noise])
     walks = np.array([FUSION.gyro_bias_walk, FUSION.accelerometer_bias_walk])
-    spread = np.concatenate(
-        [
-            np.full(3, sizes[0] ** 2 * dt * T),
-            np.full(3, sizes[1] ** 2 * dt * T),
-            np.full(3, sizes[1] ** 2 * dt * T**3 / 3.0),
-            *(np.full(3, walk**2 * T) for walk in walks),
-        ]
-    )
+    gyro_noise, force_noise = sizes**2 * dt * T
+    spread = np.repeat([gyro_noise, force_noise, force_noise * T**2 / 3.0, *(walks**2 * T)], 3)
     started = rotation[0].copy()
     up = np.abs(started[2])  # a heading is a turn about the world's vertical, in body axes
     angles = np.sqrt((FUSION.tilt_std * (1.0 - up)) ** 2 + (heading_std * up) ** 2)
@@ -320,8 +292,12 @@ def fuse(
     change, std = np.zeros((2, count + 1, N))
     for _ in range(FUSION.iterations):
         prior = np.concatenate([_log(rotation[0].T @ started), begun - linear[0]])
-        _smooth(nominal, rates, spread, prior, prior_std, measured, change, std)
-        if _fold(rotation, linear, change) < FUSION.settled:
+        measured = _measured(times, rates, rotation, linear, readings)
+        _smooth(nominal, spread, prior, prior_std, measured, change, std)
+        turn = Rotation.from_rotvec(change[:, :3])
+        rotation[:] = (Rotation.from_matrix(rotation) * turn).as_matrix()
+        linear += change[:, 3:]
+        if turn.magnitude().max() < FUSION.settled:
             break
     if positions is None:
         std[:, 3:6] = np.hypot(std[:, 3:6], FUSION.steady_velocity_std)
@@ -390,36 +366,32 @@ def _heading(
     return float(np.angle(np.sum(np.conj(felt) * seen))) + zero
 
 
-def _measurements(
-    times: Array, positions: Readings | None, attitudes: Readings | None
+def _measured(
+    times: Array,
+    rates: Array,
+    rotation: Array,
+    linear: Array,
+    readings: Mapping[int, Readings],
 ) -> Measurements:
-    """Return all measurements, sorted by knot: kind, knot, time behind it, vector, matrix and
-    variance.
+    """Return how far all readings, by the first of the states that they show, are from a nominal
+    motion at the nearest knot.
     """
-    if positions is None:
-        bound = np.arange(times[0], times[-1], FUSION.velocity_every)
-        groups = [(1, Readings(bound, np.zeros((len(bound), 3)), FUSION.velocity_std))]
-    else:
-        groups = [(2, positions)]
-    if attitudes is not None:
-        groups.append((0, attitudes))
-    counts = [len(readings.t) for _, readings in groups]
-    t = np.concatenate([readings.t for _, readings in groups])
-    knots = np.clip(np.rint((t - times[0]) / (times[1] - times[0])), 0, len(times) - 1)
-    knots = knots.astype(np.int64)
-    kinds = np.repeat(np.array([kind for kind, _ in groups], dtype=np.int64), counts)
-    variances = np.repeat([readings.std**2 for _, readings in groups], counts)
-    vectors, matrices = np.zeros((len(t), 3)), np.tile(np.eye(3), (len(t), 1, 1))
-    for kind, readings in groups:
-        (vectors if kind else matrices)[kinds == kind] = readings.values
-    order = np.argsort(knots, kind="stable")
-    late = np.asarray(t - times[knots], dtype=np.float64)
-    sorted_late, sorted_variances = late[order], np.asarray(variances[order])
-    return (
-        kinds[order],
-        knots[order],
-        sorted_late,
-        vectors[order],
-        matrices[order],
-        sorted_variances,
+    parts = []
+    for first, r in readings.items():
+        knots = np.rint((r.t - times[0]) / (times[1] - times[0])).astype(np.int64)
+        knots = np.clip(knots, 0, len(times) - 1)
+        late = r.t - times[knots]
+        if first == ATTITUDE:
+            turn = Rotation.from_rotvec(rates[knots] * late[:, None])
+            seen = (Rotation.from_matrix(rotation[knots]) * turn).inv()
+            off = (seen * Rotation.from_matrix(r.values)).as_rotvec()
+        elif first == VELOCITY:
+            off = r.values - linear[knots, 0:3]
+        else:
+            off = r.values - linear[knots, 3:6] - late[:, None] * linear[knots, 0:3]
+        parts.append((knots, np.full_like(knots, first), late, off, np.full(len(knots), r.std**2)))
+    knots, firsts, late, off, variances = (
+        np.concatenate(part) for part in zip(*parts, strict=True)
     )
+    order = np.argsort(knots, kind="stable")
+    return knots[order], firsts[order], late[order], off[order], variances[order]

@@ -54,11 +54,6 @@ class InertialSignals(Signals):
     position_std: Array  # (n, 3) m, world
     bias_std: Array  # (3,) m/s2, of the accelerometer's bias that was taken out
 
-    @property
-    def measured(self) -> Array:
-        """Acceleration (m/s2, world) and angular velocity (rad/s, body), (n, 6)."""
-        return np.column_stack([self.acceleration, self.angular_velocity])
-
 
 def pose_rate(log: FlightLog) -> float:
     """Return how many new poses a second a log holds; 0 where it holds none."""

@@ -12,6 +12,7 @@ from ...dynamics.vehicle import EffectSetting, Mocap, MotorCurve, Uncertainty, V
 from ..logs.flight_log import FlightLog
 from ..motion.sensor_noise import sensor_noise
 from .effect_settings import effect_of, estimate_name
+from .estimates import AIR
 from .geometry import USUAL, Geometry
 from .model import inertia_of
 from .motors import MotorResponse
@@ -20,16 +21,6 @@ from .solve import VehicleFit
 
 Array = NDArray[np.float64]
 
-# how many coefficients of these roles a vehicle file takes
-_EFFECTS = {
-    Role.ROTOR_DRAG: 2,
-    Role.BODY_DRAG: 5,
-    Role.INFLOW_THRUST: 1,
-    Role.TRANSLATIONAL_LIFT: 1,
-    Role.RATE_DAMPING: 3,
-    Role.FLAPPING_MOMENT: 1,
-}
-
 
 def vehicle_of(
     name: str,
@@ -37,7 +28,6 @@ def vehicle_of(
     estimates: Mapping[str, Estimate],
     geometry: Geometry,
     logs: Sequence[FlightLog],
-    gravity: float,
     voltage: float,
     step: float,
     motors: MotorResponse | None = None,
@@ -50,7 +40,7 @@ def vehicle_of(
     curve = None
     if fit.drive.commands:
         curve = _curve(fit)
-        k = fit.model.mass * gravity / (4.0 * USUAL.hover_speed**2)
+        k = fit.model.weight / (4.0 * USUAL.hover_speed**2)
     else:
         k = estimates["k"].value
         if motors is not None:  # thrust against command by way of the speed
@@ -75,7 +65,6 @@ def vehicle_of(
         omega_lsb=step,
         omega_source="commanded" if late else "measured",
         voltage_ref=voltage,
-        gravity=gravity,
         spin=fit.drive.spin.copy(),
         rotor_positions=geometry.positions if geometry.known and _uneven(geometry) else None,
         com=com,
@@ -135,10 +124,10 @@ def _shown(estimate: Estimate | None) -> float:
 
 def _effects(estimates: Mapping[str, Estimate]) -> Sequence[EffectSetting]:
     out = []
-    for role, count in _EFFECTS.items():
+    for role in dict.fromkeys(role for role, *_ in AIR.values()):
         effect = effect_of(role)
         coefficients = {}
-        for i, c in enumerate(get(effect).coefficients[:count]):
+        for i, c in enumerate(get(effect).coefficients):
             known = estimates.get(estimate_name(role, i))
             if known is not None and ((value := _shown(known)) > 0.0 or c.minimum < 0.0):
                 coefficients[c.name] = value

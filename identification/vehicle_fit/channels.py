@@ -17,6 +17,7 @@ from ..logs.flight_log import FlightLog
 from ..logs.source_rates import MOTOR_RATES
 from ..motion.signals import log_signals
 from ..motion.smoothing import derivative, low_pass, resampled, runs_of, unbroken
+from .geometry import GRAVITY
 
 Array = NDArray[np.float64]
 
@@ -137,14 +138,13 @@ def rounding_step(logs: Sequence[FlightLog]) -> float:
 
 
 def pieces_of(
-    logs: Sequence[FlightLog], windows: Sequence[tuple[float, float]], gravity: float
+    logs: Sequence[FlightLog], windows: Sequence[tuple[float, float]]
 ) -> tuple[list[MotionPiece], Sources]:
     """Return all unbroken pieces of the logs in flight, and what they rest on.
 
     Args:
         logs: flights of one vehicle.
         windows: for each log, from and to in s after its start.
-        gravity: m/s2.
 
     Raises:
         InputError: a log lacks what is needed, or none of it is long enough in flight.
@@ -153,7 +153,7 @@ def pieces_of(
     pieces: list[MotionPiece] = []
     for number, (log, (first, last)) in enumerate(zip(logs, windows, strict=True)):
         posed = "pose" in (sources.rate, sources.force)
-        for motion in _posed(log, sources, gravity) if posed else _inertial(log, sources):
+        for motion in _posed(log, sources) if posed else _inertial(log, sources):
             piece = _piece(log, number, motion, sources)
             inside = (piece.t >= log.t[0] + first) & (piece.t <= log.t[0] + last)
             for part in _cut(piece, inside):
@@ -170,11 +170,11 @@ def pieces_of(
 _Motion = tuple[Array, float, Array | None, Array, Array, Array | None]
 
 
-def _posed(log: FlightLog, sources: Sources, gravity: float) -> Iterator[_Motion]:
+def _posed(log: FlightLog, sources: Sources) -> Iterator[_Motion]:
     """Yield motion whose force, and rate where there is no gyro, are the pose's derivatives."""
     for s in log_signals(log, wide_hz=np.inf):
         inverse = Rotation.from_matrix(s.rotation).inv()
-        force = inverse.apply(s.acceleration + np.array([0.0, 0.0, gravity]))
+        force = inverse.apply(s.acceleration + np.array([0.0, 0.0, GRAVITY]))
         rate, turning = s.angular_velocity, s.angular_acceleration
         if sources.force == "accelerometer" and log.accelerometer is not None:
             force = _sensor(log, log.accelerometer, s.t)

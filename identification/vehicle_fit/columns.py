@@ -40,6 +40,8 @@ class Drive:
     delay: float = 0.0  # s, by which the motion comes behind the rotors
     gamma: float = 0.0  # exponent of the voltage
     band: float = SPECTRUM.band  # Hz, up to which force and turning are compared
+    # rad/s, standard deviation of one measured speed; of those behind a lag nothing is known
+    speed_noise: float = 0.0
 
     def at(self, values: Mapping[str, float]) -> "Drive":
         """Return the drive with the lag, time offset and exponent among some values."""
@@ -61,12 +63,8 @@ class BalanceSpectra:
     noise: Array  # (4, c): standard deviation times root s, of each rotor's noise in each column
 
 
-def balance(
-    pieces: list[MotionPiece], drive: Drive, nonlinear: tuple[str, ...], rotor_noise: float = 0.0
-) -> BalanceSpectra:
-    """Return the transforms of all pieces, linear about a drive in its ``nonlinear`` parameters;
-    ``rotor_noise`` (rad/s) is the standard deviation of one measured rotor speed.
-    """
+def balance(pieces: list[MotionPiece], drive: Drive, nonlinear: tuple[str, ...]) -> BalanceSpectra:
+    """Return the transforms of all pieces, linear about a drive in its ``nonlinear`` parameters."""
     segments: list[Segment] = []
     names: tuple[str, ...] = ()
     noise: list[Array] = []
@@ -87,7 +85,7 @@ def balance(
         stacked = low_pass(np.column_stack(parts), drive.band, piece.period)
         for s in segments_of(stacked, piece.period, piece.log, drive.band):
             segments.append(_with_delay(s, drive, nonlinear, count, len(here), slow))
-        noise.append(_rotor_noise(piece, drive, names, rotor_noise))
+        noise.append(_rotor_noise(piece, drive, names))
     weights = np.array([len(p.t) * p.period for p in pieces])
     mean = np.sqrt(np.average(np.square(noise), axis=0, weights=weights))
     signs = np.sign(np.sum(noise, axis=0))
@@ -179,14 +177,16 @@ def _with_delay(
     return replace(s, columns=np.concatenate([measured, *every], axis=2))
 
 
-def _rotor_noise(piece: MotionPiece, drive: Drive, names: tuple[str, ...], noise: float) -> Array:
+def _rotor_noise(piece: MotionPiece, drive: Drive, names: tuple[str, ...]) -> Array:
     """Return what white noise of each rotor's speed makes in each column (4, c), root of a
     spectrum: its column's standard deviation times the root of the period.
     """
     out = np.zeros((4, len(names)))
-    if noise <= 0.0 or drive.commands or piece.rotor_speeds is None:
+    if drive.speed_noise <= 0.0 or drive.lag > 0.0 or piece.rotor_speeds is None:
         return out
-    size = noise * np.sqrt(piece.period * np.mean(4.0 * np.square(piece.rotor_speeds), axis=0))
+    size = drive.speed_noise * np.sqrt(
+        piece.period * np.mean(4.0 * np.square(piece.rotor_speeds), axis=0)
+    )
     parts = {
         "T0": np.ones(4),
         "X0": drive.positions[:, 1],

@@ -4,19 +4,11 @@ called, and what a vehicle has of it.
 
 from ...dynamics.effects import Role, get, playing
 from ...dynamics.vehicle import Vehicle
-from ...runtime.errors import InputError
 
 
 def effect_of(role: Role) -> str:
-    """Return the effect of the library that plays a role.
-
-    Raises:
-        InputError: it has none.
-    """
-    effects = playing(role)
-    if not effects:
-        raise InputError(f"the library of effects: expected one of role {role!s}, found none")
-    return effects[0]
+    """Return the first effect of the library that plays a role."""
+    return playing(role)[0]
 
 
 def estimate_name(role: Role, index: int) -> str:

@@ -23,7 +23,7 @@ Function = Callable[[Values], float]
 Interval = tuple[float, float, float]  # value, low and high
 
 # of each further effect of the air: its role, its first coefficient there, and what shows it
-_AIR: dict[str, tuple[Role, int, str]] = {
+AIR: dict[str, tuple[Role, int, str]] = {
     "rotor drag": (Role.ROTOR_DRAG, 0, ""),
     "linear drag": (Role.BODY_DRAG, 0, ""),
     "quadratic drag": (Role.BODY_DRAG, 3, ""),
@@ -63,43 +63,15 @@ def thrust_of(values: Values, exponents: Sequence[int], u: float) -> float:
     return sum(values[f"a{j}"] * u**e for j, e in enumerate(exponents))
 
 
-def estimates_of(
-    fit: VehicleFit,
-    sources: Sources,
-    geometry: Geometry,
-    pieces: Sequence[MotionPiece],
-    not_told: tuple[Mapping[str, str], Mapping[str, float]],
-    kept: Sequence[str],
-    weight: float,
-) -> list[Estimate]:
-    """Return what is known of every quantity.
+class Estimates:
+    """What is said of one vehicle, and the lengths that the rest scales with.
 
     Args:
         fit: of the parameters.
         sources: what the logs measure.
         geometry: where the rotors stand.
-        pieces: of the logs.
-        not_told: inertias that the flight does not show: why, and what is usual instead.
         kept: names of the further effects that show.
-        weight: N.
     """
-    estimates = _Estimates(fit, sources, geometry, kept)
-    vertical = f"{sources.force} along body z against {sources.rotors}, with the mass given"
-    if fit.drive.commands:
-        estimates.say_curve(pieces, weight, vertical)
-    else:
-        estimates.say("k", lambda v: v["a0"], "N/(rad/s)^2", vertical)
-    estimates.say_arm()
-    estimates.say_inertia(*not_told)
-    estimates.say_yaw()
-    estimates.say_lag()
-    estimates.say_centre()
-    estimates.say_drag()
-    return estimates.said
-
-
-class _Estimates:
-    """What is said of one vehicle, and the lengths that the rest scales with."""
 
     def __init__(
         self, fit: VehicleFit, sources: Sources, geometry: Geometry, kept: Sequence[str]
@@ -111,34 +83,57 @@ class _Estimates:
         self.arm_range = (1.0, 1.0)  # shares of it
         self.rotors = f"against {sources.rotors}"
 
-    def add(
+    def say_all(
+        self, pieces: Sequence[MotionPiece], not_told: Mapping[str, tuple[str, float]]
+    ) -> list[Estimate]:
+        """Return what is known of every quantity; ``not_told`` are inertias that the flight does
+        not show: why, and what is usual instead.
+        """
+        source = self.sources
+        vertical = f"{source.force} along body z against {source.rotors}, with the mass given"
+        if self.fit.drive.commands:
+            self._say_curve(pieces, vertical)
+        else:
+            self._say("k", lambda v: v["a0"], "N/(rad/s)^2", vertical)
+        self._say_arm()
+        self._say_inertia(not_told)
+        self._say_yaw()
+        self._say_lag()
+        self._say_centre()
+        self._say_drag()
+        return self.said
+
+    def _add(
         self, name: str, known: Interval, unit: str, how: str, status: str = IDENTIFIED
     ) -> None:
         self.said.append(Estimate(name, *known, unit, status, how))
 
-    def say(self, name: str, of: Function, unit: str, how: str, status: str = IDENTIFIED) -> None:
+    def _of(self, parameter: str, logarithm: bool = False, times: float = 1.0) -> Interval:
+        """Return a parameter's value, low and high, times a factor."""
+        return self.intervals.of(lambda v: times * v[parameter], logarithm)
+
+    def _say(self, name: str, of: Function, unit: str, how: str, status: str = IDENTIFIED) -> None:
         """Add a positive quantity, or that its interval is too wide."""
         known = self.intervals.of(of)
         if status == IDENTIFIED and not told(known):
             status, how = NOTHING, f"{how}: the interval is wider than half the value"
-        self.add(name, known, unit, how, status)
+        self._add(name, known, unit, how, status)
 
-    def scaled(self, known: Interval) -> Interval:
+    def _scaled(self, known: Interval) -> Interval:
         """Return what is a number times the arm, with the range of an arm that is assumed."""
         value, *ends = (self.arm * x for x in known)
         corners = [end * share for end in ends for share in self.arm_range]
         return value, min(corners), max(corners)
 
-    def say_curve(self, pieces: Sequence[MotionPiece], weight: float, how: str) -> None:
+    def _say_curve(self, pieces: Sequence[MotionPiece], how: str) -> None:
         exponents = self.fit.drive.exponents
         for j, e in enumerate(exponents):
-            known = self.intervals.of(lambda v, j=j: v[f"a{j}"], False)  # type: ignore[misc]
-            self.add(f"thrust u^{e}", known, "N", how)
+            self._add(f"thrust u^{e}", self._of(f"a{j}"), "N", how)
         flown = np.concatenate([p.command.ravel() for p in pieces if p.command is not None])
         low, high = np.clip(np.quantile(flown, [0.005, 0.995]), 0.0, 1.0)
         beyond = f"continues the curve beyond the commands flown, {low:.2f} to {high:.2f}"
         for u in (0.25, 0.5, 0.75, 1.0):
-            self.say(
+            self._say(
                 f"thrust({u:g})",
                 lambda v, u=u: thrust_of(v, exponents, u),  # type: ignore[misc]
                 "N",
@@ -146,21 +141,20 @@ class _Estimates:
             )
 
         def excess(u: float, values: Values) -> float:
-            return 4.0 * thrust_of(values, exponents, u) - weight
+            return 4.0 * thrust_of(values, exponents, u) - self.fit.model.weight
 
         def hover(values: Values) -> float:
             return (
                 float(brentq(excess, 0.0, 2.0, args=(values,))) if excess(2.0, values) > 0 else 2.0
             )
 
-        self.say("hover command", hover, "1", how)
+        self._say("hover command", hover, "1", how)
         if "gamma" in self.fit.model.free:
-            known = self.intervals.of(lambda v: v["gamma"], False)
-            self.add("voltage_exponent", known, "1", how + " and voltage")
+            self._add("voltage_exponent", self._of("gamma"), "1", how + " and voltage")
 
-    def say_arm(self) -> None:
+    def _say_arm(self) -> None:
         if self.geometry.known:
-            self.add("arm_l", 3 * (self.geometry.arm,), "m", "--geometry", GIVEN)
+            self._add("arm_l", 3 * (self.geometry.arm,), "m", "--geometry", GIVEN)
             return
         # with rotors at unit distance the fit's inertia is inertia over arm, which for a usual
         # radius of gyration is gyration * mass * arm
@@ -171,20 +165,21 @@ class _Estimates:
             f"turning shows arm over inertia alone; with {USUAL.gyration:g} mass arm^2 for the "
             f"inertia, {USUAL.gyration_range[0]:g} to {USUAL.gyration_range[1]:g}"
         )
-        self.add("arm_l", (value, low, high), "m", how, ASSUMED)
+        self._add("arm_l", (value, low, high), "m", how, ASSUMED)
         self.arm, self.arm_range = value, (low / value, high / value)
 
-    def say_inertia(self, reasons: Mapping[str, str], instead: Mapping[str, float]) -> None:
+    def _say_inertia(self, not_told: Mapping[str, tuple[str, float]]) -> None:
         given = (IDENTIFIED, "given") if self.geometry.known else (ASSUMED, "assumed")
         motions = {"Jx": "roll", "Jy": "pitch", "Jz": "yaw while rolling or pitching"}
         for axis, motion in motions.items():
             name = axis + axis[1]
-            if axis not in reasons:
-                known = self.scaled(self.intervals.of(lambda v, axis=axis: v[axis]))  # type: ignore[misc]
+            if axis not in not_told:
+                known = self._scaled(self._of(axis, logarithm=True))
                 how = f"{self.sources.rate} in {motion} {self.rotors}, with the arm {given[1]}"
-                self.add(name, known, "kg m2", how, given[0])
+                self._add(name, known, "kg m2", how, given[0])
                 continue
-            value = instead[axis] * self.arm
+            reason, usual_value = not_told[axis]
+            value = usual_value * self.arm
             if axis == "Jz":
                 x, y = self.said[-2:]
                 low, high = USUAL.flat_range
@@ -193,19 +188,19 @@ class _Estimates:
             else:
                 low, high = (value * g / USUAL.gyration for g in USUAL.gyration_range)
                 usual = f"{USUAL.gyration:g} mass arm^2"
-            self.add(name, (value, low, high), "kg m2", f"{reasons[axis]}; {usual}", ASSUMED)
+            self._add(name, (value, low, high), "kg m2", f"{reason}; {usual}", ASSUMED)
         for axis, across in (("Jx", 1), ("Jy", 0)):
-            if axis not in reasons:
+            if axis not in not_told:
                 length = float(np.mean(np.abs(self.fit.drive.positions[:, across])))
                 known = self.intervals.of(lambda v, n=length, axis=axis: n / v[axis])  # type: ignore[misc]
                 how = f"{self.sources.rate} {self.rotors}: needs no arm"
-                self.add(f"l/{axis}{axis[1]}", known, "1/(kg m)", how)
+                self._add(f"l/{axis}{axis[1]}", known, "1/(kg m)", how)
         if "products of inertia" in self.kept:
             for name in ("Jxy", "Jxz", "Jyz"):
-                known = self.scaled(self.intervals.of(lambda v, n=name: v[n], False))  # type: ignore[misc]
-                self.add(name, known, "kg m2", f"{self.sources.rate} across axes", given[0])
+                how = f"{self.sources.rate} across axes"
+                self._add(name, self._scaled(self._of(name)), "kg m2", how, given[0])
 
-    def say_yaw(self) -> None:
+    def _say_yaw(self) -> None:
         how = f"{self.sources.rate} in yaw {self.rotors}"
         gain = self.intervals.of(lambda v: v["reach"] / v["Jz"])
         inertia = next(e for e in self.said if e.name == "Jzz")
@@ -214,34 +209,34 @@ class _Estimates:
             how = "the flight hardly accelerates in yaw"
             if doubtful:
                 how = "quick motion contradicts slow motion in these logs"
-            self.add("(p/k)/Jzz", gain, "1/(kg m)", how, NOTHING)
+            self._add("(p/k)/Jzz", gain, "1/(kg m)", how, NOTHING)
             length = float(np.mean(np.abs(self.fit.drive.positions[:, :2]))) * self.arm
             low, high = (r * length for r in USUAL.reach_range)
             ratio, status = (USUAL.reach * length, low, high), ASSUMED
             how = f"{how}; {USUAL.reach:g} of the arm"
         else:
-            self.add("(p/k)/Jzz", gain, "1/(kg m)", how)
-            ratio, status = self.scaled(self.intervals.of(lambda v: v["reach"])), IDENTIFIED
+            self._add("(p/k)/Jzz", gain, "1/(kg m)", how)
+            ratio, status = self._scaled(self._of("reach", logarithm=True)), IDENTIFIED
             if inertia.status == ASSUMED:
                 # the inertia about z is not told by the flight: the ratio is, and carries it
                 values = (inertia.value, inertia.low, inertia.high)
                 a, b, c = (x * y for x, y in zip(gain, values, strict=True))
                 ratio, status, how = (a, b, c), ASSUMED, f"{how}, with the Jzz that is assumed"
-        self.add("p/k", ratio, "m", how, status)
+        self._add("p/k", ratio, "m", how, status)
         if not self.fit.drive.commands:
             k = self.said[0].value
             known = (ratio[0] * k, ratio[1] * k, ratio[2] * k)
             if status == IDENTIFIED:
                 known = self.intervals.of(lambda v: v["reach"] * v["a0"])
-            self.add("p", known, "Nm/(rad/s)^2", how, status)
+            self._add("p", known, "Nm/(rad/s)^2", how, status)
 
-    def say_lag(self) -> None:
+    def _say_lag(self) -> None:
         name = effect_of(Role.LAG)
         if "lag" in self.fit.model.free:
             how = f"force and turning {self.rotors}"
             if not self.fit.drive.commands:
                 how += ", which therefore are commanded, not measured"
-            known, status = self.intervals.of(lambda v: v["lag"]), IDENTIFIED
+            known, status = self._of("lag", logarithm=True), IDENTIFIED
             if not told(known):
                 status, how = NOTHING, "a time offset of the motion does nearly the same here"
         else:
@@ -250,47 +245,41 @@ class _Estimates:
                 "force follows the logged rotor speeds at once: they are measured, and no command "
                 "is logged beside them"
             )
-        self.add(name, known, "s", how, status)
-        known = self.intervals.of(lambda v: v["delay"], False)
-        self.add("time_offset", known, "s", "of the motion behind the rotors")
+        self._add(name, known, "s", how, status)
+        self._add("time_offset", self._of("delay"), "s", "of the motion behind the rotors")
 
-    def say_centre(self) -> None:
+    def _say_centre(self) -> None:
         how = (
             "constant share of thrust in roll and pitch torque: a centre of mass off the rotors' "
             "middle, or unequal rotors"
         )
         for axis in "xy":
-            value, low, high = self.intervals.of(lambda v, n=f"c{axis}": v[n], False)  # type: ignore[misc]
-            status = IDENTIFIED if self.geometry.known else ASSUMED
-            reason = how
-            if high - low > 0.5 * self.geometry.arm:
+            known = self._of(f"c{axis}", times=self.arm)
+            status, reason = IDENTIFIED if self.geometry.known else ASSUMED, how
+            if known[2] - known[1] > 0.5 * self.arm * self.geometry.arm:
                 status = NOTHING
                 reason = "thrust hardly changes: a constant torque does the same"
-            known = (self.arm * value, self.arm * low, self.arm * high)
-            self.add(f"com {axis}", known, "m", reason, status)
+            self._add(f"com {axis}", known, "m", reason, status)
         if self.sources.force == "pose":
-            known = self.intervals.of(lambda v: -v["rz"], False)
+            known = self._of("rz", times=-1.0)
             wide = known[2] - known[0] > 0.5 * self.arm * self.geometry.arm
             how = "the pose's point swings about it: or the markers' middle is off"
-            self.add("com z", known, "m", how, NOTHING if wide else IDENTIFIED)
+            self._add("com z", known, "m", how, NOTHING if wide else IDENTIFIED)
 
-    def say_drag(self) -> None:
+    def _say_drag(self) -> None:
         if not self.sources.velocity:
             how = "no velocity is known: the logs have no position"
-            self.add("drag", UNKNOWN, "N/(m/s)", how, NOTHING)
+            self._add("drag", UNKNOWN, "N/(m/s)", how, NOTHING)
             return
         along = f"{self.sources.force} along body x and y against velocity"
         damped = f"{self.sources.rate}, its own derivative against it and against velocity"
-        for kind, (role, first, channel) in _AIR.items():
+        for kind, (role, first, channel) in AIR.items():
             how = {"": along, "z": "force along body z", "turning": damped}[channel]
             for index, parameter in enumerate(OPTIONAL[kind] if kind in self.kept else (), first):
                 factor = {"lift": 0.25}.get(kind, self.arm if channel == "turning" else 1.0)
-                known = self.intervals.of(
-                    lambda v, f=factor, n=parameter: f * v[n],  # type: ignore[misc]
-                    channel == "turning",
-                )
+                known = self._of(parameter, channel == "turning", factor)
                 unit = get(effect_of(role)).coefficients[index].unit
-                self.add(estimate_name(role, index), known, unit, how)
+                self._add(estimate_name(role, index), known, unit, how)
         if not {"rotor drag", "linear drag", "quadratic drag"} & set(self.kept):
             known = (0.0, math.nan, math.nan)
-            self.add("drag", known, "N/(m/s)", "none stands out of the disturbances", NOTHING)
+            self._add("drag", known, "N/(m/s)", "none stands out of the disturbances", NOTHING)

@@ -11,6 +11,7 @@ Array = NDArray[np.float64]
 
 QUADRANT = np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
 SPIN = np.array([-1.0, 1.0, -1.0, 1.0])  # about body +z, in the same order
+GRAVITY = 9.81  # m/s2
 
 
 @dataclass(frozen=True)

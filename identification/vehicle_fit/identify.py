@@ -21,7 +21,7 @@ from .assemble import advice_of, vehicle_of
 from .channels import MotionPiece, Sources, pieces_of, rounding_step
 from .columns import ANSWERED_HZ, Drive
 from .effect_settings import effect_of
-from .estimates import Intervals, estimates_of, thrust_of
+from .estimates import Estimates, Intervals, thrust_of
 from .geometry import SPIN, USUAL, Geometry
 from .motors import motor_response
 from .parameters import ANSWERED, FORCE_BIAS, OPTIONAL, POSITIVE, first_model
@@ -58,7 +58,6 @@ def identify(
     geometry: Geometry,
     windows: Sequence[tuple[float, float]] | None = None,
     name: str = "identified",
-    gravity: float = 9.81,
     report: Report = lambda share, text: None,
 ) -> Identified:
     """Return what flights tell of their vehicle.
@@ -70,7 +69,6 @@ def identify(
         geometry: where the rotors stand, or not known.
         windows: for each log, from and to in s after its start; None: all of it.
         name: of the vehicle.
-        gravity: m/s2.
         report: is told the share that is done, and what is being done.
 
     Raises:
@@ -78,17 +76,17 @@ def identify(
     """
     if not (math.isfinite(mass) and mass > 0.0):
         raise InputError(f"--mass {mass:g}: expected the vehicle's mass in kg")
-    whole = [(0.0, math.inf)] * len(logs)
-    pieces, sources = pieces_of(logs, windows or whole, gravity)
+    pieces, sources = pieces_of(logs, windows or [(0.0, math.inf)] * len(logs))
     notes: list[str] = []
     voltage = _voltage(pieces)
     commands = sources.rotors == "commands"
-    drive = Drive(geometry.positions, SPIN, commands, voltage_ref=voltage if commands else 0.0)
     step = 0.0 if commands else rounding_step(logs)
+    reference, noise = voltage if commands else 0.0, step / math.sqrt(12.0)
+    drive = Drive(geometry.positions, SPIN, commands, voltage_ref=reference, speed_noise=noise)
     report(0.05, "fitting forces and torques")
-    fit, turned = _first_fit(pieces, sources, drive, mass, gravity, step / math.sqrt(12.0))
+    fit, turned = _first_fit(pieces, sources, drive, mass)
     report(0.4, "asking whether slow and quick motion agree")
-    fit = _agreeing(pieces, fit, step / math.sqrt(12.0), mass * gravity)
+    fit = _agreeing(pieces, fit)
     if fit.drive.band < SPECTRUM.band:
         notes.append(
             f"warning: above {fit.drive.band:g} Hz these logs contradict what they say below, as "
@@ -96,7 +94,7 @@ def identify(
             "only what is slower was used"
         )
     report(0.5, "asking what else shows")
-    fit, kept = _with_optional(pieces, fit, sources, step / math.sqrt(12.0))
+    fit, kept = _with_optional(pieces, fit, sources)
     if "answered torque" in kept:
         shares = ", ".join(f"{100 * fit.values[f'answered {a}']:.0f} %" for a in "xyz")
         notes.append(
@@ -105,7 +103,7 @@ def identify(
             "what is quicker"
         )
     report(0.8, "asking what can be told")
-    reasons, instead = _not_told(fit, geometry)
+    not_told = _not_told(fit, geometry)
     if turned:
         notes.append(
             "yaw turns against the usual turning senses of the rotors (front-left clockwise from "
@@ -116,9 +114,7 @@ def identify(
             "the accelerometer's scale is taken as right: an error of 1 % in it is one of 1 % in "
             "thrust"
         )
-    estimates = estimates_of(
-        fit, sources, geometry, pieces, (reasons, instead), kept, mass * gravity
-    )
+    estimates = Estimates(fit, sources, geometry, kept).say_all(pieces, not_told)
     if "lag" in fit.model.free:
         estimates.append(_lag_alone(pieces, fit))
     motors = None if commands or "lag" in fit.model.free else motor_response(pieces)
@@ -129,7 +125,7 @@ def identify(
         lag = Estimate(effect_of(Role.LAG), *motors.known, "s", IDENTIFIED, how)
         estimates = [lag if e.name == lag.name else e for e in estimates]
     named = {e.name: e for e in estimates}
-    vehicle = vehicle_of(name, fit, named, geometry, logs, gravity, voltage, step, motors)
+    vehicle = vehicle_of(name, fit, named, geometry, logs, voltage, step, motors)
     return Identified(
         vehicle,
         tuple(estimates),
@@ -138,8 +134,6 @@ def identify(
         fit,
         tuple(notes),
         tuple(advice_of(named)),
-        fit.balance.seconds,
-        len(fit.balance.segments),
     )
 
 
@@ -164,18 +158,12 @@ def _voltage(pieces: Sequence[MotionPiece]) -> float:
 
 
 def _first_fit(
-    pieces: list[MotionPiece],
-    sources: Sources,
-    drive: Drive,
-    mass: float,
-    gravity: float,
-    noise: float,
+    pieces: list[MotionPiece], sources: Sources, drive: Drive, mass: float
 ) -> tuple[VehicleFit, bool]:
     """Return the fit of the basic model, and whether the rotors turn the other way."""
-    known = (pieces, sources, drive, mass, gravity)
     if not drive.commands:
-        model, start, drive, turned = first_model(*known, ("delay",))
-        plain = solve(pieces, drive, model, start, noise)
+        model, start, drive, turned = first_model(pieces, sources, drive, mass, ("delay",))
+        plain = solve(pieces, drive, model, start)
         # do the logged speeds lead the motion as commands do?
         if lag_with(pieces, plain) < IDENTIFY.least_lag:
             return plain, turned
@@ -190,7 +178,7 @@ def _first_fit(
     # from the richest curve down: a fit that starts poor takes its own misfit for noise
     for exponents in ((0, 1, 2), (1, 2), (2,)):
         here = replace(drive, exponents=exponents)
-        model, start, here, turned = first_model(pieces, sources, here, mass, gravity, nonlinear)
+        model, start, here, turned = first_model(pieces, sources, here, mass, nonlinear)
         fits = []
         for lag in IDENTIFY.lags if best is None else (best[1].drive.lag,):
             start[model.free.index("lag")] = lag
@@ -206,16 +194,13 @@ def _first_fit(
     return best[1], best[2]
 
 
-def _agreeing(
-    pieces: list[MotionPiece], fit: VehicleFit, noise: float, weight: float
-) -> VehicleFit:
+def _agreeing(pieces: list[MotionPiece], fit: VehicleFit) -> VehicleFit:
     """Return the fit up to the widest frequency at which thrust is what slower motion alone says
     (Hausman's test), and no sensor's bias is beyond belief.
     """
-    rotor_noise = 0.0 if fit.drive.lag > 0.0 else noise
     for band in IDENTIFY.bands:
-        slow = solve(pieces, replace(fit.drive, band=band), fit.model, fit.theta, rotor_noise)
-        wide, narrow = _hover_thrust(fit, weight), _hover_thrust(slow, weight)
+        slow = solve(pieces, replace(fit.drive, band=band), fit.model, fit.theta)
+        wide, narrow = _hover_thrust(fit), _hover_thrust(slow)
         apart = abs(math.log(narrow[0] / wide[0])) if min(narrow[0], wide[0]) > 0.0 else math.inf
         bias = abs(fit.values.get("force bias z", 0.0))
         sure = apart > IDENTIFY.apart * math.hypot(narrow[1], IDENTIFY.close)
@@ -225,12 +210,12 @@ def _agreeing(
     return fit
 
 
-def _hover_thrust(fit: VehicleFit, weight: float) -> tuple[float, float]:
+def _hover_thrust(fit: VehicleFit) -> tuple[float, float]:
     """Return the thrust at what a hover takes by the fit's own start, as a share of the weight, and
     its standard deviation.
     """
     intervals = Intervals(fit)
-    exponents = fit.drive.exponents
+    exponents, weight = fit.drive.exponents, fit.model.weight
     # where the start's curve, in which each power carries its share, carries the weight
     scale = fit.model.scale
     u = (weight / (4.0 * scale[f"a{len(exponents) - 1}"])) ** (1.0 / exponents[-1])
@@ -243,9 +228,7 @@ def _hover_thrust(fit: VehicleFit, weight: float) -> tuple[float, float]:
 def _rises(fit: VehicleFit) -> bool:
     """Does thrust grow with the command, from nothing to full?"""
     u = np.linspace(0.05, 1.0, 20)
-    values = fit.values
-    curve = sum(values[f"a{j}"] * u**e for j, e in enumerate(fit.drive.exponents))
-    return bool(np.all(np.diff(curve) > 0.0))
+    return bool(np.all(np.diff([thrust_of(fit.values, fit.drive.exponents, x) for x in u]) > 0.0))
 
 
 def _frequencies(fit: VehicleFit) -> float:
@@ -254,7 +237,7 @@ def _frequencies(fit: VehicleFit) -> float:
 
 
 def _with_optional(
-    pieces: list[MotionPiece], fit: VehicleFit, sources: Sources, noise: float
+    pieces: list[MotionPiece], fit: VehicleFit, sources: Sources
 ) -> tuple[VehicleFit, list[str]]:
     """Return a fit with those further effects that make the logs much likelier, and which."""
     kept: list[str] = []
@@ -270,44 +253,38 @@ def _with_optional(
         model, start = fit.model.with_more(fit.theta, *parameters)
         least = IDENTIFY.penalty * len(parameters) * math.log(_frequencies(fit))
         if fall_with(fit, model, start) > least:
-            rotor_noise = 0.0 if fit.drive.lag > 0.0 else noise
-            richer = solve(pieces, fit.drive, model, start, rotor_noise)
+            richer = solve(pieces, fit.drive, model, start)
             if all(richer.values[p] > 0.0 for p in richer.model.free if p in POSITIVE):
                 fit = richer
                 kept.append(name)
     return fit, kept
 
 
-def _not_told(fit: VehicleFit, geometry: Geometry) -> tuple[dict[str, str], dict[str, float]]:
+def _not_told(fit: VehicleFit, geometry: Geometry) -> dict[str, tuple[str, float]]:
     """Return the inertias that the flight does not show: why, and what is usual instead.
 
     Raises:
         InputError: neither turning nor an arm says how large the vehicle is.
     """
-    reasons: dict[str, str] = {}
-    instead: dict[str, float] = {}
+    not_told: dict[str, tuple[str, float]] = {}
     values = fit.values
     usual = USUAL.gyration * fit.model.mass * geometry.arm**2
     doubtful = fit.drive.band < SPECTRUM.band
     for axis, motion in (("Jx", "roll"), ("Jy", "pitch")):
         if doubtful:  # turning is quick, and quick motion contradicts itself here
-            reasons[axis] = f"quick {motion} contradicts slow motion in these logs"
-            instead[axis] = usual
+            not_told[axis] = f"quick {motion} contradicts slow motion in these logs", usual
         elif 1.96 * fit.deviation(axis) > WIDEST:
-            reasons[axis] = f"the flight hardly shows {motion}"
-            instead[axis] = usual
-    if reasons and not geometry.known:
+            not_told[axis] = f"the flight hardly shows {motion}", usual
+    if not_told and not geometry.known:
         raise InputError(
-            f"{'; '.join(reasons.values())}, and no arm is given; expected --geometry, or a log "
-            "with quick roll and pitch"
+            f"{'; '.join(why for why, _ in not_told.values())}, and no arm is given; expected "
+            "--geometry, or a log with quick roll and pitch"
         )
-    both = values["Jx"] + values["Jy"]
     wide = 1.96 * fit.deviation("Jz") > WIDEST
-    if doubtful or wide or not 0.3 < values["Jz"] / both < 1.3:
-        reasons["Jz"] = (
-            "quick motion contradicts slow motion in these logs"
-            if doubtful
-            else "the flight does not yaw while it rolls or pitches"
-        )
-        instead["Jz"] = USUAL.flat * sum(instead.get(a, values[a]) for a in ("Jx", "Jy"))
-    return reasons, instead
+    if doubtful or wide or not 0.3 < values["Jz"] / (values["Jx"] + values["Jy"]) < 1.3:
+        why = "the flight does not yaw while it rolls or pitches"
+        if doubtful:
+            why = "quick motion contradicts slow motion in these logs"
+        both = sum(not_told.get(axis, ("", values[axis]))[1] for axis in ("Jx", "Jy"))
+        not_told["Jz"] = why, USUAL.flat * both
+    return not_told

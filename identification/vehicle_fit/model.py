@@ -14,6 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .geometry import GRAVITY
+
 Array = NDArray[np.float64]
 
 _AXES = "xyz"
@@ -34,6 +36,11 @@ class Model:
     free: tuple[str, ...]
     scale: Mapping[str, float]  # one unit of a parameter in SI units; 1 where none is given
     prior: Mapping[str, float]  # standard deviation about 0, SI units
+
+    @property
+    def weight(self) -> float:
+        """Weight, N."""
+        return self.mass * GRAVITY
 
     def values(self, theta: Array) -> dict[str, float]:
         """Return the free parameters in SI units."""

@@ -48,12 +48,8 @@ def motor_response(pieces: list[MotionPiece]) -> MotorResponse | None:
         return None
 
     def columns(lag: float) -> Array:
-        parts = []
-        for p in pieces:
-            assert p.command is not None
-            u = lagged(p.command, lag, p.period)
-            parts.append(np.stack([u**j for j in range(MOTORS.powers)], axis=2))
-        return np.concatenate(parts).reshape(-1, MOTORS.powers)
+        u = [lagged(p.command, lag, p.period).ravel() for p in pieces if p.command is not None]
+        return np.asarray(np.vander(np.concatenate(u), MOTORS.powers, increasing=True))
 
     target = speeds.ravel()
 

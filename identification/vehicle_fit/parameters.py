@@ -12,7 +12,7 @@ from scipy.signal import butter, sosfiltfilt
 from ...runtime.errors import InputError
 from .channels import MotionPiece, Sources
 from .columns import Drive, rotor_columns
-from .geometry import USUAL
+from .geometry import GRAVITY, USUAL
 from .model import Model
 
 Array = NDArray[np.float64]
@@ -64,7 +64,6 @@ def first_model(
     sources: Sources,
     drive: Drive,
     mass: float,
-    gravity: float,
     nonlinear: Sequence[str],
 ) -> tuple[Model, Array, Drive, bool]:
     """Return the model, where it starts, the drive with the turning senses that yaw shows, and
@@ -77,7 +76,7 @@ def first_model(
     columns = [rotor_columns(piece, drive) for piece in pieces]
     # a basis coefficient at which it alone would carry the weight
     totals = [np.concatenate([c[f"T{j}"] for c in columns]) for j in range(len(drive.exponents))]
-    each = [mass * gravity / max(float(np.mean(total)), 1e-12) for total in totals]
+    each = [mass * GRAVITY / max(float(np.mean(total)), 1e-12) for total in totals]
     share = 1.0 / len(each)
     gains, alike = _first_gains(pieces, columns, [share * a for a in each])
     for axis, correlation in zip(("roll", "pitch"), alike, strict=False):
@@ -99,7 +98,7 @@ def first_model(
         **dict.fromkeys(("Jxy", "Jxz", "Jyz"), 0.1 * inertia[0]),
         "reach": float(np.clip(abs(float(gains[2])) * flat, 1e-3 * arm, 10.0 * arm)),
         **dict.fromkeys(("cx", "cy"), 0.01 * arm),
-        "Jr": 0.01 * inertia[0] / speed * float(np.sqrt(gravity / arm)),
+        "Jr": 0.01 * inertia[0] / speed * float(np.sqrt(GRAVITY / arm)),
         **dict.fromkeys(("tilt x", "tilt y", "rx", "ry", "rz"), 0.01),
         **dict.fromkeys(("turn bias x", "turn bias y", "turn bias z", *BIASES), 0.1),
         **{f"rotor drag {a}": 0.05 * mass / speed for a in "xyz"},

@@ -40,8 +40,8 @@ def identified_data(found: Identified, errors: PredictionErrors | None = None) -
     data: dict[str, Any] = {
         "vehicle": found.vehicle.name,
         "mass_kg": found.vehicle.mass,
-        "flight_s": found.seconds,
-        "segments": found.segments,
+        "flight_s": found.fit.balance.seconds,
+        "segments": len(found.fit.balance.segments),
         "channels": found.sources,
         "estimates": [
             {

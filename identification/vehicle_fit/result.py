@@ -51,8 +51,6 @@ class Identified:
     fit: VehicleFit
     notes: tuple[str, ...]
     advice: tuple[str, ...]
-    seconds: float  # of flight
-    segments: int
 
     def __getitem__(self, name: str) -> Estimate:
         """Return an estimate by its name."""

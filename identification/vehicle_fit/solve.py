@@ -6,7 +6,7 @@ is taken away before the normal equations are solved, so that it does not shrink
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -86,14 +86,12 @@ class VehicleFit:
         return unit * float(np.sqrt(self.covariance[i, i]))
 
 
-def solve(
-    pieces: list[MotionPiece], drive: Drive, model: Model, start: Array, rotor_noise: float = 0.0
-) -> VehicleFit:
+def solve(pieces: list[MotionPiece], drive: Drive, model: Model, start: Array) -> VehicleFit:
     """Return the fit that Gauss-Newton reaches from ``start`` (p,)."""
     theta = start.copy()
 
     def linear() -> BalanceSpectra:
-        return balance(pieces, drive.at(model.values(theta)), model.nonlinear, rotor_noise)
+        return balance(pieces, drive.at(model.values(theta)), model.nonlinear)
 
     made = linear()
     powers = [np.mean(np.abs(s.columns[:, :, :6]) ** 2, axis=0) for s in made.segments]
@@ -137,7 +135,7 @@ def fall_with(fit: VehicleFit, model: Model, start: Array) -> float:
 def lag_with(pieces: list[MotionPiece], fit: VehicleFit) -> float:
     """Return the lag that one step from a fit without one would take, in standard deviations."""
     model, start = fit.model.with_more(fit.theta, "lag")
-    made = balance(pieces, fit.drive, model.nonlinear)
+    made = balance(pieces, replace(fit.drive, speed_noise=0.0), model.nonlinear)
     total = np.sum(_grams(made, fit.spectra), axis=0)
     step, information, *_ = _newton(made, total, model, start)
     return float(step[-1] / np.sqrt(np.linalg.inv(information)[-1, -1]))

@@ -6,6 +6,7 @@ from typing import Any
 
 from ...controllers.fan_laws import Lead
 from ...controllers.features import QUANTITIES
+from ...controllers.registry import shipped_policies
 from ...controllers.trained_policy import TrainedPolicy, cell_of, layers_of, load_policy
 from ...runtime.errors import InputError
 from .c_numbers import literal, table
@@ -18,8 +19,8 @@ _COLUMNS = (
 )
 
 
-def exportable_policy(name: str, path: Path | None) -> Mapping[str, Any]:
-    """Return what the templates need of a policy: a law, or the trained one at ``path``.
+def exportable_policy(name: str) -> Mapping[str, Any]:
+    """Return what the templates need of a policy: a law, or a trained one by its name or path.
 
     Raises:
         InputError: there is no such policy, or it is of a kind that is not exported.
@@ -36,10 +37,13 @@ def exportable_policy(name: str, path: Path | None) -> Mapping[str, Any]:
         }
     if name == "tracker":
         return {"kind": "tracker"}  # the rest is the vehicle's: ``tracker.tracker_policy``
-    if path is None:
+    trained = shipped_policies()
+    if name not in trained and not name.endswith((".npz", ".json")):
         raise InputError(
-            f"--policy {name}: expected {', '.join(LAWS)} or the name or path of a trained policy"
+            f"--policy {name}: no such policy; expected {', '.join((*LAWS, *trained))}, or the "
+            "path of a trained one"
         )
+    path = trained.get(name, Path(name))
     policy = load_policy(path)
     if not isinstance(policy, TrainedPolicy):
         raise InputError(f"--policy {name}: is of {policy.task}; expected one of FanTracking")

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.paths import ROOT
 from windwrench.commands.example import confronted
 from windwrench.identification.logs.example import example_flight
 from windwrench.identification.logs.reading import read_log
@@ -73,9 +72,3 @@ def test_the_example_of_a_comparison_has_the_known_answer(call):
     found = json.loads(out)["result"]
     assert found["place"] == "rotor 2 (rear-left)"
     assert found["probabilities"]["rotor 2 (rear-left)"] > 0.95
-
-
-def test_the_example_of_a_comparison_has_logs_of_its_own(call):
-    code, _, err = call("compare", "--example", ROOT / "README.md")
-    assert code == 2
-    assert "--example: has logs of its own" in err

@@ -80,7 +80,6 @@ def logs(tmp_path):
     out.mkdir()
     outcomes = Outcomes(out / OUTCOMES)
     outcomes.add({"key": key_of(next(x for x in found if x.name == "done.csv"), ()), **FOUND})
-    outcomes.close()
     return folder
 
 

@@ -63,18 +63,3 @@ def test_a_part_of_a_log():
     path, window = parse_window("a/b.csv:35-65.5")
     assert (str(path), window) == ("a/b.csv", (35.0, 65.5))
     assert parse_window("b.csv")[1] == (0.0, math.inf)
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("identify", "flight", "--mass", "0.4"),
-        ("compare", "flight", "--against", "flight", "--vehicle", "ardrone2"),
-        ("estimate", "flight", "--vehicle", "ardrone2"),
-    ],
-)
-def test_a_piece_that_a_log_does_not_have(call, log, words):
-    words = [log if word == "flight" else word for word in words]
-    code, _, said = call(*words, "--piece", "3")
-    assert code != 0
-    assert "piece 3: it has 1; expected 1 to 1" in said

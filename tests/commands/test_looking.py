@@ -52,12 +52,3 @@ def test_a_log_of_an_unknown_vehicle_is_told_how_one_is_made(call, log, tmp_path
     assert "windwrench identify theirs.csv --mass KG" in out
     assert "12.0 s" in out.strip().splitlines()[-1]
     assert not Path("all/estimate").exists()
-
-
-def test_neither_a_log_nor_a_command(call):
-    code, _, err = call("no_such_flight.csv")
-    assert code == 2
-    assert "no_such_flight.csv" in err
-    code, _, err = call("diagnoze")
-    assert code == 2
-    assert "'diagnose'" in err

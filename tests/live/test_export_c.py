@@ -165,7 +165,7 @@ def test_compilers_find_nothing_to_say(estimator, compiler, tmp_path):
     effects = ("rotor_drag", "motor_lag", "ground_effect", "com_offset", "attitude_gain")
     model = model.with_effects(*(parse_setting(e, model) for e in effects))
     names = {"ekf": "sac-0", "ukf": "tracker", "constant-gain": "lead"}
-    policy = exportable_policy(names[estimator], POLICY if estimator == "ekf" else None)
+    policy = exportable_policy(names[estimator])
     for number, exported in enumerate(
         (
             export_c(model, estimator, policy=policy),
@@ -186,7 +186,7 @@ def test_only_the_allowed_functions_of_libm_are_called(tmp_path):
     model = model.with_effects(*(parse_setting(e, model) for e in exportable_effects()))
     allowed = {*(f"{name}f" for name in FUNCTIONS), "memcpy", "memset"}
     for estimator in ("ekf", "ukf"):
-        exported = export_c(model, estimator, policy=exportable_policy("sac-0", POLICY))
+        exported = export_c(model, estimator, policy=exportable_policy("sac-0"))
         folder = write(exported, tmp_path / estimator)
         # a compiler that optimises may make one call of two (sincosf), or none
         plain = ("-std=c99", "-O0", "-fno-stack-protector", "-c")
@@ -272,7 +272,7 @@ def test_effects_in_c_are_those_in_python(tmp_path):
 
 def test_the_policy_in_c_commands_what_it_does_in_python(tmp_path):
     needs("gcc")
-    policy = exportable_policy("sac-0", POLICY)
+    policy = exportable_policy("sac-0")
     c = CompiledFilter(export_c(load_vehicle("ardrone2"), policy=policy), tmp_path)
     python, rng, command = load_policy(POLICY), np.random.default_rng(0), 0.0
     e = c.estimate
@@ -287,7 +287,7 @@ def test_the_policy_in_c_commands_what_it_does_in_python(tmp_path):
 
 def test_the_law_with_lead(tmp_path):
     needs("gcc")
-    policy = exportable_policy("lead", None)
+    policy = exportable_policy("lead")
     c = CompiledFilter(export_c(load_vehicle("ardrone2"), policy=policy), tmp_path)
     e = c.estimate
     torque = np.array([0.001, 0.004, -0.003, 0.01, 0.1])
@@ -355,7 +355,7 @@ def test_what_cannot_be_exported_is_said_in_a_line():
             export_c(declared)
         assert "\n" not in str(refused.value)
     with pytest.raises(InputError, match="recurrent"):
-        exportable_policy("recurrent-ppo-0", POLICY.with_name("recurrent-ppo-0.npz"))
+        exportable_policy("recurrent-ppo-0")
     for wrong in ({"rate": -1.0}, {"estimator": "kalman"}, {"precision": "half"}):
         with pytest.raises(InputError, match=next(iter(wrong))):
             export_c(model, **wrong)

@@ -68,7 +68,7 @@ class OwnTracker(Tracker):
 def c(tmp_path_factory):
     if shutil.which("gcc") is None:
         pytest.skip("not installed: gcc")
-    policy = exportable_policy("tracker", None)
+    policy = exportable_policy("tracker")
     exported = export_c(VEHICLE, "constant-gain", 200.0, 0.45, policy=policy)
     return CompiledFilter(exported, tmp_path_factory.mktemp("tracker"))
 

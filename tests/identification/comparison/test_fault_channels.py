@@ -10,6 +10,7 @@ from windwrench.identification.comparison.fault_channels import (
     sample,
 )
 from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.logs.streams import Stream
 
 
 def hover(seconds=8.0, rate=200.0, command_rate=200.0, **changed):
@@ -20,9 +21,8 @@ def hover(seconds=8.0, rate=200.0, command_rate=200.0, **changed):
         "accelerometer": np.tile([0.0, 0.0, 9.81], (len(t), 1)),
         "command": np.full((len(u), 4), 0.4),
     } | changed
-    return Channels(
-        "hover.csv", t, streams["gyro"], t, streams["accelerometer"], u, streams["command"]
-    )
+    times = {"command": u}
+    return Channels("hover.csv", *(Stream(k, times.get(k, t), x) for k, x in streams.items()))
 
 
 def test_nothing_is_read_behind_a_clipped_gyro_or_an_impact():

@@ -195,4 +195,3 @@ def test_flights_are_in_the_order_of_times_else_of_names(tmp_path):
         ("b", 2, "b10"),
     ]
     assert "limit_s" not in rows(done, outcomes)[0]
-    outcomes.close()

@@ -20,12 +20,10 @@ def test_outcomes_are_found_again(tmp_path):
     assert first[A]["notes"] == ["°"]  # while it is written to
     first.add({"key": A, "status": "refused"})
     assert (first[A]["status"], len(first)) == ("refused", 2)
-    first.close()
     again = Outcomes(path)
     assert again[A]["status"] == "refused"
     assert B in again
     assert C not in again
-    again.close()
 
 
 def test_a_torn_line_costs_one_outcome_alone(tmp_path):
@@ -36,10 +34,8 @@ def test_a_torn_line_costs_one_outcome_alone(tmp_path):
     assert A in outcomes
     assert B not in outcomes
     outcomes.add({"key": C, "status": "refused"})
-    outcomes.close()
     again = Outcomes(path)
     assert (again[A]["status"], again[C]["status"]) == ("diagnosed", "refused")
-    again.close()
 
 
 def test_what_cannot_be_written_is_named(tmp_path):

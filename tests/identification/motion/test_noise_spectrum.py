@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 
+from tests.support.flown import recorded
 from windwrench.dynamics import load_vehicle, preset_names
 from windwrench.envs.recording import record_flight
 from windwrench.identification.logs.flight_log import FlightLog
@@ -21,10 +22,7 @@ VEHICLE = load_vehicle("ardrone2")
 
 @pytest.fixture(scope="module", params=["excite", "hover"])
 def log(request):
-    c = record_flight(VEHICLE, (), request.param, 15.0, 5)
-    return FlightLog(
-        c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c.get("voltage"), name="flight"
-    )
+    return recorded(request.param, 15.0, 5)
 
 
 @pytest.mark.parametrize("name", list(FILTERS))

@@ -164,7 +164,7 @@ def test_turning_is_compared_with_torque_at_its_own_delay(sense):
     )
     drive = Drive(parse_geometry(str(ARM)).positions, SPIN)
     sources = Sources("accelerometer", "gyro", "rotor speeds", True)
-    asked = partial(first_model, [piece], sources, drive, MASS, 9.81, ("delay",))
+    asked = partial(first_model, [piece], sources, drive, MASS, ("delay",))
     if sense < 0.0:
         with pytest.raises(InputError, match="roll turns against"):
             asked()
