@@ -59,12 +59,8 @@ def write_text(text: str, path: Path) -> None:
         partial.write_bytes(gzip.compress(data, 9, mtime=0) if path.suffix == ".gz" else data)
 
 
-def write_png(figure: "Figure", path: Path) -> None:
-    """Write a figure as a PNG of at most 128 colours, whole or not at all.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
+def png_of(figure: "Figure") -> bytes:
+    """Return a figure as a PNG of at most 128 colours."""
     from PIL import Image
 
     buffer = io.BytesIO()
@@ -73,8 +69,20 @@ def write_png(figure: "Figure", path: Path) -> None:
     few = picture.quantize(
         _COLOURS, method=Image.Quantize.MEDIANCUT, kmeans=3, dither=Image.Dither.NONE
     )
+    buffer = io.BytesIO()
+    few.save(buffer, format="png", optimize=True)
+    return buffer.getvalue()
+
+
+def write_png(figure: "Figure", path: Path) -> None:
+    """Write a figure as a PNG of at most 128 colours, whole or not at all.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    data = png_of(figure)
     with replaced(path) as partial:
-        few.save(partial, format="png", optimize=True)
+        partial.write_bytes(data)
 
 
 def write_figure(figure: "Figure", folder: Path, name: str) -> Path:

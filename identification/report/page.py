@@ -1,8 +1,8 @@
 """The page of a diagnosis's report: one HTML file that needs nothing else.
 
 A script and a small library (``uplot/``) draw its plots, with zoom and cursor. Where a browser runs
-no scripts, a table of each plot shows the same numbers. The page's policy allows no other script,
-and nothing from elsewhere.
+no scripts, one still picture and a table of each plot show the same numbers. The page's policy
+allows no other script, and nothing from elsewhere.
 """
 
 import base64
@@ -19,6 +19,7 @@ from ..findings import Diagnosis
 from . import amounts, words
 from .headline import headline
 from .plot_numbers import candidate_bars, page_plots
+from .still_picture import still_picture
 
 _TONES = {
     "explained": "good",
@@ -33,7 +34,8 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
     come from users.
     """
     plots, bars = page_plots(diagnosis), candidate_bars(diagnosis)
-    data, library, script = plots.data, _library(), _file("page.js")
+    data, drawn = plots.data, [*plots.time, *plots.frequency, *plots.signatures]
+    library, script = _library(), _file("page.js")
     shown = {bar.name for bar in bars}
     return page_template(__package__, "page.html.j2").render(
         found=diagnosis,
@@ -46,6 +48,7 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
         missing=words.MISSING,
         alike=[words.confusion(e) for e in diagnosis.effects if e.indistinguishable_from],
         plots=plots,
+        still=still_picture(drawn) if drawn else "",
         bars=bars,
         more_candidates=[c for c in diagnosis.candidates if c.name not in shown],
         policy=_policy((library, script) if data else ()),

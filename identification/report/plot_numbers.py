@@ -1,9 +1,9 @@
-"""The plots of a diagnosis's page: one object each, from which both its forms come.
+"""The plots of a diagnosis's page: one object each, from which its three forms come.
 
-``packed`` is what ``page.js`` draws with uPlot, and ``table`` the same numbers where no script runs
-and for readers who do not see a plot. A plot over time keeps, in each column of the window, the
-samples with the lowest and the highest residual before and after: peaks stay, and every value is
-one of the log.
+``packed`` is what ``page.js`` draws with uPlot, ``lines`` what the still picture shows on pages
+without scripts, and ``table`` the same numbers for readers who do not see a plot. A plot over time
+keeps, in each column of the window, the samples with the lowest and the highest residual before and
+after: peaks stay, and every value is one of the log.
 """
 
 import base64
@@ -60,6 +60,7 @@ class Plot:
     """One plot of the page."""
 
     packed: dict[str, Any]  # its ``key`` is its name in the page
+    lines: dict[str, tuple[Array, Array]]  # x and y (n,) of ``before``, ``after`` and ``mean``
     table: PlotTable
     title: str  # what is drawn, with its unit
     axis: str  # what it is drawn over
@@ -175,8 +176,10 @@ def _plot_over_time(joined: _Joined, i: int) -> Plot:
     limit = factor * (1.08 * largest or 1.0 / factor)
     before, after = (rounded(factor * _rms(x[:, i]), 2) for x in sides.values())
     change = f"rms {before} → {after}"
+    kept = np.concatenate(joined.kept(i, PLOTS.least_columns))
     return Plot(
         _packed_channel(joined, i, factor, unit, limit),
+        {name: (joined.x[kept], factor * x[kept, i]) for name, x in sides.items()},
         _table_over_time(traces, i, factor, unit),
         f"{_SYMBOLS[i]} ({unit})",
         "time (s)" if len(traces) == 1 else "pieces of flight, side by side (s)",
@@ -205,6 +208,7 @@ def _plot_of_spectrum(
             "before": _digits(before),
             "after": _digits(after),
         },
+        {"before": (x, before), "after": (x, after)},
         PlotTable(
             f"Amplitude of the residual {name}",
             ("Frequency (Hz)", "Before", "After"),
@@ -262,6 +266,11 @@ def _plot_of_signature(signature: Signature, number: int) -> Plot:
             "fitted": packed_series(fitted[kept]),
             "middle": _digits(middle),
             "mean": _digits(mean),
+        },
+        {
+            "before": (x[kept], residual[kept]),
+            "after": (x[kept], fitted[kept]),
+            "mean": (middle, mean),
         },
         PlotTable(
             f"{signature.effect}: {symbol} ({unit}) over {signature.regressor}, means of "

@@ -136,13 +136,25 @@ def test_the_numbers(reports):
     data = strict(paths[0])
     first = "verdict remainder effects alternatives unknown error advice"
     assert " ".join(list(data)[:7]) == first
+    assert (data["verdict"], data["remainder"]) == ("explained", "random")
     (effect,) = data["effects"]
-    assert (effect["name"], effect["coefficients"]) == ("rotor_drag", DRAG)
+    assert " ".join(effect) == (
+        "name coefficients std units tentative indistinguishable_from evidence channels probability"
+    )
+    assert effect["name"] == "rotor_drag"
+    assert effect["coefficients"] == DRAG
     error = data["error"]
+    assert set(error) == {"held_out_segments", "before", "after", "floor"}
     assert error["held_out_segments"] == [pytest.approx(s[1:]) for s in diagnosis.held_out_segments]
+    assert (
+        set(error["before"])
+        == set(error["after"])
+        == {"force_rms_N", "torque_rms_Nm", "nis_without_wrench_state", "rollout_1s_position_rms_m"}
+    )
     assert error["before"]["force_rms_N"] == pytest.approx(diagnosis.before.force_rms, rel=1e-5)
     assert error["after"]["rollout_1s_position_rms_m"] is None
     assert error["floor"] == {"force_rms_N": 0.0123, "torque_rms_Nm": 0.00094}
+    assert data["advice"] == list(diagnosis.advice)
     std = {e.name: e.std for e in diagnosis.effects}
     text = dump_vehicle(diagnosis.amended, std)
     assert paths[2].read_text(encoding="utf-8") == text
@@ -272,7 +284,7 @@ class TestInABrowser:
         assert found["complaints"] == []
         assert found["missing"] == []
         plots = 6 + 2 + len(made.signatures)
-        assert len(found["pictures"]) == (plots if scripts else 0)
+        assert len(found["pictures"]) == (plots if scripts else 1)  # one still picture of all
         assert all(p["alt"] and p["width"] > 250 and p["height"] > 100 for p in found["pictures"])
         heads = ("Held out\tBefore\tAfter", "Frequency (Hz)\tBefore", "without it\tEffect")
         assert all((head in found["text"]) != scripts for head in heads)  # tables stand open
