@@ -72,9 +72,9 @@ def test_a_leak_is_seen():
     ("make", "most"),
     [
         (lambda: stepped(WrenchUKF(VEHICLE)), 4000),
-        (lambda: stepped(ConstantGainFilter(VEHICLE)), 4000),
+        pytest.param(lambda: stepped(ConstantGainFilter(VEHICLE)), 4000, marks=pytest.mark.slow),
         (lambda: stepped(WrenchUKFBatch(VEHICLE, 11), 11, 50), 4000),
-        (lambda: episode(FanTrackingEnv("base")), 20_000),
+        pytest.param(lambda: episode(FanTrackingEnv("base")), 20_000, marks=pytest.mark.slow),
         (lambda: episode(TaskVectorEnv(3, threads=2, scenario="base")), 20_000),
     ],
     ids=["filter", "constant gain", "batch", "environment", "environments"],

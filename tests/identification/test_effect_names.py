@@ -63,10 +63,7 @@ def without_plain_names(data):
 
 @pytest.mark.parametrize(
     "name",
-    [
-        name if name in ("wind", "commanded") else pytest.param(name, marks=pytest.mark.slow)
-        for name in FLIGHTS
-    ],
+    [name if name == "wind" else pytest.param(name, marks=pytest.mark.slow) for name in FLIGHTS],
 )
 def test_a_library_under_other_names_explains_the_same(name):
     log = flight(name)
@@ -81,7 +78,7 @@ def test_a_library_under_other_names_explains_the_same(name):
     ("original", "own", "name"),
     [
         ("wind", "breeze", "wind"),
-        ("latency", "radio_delay", "late"),
+        pytest.param("latency", "radio_delay", "late", marks=pytest.mark.slow),
         pytest.param("slung_payload", "hanging_load", "load", marks=pytest.mark.slow),
     ],
 )

@@ -131,6 +131,7 @@ def test_a_task_that_fails_is_named(cluster):
         list(every(refuse, [[]], cluster=cluster))
 
 
+@pytest.mark.slow
 def test_flights_on_a_cluster_are_the_local_ones(cluster):
     there = fly_all(["admittance"], ["base"], 4, seed=0, cluster=cluster)
     here = fly_all(["admittance"], ["base"], 4, seed=0, jobs=1)

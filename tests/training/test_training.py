@@ -207,6 +207,7 @@ def test_sequences_in_one_call_are_those_of_sb3_contrib(starts):
     torch.testing.assert_close(then, expected)
 
 
+@pytest.mark.slow
 def test_sac_learns_to_track_the_fan_in_four_thousand_decisions(tmp_path):
     config = load_config(
         "sac", ["steps=4000", "validation.every=1000", "validation.episodes=10", "checkpoint=4000"]

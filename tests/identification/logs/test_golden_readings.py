@@ -6,7 +6,7 @@ from tests.support.golden_readings import available, load_golden, recorded
 from tests.support.parameters import mostly_slow
 
 GOLDEN = load_golden()
-QUICK = ("table tests", "random", "file tests", "hostile 0", "hostile nanobench")
+QUICK = ("table tests", "random 1", "random 3", "random 5", "file tests", "hostile 0")
 
 
 def cases(way):

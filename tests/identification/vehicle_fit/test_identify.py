@@ -121,6 +121,7 @@ def test_an_imu_and_commands_are_enough(inertial):
     assert thrust.sum() == pytest.approx(MASS * 9.81, rel=0.05)
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_about_as_often_as_they_say(inertial):
     held = []
     for log, speeds in inertial:
