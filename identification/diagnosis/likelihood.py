@@ -102,6 +102,8 @@ class Likelihood:
     ) -> None:
         self.flights, self.setting = flights, setting
         self.vehicle = flights.amended({k: v for k, v in setting.items() if k})
+        self.pieces: list[Poses]
+        self._fit: list[NDArray[np.bool_]]
         if near is not None and _sensing(near.vehicle) == _sensing(self.vehicle):
             self.pieces, self._fit = near.pieces, near._fit
         else:
@@ -120,11 +122,11 @@ class Likelihood:
         if near is not None and [len(piece.t) for piece in near.pieces] != lengths:
             near = None
         same = near if same_noise else None
-        self.noise = near.noise if near else self._first_noise()
+        self.noise: tuple[AxisNoise, ...] = near.noise if near else self._first_noise()
         # (n, 6, 3) of each piece, what rotors' innovations say of it
-        self.known = near.known if near else [np.zeros((n, 6, 3)) for n in lengths]
+        self.known: list[Array] = near.known if near else [np.zeros((n, 6, 3)) for n in lengths]
         self.tracks = self._run(self.noise, self.known)
-        self.answers = same.answers if same else self._rotor_innovations()
+        self.answers: list[Array] = same.answers if same else self._rotor_innovations()
         for i in range(0 if same else 1 if near else LIKELIHOOD.noise_rounds):
             self.noise, self.known = self._likeliest(begun=near is not None or i > 0)
             self.tracks = self._run(self.noise, self.known)

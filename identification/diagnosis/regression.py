@@ -50,7 +50,8 @@ from .time_offsets import (
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.int64]
-K, V = TypeVar("K"), TypeVar("V")
+K = TypeVar("K")
+V = TypeVar("V")
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,7 @@ CENTRAL = "central"  # the coefficient of effects that act rotor by rotor
 START_PREFIX = "start "
 
 
-def without(setting: Setting, effect: str) -> Setting:
+def without(setting: Mapping[str, V], effect: str) -> dict[str, V]:
     """Return a setting with one effect less."""
     return {e: x for e, x in setting.items() if e != effect}
 
