@@ -7,7 +7,6 @@ that of torques; what the model reads shows where its wrench changes with an inp
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from ...dynamics.effects import get
 from ..motion.residual import acting_wrench
 from ..motion.signals import Signals
-from .regression import Flights, Setting
+from .regression import Flights, Setting, without
 
 Array = NDArray[np.float64]
 
@@ -58,8 +57,7 @@ def carrying_channels(flights: Flights, setting: Setting, effect: str) -> tuple[
 
 def _traces(flights: Flights, setting: Setting, effect: str) -> Iterator[str]:
     """Yield the channels in which an effect leaves its trace."""
-    less = {e: x for e, x in setting.items() if e != effect}
-    part = flights.residual(less) - flights.residual(setting)
+    part = flights.residual(without(setting, effect)) - flights.residual(setting)
     noise = np.mean(np.square(flights.sensor_noise), axis=0) + 1e-30
     power = np.mean(np.square(part), axis=0) / noise
     whole = max(float(power.sum()), 1e-30)
@@ -74,8 +72,7 @@ def _read(flights: Flights, setting: Setting, effect: str) -> Iterator[str]:
     if get(effect).kind == "sensing":
         yield from ("position", "attitude")
         return
-    piece = flights.pieces(setting)[0].signals
-    s = _head(piece)
+    s = flights.pieces(setting)[0].signals.at(slice(CHANNELS.most_samples))
     own = _wrench(flights, setting, effect, s)
     size = float(np.sqrt(np.mean(np.square(own), axis=0)).sum())
     placed = any(np.isfinite(log.position).any() for log in flights.logs)
@@ -91,16 +88,6 @@ def _read(flights: Flights, setting: Setting, effect: str) -> Iterator[str]:
         change = float(np.sqrt(np.mean(np.square(moved), axis=0)).sum())
         if change > CHANNELS.least_change * max(size, 1e-12):
             yield names.get(name, name)
-
-
-def _head(s: Signals) -> Signals:
-    cut = slice(0, CHANNELS.most_samples)
-    fields: dict[str, Any] = {
-        name: x[cut]
-        for name, x in vars(s).items()
-        if isinstance(x, np.ndarray) and len(x) == len(s.t)
-    }
-    return replace(s, **fields)
 
 
 def _changed(s: Signals) -> Iterator[tuple[str, Signals]]:
@@ -119,10 +106,11 @@ def _wrench(flights: Flights, setting: Setting, effect: str, s: Signals) -> Arra
     """Return what an effect adds (n, 6) by the rotor speeds, both in body axes: force over the
     weight, torque over the weight times the arm.
     """
-    with_it = {k: v for k, v in setting.items() if k}
-    without = {k: v for k, v in with_it.items() if k != effect}
     vehicle = flights.vehicle
-    a, b = (acting_wrench(s, flights.amended(x), vehicle)[0] for x in (with_it, without))
+    a, b = (
+        acting_wrench(s, flights.amended(x), vehicle)[0]
+        for x in (setting, without(setting, effect))
+    )
     off = a - b
     force = np.einsum("nji,nj->ni", s.rotation, off[:, :3])
     return np.column_stack([force / vehicle.weight, off[:, 3:] / (vehicle.weight * vehicle.arm_l)])

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model
+from ...dynamics.motion import acceleration_of, angular_acceleration_of, body_numbers
+from ...dynamics.rotation import normalise, quaternion_to_matrix, turn_body
 from ...dynamics.vehicle import Vehicle
 from ...runtime.compiled import Record, compiled, compiled_for_vectors
 from .axis_filter import AxisNoise
@@ -36,18 +38,25 @@ class Poses:
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
-    """A piece of a flight as the filter saw it. Row k is of the step from sample k to k + 1, but
-    for the predictions, which are of sample k.
+class State:
+    """A piece of flight (n samples)."""
+
+    position: Array  # (n, 3) m, world
+    rotation: Array  # (n, 3, 3) body to world
+    velocity: Array  # (n, 3) m/s, world
+    angular_velocity: Array  # (n, 3) rad/s, body
+    acceleration: Array  # (n, 3) m/s2, world; of a track (n, 6), and rad/s2, body
+    rotors: Array  # (n, 4) thrust (N) and torques (Nm) of the rotors
+
+
+@dataclass(frozen=True, eq=False)
+class Track(State):
+    """A piece of a flight as the filter saw it, half a step on from what is known at sample k. Row
+    k is of the step from sample k to k + 1, but for the predictions, which are of sample k. The
+    acceleration is that of the model and its disturbance.
     """
 
-    position: Array  # (n, 3) m, half a step on from what is known at sample k
-    rotation: Array  # (n, 3, 3) body to world
-    velocity: Array  # (n, 3) m/s
-    angular_velocity: Array  # (n, 3) rad/s, body
-    acceleration: Array  # (n, 6) of the model and its disturbance: m/s2 world, rad/s2 body
-    model: Array  # (n, 6) of the model alone
-    rotors: Array  # (n, 4) thrust (N) and torques (Nm) of the rotors
+    model: Array  # (n, 6) acceleration of the model alone
     predicted: Array  # (n, 7) position and quaternion at sample k, from samples before it
     innovations: Array  # (n, 6) m, and rad in the body frame
 
@@ -55,25 +64,8 @@ class Track:
 @compiled
 def _turn(q: Array, w: Array, out: Array) -> None:
     """Write the quaternion after a rotation vector in the body frame."""
-    angle = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
-    s = 0.5 if angle < 1e-9 else np.sin(0.5 * angle) / angle
-    c, x, y, z = np.cos(0.5 * angle), s * w[0], s * w[1], s * w[2]
-    a, b, d, e = q[0], q[1], q[2], q[3]
-    out[0] = a * c - b * x - d * y - e * z
-    out[1] = a * x + b * c + d * z - e * y
-    out[2] = a * y - b * z + d * c + e * x
-    out[3] = a * z + b * y - d * x + e * c
-    size = np.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2 + out[3] ** 2)
-    for i in range(4):
-        out[i] /= size
-
-
-@compiled
-def _matrix(q: Array, r: Array) -> None:
-    w, x, y, z = q[0], q[1], q[2], q[3]
-    r[0, 0], r[0, 1], r[0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
-    r[1, 0], r[1, 1], r[1, 2] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
-    r[2, 0], r[2, 1], r[2, 2] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+    turn_body(q, w[0], w[1], w[2], 1.0, out)
+    normalise(out)
 
 
 @compiled
@@ -88,11 +80,6 @@ def _run(
     gain: Array,
     keep: Array,
     known: Array,
-    mass: float,
-    gravity: float,
-    com: Array,
-    inertia: Array,
-    inverse: Array,
     at_position: Array,
     at_rotation: Array,
     at_velocity: Array,
@@ -104,10 +91,10 @@ def _run(
     innovations: Array,
 ) -> None:
     f = models[0]
+    b, nothing = body_numbers(f.body), (0.0, 0.0, 0.0)
     p, v, w, d = position[0].copy(), begun[:3].copy(), begun[3:].copy(), np.zeros(6)
     q, q2, r = quaternion[0].copy(), np.empty(4), np.empty((3, 3))
-    step, spin, moment, needed = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    mid, both = np.empty(3), np.empty(4)
+    step, mid, both = np.empty(3), np.empty(3), np.empty(4)
     half = 0.5 * period
     for k in range(len(speeds)):
         # what the last sample's rotors said
@@ -148,44 +135,24 @@ def _run(
             mid[i] = p[i] + half * v[i]
             step[i] = half * w[i]
         _turn(q2, step, q)
-        _matrix(q, r)
+        quaternion_to_matrix(q, r)
         for i in range(4):
             both[i] = 0.5 * (speeds[k, i] + speeds[min(k + 1, len(speeds) - 1), i])
         drive(f, both, period, voltage[k])
         apply_effects(f, mid, r, v, w)
         f.time += period
+        u, g = f.rotor_wrench, f.effect_wrench
+        turn = (r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2])
+        thrust, effects = (u[0], u[1], u[2], u[3]), (g[0], g[1], g[2], g[3], g[4], g[5])
+        omega, a = (w[0], w[1], w[2]), acting[k]
+        x, y, z = angular_acceleration_of(b, turn, omega, thrust, nothing, effects)
+        model[k, 3], model[k, 4], model[k, 5] = x, y, z
+        turning = (x + d[3], y + d[4], z + d[5])
+        x, y, z = acceleration_of(b, turn, omega, turning, thrust, nothing, effects)
+        model[k, 0], model[k, 1], model[k, 2] = x, y, z
+        for i in range(6):
+            a[i] = model[k, i] + d[i]
         for i in range(3):
-            spin[i] = inertia[i, 0] * w[0] + inertia[i, 1] * w[1] + inertia[i, 2] * w[2]
-        for i in range(3):
-            x, y = (i + 1) % 3, (i + 2) % 3
-            moment[i] = (
-                f.rotor_wrench[1 + i] + f.effect_wrench[3 + i] - (w[x] * spin[y] - w[y] * spin[x])
-            )
-        for i in range(3):
-            model[k, 3 + i] = (
-                inverse[i, 0] * moment[0] + inverse[i, 1] * moment[1] + inverse[i, 2] * moment[2]
-            )
-            acting[k, 3 + i] = model[k, 3 + i] + d[3 + i]
-        along = w[0] * com[0] + w[1] * com[1] + w[2] * com[2]
-        square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
-        for i in range(3):
-            x, y = (i + 1) % 3, (i + 2) % 3
-            needed[i] = (
-                acting[k, 3 + x] * com[y]
-                - acting[k, 3 + y] * com[x]
-                + along * w[i]
-                - square * com[i]
-            )
-        for i in range(3):
-            model[k, i] = (
-                (r[i, 2] * f.rotor_wrench[0] + f.effect_wrench[i]) / mass
-                - r[i, 0] * needed[0]
-                - r[i, 1] * needed[1]
-                - r[i, 2] * needed[2]
-            )
-        model[k, 2] -= gravity
-        for i in range(3):
-            acting[k, i] = model[k, i] + d[i]
             at_position[k, i], at_velocity[k, i], at_rate[k, i] = mid[i], v[i], w[i]
             for j in range(3):
                 at_rotation[k, i, j] = r[i, j]
@@ -202,9 +169,7 @@ def _run(
         _turn(q2, step, q)
 
 
-def run(
-    poses: Poses, vehicle: Vehicle, noise: tuple[AxisNoise, ...], known: Array | None = None
-) -> Track:
+def run(poses: Poses, vehicle: Vehicle, noise: tuple[AxisNoise, ...], known: Array) -> Track:
     """Return a piece as the filter with a vehicle's model and six axes' noise sees it.
 
     Args:
@@ -212,22 +177,13 @@ def run(
         vehicle: with the model.
         noise: of each axis.
         known: (n, 6, 3) what is added to pose, rate and disturbance of each axis before the pose of
-            sample k is read; default: nothing.
+            sample k is read.
     """
     models = np.zeros(1, dtype=_MODEL)
-    body = load_model(models[0], vehicle)
+    load_model(models[0], vehicle)
     n = len(poses.t)
-    out = Track(
-        np.empty((n, 3)),
-        np.empty((n, 3, 3)),
-        np.empty((n, 3)),
-        np.empty((n, 3)),
-        np.empty((n, 6)),
-        np.empty((n, 6)),
-        np.empty((n, 4)),
-        np.empty((n, 7)),
-        np.empty((n, 6)),
-    )
+    shapes = ((3,), (3, 3), (3,), (3,), (6,), (4,), (6,), (7,), (6,))
+    out = Track(*(np.empty((n, *shape)) for shape in shapes))
     _run(
         models,
         poses.period,
@@ -238,12 +194,7 @@ def run(
         np.concatenate([poses.velocity, poses.angular_velocity]),
         np.array([x.gain for x in noise]),
         np.exp(-poses.period / np.array([x.time for x in noise], dtype=np.float64)),
-        np.zeros((n, 6, 3)) if known is None else known,
-        body.mass,
-        body.gravity,
-        np.ascontiguousarray(body.com),
-        np.ascontiguousarray(body.inertia),
-        np.asarray(np.linalg.inv(body.inertia), dtype=np.float64),
+        known,
         out.position,
         out.rotation,
         out.velocity,

@@ -1,15 +1,18 @@
 """The mode of the posterior of some effects' coefficients, whatever likelihood it is of."""
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from .evidence import Index, Marginal, set_evidence
-from .likelihood import declared
-from .priors import Base, Setting
+import numpy as np
+
+from ...runtime.errors import InputError
+from .evidence import set_evidence
+from .priors import Base, Setting, declared
 from .regression import Column, Flights, coefficient
 
-# minus the logarithm of likelihood and prior at a setting, infinite where no vehicle is like that,
-# and what returns the mode of the linearised posterior there
+# minus the logarithm of likelihood and prior at a setting, and what returns the mode of the
+# linearised posterior there
 Height = tuple[float, Callable[[], Setting]]
 
 
@@ -26,13 +29,18 @@ CLIMB = ClimbSettings()
 
 
 def mode(start: Setting, at: Callable[[Setting], Height]) -> Setting:
-    """Return the mode of the posterior from a setting on (damped Gauss-Newton)."""
-    here, (value, target) = start, at(start)
+    """Return the mode of the posterior from a setting on (damped Gauss-Newton); ``at`` raises an
+    error where no vehicle is like that.
+    """
+    here, (value, target) = start, height(start, at)
     for _ in range(CLIMB.rounds):
         there = target()
         for share in CLIMB.shares:
-            trial = _between(here, there, share)
-            after, onwards = at(trial)
+            trial = {
+                e: {n: own.get(n, 0.0) + share * (x - own.get(n, 0.0)) for n, x in there[e].items()}
+                for e, own in here.items()
+            }
+            after, onwards = height(trial, at)
             if after < value:
                 break
         else:
@@ -43,39 +51,32 @@ def mode(start: Setting, at: Callable[[Setting], Height]) -> Setting:
     return here
 
 
-def linear_mode(
-    flights: Flights,
-    base: Base,
-    m: Marginal,
-    asked: Index,
-    columns: Sequence[Column],
-    setting: Setting,
-) -> Setting:
-    """Return a setting with its coefficients at the mode of a quadratic likelihood, within their
-    limits.
+def height(setting: Setting, at: Callable[[Setting], Height]) -> Height:
+    """Return how high the posterior is at a setting; infinite where no vehicle is like that."""
+    try:
+        return at(setting)
+    except (InputError, np.linalg.LinAlgError):
+        return math.inf, lambda: setting
 
-    Args:
-        flights: of the vehicle.
-        base: the columns' prior sizes and bounds.
-        m: the likelihood of the columns that are asked about.
-        asked: (c,) which of the base's columns they are.
-        columns: (c,) effect and coefficient of each.
-        setting: about which the likelihood is quadratic.
+
+def linearised(
+    flights: Flights, base: Base, asked: list[Column], setting: Setting, power: float = 1.0
+) -> Height:
+    """Return the height of a quadratic likelihood at the setting about which it is one, and its
+    mode within the limits of the coefficients that are asked about.
     """
-    found = set_evidence(m, range(len(asked)), base.low[asked], base.high[asked])
-    out: Setting = {e: dict(values) for e, values in setting.items()}
-    for c, x in zip(columns, (found.mode * base.size[asked]).tolist(), strict=True):
-        limits = coefficient(c)
-        out[c[0]][c[1]] = min(max(declared(c, flights) + x, limits.minimum), limits.maximum)
-    return out
+    at = base.at(asked)
+    m = base.marginal(at, base.plain, power=power)
+    here = np.array([setting[e].get(n, 0.0) - declared((e, n), flights) for e, n in asked])
+    z = here / base.size[at]
+    value = -m.constant - float(m.right @ z - 0.5 * z @ m.normal @ z) + 0.5 * float(z @ z)
 
+    def target() -> Setting:
+        found = set_evidence(m, range(len(at)), base.low[at], base.high[at])
+        out: Setting = {e: dict(values) for e, values in setting.items()}
+        for c, x in zip(asked, (found.mode * base.size[at]).tolist(), strict=True):
+            limits = coefficient(c)
+            out[c[0]][c[1]] = min(max(declared(c, flights) + x, limits.minimum), limits.maximum)
+        return out
 
-def _between(here: Setting, there: Setting, share: float) -> Setting:
-    """Return the setting that lies a share of the way from one to another of the same effects."""
-    return {
-        e: {
-            name: values.get(name, 0.0) + share * (there[e][name] - values.get(name, 0.0))
-            for name in there[e]
-        }
-        for e, values in here.items()
-    }
+    return value, target

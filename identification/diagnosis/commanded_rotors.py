@@ -8,12 +8,11 @@ vertical, is for ``row_nuisances`` to say.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...dynamics.effects import Role, get
+from ...dynamics.effects import Role, playing
 from ...dynamics.vehicle import Vehicle
 from ..logs.flight_log import FlightLog, with_rows
 from ..logs.flight_phases import FLIGHT, flight_phases
@@ -84,35 +83,24 @@ def downsampled(signals: Signals) -> Signals:
     step = max(1, int(COMMANDED.period / signals.period + 1e-6))
     if step == 1:
         return signals
-    count = len(signals.t)
-    at = np.arange(0, count, step)
     smooth = np.maximum(low_pass(signals.rotor_speeds, CUTOFFS.pose_hz, signals.period), 0.0)
-    sampled: dict[str, Any] = {
-        name: x[at]
-        for name, x in {**vars(signals), "rotor_speeds": smooth}.items()
-        if isinstance(x, np.ndarray) and len(x) == count
-    }
-    return replace(signals, period=step * signals.period, **sampled)
+    every = replace(signals, rotor_speeds=smooth).at(slice(None, None, step))
+    return replace(every, period=step * signals.period)
 
 
 def thrust_is_assumed(logs: Sequence[FlightLog], vehicle: Vehicle) -> bool:
     """Return whether rotor speeds are worked out from commands, and the vehicle states no curve
     (``motor_curve``) that says how much thrust a command makes.
     """
-    return any_commanded(logs) and getattr(vehicle, "motor_curve", None) is None
+    commanded = any(log.commanded for log in logs)
+    return commanded and getattr(vehicle, "motor_curve", None) is None
 
 
-def assumed_thrust_doubts(effects: Sequence[str]) -> list[str]:
+def assumed_thrust_doubts(effects: Sequence[str]) -> tuple[str, ...]:
     """Return, as sentences, which effects rest on a thrust that nobody measured."""
-    found = [effect for effect in effects if get(effect).role in THRUST_FACTORS]
-    return [
+    return tuple(
         f"{effect}: the log holds motor commands and the vehicle file states no motor curve, so "
         "how much thrust a command makes is an assumption, and this effect may be its error alone. "
         "State motor_curve in the vehicle file, or log rotor speeds"
-        for effect in found
-    ]
-
-
-def any_commanded(logs: Sequence[FlightLog]) -> bool:
-    """Return whether any log's rotor speeds are worked out from commands."""
-    return any(log.commanded for log in logs)
+        for effect in playing(*THRUST_FACTORS, among=effects)
+    )

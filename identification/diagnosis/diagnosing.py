@@ -7,7 +7,7 @@ never saw.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...dynamics.effects import get, names
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError, unknown_name
-from ..findings import CHANNELS, Diagnosis, Errors, NamedEffect, Signature, Structure, Trace
+from ..findings import CHANNELS, Diagnosis, Errors, NamedEffect, Signature, Trace
 from ..logs.flight_log import FlightLog
 from ..logs.screening import LEAST_SECONDS, screened
 from ..motion.noise_spectrum import filtering_notes, pose_was_filtered
@@ -24,10 +24,9 @@ from ..prediction import nis_without_wrench_state, rollout_error
 from ..wrench_series import pose_notes
 from .explanatory_variables import explanatory_variables
 from .fit_range import range_notes
-from .judged import Setting
 from .regression import Flights, lost_behind_a_filter
 from .settings import DIAGNOSIS, DiagnosisSettings
-from .verdict import judged
+from .verdict import Judged
 
 Array = NDArray[np.float64]
 
@@ -72,9 +71,8 @@ def diagnose(
     notes = [*(f"{log.name}: {note}" for log in flights.logs for note in log.notes), *doubts]
     notes += [f"{log.name}: {note}" for log in every for note in filtering_notes(log)]
     notes += [f"{log.name}: {note}" for log, _ in checked for note in pose_notes(log, vehicle)]
-    library = [n for n in names() if n not in without]
-    said = judged(flights, library, settings, report)
-    effects, found = said.effects, said.balance
+    said = Judged(flights, [n for n in names() if n not in without], settings, report)
+    effects, found, setting = said.effects, said.balance, said.setting
     sure = said.remainder == "none" and not any(
         effect.tentative or effect.indistinguishable_from for effect in effects
     )
@@ -83,15 +81,13 @@ def diagnose(
         if effects
         else ("nothing to explain" if said.remainder == "none" else "unexplained")
     )
-    notes += said.notes
-    named = [e for e in said.setting if e]
     report("predicting the flights")
-    amended = flights.amended({e: said.setting[e] for e in named})
-    notes += range_notes(flights)
+    named = {e: x for e, x in setting.items() if e}
+    amended = flights.amended(named)
+    notes += [*said.notes, *range_notes(flights)]
     segments = _segments(flights)
-    parts = _parts(flights, said.setting, found.after)
-    hidden = sorted(flights.needs_pose | said.hidden)
-    unseen = sorted((flights.not_identifiable | said.unseen) - flights.needs_pose)
+    hidden = flights.needs_pose | said.hidden
+    unseen = (flights.not_identifiable | said.unseen) - flights.needs_pose
     return Diagnosis(
         verdict=verdict,
         remainder=said.remainder,
@@ -102,20 +98,13 @@ def diagnose(
         floor_force_rms=found.floor[0],
         floor_torque_rms=found.floor[1],
         advice=tuple(
-            _advice(
-                effects,
-                unseen,
-                said.remainder,
-                flights.filtered,
-                hidden,
-            )
+            _advice(effects, sorted(unseen), said.remainder, flights.filtered, sorted(hidden))
         ),
         notes=tuple(dict.fromkeys(notes)),
         candidates=said.candidates,
-        traces=tuple(_traces(flights, found.before, found.after, parts)),
+        traces=tuple(_traces(flights, said)),
         signatures=tuple(
-            _signature(flights, said.setting, e.name, found.after, settings.most_signature_points)
-            for e in effects
+            _signature(flights, said, e.name, settings.most_signature_points) for e in effects
         ),
         structure=said.structure,
         gusts=said.gusts,
@@ -125,10 +114,10 @@ def diagnose(
         amended=amended if found.better or not named else vehicle,
         logs=tuple(log.name for log in logs),
         test_logs=tuple(log.name for log in test),
-        seconds=float(sum(log.t[-1] - log.t[0] for log in (*logs, *test))),
+        seconds=float(sum(log.t[-1] - log.t[0] for log in every)),
         floor_is_bound=not flights.inertial
         and (flights.filtered or any(map(pose_was_filtered, every))),
-        needs_pose=tuple(hidden),
+        needs_pose=tuple(sorted(hidden)),
         doubts=said.doubts,
         ranking=said.ranking,
         probabilities=said.probabilities,
@@ -180,57 +169,36 @@ def _mean(values: Array, weight: Sequence[float]) -> float:
     )
 
 
-def _parts(flights: Flights, setting: Setting, after: Array) -> dict[str, Array]:
-    """Return by how much the residual (rows, 6) grows where one named effect is left out."""
-    return {
-        effect: flights.residual(_without(setting, effect)) - after for effect in setting if effect
-    }
-
-
-def _without(setting: Setting, effect: str) -> Setting:
-    return {name: values for name, values in setting.items() if name != effect}
-
-
-def _traces(
-    flights: Flights, before: Array, after: Array, parts: Mapping[str, Array]
-) -> list[Trace]:
+def _traces(flights: Flights, said: Judged) -> Iterator[Trace]:
     begins = np.flatnonzero(flights.start)
-    out = []
     for a, b in zip(begins, [*begins[1:], len(flights.t)], strict=True):
-        out.append(
-            Trace(
-                flights.logs[flights.log[a]].name,
-                flights.period,
-                flights.t[a:b],
-                before[a:b],
-                after[a:b],
-                ~flights.fit_rows[a:b],
-                {effect: part[a:b] for effect, part in parts.items()},
-            )
+        yield Trace(
+            flights.logs[flights.log[a]].name,
+            flights.period,
+            flights.t[a:b],
+            said.balance.before[a:b],
+            said.balance.after[a:b],
+            ~flights.fit_rows[a:b],
+            {effect: part[a:b] for effect, part in said.parts.items()},
         )
-    return out
 
 
-def _signature(
-    flights: Flights, setting: Setting, effect: str, after: Array, points: int
-) -> Signature:
+def _signature(flights: Flights, said: Judged, effect: str, points: int) -> Signature:
     """Return the channel in which an effect is largest, against what it follows most closely."""
-    share = flights.residual(_without(setting, effect)) - after
+    share = said.parts[effect]
     noise = np.maximum(flights.sensor_noise.std(axis=0), 1e-12)
     channel = (
         int(np.argmax(share.std(axis=0) / noise))
         if np.any(share.std(axis=0) > 0.3 * noise)
         else int(np.argmax(np.abs(share).mean(axis=0) / noise))
     )
-    y = share[:, channel]
-    known = explanatory_variables(flights, setting)
+    y, after = share[:, channel], said.balance.after[:, channel]
     name, x = max(
-        known, key=lambda d: abs(float(np.corrcoef(d[1], y)[0, 1])) if y.std() > 1e-9 else 0.0
+        explanatory_variables(flights, said.setting),
+        key=lambda d: abs(float(np.corrcoef(d[1], y)[0, 1])) if y.std() > 1e-9 else 0.0,
     )
     thin = slice(None, None, max(1, len(y) // points))
-    return Signature(
-        effect, CHANNELS[channel], name, x[thin], (y + after[:, channel])[thin], y[thin]
-    )
+    return Signature(effect, CHANNELS[channel], name, x[thin], (y + after)[thin], y[thin])
 
 
 def _advice(
@@ -238,15 +206,14 @@ def _advice(
     not_identifiable: Sequence[str],
     remainder: str,
     filtered: bool,
-    needs_pose: Sequence[str] = (),
+    needs_pose: Sequence[str],
 ) -> list[str]:
     out = []
     if filtered:
         out.append(
             "Log the pose as it was measured, before any filter or estimator. Behind one, no "
             f"flight identifies {', '.join(sorted(lost_behind_a_filter()))}, and no name is more "
-            "than "
-            "tentative."
+            "than tentative."
         )
         not_identifiable = [x for x in not_identifiable if x not in lost_behind_a_filter()]
     for effect in effects:
@@ -277,6 +244,3 @@ def _advice(
             + "; ".join(f"{name}: {get(name).excitation}" for name in not_identifiable[:4])
         )
     return out
-
-
-__all__ = ["Diagnosis", "Structure", "diagnose"]

@@ -6,13 +6,13 @@ They are of the state as the filter predicts it, so none knows the noise of the 
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import bilinear, lfilter
 
-from .causal_filter import Track
+from .causal_filter import State
 
 Array = NDArray[np.float64]
 
@@ -40,19 +40,15 @@ class DiscrepancySettings:
 
 
 DISCREPANCY = DiscrepancySettings()
-GROUPS = ("velocity", "place", "time", "rotors", "constant", "resonance")
 
 
-@dataclass(frozen=True, eq=False)
-class State:
-    """A piece of flight (n samples)."""
-
-    position: Array  # (n, 3) m, world
-    rotation: Array  # (n, 3, 3) body to world
-    velocity: Array  # (n, 3) m/s, world
-    angular_velocity: Array  # (n, 3) rad/s, body
-    rotors: Array  # (n, 4) thrust (N) and torques (Nm) of the rotors
-    acceleration: Array  # (n, 3 or more) m/s2, world
+def _joined(tracks: Sequence[State]) -> tuple[Array, dict[str, Array]]:
+    """Return where pieces end but the last, and what is known of all of them, one after the
+    other.
+    """
+    ends = np.cumsum([len(track.position) for track in tracks])[:-1]
+    names = (f.name for f in fields(State))
+    return ends, {n: np.concatenate([getattr(track, n) for track in tracks]) for n in names}
 
 
 def _scaled(x: Array) -> Array:
@@ -62,7 +58,7 @@ def _scaled(x: Array) -> Array:
 
 
 def discrepancy_columns(
-    tracks: Sequence[State | Track], times: list[Array], weight: float, arm: float, inertias: Array
+    tracks: Sequence[State], times: list[Array], weight: float, arm: float, inertias: Array
 ) -> dict[tuple[str, str], list[Array]]:
     """Return accelerations (n, 6) of each piece by group and name, each of a standard deviation of
     the weight, or of the weight times the arm.
@@ -74,68 +70,60 @@ def discrepancy_columns(
         arm: m.
         inertias: (6,) mass (kg) three times, and moments of inertia (kg m2).
     """
-    ends = np.cumsum([len(track.position) for track in tracks])[:-1]
-
-    def joined(name: str) -> Array:
-        return np.concatenate([getattr(track, name) for track in tracks])
-
-    rotation, velocity, position = joined("rotation"), joined("velocity"), joined("position")
-    rate, rotors, t = joined("angular_velocity"), joined("rotors"), np.concatenate(times)
+    ends, joined = _joined(tracks)
+    rotation, velocity, position = joined["rotation"], joined["velocity"], joined["position"]
+    rate, rotors, t = joined["angular_velocity"], joined["rotors"], np.concatenate(times)
     body = np.einsum("nij,ni->nj", rotation, velocity)
     above = position[:, 2] - position[:, 2].min()
-    shapes: dict[str, list[tuple[str, Array, tuple[int, ...]]]] = {group: [] for group in GROUPS}
+    shapes: list[tuple[str, str, Array, tuple[int, ...]]] = []  # group, name, of which channels
     every = tuple(range(6))
     for i, axis in enumerate("xyz"):
-        shapes["velocity"] += [
-            (f"velocity {axis}", body[:, i], every),
-            (f"squared velocity {axis}", body[:, i] * np.abs(body[:, i]), every),
+        shapes += [
+            ("velocity", f"velocity {axis}", body[:, i], every),
+            ("velocity", f"squared velocity {axis}", body[:, i] * np.abs(body[:, i]), every),
+            ("rotors", f"angular velocity {axis}", rate[:, i], every),
+            ("rotors", f"torque {axis}", rotors[:, 1 + i], (3, 4, 5)),
+            ("rotors", f"change of torque {axis}", _change(rotors[:, 1 + i]), (3 + i,)),
         ]
-        shapes["rotors"] += [
-            (f"angular velocity {axis}", rate[:, i], every),
-            (f"torque {axis}", rotors[:, 1 + i], (3, 4, 5)),
-            (f"change of torque {axis}", _change(rotors[:, 1 + i]), (3 + i,)),
-        ]
-    shapes["rotors"] += [
-        ("thrust", rotors[:, 0], every),
-        ("change of thrust", _change(rotors[:, 0]), (2, 3, 4, 5)),
+    shapes += [
+        ("rotors", "thrust", rotors[:, 0], every),
+        ("rotors", "change of thrust", _change(rotors[:, 0]), (2, 3, 4, 5)),
     ]
     for a, b in ((0, 1), (1, 2), (0, 2)):
         axes = f"{'xyz'[a]} and {'xyz'[b]}"
-        shapes["velocity"].append((f"velocities {axes}", body[:, a] * body[:, b], every))
-        shapes["rotors"].append((f"angular velocities {axes}", rate[:, a] * rate[:, b], (3, 4, 5)))
+        shapes += [
+            ("velocity", f"velocities {axes}", body[:, a] * body[:, b], every),
+            ("rotors", f"angular velocities {axes}", rate[:, a] * rate[:, b], (3, 4, 5)),
+        ]
     heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
     places = [("x", position[:, 0]), ("y", position[:, 1]), ("height", position[:, 2])]
     places += [(f"height below {h:g} m", np.exp(-above / h)) for h in DISCREPANCY.heights]
     places += [("heading's sine", np.sin(heading)), ("heading's cosine", np.cos(heading))]
     places += [(f"tilt {axis}", rotation[:, 2, i]) for i, axis in enumerate("xy")]
-    shapes["place"] += [(name, x, every) for name, x in places]
-    span = max(float(t[-1] - t[0]), 1e-9)
-    for i in (1, 2, 3):
-        shapes["time"].append((f"time {i}", np.cos(np.pi * i * (t - t[0]) / span), every))
+    shapes += [("place", name, x, every) for name, x in places]
+    along = np.pi * (t - t[0]) / max(float(t[-1] - t[0]), 1e-9)
+    shapes += [("time", f"time {i}", np.cos(i * along), every) for i in (1, 2, 3)]
     size = np.repeat([weight, weight * DISCREPANCY.torque_arm * arm], 3) / inertias
     out: dict[tuple[str, str], list[Array]] = {}
 
     def add(group: str, name: str, column: Array) -> None:
         out[group, name] = np.split(column, ends)
 
-    for group, found in shapes.items():
-        for name, x, channels in found:
-            z = _scaled(x)
-            if not z.any():
-                continue
-            for channel in channels:
-                column = np.zeros((len(z), 6))
-                if channel < 3:
-                    column[:, :3] = (weight / inertias[0]) * z[:, None] * rotation[:, :, channel]
-                else:
-                    column[:, channel] = size[channel] * z
-                add(group, f"{name} in {channel}", column)
+    for group, name, x, channels in shapes:
+        z = _scaled(x)
+        for channel in channels if z.any() else ():
+            column = np.zeros((len(z), 6))
+            if channel < 3:
+                column[:, :3] = (weight / inertias[0]) * z[:, None] * rotation[:, :, channel]
+            else:
+                column[:, channel] = size[channel] * z
+            add(group, f"{name} in {channel}", column)
     for channel in every:
         column = np.zeros((len(t), 6))
         column[:, channel] = size[channel]
         add("constant", f"a constant in {channel}", column)
     period = float(np.median(np.diff(t)))
-    acceleration, turning = joined("acceleration"), rotors[:, 1:] / inertias[3:]
+    acceleration, turning = joined["acceleration"], rotors[:, 1:] / inertias[3:]
     for hertz in DISCREPANCY.load_hz:
         column = np.zeros((len(t), 6))
         column[:, :2] = _resonance(acceleration[:, :2], hertz, period, ends)
@@ -163,18 +151,14 @@ def _resonance(drive: Array, hertz: float, period: float, ends: Array) -> Array:
     return np.concatenate([lfilter(*shape, x, axis=0) for x in np.split(drive, ends)])
 
 
-def variables(tracks: Sequence[State | Track], times: list[Array]) -> dict[str, list[Array]]:
+def variables(tracks: Sequence[State], times: list[Array]) -> dict[str, list[Array]]:
     """Return what a coefficient may change with: variables (n,) of each piece by name, of mean zero
     and standard deviation one over all.
     """
-    ends = np.cumsum([len(track.position) for track in tracks])[:-1]
-
-    def joined(name: str) -> Array:
-        return np.concatenate([getattr(track, name) for track in tracks])
-
-    rotation, velocity, position = joined("rotation"), joined("velocity"), joined("position")
+    ends, joined = _joined(tracks)
+    rotation, velocity, position = joined["rotation"], joined["velocity"], joined["position"]
     heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
-    speed, rotors = np.linalg.norm(velocity, axis=1), joined("rotors")
+    speed, rotors = np.linalg.norm(velocity, axis=1), joined["rotors"]
     found = {
         "speed": speed,
         "speed, squared": speed**2,
@@ -186,7 +170,7 @@ def variables(tracks: Sequence[State | Track], times: list[Array]) -> dict[str, 
         "heading's cosine": np.cos(heading),
         "time": np.concatenate(times),
         "thrust": rotors[:, 0],
-        "yaw rate": joined("angular_velocity")[:, 2],
+        "yaw rate": joined["angular_velocity"][:, 2],
     }
     scaled = {name: _scaled(x) for name, x in found.items()}
     return {name: np.split(x, ends) for name, x in scaled.items() if x.any()}

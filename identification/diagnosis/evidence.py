@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
+from scipy.special import logsumexp
 
 from ...runtime.compiled import compiled
 
@@ -28,6 +29,16 @@ class Marginal:
     normal: Array  # (c, c)
     right: Array  # (c,)
     constant: float
+
+    @property
+    def own(self) -> Array:
+        """The columns' products with themselves (c,), less what the others have already."""
+        return np.maximum(np.diagonal(self.normal), 1e-9)
+
+    def explained(self, index: Sequence[int], z: Array) -> float:
+        """Return the deviance that some columns explain at coefficients ``z``."""
+        right, normal = self.right[index], self.normal[np.ix_(index, index)]
+        return float(2.0 * right @ z - z @ normal @ z)
 
 
 def marginal(
@@ -211,9 +222,7 @@ def tempering(blocks: Array, chosen: Index) -> float:
     return 1.0 / max(1.0, spread)
 
 
-def evidence_of_one_more(
-    normal: Array, right: Array, chosen: Index, size: Array, tried: Index, sizes: Sequence[float]
-) -> float:
+def evidence_of_one_more(m: Marginal, tried: Sequence[int], sizes: Sequence[float]) -> float:
     """Return the logarithm of the Bayes factor of one further column, no one knows which, against
     none.
 
@@ -222,35 +231,11 @@ def evidence_of_one_more(
     pay for each.
 
     Args:
-        normal: (c, c) products of all columns.
-        right: (c,) their products with the residual.
-        chosen: columns of the model.
-        size: (len(chosen),) standard deviations of their prior.
-        tried: the further columns.
-        sizes: standard deviations that theirs may have.
+        m: the likelihood of further columns beside a model.
+        tried: those of them that it may be.
+        sizes: standard deviations that their coefficients may have.
     """
-    score, left = one_more(normal, right, chosen, size, tried)
-    square = np.square(np.asarray(sizes))[:, None]
-    factors = 0.5 * square * score**2 / (1.0 + square * left) - 0.5 * np.log1p(square * left)
-    return log_sum(factors.ravel().tolist()) - math.log(factors.size)
-
-
-def one_more(
-    normal: Array, right: Array, chosen: Index, size: Array, tried: Index
-) -> tuple[Array, Array]:
-    """Return of each further column (len(tried),) its product with what the model leaves, and with
-    itself, less what the model has already; arguments as of ``evidence_of_one_more``.
-    """
-    inner = normal[np.ix_(chosen, chosen)] * size[:, None] * size + np.eye(len(chosen))
-    cross = normal[np.ix_(chosen, tried)] * size[:, None]
-    both = np.linalg.solve(inner, np.column_stack([cross, right[chosen] * size]))
-    left = np.maximum(normal[tried, tried] - np.einsum("ij,ij->j", cross, both[:, :-1]), 1e-9)
-    return right[tried] - cross.T @ both[:, -1], left
-
-
-def log_sum(values: Sequence[float]) -> float:
-    """Return the logarithm of a sum of exponentials."""
-    most = max(values, default=-math.inf)
-    if most == -math.inf:
-        return most
-    return most + math.log(sum(math.exp(x - most) for x in values))
+    square, left = np.square(np.asarray(sizes))[:, None], m.own[tried]
+    gained = 0.5 * square * np.square(m.right[tried]) / (1.0 + square * left)
+    factors = gained - 0.5 * np.log1p(square * left)
+    return float(logsumexp(factors)) - math.log(factors.size)

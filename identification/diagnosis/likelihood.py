@@ -7,7 +7,8 @@ from sums of products alone.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,35 +27,45 @@ from ..motion.smoothing import continuous, turn_between, turned
 from .axis_filter import AXIS, AxisNoise, likeliest_noise, steady_noise
 from .causal_filter import Poses, Track, run, sensitivities
 from .discrepancy import changing_columns, discrepancy_columns, variables
+from .priors import (
+    BETWEEN,
+    GAIN,
+    MODEL_ERROR,
+    ROUNDED,
+    UNKNOWN,
+    WHOLE_PREFIX,
+    Base,
+    Setting,
+    Starts,
+    in_prior_units,
+    variants_of,
+)
 from .regression import (
     CENTRAL,
+    REGRESSION,
     START_PREFIX,
     Column,
     Flights,
-    Setting,
     coefficient,
     is_delay,
     typical_size,
+    without,
 )
 from .rotor_innovations import DRIVEN, rotor_innovations
 from .time_offsets import (
     ATTITUDE_TIME_OFFSET,
     LAG_ASYMMETRY,
     ROTOR_TIME_OFFSET,
-    TIMING,
+    TIMINGS,
     with_time_offsets,
     with_uneven_lag,
 )
 
 Array = NDArray[np.float64]
 
-WHOLE_PREFIX = "whole "  # a coefficient of an effect that acts at the centre, without a moment
-BETWEEN = "rotors between samples"
 STATES = (0, 1, 2)  # of an axis: pose, rate, disturbance
 # rad of tilt for a rad/s2 of roll or pitch: the unit of gains of sideways states
 SIDEWAYS = 0.01
-MODEL_ERROR, GAIN, UNKNOWN, NUISANCE = "model error", "rotor gain of", "unknown ", "nuisance "
-ROUNDED = "rounding of torque "
 
 
 @dataclass(frozen=True)
@@ -62,36 +73,12 @@ class LikelihoodSettings:
     """What the likelihood allows for beside effects."""
 
     step: float = 0.1  # typical sizes, over which derivatives are taken
-    # share of an axis' force or torque by which any model is wrong: of thrust along its axis and
-    # across it, and of the torques. Propellers and bearings are not stable to less
-    model_error: float = 0.003
-    # standard deviations of the gains on the rotors' innovations, by which pose, rate and
-    # disturbance answer them, in what one period of such an acceleration makes. They are to leave
-    # the gains free: a loop that shows the tilt that it sees has gains of some 3,000, 100 and 1
-    gains: tuple[float, float, float] = (1e4, 1e3, 1e2)
-    # second differences of the rotor speeds, the standard deviation of what they may do between
-    # samples beside a straight line
-    between_samples: float = 0.5
+    step_of_time: float = 0.001  # s, the same for the rotors' time offset
     noise_rounds: int = 2  # of the noise and of the flight as it is seen with it
-    block: float = 3.0  # s, of the sums by which the likelihood's scatter is judged
     first_disturbance: float = 0.3  # m/s2 and rad/s2, at which the search for the noise begins
 
 
 LIKELIHOOD = LikelihoodSettings()
-
-
-@dataclass(frozen=True, eq=False)
-class Sums:
-    """Sums of products over blocks, of columns and of the innovations (last), whitened."""
-
-    columns: tuple[Column, ...]
-    blocks: Array  # (blocks, c + 1, c + 1)
-    value: Array  # (c,) the coefficients' values at the setting
-    penalty: float  # twice the sum over samples of the logarithm of innovation deviations
-
-    def deviance(self) -> float:
-        """Return -2 log-likelihood at the setting."""
-        return float(self.blocks[:, -1, -1].sum()) + self.penalty
 
 
 class Likelihood:
@@ -105,8 +92,6 @@ class Likelihood:
         same_noise: whether that noise is taken as it is, and the columns of what any flight may
             have.
     """
-
-    axes: tuple[int, ...] = (0, 1, 2, 3, 4, 5)  # whose innovations count
 
     def __init__(
         self,
@@ -133,36 +118,43 @@ class Likelihood:
         self.period = self.pieces[0].period
         inertia = flights.vehicle.inertia
         self.inertias = np.array([flights.vehicle.mass] * 3 + np.diagonal(inertia).tolist())
-        # tracks, and the rotors' innovations of them
-        self._answers: tuple[list[Track], list[Array]] = [], []
-        self.known: list[Array]  # (n, 6, 3) of each piece, what rotors' innovations say of it
         lengths = [len(piece.t) for piece in self.pieces]
-        if near is None or [len(piece.t) for piece in near.pieces] != lengths:
+        if near is not None and [len(piece.t) for piece in near.pieces] != lengths:
             near = None
-            self.noise = self._first_noise()
-            self.known = [np.zeros((n, 6, 3)) for n in lengths]
-        else:
-            self.noise, self.known = near.noise, near.known
+        same = near if same_noise else None
+        self.noise: tuple[AxisNoise, ...] = near.noise if near else self._first_noise()
+        # (n, 6, 3) of each piece, what rotors' innovations say of it
+        self.known: list[Array] = near.known if near else [np.zeros((n, 6, 3)) for n in lengths]
         self.tracks = self._run(self.noise, self.known)
-        rounds = 0 if near and same_noise else 1 if near else LIKELIHOOD.noise_rounds
-        for i in range(rounds):
+        self.answers: list[Array] = same.answers if same else self._rotor_innovations()
+        for i in range(0 if same else 1 if near else LIKELIHOOD.noise_rounds):
             self.noise, self.known = self._likeliest(begun=near is not None or i > 0)
             self.tracks = self._run(self.noise, self.known)
+            self.answers = self._rotor_innovations()
         self.signals = [
             _signals(piece, track) for piece, track in zip(self.pieces, self.tracks, strict=True)
         ]
         self._base = [self._acceleration(s, self.vehicle) for s in self.signals]
         # what a unit of each column adds to the accelerations, or to the measured pose; a column
-        # that was asked for once is kept
-        self._columns: tuple[dict[Column, list[Array]], dict[Column, list[Array]]] = {}, {}
-        if near is not None and same_noise:  # what any flight may have changes little with effects
-            self._columns = near.nuisances()
-            self._answers = self.tracks, near._rotor_innovations()
+        # that was asked for once is kept. What any flight may have changes little with effects
+        self._acting: dict[Column, list[Array]] = {}
+        self._posed: dict[Column, list[Array]] = {}
+        if same:
+            self._acting, self._posed = (
+                {c: x for c, x in part.items() if not c[0] and not c[1].startswith(UNKNOWN)}
+                for part in (same._acting, same._posed)
+            )
+        if not self._acting:
+            self._add_what_any_flight_may_have()
 
     def _run(self, noise: tuple[AxisNoise, ...], known: Sequence[Array]) -> list[Track]:
         return [
             run(piece, self.vehicle, noise, x) for piece, x in zip(self.pieces, known, strict=True)
         ]
+
+    def _rotor_innovations(self) -> list[Array]:
+        pairs = list(zip(self.pieces, self.tracks, strict=True))
+        return rotor_innovations(pairs, self.inertias[2:])
 
     # Noise
 
@@ -203,15 +195,13 @@ class Likelihood:
         """Return the standard deviation of the accelerations (6,) that the rotor speeds' rounding
         makes: m/s2 and rad/s2.
         """
-        vehicle, std = self.vehicle, self._rounding_std
         speeds = np.concatenate([p.rotor_speeds for p in self.pieces]).mean(axis=0)
-        base = vehicle.rotor_wrench(speeds[None])[0]
-        steps = [
-            vehicle.rotor_wrench((speeds + std * np.eye(4)[i])[None])[0] - base for i in range(4)
-        ]
+        off = self._rounding_std * np.vstack([np.zeros(4), np.eye(4)])
+        wrenches = self.vehicle.rotor_wrench(speeds + off)
+        steps = wrenches[1:] - wrenches[0]
         # between two samples the mean of both counts
         wrench = np.sqrt(np.sum(np.square(steps), axis=0) / 2.0)
-        out = np.array([0.0, 0.0, wrench[0], *wrench[1:]]) / self.inertias
+        out = np.array([0.0, 0.0, *wrench]) / self.inertias
         return np.asarray(np.maximum(out, 1e-9))
 
     def _likeliest(
@@ -273,73 +263,36 @@ class Likelihood:
             ]
         )
 
-    def _slope(self, column: Column) -> list[Array] | None:
-        """Return what a unit of a coefficient adds to the acceleration (n, 6) of each piece; None
-        where no vehicle can be like that.
+    def _change(
+        self,
+        setting: Setting,
+        step: float = 1.0,
+        moved: Callable[[Signals], Signals] = lambda s: s,
+    ) -> list[Array]:
+        """Return what another setting, and signals that are ``moved``, add to the acceleration
+        (n, 6) of each piece, over a step.
         """
+        vehicle = self.flights.amended(setting)
+        return [
+            (self._acceleration(moved(s), vehicle) - base) / step
+            for s, base in zip(self.signals, self._base, strict=True)
+        ]
+
+    def _slope(self, column: Column) -> list[Array] | None:
+        """Return what a unit of a coefficient adds; None where no vehicle can be like that."""
         effect, name = column
-        whole = name.startswith(WHOLE_PREFIX)
-        name = name.removeprefix(WHOLE_PREFIX)
         own = dict(self.flights.coefficients(self.setting, effect))
-        if whole:
+        if name.startswith(WHOLE_PREFIX):
             own[CENTRAL] = 1.0
-        value = own.get(name, 0.0)
-        c = coefficient((effect, name))
+        name = name.removeprefix(WHOLE_PREFIX)
+        value, c = own.get(name, 0.0), coefficient((effect, name))
         delta = LIKELIHOOD.step * typical_size((effect, name), self.flights.vehicle)
         if not c.minimum <= value + delta <= c.maximum:
             delta = -delta
-        after = {k: v for k, v in self.setting.items() if k}
-        after[effect] = {**own, name: value + delta}
         try:
-            vehicle = self.flights.amended(after)
-            return [
-                (self._acceleration(s, vehicle) - base) / delta
-                for s, base in zip(self.signals, self._base, strict=True)
-            ]
+            return self._change({**self.setting, effect: {**own, name: value + delta}}, delta)
         except (InputError, np.linalg.LinAlgError):
             return None
-
-    def _start(self, effect: str, coefficients: Mapping[str, float]) -> list[Array]:
-        after = {k: v for k, v in self.setting.items() if k}
-        after[effect] = dict(coefficients)
-        vehicle = self.flights.amended(after)
-        return [
-            self._acceleration(s, vehicle) - base
-            for s, base in zip(self.signals, self._base, strict=True)
-        ]
-
-    def _later_rotors(self) -> list[Array]:
-        """Return what rotor speeds that act a second later add, by the derivative."""
-        delta, out = 0.001, []
-        for s, base in zip(self.signals, self._base, strict=True):
-            at = np.arange(len(s.t)) - delta / s.period
-            ends = np.arange(len(s.t))
-            moved = np.column_stack([np.interp(at, ends, x) for x in s.rotor_speeds.T])
-            shifted = replace(s, rotor_speeds=moved)
-            out.append((self._acceleration(shifted, self.vehicle) - base) / delta)
-        return out
-
-    def _uneven_lag(self) -> list[Array]:
-        """Return what a second of the lag's asymmetry adds, by the derivative."""
-        delta = LIKELIHOOD.step * TIMING.lag_asymmetry_size
-        return [
-            (self._acceleration(with_uneven_lag(s, self.vehicle, delta), self.vehicle) - base)
-            / delta
-            for s, base in zip(self.signals, self._base, strict=True)
-        ]
-
-    def _bent_rotors(self) -> list[Array]:
-        """Return what rotor speeds add that move between samples by their second difference beside
-        the straight line.
-        """
-        out = []
-        for s, base in zip(self.signals, self._base, strict=True):
-            u = s.rotor_speeds  # of k + 1/2: nothing later than sample k + 1
-            bent = np.zeros_like(u)
-            bent[2:] = u[2:] - 2.0 * u[1:-1] + u[:-2]
-            moved = replace(s, rotor_speeds=u + bent)
-            out.append(self._acceleration(moved, self.vehicle) - base)
-        return out
 
     def _moved(self, column: Column) -> list[Array]:
         """Return by how much a unit of a sensing effect moves the pose (n, 6), at the pose that the
@@ -360,27 +313,22 @@ class Likelihood:
             out.append(np.column_stack([shift, turn]) / delta)
         return out
 
-    def sums(
-        self,
-        wanted: Iterable[Column],
-        starts: Mapping[Column, Mapping[str, float]],
-        unknown: bool = True,
-    ) -> Sums:
-        """Return the sums of products of these columns, of what any flight may have beside them,
-        and of the innovations.
+    def base(self, library: Iterable[str], starts: Starts, unknown: bool = False) -> Base:
+        """Return the likelihood of the coefficients of effects, and of what any flight may have.
 
-        All columns that were asked for before are in them as well.
+        All columns that were asked for before are in it as well.
 
         Args:
-            wanted: coefficients of effects.
+            library: names of effects. What the vehicle's file fixes of them is not asked.
             starts: columns of whole effects, with the coefficients of each.
             unknown: whether the discrepancy's columns are wanted.
         """
-        acting, moved = self._columns
-        if not acting:
-            self._add_what_any_flight_may_have()
-        if playing(Role.LAG, among=[e for e in self.setting if e]) and LAG_ASYMMETRY not in acting:
-            acting[LAG_ASYMMETRY] = self._uneven_lag()
+        acting, moved = self._acting, self._posed
+        if playing(Role.LAG, among=self.setting) and LAG_ASYMMETRY not in acting:
+            delta = LIKELIHOOD.step * TIMINGS[LAG_ASYMMETRY].size
+            acting[LAG_ASYMMETRY] = self._change(
+                self.setting, delta, lambda s: with_uneven_lag(s, self.vehicle, delta)
+            )
         if unknown and not any(name.startswith(UNKNOWN) for _, name in acting):
             found = discrepancy_columns(
                 self.tracks,
@@ -394,98 +342,88 @@ class Likelihood:
             self._add_changing_coefficients()
         for c, start in starts.items():
             if c not in acting:
-                acting[c] = self._start(c[0], start)
+                acting[c] = self._change({**self.setting, c[0]: dict(start)})
+        wanted = (
+            c
+            for e in library
+            for _, columns in variants_of(self.flights, e, self.setting, starts)
+            for c in columns
+            if c[1].removeprefix(WHOLE_PREFIX) not in self.flights.stated(e)
+        )
         for c in wanted:
             if c in acting or c in moved or c[1].startswith(START_PREFIX):
                 continue
             if is_delay(c[0]):
                 acting[c] = acting[ROTOR_TIME_OFFSET]
-            elif get(c[0]).kind == "sensing" and not is_delay(c[0]):
+            elif get(c[0]).kind == "sensing":
                 moved[c] = self._moved(c)
             elif (slope := self._slope(c)) is not None:
                 acting[c] = slope
                 if get(c[0]).role == Role.CENTRE_OF_MASS:
                     self._swing(c)
-        return self._products(acting, moved)
-
-    def nuisances(self) -> tuple[dict[Column, list[Array]], dict[Column, list[Array]]]:
-        """Return the columns of what any flight may have beside effects: what a unit of each adds
-        to the accelerations, and to the pose.
-        """
-        if not self._columns[0]:
-            self._add_what_any_flight_may_have()
-        acting, moved = (
-            {c: x for c, x in part.items() if not c[0] and not c[1].startswith(UNKNOWN)}
-            for part in self._columns
-        )
-        return acting, moved
+        return self._products(starts)
 
     def _add_changing_coefficients(self) -> None:
         """Add the dictionary's columns of effects of the setting whose coefficients change."""
-        acting, moved = self._columns
-        effects = [e for e in self.setting if e]
         parts, poses = {}, {}
-        for effect in effects:
+        for effect, own in self.setting.items():
             if get(effect).kind == "sensing" and not is_delay(effect):
-                own = self.setting[effect].items()
+                moved = [(x, self._moved((effect, name))) for name, x in own.items()]
                 poses[effect] = [
-                    np.sum([value * self._moved((effect, name))[i] for name, value in own], axis=0)
+                    np.sum([x * column[i] for x, column in moved], axis=0)
                     for i in range(len(self.pieces))
                 ]
-                continue
-            vehicle = self.flights.amended({e: self.setting[e] for e in effects if e != effect})
-            parts[effect] = [
-                base - self._acceleration(s, vehicle)
-                for s, base in zip(self.signals, self._base, strict=True)
-            ]
+            else:
+                parts[effect] = self._change(without(self.setting, effect), -1.0)
         found = variables(self.tracks, [p.t for p in self.pieces])
-        for columns, of in ((acting, parts), (moved, poses)):
+        for columns, of in ((self._acting, parts), (self._posed, poses)):
             for (group, name), column in changing_columns(of, found).items():
                 columns["", f"{UNKNOWN}{group}: {name}"] = column
 
     def _add_what_any_flight_may_have(self) -> None:
         """Add the columns of time offsets, of rotors between samples and of the model's error."""
-        acting, moved = self._columns
-        acting[ROTOR_TIME_OFFSET] = self._later_rotors()
-        acting["", BETWEEN] = self._bent_rotors()
-        for name, column in self._model_errors().items():
-            acting["", f"{MODEL_ERROR} {name}"] = column
+        acting, delta = self._acting, LIKELIHOOD.step_of_time
+        offset = {ROTOR_TIME_OFFSET[1]: delta}
+        acting[ROTOR_TIME_OFFSET] = self._change(
+            self.setting, delta, lambda s: with_time_offsets(s, offset)
+        )
+        acting["", BETWEEN] = self._change(self.setting, 1.0, _bent_rotors)
+        self._add_model_errors()
         if self._rounding_std > 0.0:
             for axis, column in zip("xyz", self._rounded_torques(), strict=True):
                 acting["", ROUNDED + axis] = column
-        moved[ATTITUDE_TIME_OFFSET] = []
+        moved = self._posed[ATTITUDE_TIME_OFFSET] = []
         for track in self.tracks:
             # the rate before the sample is read: after it, it knows that sample's noise
             rate = track.angular_velocity + self.period * track.acceleration[:, 3:]
             rate = np.vstack([track.angular_velocity[:1], rate[:-1]])
-            moved[ATTITUDE_TIME_OFFSET].append(np.column_stack([np.zeros_like(rate), -rate]))
+            moved.append(np.column_stack([np.zeros_like(rate), -rate]))
 
-    def quieter(self, coefficients: Mapping[Column, float]) -> Sums:
-        """Return the sums of the same columns with the noise that is likeliest beside them all, at
-        these coefficients.
+    def quieter(self, coefficients: Mapping[Column, float], starts: Starts) -> Base:
+        """Return the likelihood of the same columns with the noise that is likeliest beside them
+        all, at these coefficients.
 
         What an effect explains counts as a disturbance where the effect is not known. Beside the
         whole library the noise is that of a flight of which everything is known.
         """
-        noise, tracks = self.noise, self.tracks
-        self.noise, known = self._likeliest(self._explained(coefficients))
-        heard = [track.innovations for track in self._run(self.noise, known)]
-        self.tracks = [
-            replace(track, innovations=x) for track, x in zip(self.tracks, heard, strict=True)
+        out = copy(self)
+        out.noise, known = self._likeliest(self._explained(coefficients))
+        heard = self._run(out.noise, known)
+        out.tracks = [
+            replace(track, innovations=x.innovations)
+            for track, x in zip(self.tracks, heard, strict=True)
         ]
-        out = self._products(*self._columns)
-        self.noise, self.tracks = noise, tracks
-        return out
+        out.answers = out._rotor_innovations()
+        return out._products(starts)
 
     def _explained(self, coefficients: Mapping[Column, float]) -> list[Array]:
         """Return what the columns move the pose of each piece by, and accelerate (n, 2, 6)."""
-        acting, moved = self._columns
         explained = []
         for i, track in enumerate(self.tracks):
             x = np.zeros((len(track.position), 2, 6))
-            for c, column in acting.items():
+            for c, column in self._acting.items():
                 x[:, 1] += coefficients.get(c, 0.0) * column[i]
-            for c, column in moved.items():
+            for c, column in self._posed.items():
                 x[:, 0] += coefficients.get(c, 0.0) * column[i]
             specific = track.rotors[:, :1] / self.vehicle.mass
             x[:, 1, :3] += specific * (
@@ -502,39 +440,27 @@ class Likelihood:
         acceleration and of the filter's attitude, and their difference, which is noise, would fit
         the poses' own noise: of equal offsets of both only the torque of the thrust is left.
         """
-        acting, moved = self._columns
-        for slope in acting[column]:
+        for slope in self._acting[column]:
             slope[:, :3] = 0.0
         axis = [c.name for c in get(column[0]).coefficients].index(column[1])
         (marker,) = playing(Role.MARKER)
         place = self._moved((marker, get(marker).coefficients[axis].name))
-        moved[column] = [-x for x in place]
+        self._posed[column] = [-x for x in place]
 
-    def _model_errors(self) -> dict[str, list[Array]]:
-        parts: dict[str, list[Array]] = {}
-        answers = self._rotor_innovations()
-        for track, answer in zip(self.tracks, answers, strict=True):
+    def _add_model_errors(self) -> None:
+        for track, answer in zip(self.tracks, self.answers, strict=True):
             specific = track.rotors[:, 0] / self.vehicle.mass
             for i, axis in enumerate("xyz"):
                 force, torque = np.zeros((len(specific), 6)), np.zeros((len(specific), 6))
                 force[:, :3] = specific[:, None] * track.rotation[:, :, i]
                 torque[:, 3 + i] = track.rotors[:, 1 + i] / self.inertias[3 + i]
-                parts.setdefault(f"of force {axis}", []).append(force)
-                parts.setdefault(f"of torque {axis}", []).append(torque)
                 # of rounded rotor speeds the flight loop's answer to the state shows too little,
                 # and what answers the state stands for it
-                expected = np.zeros_like(torque)
-                expected[:, 3 + i] = torque[:, 3 + i] - answer[:, 1 + i]
-                parts.setdefault(f"of expected torque {axis}", []).append(expected)
-        return parts
-
-    def _rotor_innovations(self) -> list[Array]:
-        tracks, found = self._answers
-        if tracks is not self.tracks:
-            pairs = list(zip(self.pieces, self.tracks, strict=True))
-            found = rotor_innovations(pairs, self.inertias[2:])
-            self._answers = self.tracks, found
-        return found
+                expected = torque.copy()
+                expected[:, 3 + i] -= answer[:, 1 + i]
+                errors = {"force": force, "torque": torque, "expected torque": expected}
+                for name, x in errors.items():
+                    self._acting.setdefault(("", f"{MODEL_ERROR} of {name} {axis}"), []).append(x)
 
     def _jumps(self) -> tuple[list[Column], list[Array], NDArray[np.intp]]:
         """Return the columns of the gains on the rotors' innovations, their jumps (n, 6, e) of each
@@ -543,13 +469,12 @@ class Likelihood:
         Thrust and torques say something of the axes that they drive. And a loop that rolls or
         pitches the vehicle has seen where it is, and what pushes it aside.
         """
-        rotors = self._rotor_innovations()
         kinds = (*(f"axis {axis}" for axis in DRIVEN), "roll aside", "pitch aside")
         names: list[Column] = [("", f"{GAIN} {kind} {state}") for kind in kinds for state in STATES]
         out = []
         units = np.array([self.period**2, self.period, 1.0])
         tilt = SIDEWAYS * self.flights.vehicle.gravity
-        for found, track in zip(rotors, self.tracks, strict=True):
+        for found, track in zip(self.answers, self.tracks, strict=True):
             rotation = track.rotation
             # an innovation of sample k changes the state after it: the jump is before sample k + 1
             found = np.vstack([np.zeros(4), found[:-1]])
@@ -565,43 +490,33 @@ class Likelihood:
             out.append(jumps.reshape(len(found), 6, len(names)))
         return names, out, np.tile(STATES, len(kinds))
 
-    def _products(
-        self, acting: Mapping[Column, list[Array]], moved: Mapping[Column, list[Array]]
-    ) -> Sums:
+    def _products(self, starts: Starts) -> Base:
+        acting, moved = self._acting, self._posed
         gains, jumps, jump_state = self._jumps()
         own = len(STATES) * len(DRIVEN)  # what the rotors say of other axes stays as it was fitted
         gains, jump_state, jumps = gains[:own], jump_state[:own], [x[:, :, :own] for x in jumps]
-        names = (*(c for c in acting if c not in moved), *moved, *gains)
-        count = len(names)
+        asked = (*(c for c in acting if c not in moved), *moved)
+        names = (*asked, *gains)
         gain = np.array([x.gain for x in self.noise])
         keep = np.exp(-self.period / np.array([x.time for x in self.noise]))
         std = np.array([x.innovation for x in self.noise])
-        use = list(self.axes)
-        length = round(LIKELIHOOD.block / self.period)
+        length = round(REGRESSION.block / self.period)
         skip = round(AXIS.settling_time / self.period)
         blocks, samples = [], 0
         for i, track in enumerate(self.tracks):
-            state = np.zeros((6, 3, count))
+            state = np.zeros((6, 3, len(names)))
             specific = track.rotors[:, 0] / self.vehicle.mass
-            pull = np.stack(
-                [
-                    -specific[:, None] * track.rotation[:, :, 1],
-                    specific[:, None] * track.rotation[:, :, 0],
-                ],
-                axis=2,
-            )
+            pull = specific[:, None, None] * track.rotation[:, :, 1::-1] * [-1.0, 1.0]
             for begin in range(0, len(track.position), length):
                 at = slice(begin, min(begin + length, len(track.position)))
                 rows = at.stop - at.start
-                asked = names[: count - len(gains)]
                 x, y = np.zeros((rows, 6, len(asked))), np.zeros((rows, 6, len(moved)))
                 for j, c in enumerate(asked):
                     if c in acting:
                         x[:, :, j] = acting[c][i][at]
                 for j, column in enumerate(moved.values()):
                     y[:, :, j] = column[i][at]
-                out = np.empty((rows, 6, count + 1))
-                inner = np.empty((rows, 6, count))
+                out = np.empty((rows, 6, len(names) + 1))
                 sensitivities(
                     self.period,
                     gain,
@@ -613,38 +528,28 @@ class Likelihood:
                     np.ascontiguousarray(jumps[i][at]),
                     jump_state,
                     state,
-                    inner,
+                    out,
                 )
-                out[:, :, :count] = inner
-                out[:, :, count] = track.innovations[at]
+                out[:, :, -1] = track.innovations[at]
                 out /= std[None, :, None]
                 fit = self._fit[i][at].copy()
                 fit[: max(skip - begin, 0)] = False
-                kept = out[fit][:, use].reshape(-1, count + 1)
+                samples += int(fit.sum())
+                kept = out[fit].reshape(-1, len(names) + 1)
                 if len(kept):
-                    samples += len(kept) // len(use)
                     blocks.append(kept.T @ kept)
-        value = np.array(
-            [
-                0.0
-                if not effect or name.startswith((START_PREFIX, WHOLE_PREFIX))
-                else self.flights.coefficients(self.setting, effect).get(name, 0.0)
-                - declared((effect, name), self.flights)
-                for effect, name in names
-            ]
-        )
-        penalty = 2.0 * samples * float(np.log(std[use]).sum())
-        return Sums(names, np.array(blocks), value, penalty)
+        penalty = 2.0 * samples * float(np.log(std).sum())
+        return in_prior_units(self.flights, names, np.array(blocks), penalty, self.setting, starts)
 
 
-def declared(column: Column, flights: Flights) -> float:
-    """Return what the vehicle's file states of a column's coefficient, from which a coefficient of
-    the likelihood counts; 0 where it states nothing.
+def _bent_rotors(s: Signals) -> Signals:
+    """Return signals whose rotor speeds move between samples by their second difference beside the
+    straight line.
     """
-    effect, name = column
-    if not effect or name.startswith(START_PREFIX):
-        return 0.0
-    return flights.coefficients({}, effect).get(name.removeprefix(WHOLE_PREFIX), 0.0)
+    u = s.rotor_speeds  # of k + 1/2: nothing later than sample k + 1
+    bent = np.zeros_like(u)
+    bent[2:] = u[2:] - 2.0 * u[1:-1] + u[:-2]
+    return replace(s, rotor_speeds=u + bent)
 
 
 def _in_fit(flights: Flights, log: int, t: Array) -> NDArray[np.bool_]:

@@ -3,26 +3,16 @@ each column, and the ways in which an effect may act.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Role
-from .evidence import Index
-from .likelihood import (
-    BETWEEN,
-    GAIN,
-    LIKELIHOOD,
-    MODEL_ERROR,
-    ROUNDED,
-    UNKNOWN,
-    WHOLE_PREFIX,
-    Sums,
-    declared,
-)
+from .evidence import Index, Marginal, marginal
 from .regression import (
     CENTRAL,
     START_PREFIX,
@@ -37,6 +27,14 @@ from .time_offsets import timing_of
 
 Array = NDArray[np.float64]
 Setting = dict[str, dict[str, float]]
+# columns of whole effects, with the coefficients of each
+Starts = Mapping[Column, Mapping[str, float]]
+
+WHOLE_PREFIX = "whole "  # a coefficient of an effect that acts at the centre, without a moment
+# columns without an effect: what any flight may have, and what an effect that is in no library does
+BETWEEN = "rotors between samples"
+MODEL_ERROR, GAIN, UNKNOWN, NUISANCE = "model error", "rotor gain of", "unknown ", "nuisance "
+ROUNDED = "rounding of torque "
 
 
 @dataclass(frozen=True)
@@ -47,11 +45,20 @@ class PriorSettings:
     # typical sizes: every effect acts a little, and one that is no larger is not worth a name. It
     # is the standard deviation of what any coefficient may have without the effect being named
     negligible: float = 0.03
-    size: float = 1.0  # typical sizes, the standard deviation of a coefficient
-    any_size: float = 3.0  # the same of effects that may be of any size
+    any_size: float = 3.0  # typical sizes, of effects that may be of any size; of others one
     most_missing_mass: float = 0.9  # share of the declared mass that a vehicle may lack
     # times a lag or a delay at which a column was made, between which the column stands for it
     near_start: tuple[float, float] = (0.5, 1.5)
+    # share of an axis' force or torque by which any model is wrong: of thrust along its axis and
+    # across it, and of the torques. Propellers and bearings are not stable to less
+    model_error: float = 0.003
+    # standard deviations of the gains on the rotors' innovations, by which pose, rate and
+    # disturbance answer them, in what one period of such an acceleration makes. They are to leave
+    # the gains free: a loop that shows the tilt that it sees has gains of some 3,000, 100 and 1
+    gains: tuple[float, float, float] = (1e4, 1e3, 1e2)
+    # second differences of the rotor speeds, the standard deviation of what they may do between
+    # samples beside a straight line
+    between_samples: float = 0.5
 
 
 PRIORS = PriorSettings()
@@ -73,31 +80,58 @@ class Base:
     plain: Index  # columns that any flight may have
     typical: Array  # (c,) typical sizes in prior standard deviations
     dictionary: Index  # columns of the discrepancy
-    starts: Mapping[Column, Mapping[str, float]]
+    starts: Starts
+
+    def at(self, columns: Iterable[Column]) -> Index:
+        """Return where some columns are."""
+        return np.array([self.columns[c] for c in columns], dtype=np.intp)
+
+    @cached_property
+    def total(self) -> Array:
+        """Sums of products (c + 1, c + 1)."""
+        return np.asarray(self.blocks.sum(axis=0))
+
+    @property
+    def asked(self) -> list[Column]:
+        """The columns of effects."""
+        return [c for c in self.columns if c[0]]
+
+    def marginal(
+        self, asked: Index, others: Index, size: Array | None = None, power: float = 1.0
+    ) -> Marginal:
+        """Return the likelihood, to a power, of columns that are asked about, with others
+        integrated out; ``size``: standard deviations of their prior, if it is not theirs.
+        """
+        total = power * self.total
+        deviance = float(total[-1, -1]) + power * self.penalty
+        size = np.ones(len(others)) if size is None else size
+        return marginal(total[:-1, :-1], total[:-1, -1], deviance, asked, others, size)
+
+    def mode(self, chosen: Index, power: float = 1.0) -> tuple[Array, Array]:
+        """Return the mode of some columns (n,) where no other acts, and what is known of them: the
+        inverse of their covariance (n, n).
+        """
+        total = power * self.total
+        normal = total[np.ix_(chosen, chosen)] + np.eye(len(chosen))
+        return np.linalg.solve(normal, total[chosen, -1]), normal
 
 
 def variants_of(
-    flights: Flights,
-    effect: str,
-    setting: Setting,
-    starts: Mapping[Column, Mapping[str, float]],
+    flights: Flights, effect: str, setting: Collection[str], starts: Starts
 ) -> list[Variant]:
-    """Return the ways in which an effect may act."""
-    names = [c.name for c in get(effect).coefficients]
+    """Return the ways in which an effect may act beside the effects of a setting."""
+    names = [c.name for c in get(effect).coefficients if c.name != CENTRAL]
+    own = tuple((effect, name) for name in names)
+    wholes: list[Variant] = [(effect, (c,)) for c in starts if c[0] == effect]
     if moves_time(effect) and effect not in setting:
-        derivative: Variant = (effect, tuple((effect, name) for name in names))
-        return [derivative, *((effect, (c,)) for c in starts if c[0] == effect)]
-    if get(effect).starting_points is not None:
-        if effect in setting or not flights.is_nonlinear(effect):
-            return [(effect, tuple((effect, name) for name in names))]
-        return [(effect, (c,)) for c in starts if c[0] == effect]
-    if CENTRAL not in names:
-        return [(effect, tuple((effect, name) for name in names))]
-    names.remove(CENTRAL)
-    plain: Variant = (effect, tuple((effect, name) for name in names))
+        return [(effect, own), *wholes]
+    if flights.is_nonlinear(effect) and effect not in setting:
+        return wholes
+    if len(names) == len(get(effect).coefficients):
+        return [(effect, own)]
     if effect in setting:
-        return [(effect, (*plain[1], (effect, CENTRAL)))]
-    return [plain, (effect, tuple((effect, WHOLE_PREFIX + name) for name in names))]
+        return [(effect, (*own, (effect, CENTRAL)))]
+    return [(effect, own), (effect, tuple((effect, WHOLE_PREFIX + name) for name in names))]
 
 
 def prior_size(column: Column, flights: Flights) -> float:
@@ -107,23 +141,16 @@ def prior_size(column: Column, flights: Flights) -> float:
         return timing.size
     if not effect:
         if name == BETWEEN:
-            return LIKELIHOOD.between_samples
+            return PRIORS.between_samples
         if name.startswith(GAIN):
-            return LIKELIHOOD.gains[int(name[-1])]
-        return LIKELIHOOD.model_error if name.startswith(MODEL_ERROR) else 1.0
+            return PRIORS.gains[int(name[-1])]
+        return PRIORS.model_error if name.startswith(MODEL_ERROR) else 1.0
     if name.startswith(START_PREFIX) or name == CENTRAL:
         return 1.0
     column = (effect, name.removeprefix(WHOLE_PREFIX))
-    factor = PRIORS.any_size if get(effect).any_size else PRIORS.size
+    factor = PRIORS.any_size if get(effect).any_size else 1.0
     size = factor * typical_size(column, flights.vehicle)
     return math.hypot(size, flights.thrust_std) if get(effect).role == Role.THRUST else size
-
-
-def _typical(column: Column, flights: Flights) -> float:
-    effect, name = column
-    if not effect or name.startswith(START_PREFIX) or name == CENTRAL:
-        return 1.0
-    return typical_size((effect, name.removeprefix(WHOLE_PREFIX)), flights.vehicle)
 
 
 def _bounds(column: Column, flights: Flights) -> tuple[float, float]:
@@ -151,13 +178,8 @@ def _errors_of_torques(total: Array, columns: Mapping[Column, int], size: Array)
     """
     factor = np.ones(len(size))
     torque, expected = f"{MODEL_ERROR} of torque ", f"{MODEL_ERROR} of expected torque "
-    others = np.array(
-        [
-            i
-            for (e, name), i in columns.items()
-            if not e and not name.startswith((torque, expected, ROUNDED, UNKNOWN))
-        ]
-    )
+    torques = (torque, expected, ROUNDED, UNKNOWN)
+    others = [i for (e, n), i in columns.items() if not e and not n.startswith(torques)]
     inner = total[np.ix_(others, others)] + np.eye(len(others))
 
     def left(i: int) -> float:
@@ -173,46 +195,75 @@ def _errors_of_torques(total: Array, columns: Mapping[Column, int], size: Array)
     return factor
 
 
+def declared(column: Column, flights: Flights) -> float:
+    """Return what the vehicle's file states of a column's coefficient, from which a coefficient of
+    the likelihood counts; 0 where it states nothing.
+    """
+    effect, name = column
+    if not effect or name.startswith(START_PREFIX):
+        return 0.0
+    return flights.coefficients({}, effect).get(name.removeprefix(WHOLE_PREFIX), 0.0)
+
+
+def _value(column: Column, flights: Flights, setting: Setting) -> float:
+    """Return what a column's coefficient has at a setting, as the likelihood counts it."""
+    effect, name = column
+    if not effect or name.startswith((START_PREFIX, WHOLE_PREFIX)):
+        return 0.0
+    return flights.coefficients(setting, effect).get(name, 0.0) - declared(column, flights)
+
+
 def in_prior_units(
     flights: Flights,
-    sums: Sums,
+    names: Sequence[Column],
+    blocks: Array,
+    penalty: float,
     setting: Setting,
-    starts: Mapping[Column, Mapping[str, float]],
+    starts: Starts,
 ) -> Base:
-    """Return sums of products in standard deviations of the priors, about zero and not about the
-    setting beside which they were made.
+    """Return a likelihood in standard deviations of the priors, about zero and not about the
+    setting beside which it was made.
+
+    Args:
+        flights: of the vehicle.
+        names: (c,) columns.
+        blocks: (blocks, c + 1, c + 1) sums of products, of columns and of what is left at the
+            setting (last), whitened.
+        penalty: twice the sum over samples of the logarithm of the standard deviations.
+        setting: of effects.
+        starts: columns of whole effects.
     """
-    size = np.array([prior_size(c, flights) for c in sums.columns])
-    bounds = np.array([_bounds(c, flights) for c in sums.columns])
-    scale = np.append(size, 1.0)
-    blocks = sums.blocks * scale[:, None] * scale
+    columns = {c: i for i, c in enumerate(names)}
+    size = np.array([prior_size(c, flights) for c in names])
+    size *= _errors_of_torques(blocks.sum(axis=0)[:-1, :-1] * size[:, None] * size, columns, size)
     # about zero, not about the setting: the residual with all its effects taken away
-    back = np.append(sums.value / size, 1.0)
+    back = np.append([_value(c, flights, setting) for c in names], 1.0)
     whole = blocks @ back
-    blocks[:, :, -1] = whole
-    blocks[:, -1, :] = whole
-    blocks[:, -1, -1] = np.einsum("c,bc->b", back, whole)
-    columns = {c: i for i, c in enumerate(sums.columns)}
-    factor = _errors_of_torques(blocks.sum(axis=0), columns, size)
-    size *= factor
-    scale = np.append(factor, 1.0)
-    blocks *= scale[:, None] * scale
-    kept = np.array([i for c, i in columns.items() if not c[1].startswith(ROUNDED)])
-    size, bounds = size[kept], bounds[kept]
-    blocks = blocks[:, np.append(kept, -1)][:, :, np.append(kept, -1)]
-    columns = {list(columns)[i]: k for k, i in enumerate(kept)}
-    plain = [i for c, i in columns.items() if not c[0] and not c[1].startswith(UNKNOWN)]
-    dictionary = [i for c, i in columns.items() if not c[0] and c[1].startswith(UNKNOWN)]
+    blocks = blocks.copy()
+    blocks[:, :, -1] = blocks[:, -1, :] = whole
+    blocks[:, -1, -1] = whole @ back
+    scale = np.append(size, 1.0)
+    kept = [i for i, (_, name) in enumerate(names) if not name.startswith(ROUNDED)]
+    at = [*kept, -1]
+    blocks = (blocks * scale[:, None] * scale)[:, at][:, :, at]
+    names, size = [names[i] for i in kept], size[kept]
+    low, high = np.array([_bounds(c, flights) for c in names]).T / size
+    plain = [i for i, c in enumerate(names) if not c[0] and not c[1].startswith(UNKNOWN)]
+    dictionary = [i for i, c in enumerate(names) if not c[0] and c[1].startswith(UNKNOWN)]
+    typical = [
+        typical_size((e, n.removeprefix(WHOLE_PREFIX)), flights.vehicle) if e else 1.0
+        for e, n in names
+    ]
     return Base(
-        columns,
+        {c: i for i, c in enumerate(names)},
         size,
-        bounds[:, 0] / size,
-        bounds[:, 1] / size,
+        low,
+        high,
         blocks,
-        sums.penalty,
+        penalty,
         frozenset(k for k in setting if k),
         np.array(plain, dtype=np.intp),
-        np.array([_typical(c, flights) for c in columns]) / size,
+        np.array(typical) / size,
         np.array(dictionary, dtype=np.intp),
         starts,
     )

@@ -5,29 +5,19 @@ missing. A set's evidence is that of the likelier noise of two: that beside no e
 beside the best set, because what is not explained counts as a disturbance.
 """
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.effects import get
-from ...runtime.errors import InputError
 from ..findings import Ranking
 from .axis_filter import AxisNoise
-from .climbing import Height, linear_mode, mode
-from .evidence import marginal
-from .likelihood import WHOLE_PREFIX, Likelihood, declared
-from .priors import Base, Setting, in_prior_units, variants_of
-from .regression import (
-    START_PREFIX,
-    Column,
-    Flights,
-    moves_time,
-    typical_size,
-)
+from .climbing import Height, linearised, mode
+from .likelihood import Likelihood
+from .priors import Base, Setting, Starts
+from .regression import START_PREFIX, Column, Flights, moves_time, typical_size
 from .sets import Posterior
 from .starting_points import starting_points
 
@@ -73,15 +63,18 @@ def rank(
         library: names of effects that may act.
         report: called with a line of progress.
     """
+
+    def beside(setting: Setting) -> tuple[Likelihood, Starts]:
+        return Likelihood(flights, setting, near), starts_of(flights, library, setting)
+
     near = Likelihood(flights, {})
-    nothing = _Beside(flights, library, {}, near)
-    loud = nothing.base()
-    quiet = nothing.quieter_base(_whole_library(loud))
+    best, starts = nothing = beside({})
+    loud = best.base(library, starts)
+    quiet = best.quieter(_whole_library(loud), starts)
     found = Posterior(flights, library, (loud, quiet))
     # the best effect first, alone: another set's columns are those of the model that has it
     setting = found.best_setting(1)
     tried: dict[frozenset[str], Setting] = {frozenset(): {}}
-    beside = nothing
     for _ in range(RANKING.rounds):
         # the columns of the same set change with its coefficients, where these have moved far
         if not found.is_elsewhere(setting, tried):
@@ -89,95 +82,39 @@ def rank(
             if not found.is_elsewhere(setting, tried):
                 break
         report(f"trying {', '.join(setting)}")
-        setting = mode(setting, partial(_height, flights, near=near))
+
+        def height(x: Setting, near: Likelihood = near) -> Height:
+            base = Likelihood(flights, x, near, same_noise=True).base(x, {})
+            return linearised(flights, base, base.asked, x)
+
+        setting = mode(setting, height)
         tried[frozenset(setting)] = setting
-        beside = _Beside(flights, library, setting, near)
-        near = beside.likelihood
-        found = Posterior(flights, library, (loud, beside.base()))
+        near, starts = beside(setting)
+        best = near
+        found = Posterior(flights, library, (loud, best.base(library, starts)))
         setting = found.best_setting()
     # once more, with the dictionary's columns, that are dear, beside the likeliest set
-    if setting.keys() != beside.setting.keys():
-        beside = _Beside(flights, library, setting, near) if setting else nothing
-    base = beside.base(unknown=True)
-    found = Posterior(flights, library, (loud, base), found.tempering())
+    if setting.keys() != best.setting.keys():
+        best, starts = beside(setting) if setting else nothing
+    whole = best.base(library, starts, unknown=True)
+    found = Posterior(flights, library, (loud, whole), found.tempering())
     column, size, _ = found.strangest()
-    ranking = found.ranking(beside.quieter_base({column: size}))
+    ranking = found.ranking(best.quieter({column: size}, starts))
     late = {
         name: x for (_, name), x in found.nuisances().items() if ("", name) in flights.time_offsets
     }
-    return Found(found, ranking, found.best_setting(), beside.likelihood.noise, late)
-
-
-def _height(flights: Flights, setting: Setting, near: Likelihood) -> Height:
-    """Return how high the posterior is at a setting, with the noise as it is."""
-    try:
-        likelihood = Likelihood(flights, setting, near, same_noise=True)
-        wanted = wanted_columns(flights, list(setting), setting, {})
-        sums = likelihood.sums(wanted, {}, unknown=False)
-        base = in_prior_units(flights, sums, setting, {})
-    except (InputError, np.linalg.LinAlgError):
-        return math.inf, lambda: setting
-    asked = np.array([i for c, i in base.columns.items() if c in wanted], dtype=np.intp)
-    total = base.blocks.sum(axis=0)
-    ones = np.ones(len(base.plain))
-    m = marginal(total[:-1, :-1], total[:-1, -1], float(total[-1, -1]), asked, base.plain, ones)
-    columns = [list(base.columns)[i] for i in asked]
-    here = np.array([setting[e].get(n, 0.0) - declared((e, n), flights) for e, n in columns])
-    z = here / base.size[asked]
-    value = -m.constant - float(m.right @ z - 0.5 * z @ m.normal @ z) + 0.5 * float(z @ z)
-    return value, lambda: linear_mode(flights, base, m, asked, columns, setting)
-
-
-class _Beside:
-    """The likelihood beside a set of effects, and the starts of all others there."""
-
-    def __init__(
-        self, flights: Flights, library: Sequence[str], setting: Setting, near: Likelihood
-    ) -> None:
-        self.flights, self.library, self.setting = flights, library, setting
-        self.likelihood = Likelihood(flights, setting, near)
-        self.starts = starts_of(flights, library, setting)
-
-    def base(self, unknown: bool = False) -> Base:
-        """Return its sums; ``unknown``: with the dictionary's columns."""
-        wanted = wanted_columns(self.flights, self.library, self.setting, self.starts)
-        sums = self.likelihood.sums(wanted, self.starts, unknown)
-        return in_prior_units(self.flights, sums, self.setting, self.starts)
-
-    def quieter_base(self, coefficients: Mapping[Column, float]) -> Base:
-        """Return its sums with the noise that is likeliest beside these coefficients."""
-        sums = self.likelihood.quieter(coefficients)
-        return in_prior_units(self.flights, sums, self.setting, self.starts)
-
-
-def wanted_columns(
-    flights: Flights,
-    library: Sequence[str],
-    setting: Setting,
-    starts: Mapping[Column, Mapping[str, float]],
-) -> dict[Column, None]:
-    """Return the columns of all effects, in order, but those that the vehicle's file fixes."""
-    return dict.fromkeys(
-        c
-        for e in library
-        for v in variants_of(flights, e, setting, starts)
-        for c in v[1]
-        if c[1].removeprefix(WHOLE_PREFIX) not in flights.stated(e)
-    )
+    return Found(found, ranking, found.best_setting(), best.noise, late)
 
 
 def _whole_library(base: Base) -> dict[Column, float]:
     """Return the coefficients of all columns of effects together, at the mode."""
-    chosen = np.concatenate([base.plain, [i for c, i in base.columns.items() if c[0]]]).astype(int)
-    total = base.blocks.sum(axis=0)
-    mode = np.linalg.solve(total[np.ix_(chosen, chosen)] + np.eye(len(chosen)), total[chosen, -1])
+    chosen = np.append(base.plain, base.at(base.asked))
     names = list(base.columns)
-    return {names[i]: float(x * base.size[i]) for i, x in zip(chosen, mode, strict=True)}
+    coefficients = base.mode(chosen)[0] * base.size[chosen]
+    return {names[i]: float(x) for i, x in zip(chosen, coefficients, strict=True)}
 
 
-def starts_of(
-    flights: Flights, library: Sequence[str], setting: Setting
-) -> dict[Column, Mapping[str, float]]:
+def starts_of(flights: Flights, library: Sequence[str], setting: Setting) -> Starts:
     """Return columns of whole effects, with the coefficients of each: lags and delays, and effects
     whose coefficients do nothing one by one.
     """
@@ -195,7 +132,7 @@ def starts_of(
         if not flights.is_nonlinear(effect):
             continue
         if residual is None:
-            residual = flights.residual({k: v for k, v in setting.items() if k})
+            residual = flights.residual(setting)
         stated = flights.stated(effect)
         for i, start in enumerate(starting_points(effect, flights, residual, stated)):
             out[effect, f"{START_PREFIX}{i}"] = {**start, **stated}

@@ -6,10 +6,11 @@ one coefficient. Residual and columns come from the same effect models that plan
 through the same filter.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,13 +30,12 @@ from ..motion.signals import Signals, log_signals
 from ..motion.smoothing import CUTOFFS, low_pass, resampled
 from .commanded_rotors import (
     COMMANDED,
-    any_commanded,
     downsampled,
     in_flight,
     in_flight_by_thrust,
     thrust_is_assumed,
 )
-from .sensor_bias import BIAS, bias, bias_columns, is_bias
+from .sensor_bias import bias, bias_columns
 from .time_offsets import (
     ATTITUDE_TIME_OFFSET,
     LAG_ASYMMETRY,
@@ -50,6 +50,8 @@ from .time_offsets import (
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.int64]
+K = TypeVar("K")
+V = TypeVar("V")
 
 
 @dataclass(frozen=True)
@@ -72,9 +74,7 @@ class RegressionSettings:
     # the golden ratio, by which the place of the held-out block moves: no flight keeps step with it
     held_out_step: float = 0.5 * (5.0**0.5 - 1.0)
     most_period_ratio: float = 1.01  # between logs that one filter reads
-    memory: int = 2**28  # bytes, of results kept: of pieces, and of columns
-    kept_residuals: int = 16  # a fit asks several times for the residual at its setting
-    bytes_per_sample: int = 400  # of a piece
+    memory: int = 2**28  # bytes, of pieces that are kept
 
 
 REGRESSION = RegressionSettings()
@@ -89,6 +89,11 @@ Column = tuple[str, str]
 CENTRAL = "central"  # the coefficient of effects that act rotor by rotor
 # a whole effect at coefficients of its own; the column is a multiple of it
 START_PREFIX = "start "
+
+
+def without(setting: Mapping[str, V], effect: str) -> dict[str, V]:
+    """Return a setting with one effect less."""
+    return {e: x for e, x in setting.items() if e != effect}
 
 
 def is_delay(effect: str) -> bool:
@@ -133,8 +138,6 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
     """
     if (timing := timing_of(column)) is not None:
         return timing.size
-    if is_bias(column):
-        return BIAS.step
     if column[1].startswith(START_PREFIX) or column[1] == CENTRAL:
         return 1.0
     c = coefficient(column)
@@ -157,6 +160,7 @@ class Piece:
     log: int  # which log
     signals: Signals
     rows: Index  # the samples that are rows
+    needed: Array  # (rows, 6) what the motion needs, N and Nm, by the declared mass and inertia
 
 
 class Flights:
@@ -183,9 +187,8 @@ class Flights:
                     f"{flown.source or flown.name}: has a pose and no gyro and accelerometer, and "
                     "another log has no pose; expected the IMU in all of them, or the pose"
                 )
-        self.commanded = any_commanded(
-            self.logs
-        )  # torque is left out, and only the time in the air counts
+        # torque is left out, and only the time in the air counts
+        self.commanded = any(log.commanded for log in self.logs)
         if self.inertial:  # a ground that carries is no effect, and no height shows it
             self.logs = tuple(in_flight_by_thrust(log, vehicle) for log in self.logs)
         elif self.commanded:
@@ -216,15 +219,9 @@ class Flights:
         self._fit_logs, self._has_test = len(logs), bool(test)
         self.biases: tuple[Column, ...] = tuple(bias_columns(len(logs)) if self.inertial else ())
         self._drift: np.random.Generator | None = None  # of a copy whose fusion errs otherwise
-        self._fused: dict[
-            int, tuple[FlightLog, list[InertialSignals]]
-        ] = {}  # by the log's identity
-        self._pieces: dict[tuple[object, ...], list[Piece]] = {}
-        self._needs: dict[int, tuple[Piece, Array]] = {}
-        self._offset_signals: dict[tuple[float, ...], tuple[Piece, Signals]] = {}
-        self._columns: dict[tuple[object, ...], dict[Column, Array]] = {}
-        self._residuals: dict[tuple[object, ...], Array] = {}
+        self._fused: dict[FlightLog, list[InertialSignals]] = {}
         self._smooth_imu: dict[int, tuple[Array, Array]] = {}
+        self._forget()
         self._first: list[Piece] = []
         self.log: Index  # (rows,) which log
         self.block: Index  # (rows,)
@@ -233,25 +230,39 @@ class Flights:
         self.t: Array  # (rows,) s
         self.period: float  # s, from row to row
         self._lay_rows()
-        self.sensor_noise: Array  # (rows, 6) a sample of what sensors alone leave
-        self.visible_noise: Array  # (rows, 6) of it, what the logs themselves show
         # of a log that is read by its IMU: effects that leave no trace in it at all, and those that
         # would show beside a pose
         self.without_trace: frozenset[str] = frozenset()
         self.needs_pose: frozenset[str] = frozenset()
-        self.not_identifiable: frozenset[
-            str
-        ]  # effects whose columns are sensor noise to a large part
-        self.rotor_noise: (
-            Array  # (4,) its share of the variance of what the rotors deliver: thrust and torque
-        )
-        self.sensor_noise, self.not_identifiable, self.rotor_noise = self._repeat_sensor_noise()
+        # the noise is added to the logs once more, and the change is what noise makes
+        noisy = self._noisier()
+        self.visible_noise: Array = noisy.residual({}) - self.residual({})  # (rows, 6), as logged
+        # what is identifiable depends on the noise that there is, not on what shows of it
+        noisy = self._noisier(hidden=True) if self.filtered else noisy
+        self.sensor_noise: Array = noisy.residual({}) - self.residual({})  # (rows, 6)
+        # effects whose columns are sensor noise to a large part
+        self.not_identifiable = self._lost_in_noise(noisy)
+        rotors, more = self.rotor_wrench({}), noisy.rotor_wrench({})
+        # (4,) its share of the variance of what the rotors deliver: thrust and torque
+        self.rotor_noise = np.var(more - rotors, axis=0) / np.maximum(np.var(rotors, axis=0), 1e-30)
+
+    def _forget(self) -> None:
+        """Keep nothing of what was computed."""
+        self._pieces: dict[tuple[object, ...], list[Piece]] = {}
+        self._columns: dict[tuple[object, ...], dict[Column, Array]] = {}
+        self._residuals: dict[tuple[object, ...], Array] = {}
+
+    def _noisier(self, hidden: bool = False) -> "Flights":
+        """Return the same rows of louder logs; ``hidden``: by what noise a filter hides."""
+        out = copy(self)
+        out._forget()
+        out.logs = tuple(noisy_logs(self.logs, self.vehicle, hidden))
+        return out
 
     def _lay_rows(self) -> None:
         """Cut the flights into pieces, and say of which of their samples rows are."""
         self._first = pieces = self.pieces({})
-        log_of, block, fit, start, t = [], [], [], [], []
-        count = 0
+        parts, count = [], 0
         seconds = sum(float(piece.signals.t[-1] - piece.signals.t[0]) for piece in pieces)
         length = (
             REGRESSION.short_block
@@ -261,123 +272,89 @@ class Flights:
         for piece in pieces:
             time = piece.signals.t[piece.rows]
             number = ((time - time[0]) // length).astype(np.int64)
-            log_of.append(np.full(len(time), piece.log))
-            block.append(number + count)
             seen = (
                 np.full(len(time), piece.log < self._fit_logs)
                 if self._has_test
                 else number % REGRESSION.blocks_per_held_out != held_out(number)
             )
-            fit.append(seen)
-            start.append(np.arange(len(time)) == 0)
-            t.append(time)
+            log = np.full(len(time), piece.log)
+            parts.append((log, number + count, seen, np.arange(len(time)) == 0, time))
             count += int(number[-1]) + 1
-        self.log = np.concatenate(log_of)
-        self.block = np.concatenate(block)
-        self.fit_rows = np.concatenate(fit)
-        self.start = np.concatenate(start)
-        self.t = np.concatenate(t)
+        self.log, self.block, self.fit_rows, self.start, self.t = map(
+            np.concatenate, zip(*parts, strict=True)
+        )
         self.period = float(np.median(np.diff(self.t)))
 
     def in_band(self, cutoff_hz: float, rate_hz: float) -> "Flights":
         """Return the same flights with a residual up to another cut-off, and as many rows a second;
         what is identifiable stays as it is.
         """
-        out = self._with_nothing_kept()
+        out = copy(self)
+        out._forget()
         out.residual_hz, out._row_rate_hz, out._first = cutoff_hz, rate_hz, []
         out._lay_rows()
-        noisy = out._with_nothing_kept()
-        noisy.logs = tuple(noisy_logs(out.logs, out.vehicle))
-        out.visible_noise = noisy.residual({}) - out.residual({})
+        out.visible_noise = out._noisier().residual({}) - out.residual({})
         return out
 
-    def _repeat_sensor_noise(self) -> tuple[Array, frozenset[str], Array]:
-        """Return a sample of the residual's sensor noise, the effects that are not identifiable,
-        and the share of noise in the rotors.
-
-        The noise is added to the logs once more, and the change is what noise makes.
-        """
-        noisy = self._with_nothing_kept()  # the same rows of louder logs
-        noisy.logs = tuple(noisy_logs(self.logs, self.vehicle))
-        floor = noisy.residual({}) - self.residual({})
-        self.visible_noise = floor
-        if self.filtered:
-            # what is identifiable depends on the noise that there is, not on what shows of it
-            noisy._pieces, noisy._needs, noisy._offset_signals, noisy._residuals = {}, {}, {}, {}
-            noisy.logs = tuple(noisy_logs(self.logs, self.vehicle, hidden=True))
-            floor = noisy.residual({}) - self.residual({})
-        lost = self._lost_in_noise(noisy, floor)
-        rotors, more = self.rotor_wrench({}), noisy.rotor_wrench({})
-        rounded = np.var(more - rotors, axis=0) / np.maximum(np.var(rotors, axis=0), 1e-30)
-        return floor, lost | self.explained_by_rounding, rounded
-
-    def _lost_in_noise(self, noisy: "Flights", floor: Array) -> frozenset[str]:
+    def _lost_in_noise(self, noisy: "Flights") -> frozenset[str]:
         """Return the effects whose columns are noise to a large part.
 
         Fitted all the same, one would come out too small, or explain the noise of the residual by
         removing it from the pose; of a causal filter, it would mend the filter's gains.
         """
-        weight = 1.0 / (np.mean(np.square(floor), axis=0) + 1e-30)
-        quietly: set[str] = set()  # of these, what the sensors' noise alone hides
-        own: list[Column] = [
-            (e, c.name)
-            for e in names()
-            if not is_nonlinear(e)
-            for c in get(e).coefficients
-            if c.name != CENTRAL
-        ]
-        quiet, loud = self.columns({}, own), noisy.columns({}, own)
-        shares = self._noise_shares(quiet, loud, own, weight)
+        linear = [e for e in names() if not is_nonlinear(e)]
+        shares = self._noise_shares(noisy, linear)
+        lost = {e for e, share in shares.items() if share > _most_noise_share(e)}
         if self.inertial:
             # a column also depends on what the IMU knows badly
-            quietly = {e for e, share in shares.items() if share > _most_noise_share(e)}
-            noisy._pieces, noisy._needs, noisy._offset_signals, noisy._residuals = {}, {}, {}, {}
-            noisy._columns, noisy._drift = {}, np.random.default_rng(1)
-            loud = {c: self._in_own_axes(x, noisy) for c, x in noisy.columns({}, own).items()}
-            shares = self._noise_shares(quiet, loud, own, weight)
-            self.without_trace = frozenset(e for e, share in shares.items() if not share < np.inf)
-        not_identifiable = {e for e, share in shares.items() if share > _most_noise_share(e)}
-        if self.inertial:
-            not_identifiable |= self._lost_in_drift(noisy, weight)
+            quietly = lost  # of these, what the sensors' noise alone hides
+            noisy._forget()
+            noisy._drift = np.random.default_rng(1)
+            shares = self._noise_shares(noisy, [*linear, *filter(is_nonlinear, names())])
+            lost = {e for e, share in shares.items() if share > _most_noise_share(e)}
+            self.without_trace = frozenset(e for e, share in shares.items() if share == np.inf)
             lacking: set[str] = set()  # what no pose would bring back
             if all(log.voltage is None for log in self.logs):
                 lacking |= set(playing(Role.THRUST_OVER_VOLTAGE))
             if self.commanded:
                 lacking |= needing(*NOT_COMMANDED)
-            self.needs_pose = frozenset(not_identifiable - (quietly - self.without_trace) - lacking)
+            self.needs_pose = frozenset(lost - (quietly - self.without_trace) - lacking)
         if self.commanded:
-            not_identifiable |= needing(*NOT_COMMANDED)
+            lost |= needing(*NOT_COMMANDED)
         if self.filtered:
-            not_identifiable |= lost_behind_a_filter()
-        return frozenset(not_identifiable)
+            lost |= lost_behind_a_filter()
+        if not self.rotor_speeds_vary:
+            lost |= needing(Need.FINE_ROTOR_SPEEDS)
+        return frozenset(lost)
 
-    def _with_nothing_kept(self) -> "Flights":
-        out = copy(self)
-        out._pieces, out._columns, out._needs = {}, {}, {}
-        out._offset_signals, out._residuals = {}, {}
-        return out
-
-    def _noise_shares(
-        self,
-        quiet: dict[Column, Array],
-        loud: dict[Column, Array],
-        own: Sequence[Column],
-        weight: Array,
-    ) -> dict[str, float]:
-        """Return the share of noise in the columns of each effect; infinite where an effect leaves
-        no trace at all in an IMU.
+    def _noise_shares(self, noisy: "Flights", effects: Iterable[str]) -> dict[str, float]:
+        """Return the share of noise in what each effect adds; infinite where an effect leaves no
+        trace at all in an IMU.
         """
+        weight = 1.0 / (np.mean(np.square(self.sensor_noise), axis=0) + 1e-30)
         out = {}
-        for effect in dict.fromkeys(e for e, _ in own):
+        for effect in effects:
             noise = whole = 0.0
-            for c in (c for c in own if c[0] == effect):
-                scale = weight * typical_size(c, self.vehicle) ** 2
-                noise += float(scale @ np.mean(np.square(loud[c] - quiet[c]), axis=0))
-                whole += float(scale @ np.mean(np.square(quiet[c]), axis=0))
+            pairs = zip(self._typical_parts(effect), noisy._typical_parts(effect), strict=True)
+            for quiet, loud in pairs:
+                turned = loud if noisy._drift is None else self._in_own_axes(loud, noisy)
+                noise += float(weight @ np.mean(np.square(turned - quiet), axis=0))
+                whole += float(weight @ np.mean(np.square(quiet), axis=0))
             out[effect] = (
                 noise / whole if whole > 0.0 else np.inf if self.inertial or noise > 0.0 else 0.0
             )
         return out
+
+    def _typical_parts(self, effect: str) -> list[Array]:
+        """Return what typical coefficients of an effect explain (rows, 6), one by one; all together
+        where its force is no sum over them.
+        """
+        own: list[Column] = [(effect, c.name) for c in get(effect).coefficients]
+        if is_nonlinear(effect):
+            setting = {effect: {c[1]: typical_size(c, self.vehicle) for c in own}}
+            return [self.residual({}) - self.residual(setting)]
+        columns = self.columns({}, [c for c in own if c[1] != CENTRAL])
+        return [typical_size(c, self.vehicle) * x for c, x in columns.items()]
 
     def _in_own_axes(self, x: Array, noisy: "Flights") -> Array:
         """Return a column (rows, 6) of a copy whose fusion errs otherwise, its force turned from
@@ -386,35 +363,11 @@ class Flights:
         An attitude that is wrong turns needed and modelled force alike: only what acts in other
         axes than the body's changes with it.
         """
-        pairs = zip(self.pieces({}), noisy.pieces({}), strict=True)
-        turn = np.concatenate(
-            [
-                np.einsum("nij,nkj->nik", a.signals.rotation[a.rows], b.signals.rotation[b.rows])
-                for a, b in pairs
-            ]
+        own, other = (
+            np.concatenate([p.signals.rotation[p.rows] for p in flights.pieces({})])
+            for flights in (self, noisy)
         )
-        return np.column_stack([np.einsum("nij,nj->ni", turn, x[:, :3]), x[:, 3:]])
-
-    def _lost_in_drift(self, noisy: "Flights", weight: Array) -> frozenset[str]:
-        """Return which nonlinear effects change by more than a share of themselves where the fusion
-        of the IMU errs otherwise.
-        """
-        lost = set()
-        for effect in filter(is_nonlinear, names()):
-            setting = {
-                effect: {
-                    c.name: abs(typical_size((effect, c.name), self.vehicle))
-                    for c in get(effect).coefficients
-                }
-            }
-            own = self.residual(setting) - self.residual({})
-            other = self._in_own_axes(noisy.residual(setting) - noisy.residual({}), noisy)
-            noise, whole = (
-                float(weight @ np.mean(np.square(x), axis=0)) for x in (other - own, own)
-            )
-            if not noise <= REGRESSION.most_noise_share * whole:
-                lost.add(effect)
-        return frozenset(lost)
+        return np.column_stack([np.einsum("nij,nkj,nk->ni", own, other, x[:, :3]), x[:, 3:]])
 
     def rotor_wrench(self, setting: Setting) -> Array:
         """Return what the rotors deliver at the rows (rows, 4): thrust (N) and torque (Nm, body),
@@ -447,13 +400,6 @@ class Flights:
             > REGRESSION.least_steps_of_rotor_speed * self.vehicle.omega_lsb
         )
 
-    @property
-    def explained_by_rounding(self) -> frozenset[str]:
-        """The effects that would explain the rounding, where rotor speeds hardly leave their
-        rounding steps.
-        """
-        return frozenset() if self.rotor_speeds_vary else needing(Need.FINE_ROTOR_SPEEDS)
-
     def pieces(self, setting: Setting) -> list[Piece]:
         """Return the pieces, with what the vehicle's sensing effects did to the logs undone."""
         vehicle = self.amended(setting)
@@ -462,20 +408,9 @@ class Flights:
             for e in vehicle.effects
             if get(e.name).kind == "sensing"
         )
-        if sensing not in self._pieces:
-            if (
-                len(self._pieces)
-                * max(
-                    REGRESSION.bytes_per_sample * sum(len(p.signals.t) for p in self._first),
-                    REGRESSION.memory // 40,
-                )
-                > REGRESSION.memory
-            ):
-                self._pieces.clear()
-                self._needs.clear()
-                self._offset_signals.clear()
-            self._pieces[sensing] = self._cut(vehicle)
-        return self._pieces[sensing]
+        size = 400 * max(sum(len(p.signals.t) for p in self._first), 1)  # bytes
+        most = min(max(REGRESSION.memory // size, 1), 40)
+        return _kept(self._pieces, sensing, lambda: self._cut(vehicle), most)
 
     def _cut(self, vehicle: Vehicle) -> list[Piece]:
         found: list[tuple[int, Signals]] = [
@@ -490,7 +425,7 @@ class Flights:
         if self.commanded:
             found = [(i, downsampled(s)) for i, s in found]
         if not self._first:
-            return [Piece(i, s, _rows(s, self._row_rate_hz)) for i, s in found]
+            return [self._piece(i, s, _rows(s, self._row_rate_hz)) for i, s in found]
         # a clock offset moves the start of a piece: the rows stay where they are in time
         pieces = []
         for first in self._first:
@@ -500,19 +435,23 @@ class Flights:
                 for i, s in found
                 if i == first.log and s.t[0] <= wanted[0] and s.t[-1] >= wanted[-1]
             )
-            pieces.append(
-                Piece(first.log, s, np.rint((wanted - s.t[0]) / s.period).astype(np.int64))
-            )
+            rows = np.rint((wanted - s.t[0]) / s.period).astype(np.int64)
+            pieces.append(self._piece(first.log, s, rows))
         return pieces
+
+    def _piece(self, log: int, signals: Signals, rows: Index) -> Piece:
+        needed = needed_wrench(signals, self.vehicle)
+        if self.commanded:
+            needed[:, 3:] = 0.0
+        return Piece(log, signals, rows, low_pass(needed, self.residual_hz, signals.period)[rows])
 
     def _inertial_signals(self, log: FlightLog) -> list[InertialSignals]:
         # no effect of the library changes what an IMU measured: each log is fused once
-        if id(log) not in self._fused:
-            self._fused[id(log)] = log, inertial_signals(log, self.vehicle.gravity)
-        found = self._fused[id(log)][1]
+        if log not in self._fused:
+            self._fused[log] = inertial_signals(log, self.vehicle.gravity)
         if self._drift is None:
-            return found
-        return [with_drift(s, self._drift, self.vehicle.gravity) for s in found]
+            return self._fused[log]
+        return [with_drift(s, self._drift, self.vehicle.gravity) for s in self._fused[log]]
 
     def bias_std(self, flight: int) -> Array:
         """Return the standard deviation (3,) m/s2 of what is left of a flight's accelerometer
@@ -571,20 +510,21 @@ class Flights:
         all, with the mass; and no noise of differentiation is multiplied by a coefficient.
         """
         key = tuple((name, *sorted(values.items())) for name, values in setting.items())
-        if key not in self._residuals:
+
+        def made() -> Array:
             pieces = zip(self.pieces(setting), self.model(setting), strict=True)
             found = np.concatenate(
                 [
-                    self._needed(piece)
+                    piece.needed
                     - low_pass(model, self.residual_hz, piece.signals.period)[piece.rows]
                     for piece, model in pieces
                 ]
             )
             found.setflags(write=False)
-            if len(self._residuals) == REGRESSION.kept_residuals:
-                self._residuals.pop(next(iter(self._residuals)))
-            self._residuals[key] = found
-        return self._residuals[key]
+            return found
+
+        # a fit asks several times for the residual at its setting
+        return _kept(self._residuals, key, made, 16)
 
     def model(self, setting: Setting) -> list[Array]:
         """Return the force and the torque (n, 6) of each sample of each piece that these effects
@@ -597,7 +537,7 @@ class Flights:
         offsets = setting.get(ROTOR_TIME_OFFSET[0], {})
         out = []
         for piece in self.pieces(setting):
-            s = self._with_time_offsets(piece, offsets)
+            s = with_time_offsets(piece.signals, offsets)
             s = with_uneven_lag(s, vehicle, offsets.get(LAG_ASYMMETRY[1], 0.0))
             model, _ = acting_wrench(s, vehicle, self.vehicle)
             if self.inertial and (off := bias(setting, piece.log)).any():
@@ -606,20 +546,6 @@ class Flights:
                 model[:, 3:] = 0.0
             out.append(model)
         return out
-
-    def _needed(self, piece: Piece) -> Array:
-        """Return what the measured motion of a piece needs (rows, 6), by the declared mass and
-        inertia.
-        """
-        if id(piece) not in self._needs:
-            needed = needed_wrench(piece.signals, self.vehicle)
-            if self.commanded:
-                needed[:, 3:] = 0.0
-            self._needs[id(piece)] = (
-                piece,
-                low_pass(needed, self.residual_hz, piece.signals.period)[piece.rows],
-            )
-        return self._needs[id(piece)][1]
 
     def felt(self, setting: Setting) -> Array | None:
         """Return the force (rows, 3) N, world, by which the accelerometers differ from what the
@@ -636,24 +562,10 @@ class Flights:
             read = resampled(s.t, *self._smooth_imu[piece.log])
             force = self.vehicle.mass * np.einsum("nij,nj->ni", s.rotation, read)
             smooth = low_pass(force, self.residual_hz, s.period)[piece.rows]
-            out.append(smooth - self._needed(piece)[:, :3])
+            out.append(smooth - piece.needed[:, :3])
         return np.concatenate(out)
 
-    def _with_time_offsets(self, piece: Piece, offsets: Mapping[str, float]) -> Signals:
-        key = (
-            id(piece),
-            offsets.get(ROTOR_TIME_OFFSET[1], 0.0),
-            offsets.get(ATTITUDE_TIME_OFFSET[1], 0.0),
-            offsets.get(VELOCITY_TIME_OFFSET[1], 0.0),
-            offsets.get(ROTOR_SPREAD[1], 0.0),
-        )
-        if key not in self._offset_signals:
-            if len(self._offset_signals) > 4 * len(self._first):
-                self._offset_signals.clear()
-            self._offset_signals[key] = piece, with_time_offsets(piece.signals, offsets)
-        return self._offset_signals[key][1]
-
-    def _kept(self, setting: Setting) -> dict[Column, Array]:
+    def _kept_columns(self, setting: Setting) -> dict[Column, Array]:
         """Return the columns of effects that were computed before and hardly change with this
         setting.
 
@@ -667,14 +579,7 @@ class Flights:
             if name and (get(name).sets_wind or get(name).kind != "wrench")
             for c, value in sorted(values.items())
         )
-        if key not in self._columns:
-            if (
-                len(self._columns) > 12
-                or sum(map(len, self._columns.values())) * 48 * len(self.t) > REGRESSION.memory
-            ):
-                self._columns.clear()
-            self._columns[key] = {}
-        return self._columns[key]
+        return _kept(self._columns, key, dict, 12)
 
     def _slope(self, setting: Setting, column: Column, base: Array, delta: float) -> Array:
         """Return what a unit of a coefficient adds (rows, 6), by a difference of ``delta`` from the
@@ -715,19 +620,25 @@ class Flights:
         """
         base = self.residual(setting)
         out: dict[Column, Array] = {}
-        kept = self._kept(setting)
+        kept = self._kept_columns(setting)
         for column in wanted:
             effect = column[0]
-            keep = effect not in setting and effect != ""
-            if keep and column in kept:
-                out[column] = kept[column]
-                continue
-            out[column] = self._slope(
-                setting, column, base, step * typical_size(column, self.vehicle)
-            )
-            if keep:
-                kept[column] = out[column]
+            known = kept if effect and effect not in setting else {}
+            if column not in known:
+                delta = step * typical_size(column, self.vehicle)
+                known[column] = self._slope(setting, column, base, delta)
+            out[column] = known[column]
         return out
+
+
+def _kept(memory: dict[K, V], key: K, make: Callable[[], V], most: int) -> V:
+    """Return what is kept under a key, or make it; of more than so many, that which was not asked
+    for the longest goes.
+    """
+    memory[key] = memory.pop(key) if key in memory else make()
+    if len(memory) > most:
+        memory.pop(next(iter(memory)))
+    return memory[key]
 
 
 def _reads_throughout(log: FlightLog) -> bool:

@@ -4,40 +4,36 @@ settings.
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from ...dynamics.effects import Role, playing
-from ...runtime.errors import InputError
 from ..motion.smoothing import low_pass
-from .climbing import linear_mode, mode
-from .discrepancy import State, changing_columns, discrepancy_columns, variables
-from .evidence import Index, marginal, tempering
-from .likelihood import NUISANCE, UNKNOWN, Sums, declared
-from .priors import Base, Setting, in_prior_units, prior_size
-from .regression import START_PREFIX, Column, Flights
-from .row_noise import RowNoise, fitted_noise, white_noise
+from .causal_filter import State
+from .climbing import Height, height, linearised, mode
+from .discrepancy import changing_columns, discrepancy_columns, variables
+from .evidence import tempering
+from .priors import (
+    NUISANCE,
+    UNKNOWN,
+    Base,
+    Setting,
+    Starts,
+    declared,
+    in_prior_units,
+    prior_size,
+)
+from .regression import Column, Flights, without
+from .row_noise import ROW_NOISE, RowNoise, fitted_noise, white_noise
 from .row_nuisances import answered, followers, row_nuisances
 from .rows import Rows
 from .sensor_bias import flight_and_axis
 from .time_offsets import LAG_ASYMMETRY, timing_of
 
 Array = NDArray[np.float64]
-Starts = Mapping[Column, Mapping[str, float]]
-
-
-@dataclass(frozen=True)
-class RowLikelihoodSettings:
-    """When fits stop."""
-
-    noise_rounds: int = 3
-    idle: float = 1e-6  # of the largest residual, up to which an effect does nothing
-
-
-ROW_LIKELIHOOD = RowLikelihoodSettings()
+IDLE = 1e-6  # of the largest residual, up to which an effect does nothing
 
 
 class RowLikelihood:
@@ -100,7 +96,7 @@ class RowLikelihood:
         X = np.stack([*own, *self.nuisances.values(), *answers.values()], axis=2)
         known = X.shape[2] - len(answers)
         noise = white_noise(y, rows.begins, rows.fit)
-        for _ in range(ROW_LIKELIHOOD.noise_rounds):
+        for _ in range(ROW_NOISE.rounds):
             use = rows.fit & noise.known
             x = noise.white(X)[use].reshape(-1, X.shape[2])
             z = noise.white(y)[use].ravel()
@@ -111,46 +107,35 @@ class RowLikelihood:
     def _white(self, x: Array) -> Array:
         return self.noise.white(x)[self._use]
 
-    # Sums
-
-    def sums(
-        self, setting: Setting, wanted: Iterable[Column], starts: Starts, unknown: bool = False
-    ) -> Sums:
-        """Return the sums of products about a setting, of these columns, of the nuisances and of
-        the residual.
+    def base(
+        self,
+        setting: Setting,
+        starts: Starts,
+        effects: Iterable[str] | None = None,
+        unknown: bool = False,
+    ) -> Base:
+        """Return the likelihood about a setting.
 
         Args:
             setting: of effects.
-            wanted: coefficients of effects.
             starts: columns of whole effects, with the coefficients of each.
+            effects: that are asked about; default: all of the library.
             unknown: whether the dictionary's columns are among them.
         """
-        rows, residual = self.rows, self.rows.residual(setting)
+        rows, flights, residual = self.rows, self.flights, self.rows.residual(setting)
+        if effects is None:
+            effects = [e for e in self.library if not flights.is_nonlinear(e) or e in setting]
         columns = dict(self.nuisances) | self._uneven_lag(setting)
-        columns |= rows.columns(setting, [c for c in wanted if not c[1].startswith(START_PREFIX)])
+        columns |= rows.columns(setting, flights.columns_of(effects))
         for c, start in starts.items():
             columns[c] = residual - rows.residual({**setting, c[0]: dict(start)})
         if unknown:
             columns |= self._dictionary() | self._changing(setting)
-        names = tuple(columns)
         x = self._white(np.stack([*columns.values(), residual], axis=2))
-        block = self.rows.block[self._use]
-        ends = np.flatnonzero(np.diff(block)) + 1
+        ends = np.flatnonzero(np.diff(rows.block[self._use])) + 1
         parts = [p.reshape(-1, p.shape[2]) for p in np.split(x, ends)]
-        value = [
-            0.0
-            if not effect or name.startswith(START_PREFIX)
-            else self.flights.coefficients(setting, effect).get(name, 0.0)
-            - declared((effect, name), self.flights)
-            for effect, name in names
-        ]
-        return Sums(names, np.array([p.T @ p for p in parts]), np.array(value), 0.0)
-
-    def base(self, setting: Setting, starts: Starts, unknown: bool = False) -> Base:
-        """Return the likelihood about a setting, with all effects of the library."""
-        linear = [e for e in self.library if not self.flights.is_nonlinear(e) or e in setting]
-        sums = self.sums(setting, self.flights.columns_of(linear), starts, unknown)
-        return in_prior_units(self.flights, sums, setting, starts)
+        blocks = np.array([p.T @ p for p in parts])
+        return in_prior_units(flights, list(columns), blocks, 0.0, setting, starts)
 
     def _dictionary(self) -> dict[Column, Array]:
         flights, vehicle = self.rows.flights, self.flights.vehicle
@@ -181,14 +166,14 @@ class RowLikelihood:
         for s in (p.signals for p in self.rows.flights.pieces({})):
             rotors = vehicle.rotor_wrench(s.rotor_speeds)
             push = rotors[:, :1] / vehicle.mass * s.rotation[:, :, 2]
-            out.append(State(s.position, s.rotation, s.velocity, s.angular_velocity, rotors, push))
+            out.append(State(s.position, s.rotation, s.velocity, s.angular_velocity, push, rotors))
         return out
 
     def _changing(self, setting: Setting) -> dict[Column, Array]:
         """Return the dictionary's columns of effects whose coefficients change."""
         rows, pieces = self.rows, self.rows.flights.pieces({})
         here = rows.residual(setting)
-        parts = {e: [rows.residual(_without(setting, e)) - here] for e in setting}
+        parts = {e: [rows.residual(without(setting, e)) - here] for e in setting}
         found = variables(self._states(), [p.signals.t for p in pieces])
         at_rows = {
             name: [rows.at_rows([z[p.rows] for z, p in zip(x, pieces, strict=True)])]
@@ -201,16 +186,34 @@ class RowLikelihood:
 
     # Fits
 
-    def deviance(self, setting: Setting) -> float:
-        """Return -2 log-likelihood at a setting, with the nuisances integrated out, up to a
-        constant.
-
-        Raises:
-            InputError: no vehicle is like that.
+    def _height(self, setting: Setting) -> Height:
+        """Return how high the posterior is at a setting, up to a constant, with the nuisances
+        integrated out.
         """
+        prior = sum(
+            ((setting[e].get(name, 0.0) - declared((e, name), self.flights)) / size) ** 2
+            for e, name in self.flights.columns_of(setting)
+            if (size := prior_size((e, name), self.flights))
+        )
         w = self._white(self.rows.residual(setting)).ravel()
         factor, b = self._nuisance_sums(w, setting)
-        return self.power * float(w @ w) - float(b @ cho_solve(factor, b))
+        deviance = self.power * float(w @ w) - float(b @ cho_solve(factor, b))
+
+        def target() -> Setting:
+            base = self.base(setting, {}, setting)
+            return linearised(self.flights, base, base.asked, setting, self.power)[1]()
+
+        return 0.5 * (deviance + prior), target
+
+    def objective(self, setting: Setting) -> float:
+        """Return minus the logarithm of likelihood and prior at a setting, up to a constant;
+        infinite where no vehicle is like that.
+        """
+        return height(setting, self._height)[0]
+
+    def fitted(self, setting: Setting) -> Setting:
+        """Return the mode of the posterior of a setting's effects."""
+        return mode(setting, self._height)
 
     def _uneven_lag(self, setting: Setting) -> dict[Column, Array]:
         """Return what rotors that speed up sooner than they slow down do beside a lag."""
@@ -226,20 +229,6 @@ class RowLikelihood:
             inner = np.block([[inner, cross[:, None]], [cross, x @ x]])
             right = np.append(right, x @ w)
         return cho_factor(self.power * inner + np.eye(len(inner))), self.power * right
-
-    def objective(self, setting: Setting) -> float:
-        """Return minus the logarithm of likelihood and prior at a setting, up to a constant;
-        infinite where no vehicle is like that.
-        """
-        prior = sum(
-            ((setting[e].get(name, 0.0) - declared((e, name), self.flights)) / size) ** 2
-            for e, name in self.flights.columns_of(setting)
-            if (size := prior_size((e, name), self.flights))
-        )
-        try:
-            return 0.5 * (self.deviance(setting) + prior)
-        except (InputError, np.linalg.LinAlgError):
-            return math.inf
 
     def sensors(self, setting: Setting) -> dict[str, tuple[float, float]]:
         """Return the likeliest biases of accelerometers from which the motion was read, and the
@@ -266,37 +255,18 @@ class RowLikelihood:
     def idle(self, setting: Setting) -> set[str]:
         """Return the effects of a setting that do nothing there."""
         here = self.rows.residual(setting)
-        least = ROW_LIKELIHOOD.idle * float(np.abs(here).max())
+        least = IDLE * float(np.abs(here).max())
         return {
             effect
             for effect in setting
-            if np.abs(self.rows.residual(_without(setting, effect)) - here).max() <= least
+            if np.abs(self.rows.residual(without(setting, effect)) - here).max() <= least
         }
-
-    def fitted(self, setting: Setting) -> Setting:
-        """Return the mode of the posterior of a setting's effects."""
-        wanted = self.flights.columns_of(setting)
-        return mode(setting, lambda x: (self.objective(x), lambda: self._linear_mode(x, wanted)))
-
-    def _linear_mode(self, setting: Setting, wanted: Sequence[Column]) -> Setting:
-        base = in_prior_units(self.flights, self.sums(setting, wanted, {}), setting, {})
-        asked = np.array([base.columns[c] for c in wanted], dtype=np.intp)
-        total = self.power * base.blocks.sum(axis=0)
-        ones = np.ones(len(base.plain))
-        m = marginal(total[:-1, :-1], total[:-1, -1], 0.0, asked, base.plain, ones)
-        return linear_mode(self.flights, base, m, asked, wanted, setting)
 
     def tempered(self, setting: Setting) -> float:
         """Return the power of the likelihood that its scatter beside a setting allows."""
-        wanted = self.flights.columns_of(setting)
-        base = in_prior_units(self.flights, self.sums(setting, wanted, {}), setting, {})
-        chosen: Index = np.arange(len(base.columns))
-        return tempering(base.blocks, chosen)
+        base = self.base(setting, {}, setting)
+        return tempering(base.blocks, np.arange(len(base.columns)))
 
 
 def _named(columns: Mapping[str, Array]) -> dict[Column, Array]:
     return {("", f"{NUISANCE}{name}"): x for name, x in columns.items()}
-
-
-def _without(setting: Setting, effect: str) -> Setting:
-    return {e: x for e, x in setting.items() if e != effect}

@@ -19,6 +19,7 @@ Mask = NDArray[np.bool_]
 class RowNoiseSettings:
     """The autoregression."""
 
+    rounds: int = 3  # of the noise and of what is explained beside it
     most_lags: int = 3
     rows_per_number: int = 12  # and channel, that a lag must have
     # share of the variance added as white noise, so that what the low-pass took is not blown up

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...dynamics.effects import Role, playing
 from ..motion.smoothing import low_pass
-from .likelihood import LIKELIHOOD, MODEL_ERROR
+from .priors import MODEL_ERROR, PRIORS
 from .rows import Rows
 from .time_offsets import timing_of
 from .turning_delay import rotor_delay
@@ -25,12 +25,9 @@ class NuisanceSettings:
     thrust: float = 0.02  # relative, of a flight against the others: cells, propellers, air
     drift: float = 0.003  # relative, of thrust over a flight, beside the fade and the battery's sag
     delay: float = 0.02  # s, of commands
-    frame_tilt: float = 0.01  # rad, of the motion capture's vertical
-    thrust_axis: float = 0.01  # rad, of the rotors' mean axis
+    tilt: float = 0.01  # rad, of the motion capture's vertical, and of the rotors' mean axis
     accelerometer_bias: float = 0.3  # m/s2, of a MEMS sensor between warm and cold
     accelerometer_scale: float = 0.02  # relative
-    # of what follows disturbances, over these: a loop answers them whole, and overshoots
-    answered: float = 1.0
     stopped: float = 0.1  # s, in which a flight loop stops an angular velocity that it did not want
 
 
@@ -105,9 +102,9 @@ def _of_commands(of: _Flown) -> dict[str, Array]:
     level = flights.vehicle.gravity * of.here[:, None]
     for axis, name in enumerate("xy"):
         if not flights.inertial:
-            tilted = use.frame_tilt * level * of.rotation[:, axis, :]
+            tilted = use.tilt * level * of.rotation[:, axis, :]
             out[f"frame tilt {name} {i}"] = rows.from_body(tilted, of.none)
-        aside = use.thrust_axis * of.along(axis, of.thrust)
+        aside = use.tilt * of.along(axis, of.thrust)
         out[f"thrust axis {name} {i}"] = rows.from_body(aside)
     return out
 
@@ -124,9 +121,9 @@ def _of_rotors(of: _Flown) -> dict[str, Array]:
     varying = of.thrust - of.here * of.thrust[of.here > 0].mean()
     out[f"{MODEL_ERROR} of thrust's changes {i}"] = noise[0] * rows.from_body(of.along(2, varying))
     for axis, name in enumerate("xyz"):
-        force = LIKELIHOOD.model_error * of.along(axis, of.thrust)
+        force = PRIORS.model_error * of.along(axis, of.thrust)
         out[f"{MODEL_ERROR} of force {name} {i}"] = rows.from_body(force)
-        gain = np.hypot(LIKELIHOOD.model_error, noise[1 + axis])
+        gain = np.hypot(PRIORS.model_error, noise[1 + axis])
         torque = gain * of.along(axis, of.turning[:, axis])
         out[f"{MODEL_ERROR} of torque {name} {i}"] = rows.from_body(of.none, torque=torque)
     return out
@@ -193,7 +190,7 @@ def answered(rows: Rows, signals: Sequence[Follower], disturbance: Array) -> dic
         size = signal.size - signal.size[rows.fit].mean()
         own = disturbance[rows.fit][:, list(signal.channels)]
         share = min(float(own.var(axis=0).max() / max(size[rows.fit].var(), 1e-12)), 1.0)
-        out[f"answer by {signal.name}"] = signal.column(rows, NUISANCES.answered * share * size)
+        out[f"answer by {signal.name}"] = signal.column(rows, share * size)
     return out
 
 

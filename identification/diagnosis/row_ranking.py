@@ -8,26 +8,24 @@ The likeliest set is fitted without linearisation, and so is each set that comes
 it, until none does that was not fitted.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from .evidence import marginal, set_evidence
-from .priors import Base, Setting, in_prior_units
+from .evidence import set_evidence
+from .priors import Base, Setting
 from .ranking import Found, starts_of
-from .regression import Column, Flights
+from .regression import Column, Flights, without
 from .row_likelihood import RowLikelihood
 from .sets import Posterior, is_possible
+from .settings import DIAGNOSIS
 
 
 @dataclass(frozen=True)
 class RowRankingSettings:
-    """Which starts are fitted, and what counts as hidden."""
+    """Which starts are fitted."""
 
     most_starts: int = 2  # of an effect with nonlinear coefficients, the likeliest, that are fitted
-    # deviance, up to which an effect does as well as another in its place: a likelihood of 20 to 1
-    apart: float = 6.0
 
 
 ROW_RANKING = RowRankingSettings()
@@ -82,9 +80,10 @@ def rank_by_rows(
             continue
         report(f"trying {effect}")
         own = [{**first, effect: dict(x)} for c, x in starts.items() if c[0] == effect]
-        near = sorted(own, key=likelihood.objective)[: ROW_RANKING.most_starts]
-        if near:
-            add(min(map(likelihood.fitted, near), key=likelihood.objective))
+        own.sort(key=likelihood.objective)
+        if own:
+            near = map(likelihood.fitted, own[: ROW_RANKING.most_starts])
+            add(min(near, key=likelihood.objective))
 
     def likeliest() -> Setting:
         """Return the likeliest set's fit, once no set is likelier that was not fitted."""
@@ -102,7 +101,7 @@ def rank_by_rows(
         """
         while True:
             best = likeliest()
-            less = [{e: x for e, x in best.items() if e != out} for out in best if out not in given]
+            less = [without(best, out) for out in best if out not in given]
             new = [x for x in less if frozenset(x) not in fitted]
             if flights.commanded or not new:
                 return best
@@ -129,19 +128,15 @@ def _behind(
     """
     if not hidden or not best:
         return {}
-    columns = likelihood.flights.columns_of([*best, *hidden])
-    sums = likelihood.sums(best, columns, {})
-    base = in_prior_units(likelihood.flights, sums, best, {})
-    at = np.array([base.columns[c] for c in columns], dtype=np.intp)
-    total = likelihood.power * base.blocks.sum(axis=0)
-    ones = np.ones(len(base.plain))
-    m = marginal(total[:-1, :-1], total[:-1, -1], 0.0, at, base.plain, ones)
+    base = likelihood.base(best, {}, [*best, *hidden])
+    at = base.at(base.asked)
+    m = base.marginal(at, base.plain, power=likelihood.power)
 
     def explained(effects: set[str]) -> float:
-        index = [i for i, (effect, _) in enumerate(columns) if effect in effects]
-        z = set_evidence(m, index, base.low[at], base.high[at]).mode
-        return float(2.0 * m.right[index] @ z - z @ m.normal[np.ix_(index, index)] @ z)
+        index = [i for i, (effect, _) in enumerate(base.asked) if effect in effects]
+        return m.explained(index, set_evidence(m, index, base.low[at], base.high[at]).mode)
 
-    whole = explained(set(best)) - ROW_RANKING.apart
+    # up to the deviance of a rival's likelihood
+    whole = explained(set(best)) + 2.0 * math.log(DIAGNOSIS.least_rival)
     found = {e: tuple(h for h in hidden if explained({*best, h} - {e}) > whole) for e in best}
     return {e: others for e, others in found.items() if others}

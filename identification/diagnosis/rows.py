@@ -149,34 +149,30 @@ class Rows:
         force = noise[:, :3] / self.flights.vehicle.mass
         return self.from_world(force, np.zeros_like(force), noise[:, 3:] / self._inertia)
 
-    def columns(
-        self, setting: Setting, wanted: Iterable[Column], step: float = ROWS.step
-    ) -> dict[Column, Array]:
-        """Return what a unit of each coefficient explains (n, channels), by differences of ``step``
-        typical sizes.
-        """
+    def columns(self, setting: Setting, wanted: Iterable[Column]) -> dict[Column, Array]:
+        """Return what a unit of each coefficient explains (n, channels), by differences."""
         wanted = list(wanted)
         if not wanted:
             return {}
         mass, setting = self.flights.vehicle.mass, {**self.fixed, **setting}
-        found = self.flights.columns(setting, wanted, step)
+        found = self.flights.columns(setting, wanted, ROWS.step)
         pose = np.stack([found[c][:, :3] / mass for c in wanted], axis=2)
         torque = np.stack([found[c][:, 3:] / self._inertia for c in wanted], axis=2)
         both = pose.copy()
         for i, (effect, name) in enumerate(wanted):
             if self.has_accelerometer and effect and get(effect).kind == "sensing":
-                both[:, :, i] += self._felt_slope(setting, (effect, name), step) / mass
+                both[:, :, i] += self._felt_slope(setting, (effect, name)) / mass
         rows = self.from_world(pose, both, torque)
         return {c: rows[:, :, i] for i, c in enumerate(wanted)}
 
-    def _felt_slope(self, setting: Setting, column: Column, step: float) -> Array:
+    def _felt_slope(self, setting: Setting, column: Column) -> Array:
         """Return how a unit of a sensing effect changes what the accelerometer has beyond the pose
         (samples, 3), N.
         """
         effect, name = column
         own = self.flights.coefficients(setting, effect)
         value, c = own.get(name, 0.0), coefficient(column)
-        delta = step * typical_size(column, self.flights.vehicle)
+        delta = ROWS.step * typical_size(column, self.flights.vehicle)
         if value + delta > c.maximum:
             delta = -delta
         moved = self.flights.felt({**setting, effect: {**own, name: value + delta}})

@@ -6,7 +6,6 @@ force itself changes.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,26 +13,12 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class BiasSettings:
-    """Size of the bias that is left."""
-
-    # m/s2, over which derivatives are taken
-    step: float = 0.04
-
-
-BIAS = BiasSettings()
 PREFIX = "accelerometer bias "
 
 
 def bias_columns(count: int) -> list[tuple[str, str]]:
     """Return the columns of the biases of ``count`` flights."""
     return [("", f"{PREFIX}{axis} {i}") for i in range(count) for axis in "xyz"]
-
-
-def is_bias(column: tuple[str, str]) -> bool:
-    """Return whether a column is that of a bias."""
-    return not column[0] and column[1].startswith(PREFIX)
 
 
 def flight_and_axis(name: str) -> tuple[int, int]:

@@ -2,29 +2,43 @@
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import logsumexp
 
 from ...dynamics.effects import get
+from ...dynamics.effects.declaration import Found
 from ..findings import RankedSet, Ranking
-from .coefficient_range import why_implausible
 from .discrepancy import DISCREPANCY
 from .evidence import (
     Index,
     Marginal,
     SetEvidence,
     evidence_of_one_more,
-    log_sum,
-    marginal,
-    one_more,
     set_evidence,
     tempering,
 )
-from .likelihood import UNKNOWN, WHOLE_PREFIX, declared
-from .priors import PRIORS, Base, Setting, Variant, variants_of
-from .regression import CENTRAL, START_PREFIX, Column, Flights, coefficient, moves_time
+from .priors import (
+    PRIORS,
+    UNKNOWN,
+    WHOLE_PREFIX,
+    Base,
+    Setting,
+    Variant,
+    declared,
+    variants_of,
+)
+from .regression import (
+    CENTRAL,
+    START_PREFIX,
+    Column,
+    Flights,
+    coefficient,
+    moves_time,
+    typical_size,
+)
 
 Array = NDArray[np.float64]
 
@@ -49,17 +63,36 @@ class _Candidate:
     variants: tuple[Variant, ...]
     evidence: SetEvidence
 
+    @property
+    def columns(self) -> list[Column]:
+        return [c for _, columns in self.variants for c in columns]
+
 
 def is_possible(
     flights: Flights, setting: Setting, std: Mapping[Column, float], effect: str, plausible: bool
 ) -> bool:
     """Return whether a vehicle can have an effect's coefficients at a setting; ``plausible``: and
     whether they are physics of this effect.
+
+    An effect that stands for another one is often fitted at a bound: a dry friction, named a drag,
+    needs a quadratic part below zero. A true coefficient of zero is at a bound too, but its best
+    fit is not far outside.
     """
-    possible = get(effect).possible
-    if possible is not None and not possible(setting[effect], flights.vehicle):
+    words, vehicle, own = get(effect), flights.vehicle, setting[effect]
+    if words.possible is not None and not words.possible(own, vehicle):
         return False
-    return not (plausible and why_implausible(flights, setting, std, effect))
+    if not plausible or words.implausible is None:
+        return True
+    named = {*(e for e in setting if e), *(e.name for e in vehicle.effects)} - {effect}
+    return not words.implausible(
+        Found(
+            own,
+            {name: std.get((effect, name), 0.0) for name in own},
+            {c.name: typical_size((effect, c.name), vehicle) for c in words.coefficients},
+            flights.speed,
+            frozenset(get(name).family for name in named),
+        )
+    )
 
 
 class Posterior:
@@ -102,24 +135,15 @@ class Posterior:
         found = sorted(self.scores, key=self.scores.__getitem__, reverse=True)
         self._search(0, [self.known[k].variants for k in found[: SETS.kept_asked]])
 
+    def _likeliest(self) -> tuple[Base, _Candidate]:
+        best = self.known[max(self.scores, key=self.scores.__getitem__)]
+        return self.bases[best.base], best
+
     def tempering(self) -> float:
         """Return the power of the likelihood that the scatter beside the likeliest set allows."""
-        best = self.known[max(self.scores, key=self.scores.__getitem__)]
-        base = self.bases[best.base]
-        own = [base.columns[c] for v in best.variants for c in v[1]]
+        base, best = self._likeliest()
+        own = base.at(best.columns)
         return tempering(base.blocks, np.array(sorted([*base.plain, *own]), dtype=np.intp))
-
-    def _marginal(self, base: Base) -> tuple[Marginal, Index, dict[Column, int]]:
-        total = self.power * base.blocks.sum(axis=0)
-        deviance = float(total[-1, -1]) + self.power * base.penalty
-        asked = np.array([i for (e, _), i in base.columns.items() if e], dtype=np.intp)
-        # what any flight may have, and a little of every effect
-        others = np.concatenate([base.plain, asked])
-        normal, right = total[:-1, :-1], total[:-1, -1]
-        little = np.ones(len(right))
-        little[asked] = self._negligible(base, asked)
-        at = {c: i for i, c in enumerate(c for c in base.columns if c[0])}
-        return marginal(normal, right, deviance, asked, others, little[others]), asked, at
 
     def _negligible(self, base: Base, asked: Index) -> Array:
         """Return how much (len(asked),) of each column any flight may have."""
@@ -148,14 +172,11 @@ class Posterior:
         return own <= key and len(own) == most
 
     def _variants(self, base: Base) -> list[Variant]:
-        out = []
-        setting: dict[str, dict[str, float]] = {e: {} for e in base.effects}
-        from_start = [c for c in base.columns if c[1].startswith(START_PREFIX)]
-        starts: dict[Column, dict[str, float]] = {c: {} for c in from_start}
+        out, known = [], self.given is not None
         for effect in self.library:
-            for _, every in variants_of(self.flights, effect, setting, starts):
+            stated = self.flights.stated(effect)
+            for _, every in variants_of(self.flights, effect, base.effects, base.starts):
                 # what a file states is not asked, and a balance does not see where an effect acts
-                stated, known = self.flights.stated(effect), self.given is not None
                 columns = tuple(
                     c
                     for c in every
@@ -168,7 +189,11 @@ class Posterior:
 
     def _search(self, number: int, asked_sets: Sequence[tuple[Variant, ...]] | None = None) -> None:
         base = self.bases[number]
-        m, asked, at = self._marginal(base)
+        asked = base.at(base.asked)
+        at = {c: i for i, c in enumerate(base.asked)}
+        # integrated out: what any flight may have, and a little of every effect
+        little = np.concatenate([np.ones(len(base.plain)), self._negligible(base, asked)])
+        m = base.marginal(asked, np.concatenate([base.plain, asked]), little, self.power)
         low, high = base.low[asked], base.high[asked]
         variants = self._variants(base)
         ways = {e: sum(v[0] == e for v in variants) for e, _ in variants}
@@ -182,10 +207,10 @@ class Posterior:
                 evidence = set_evidence(m, index, low, high)
             except np.linalg.LinAlgError:
                 return -math.inf
-            value = evidence.log_evidence - sum(math.log(ways[e]) for e, _ in some)
             if not self._possible(base, some, evidence):
                 return -math.inf
-            total = value + self._log_prior(len(some))
+            total = evidence.log_evidence - sum(math.log(ways[e]) for e, _ in some)
+            total += self._log_prior(len(some))
             if total > self.scores.get(key, -math.inf):
                 self.scores[key] = total
                 self.known[key] = _Candidate(number, some, evidence)
@@ -244,19 +269,14 @@ class Posterior:
         """
         none, more = [], []
         for base in (self.bases[-1], *((quieter,) if quieter else ())):
-            normal, right, chosen, size, tried = sums = self._beside_best(base)
-            deviance = float(normal[-1, -1]) + self._dictionary_power * base.penalty
-            m = marginal(normal[:-1, :-1], right[:-1], deviance, chosen[:0], chosen, size)
+            m = self._dictionary_beside_best(base)
             names = list(base.columns)
             groups: dict[str, list[int]] = {}
-            for i in tried.tolist():
-                groups.setdefault(names[i][1].split(": ")[0], []).append(i)
-            found = [
-                evidence_of_one_more(*sums[:4], np.array(i), DISCREPANCY.sizes)
-                for i in groups.values()
-            ]
+            for i, at in enumerate(base.dictionary.tolist()):
+                groups.setdefault(names[at][1].split(": ")[0], []).append(i)
+            found = [evidence_of_one_more(m, i, DISCREPANCY.sizes) for i in groups.values()]
             none.append(m.constant)
-            more.append(m.constant + log_sum(found) - math.log(len(found)))
+            more.append(m.constant + float(logsumexp(found)) - math.log(len(found)))
         return max(more) - max(none)
 
     def strangest(self) -> tuple[Column, float, float]:
@@ -264,22 +284,12 @@ class Posterior:
         coefficient, and the deviance that it explains.
         """
         base = self.bases[-1]
-        score, left = one_more(*self._beside_best(base))
-        gains = np.square(score) / left
+        m = self._dictionary_beside_best(base)
+        coefficients = m.right / m.own
+        gains = m.right * coefficients
         best = int(np.argmax(gains))
         name = list(base.columns)[base.dictionary[best]]
-        return name, float(score[best] / left[best]), float(gains[best])
-
-    def _split(self, base: Base, asked: Index, beside: Sequence[int]) -> Marginal:
-        """Return the likelihood of some columns of a base with others integrated out."""
-        total = self.power * base.blocks.sum(axis=0)
-        others = np.array([*base.plain, *beside], dtype=np.intp)
-        ones = np.ones(len(others))
-        return marginal(total[:-1, :-1], total[:-1, -1], float(total[-1, -1]), asked, others, ones)
-
-    def _best(self) -> tuple[Base, _Candidate]:
-        best = self.known[max(self.scores, key=self.scores.__getitem__)]
-        return self.bases[best.base], best
+        return name, float(coefficients[best]), float(gains[best])
 
     def log_bayes_factor(self, effect: str) -> float:
         """Return by how much the likeliest set with an effect is likelier than the likeliest
@@ -293,16 +303,12 @@ class Posterior:
 
     def left(self) -> float:
         """Return the deviance that the likeliest set leaves, with the nuisances integrated out."""
-        base, best = self._best()
-        at = np.array([base.columns[c] for v in best.variants for c in v[1]], dtype=np.intp)
-        m = self._split(base, at, [])
-        inner = np.eye(len(base.plain))  # of the nuisances' integral the logarithm is no deviance
-        total = self.power * base.blocks.sum(axis=0)
-        inner += total[np.ix_(base.plain, base.plain)]
-        log_volume = 0.5 * float(np.linalg.slogdet(inner)[1])
-        whole = -2.0 * (m.constant + log_volume)
-        z = best.evidence.mode
-        return whole - float(2.0 * m.right @ z - z @ m.normal @ z)
+        base, best = self._likeliest()
+        m = base.marginal(base.at(best.columns), base.plain, power=self.power)
+        # of the nuisances' integral the logarithm is no deviance
+        log_volume = 0.5 * float(np.linalg.slogdet(base.mode(base.plain, self.power)[1])[1])
+        whole = -2.0 * (m.constant + log_volume) - self.power * base.penalty
+        return whole - m.explained(range(len(m.right)), best.evidence.mode)
 
     def alone(self) -> dict[str, float]:
         """Return the deviance that each effect of the library explains alone, beside what every set
@@ -310,35 +316,28 @@ class Posterior:
         """
         given = self.given or frozenset()
         base = next(x for x in self.bases if x.effects == given)
-        always = [i for (e, _), i in base.columns.items() if e in given]
-        asked = np.array([i for (e, _), i in base.columns.items() if e and e not in given])
-        m = self._split(base, asked, always)
-        at = {i: k for k, i in enumerate(asked.tolist())}
-
-        def explained(index: list[int]) -> float:
-            z = set_evidence(m, index, base.low[asked], base.high[asked]).mode
-            return float(2.0 * m.right[index] @ z - z @ m.normal[np.ix_(index, index)] @ z)
-
+        asked = [c for c in base.asked if c[0] not in given]
+        always = base.at(c for c in base.asked if c[0] in given)
+        at, index = base.at(asked), {c: i for i, c in enumerate(asked)}
+        m = base.marginal(at, np.append(base.plain, always), power=self.power)
         normal = m.normal + np.eye(len(asked))
         whole = max(float(m.right @ np.linalg.solve(normal, m.right)), 1e-12)
         out: dict[str, float] = {}
         for effect, columns in self._variants(base):
             if effect not in given:
-                share = explained([at[base.columns[c]] for c in columns]) / whole
-                out[effect] = max(out.get(effect, 0.0), share)
+                own = [index[c] for c in columns]
+                z = set_evidence(m, own, base.low[at], base.high[at]).mode
+                out[effect] = max(out.get(effect, 0.0), m.explained(own, z) / whole)
         return out
 
     def nuisances(self) -> dict[Column, tuple[float, float]]:
         """Return what any flight may have beside effects, at the mode beside the likeliest set:
         values and standard deviations.
         """
-        base, best = self._best()
-        own = [base.columns[c] for v in best.variants for c in v[1]]
-        chosen, count = np.array([*base.plain, *own], dtype=np.intp), len(base.plain)
-        total = self.power * base.blocks.sum(axis=0)
-        normal = total[np.ix_(chosen, chosen)] + np.eye(len(chosen))
-        value = np.linalg.solve(normal, total[chosen, -1])[:count]
-        std = np.sqrt(np.diag(np.linalg.inv(normal)))[:count]
+        base, best = self._likeliest()
+        count = len(base.plain)
+        mode, normal = base.mode(np.append(base.plain, base.at(best.columns)), self.power)
+        value, std = mode[:count], np.sqrt(np.diag(np.linalg.inv(normal)))[:count]
         names = list(base.columns)
         size = base.size[base.plain]
         return {
@@ -350,46 +349,35 @@ class Posterior:
         """Return for each effect outside the likeliest set by how much a typical size of it changes
         the deviance; ``known``: nuisances of which nothing is left to find out.
         """
-        base, best = self._best()
-        own = [base.columns[c] for v in best.variants for c in v[1]]
-        base = replace(base, plain=np.setdiff1d(base.plain, [base.columns[c] for c in known]))
+        base, best = self._likeliest()
+        others = np.append(np.setdiff1d(base.plain, base.at(known)), base.at(best.columns))
+        m = base.marginal(base.at(base.asked), others, power=self.power)
+        index = {c: i for i, c in enumerate(base.asked)}
         out: dict[str, float] = {}
         for effect, columns in self._variants(base):
             starts = any(c[1].startswith(START_PREFIX) for c in columns)
             if starts or effect in {e for e, _ in best.variants}:
                 continue
-            at = np.array([base.columns[c] for c in columns], dtype=np.intp)
             names = [(e, name.removeprefix(WHOLE_PREFIX)) for e, name in columns]
-            z = base.typical[at] * np.sign([coefficient(c).typical[0] for c in names])
-            shown = float(z @ self._split(base, at, own).normal @ z)
-            out[effect] = max(shown, out.get(effect, 0.0))
+            sign = np.sign([coefficient(c).typical[0] for c in names])
+            z, i = base.typical[base.at(columns)] * sign, [index[c] for c in columns]
+            out[effect] = max(float(z @ m.normal[np.ix_(i, i)] @ z), out.get(effect, 0.0))
         return out
 
-    @property
-    def _dictionary_power(self) -> float:
-        """Power of the likelihood that the dictionary is asked with."""
-        varied = self.flights.commanded or self.flights.rotor_speeds_vary
-        return self.power * (1.0 if varied else DISCREPANCY.rounded)
-
-    def _beside_best(self, base: Base) -> tuple[Array, Array, Index, Array, Index]:
-        """Return the sums of a base that has the dictionary's columns, those that the likeliest set
-        has there with their sizes, and the dictionary's.
+    def _dictionary_beside_best(self, base: Base) -> Marginal:
+        """Return the likelihood of the dictionary's columns of a base beside what the likeliest set
+        has there.
         """
-        best = max(self.scores, key=self.scores.__getitem__)
-        own = [
-            base.columns[c] for v in self.known[best].variants for c in v[1] if c in base.columns
-        ]
-        asked = np.array([i for (e, _), i in base.columns.items() if e], dtype=np.intp)
-        little = self._negligible(base, asked)
-        chosen = np.array([*base.plain, *asked, *own], dtype=np.intp)
-        total = self._dictionary_power * base.blocks.sum(axis=0)
+        own = base.at(c for c in self._likeliest()[1].columns if c in base.columns)
+        asked = base.at(base.asked)
         # an effect of the set is true to some per cent, whatever it changes with
-        names = list(base.columns)
-        changing = [i for i in base.dictionary.tolist() if names[i][1].startswith(CHANGING)]
+        changing = base.at(c for c in base.columns if c[1].startswith(CHANGING))
         wrong = np.full(len(changing), DISCREPANCY.model_error / DISCREPANCY.share_of_effect)
-        chosen = np.append(chosen, np.array(changing, dtype=np.intp))
-        size = np.concatenate([np.ones(len(base.plain)), little, np.ones(len(own)), wrong])
-        return total, total[:, -1], chosen, size, base.dictionary
+        little, ones = self._negligible(base, asked), np.ones(len(base.plain) + len(own))
+        chosen = np.concatenate([base.plain, own, asked, changing])
+        varied = self.flights.commanded or self.flights.rotor_speeds_vary
+        power = self.power * (1.0 if varied else DISCREPANCY.rounded)
+        return base.marginal(base.dictionary, chosen, np.concatenate([ones, little, wrong]), power)
 
     def best_setting(self, most: int = SETS.most_effects) -> Setting:
         """Return the coefficients of the likeliest set of at most so many effects."""
@@ -446,7 +434,7 @@ class Posterior:
 
     def ranking(self, quieter: Base | None = None) -> Ranking:
         """Return probabilities; ``quieter`` as of ``structure``."""
-        total = log_sum(list(self.scores.values()))
+        total = float(logsumexp(list(self.scores.values())))
         p = {k: math.exp(v - total) for k, v in self.scores.items()}
         probability = {e: sum(x for k, x in p.items() if e in k) for e in self.library}
         best = sorted(p, key=p.__getitem__, reverse=True)

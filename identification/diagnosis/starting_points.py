@@ -52,9 +52,9 @@ def starting_points(
     declared = get(effect).starting_points
     if declared is None:
         return []
-    thin = [_thinned(piece.signals, _every(piece.rows)) for piece in flights.pieces({})]
-    seen = flights.fit_rows
     pieces = flights.pieces({})
+    thin = [piece.signals.at(_every(piece.rows)) for piece in pieces]
+    seen = flights.fit_rows
     found = [
         dict(start)
         for start in declared(
@@ -88,15 +88,15 @@ def _likeness(
     none.
     """
     bare = replace(flights.vehicle, effects=())
-    first = bare.with_effects(EffectSetting(effect, starts[0]))
-    whole = not _is_steady(flights.pieces({})[0].signals, first)
+    pieces = flights.pieces({})
+    whole = not _is_steady(pieces[0].signals, bare.with_effects(EffectSetting(effect, starts[0])))
     looked_at, rows, picked = [], [], []
     row = 0
-    for piece in flights.pieces({}):
+    for piece in pieces:
         at = _every(piece.rows)
         rows.append(row + np.searchsorted(piece.rows, at))
         row += len(piece.rows)
-        looked_at.append(piece.signals if whole else _thinned(piece.signals, at))
+        looked_at.append(piece.signals if whole else piece.signals.at(at))
         picked.append(at if whole else np.arange(len(at)))
     every = np.concatenate(rows)
     seen = flights.fit_rows[every]
@@ -122,10 +122,8 @@ def _is_steady(signals: Signals, vehicle: Vehicle) -> bool:
     """Return whether a vehicle's effects do the same as long as nothing else changes: they have no
     state of their own and go by no clock, so not every sample need be looked at.
     """
-    same = replace(
-        _thinned(signals, np.zeros(STARTING.steady_samples, dtype=np.int64)),
-        period=STARTING.steady_period,
-    )
+    still = signals.at(np.zeros(STARTING.steady_samples, dtype=np.int64))
+    same = replace(still, period=STARTING.steady_period)
     found = residual_wrench(same, vehicle)
     return bool(np.all(found == found[0]))
 
@@ -133,20 +131,3 @@ def _is_steady(signals: Signals, vehicle: Vehicle) -> bool:
 def _every(rows: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return every so many-th row of a piece."""
     return rows[:: max(1, STARTING.sample_step // max(1, int(rows[1] - rows[0])))]
-
-
-def _thinned(signals: Signals, at: NDArray[np.int64]) -> Signals:
-    """Return the signals at some samples, with the period as it was."""
-    s = signals
-    return Signals(
-        s.t[at],
-        s.period,
-        s.position[at],
-        s.rotation[at],
-        s.velocity[at],
-        s.acceleration[at],
-        s.angular_velocity[at],
-        s.angular_acceleration[at],
-        s.rotor_speeds[at],
-        None if s.voltage is None else s.voltage[at],
-    )

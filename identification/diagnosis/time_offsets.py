@@ -14,27 +14,6 @@ from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import Vehicle
 from ..motion.signals import Signals
 
-
-@dataclass(frozen=True)
-class TimingSettings:
-    """Typical sizes and ranges of what is apart."""
-
-    rotor_time_offset_range: tuple[float, float] = (-0.006, 0.006)  # s
-    # s, the same where the pose was filtered before the log was written: a causal low-pass of 5 Hz
-    # is 45 ms late, an estimator some more
-    filtered_rotor_time_offset_range: tuple[float, float] = (-0.1, 0.1)
-    # s, typical size of a time offset, and of the rotors' where the pose was filtered
-    time_offset_size: float = 0.0025
-    filtered_rotor_time_offset_size: float = 0.02
-    # s2, typical size and range of the spread in time: 5 ms, and at most 40
-    rotor_spread_size: float = 2.5e-5
-    rotor_spread_range: tuple[float, float] = (0.0, 1.6e-3)
-    # s, typical size and range of a lag's asymmetry: rotors are driven up, and drag slows them down
-    lag_asymmetry_size: float = 0.005
-    lag_asymmetry_range: tuple[float, float] = (-0.02, 0.02)
-
-
-TIMING = TimingSettings()
 # time offsets (s) of a log: by which the rotor speeds act later than they are logged, by which the
 # attitude is ahead of the position, and by which the velocity that acts is behind the position's (a
 # simulator that holds its forces over a step has one)
@@ -58,6 +37,19 @@ class Timing:
     range: tuple[float, float]
 
 
+_OFFSET = Timing(0.0025, (-0.006, 0.006))
+TIMINGS = {
+    ROTOR_TIME_OFFSET: _OFFSET,
+    ATTITUDE_TIME_OFFSET: _OFFSET,
+    VELOCITY_TIME_OFFSET: _OFFSET,
+    ROTOR_SPREAD: Timing(2.5e-5, (0.0, 1.6e-3)),  # 5 ms, and at most 40
+    LAG_ASYMMETRY: Timing(0.005, (-0.02, 0.02)),  # rotors are driven up, and drag slows them down
+}
+# where the pose was filtered before the log was written: a causal low-pass of 5 Hz is 45 ms late,
+# an estimator some more
+_BEHIND_A_FILTER = Timing(0.02, (-0.1, 0.1))
+
+
 def timing_of(column: tuple[str, str], filtered: bool = False) -> Timing | None:
     """Return size and range of a nuisance of this module; None of any other column.
 
@@ -65,17 +57,8 @@ def timing_of(column: tuple[str, str], filtered: bool = False) -> Timing | None:
         column: without an effect, and the nuisance's name.
         filtered: whether the pose was filtered, and may be late.
     """
-    if filtered and column == ROTOR_TIME_OFFSET:
-        return Timing(
-            TIMING.filtered_rotor_time_offset_size, TIMING.filtered_rotor_time_offset_range
-        )
-    if column in (ROTOR_TIME_OFFSET, ATTITUDE_TIME_OFFSET, VELOCITY_TIME_OFFSET):
-        return Timing(TIMING.time_offset_size, TIMING.rotor_time_offset_range)
-    if column == ROTOR_SPREAD:
-        return Timing(TIMING.rotor_spread_size, TIMING.rotor_spread_range)
-    if column == LAG_ASYMMETRY:
-        return Timing(TIMING.lag_asymmetry_size, TIMING.lag_asymmetry_range)
-    return None
+    late = filtered and column == ROTOR_TIME_OFFSET
+    return _BEHIND_A_FILTER if late else TIMINGS.get(column)
 
 
 def with_uneven_lag(signals: Signals, vehicle: Vehicle, asymmetry: float) -> Signals:
@@ -100,24 +83,27 @@ def with_uneven_lag(signals: Signals, vehicle: Vehicle, asymmetry: float) -> Sig
 
 def with_time_offsets(signals: Signals, offsets: Mapping[str, float]) -> Signals:
     """Return the signals with the time offsets of rotor speeds, velocity and attitude applied."""
-    rotor_offset, attitude_offset = (
-        offsets.get(ROTOR_TIME_OFFSET[1], 0.0),
-        offsets.get(ATTITUDE_TIME_OFFSET[1], 0.0),
+    rotors, attitude, velocity, spread = (
+        offsets.get(name, 0.0)
+        for _, name in (
+            ROTOR_TIME_OFFSET,
+            ATTITUDE_TIME_OFFSET,
+            VELOCITY_TIME_OFFSET,
+            ROTOR_SPREAD,
+        )
     )
-    if rotor_offset != 0.0:
-        n = len(signals.t)
-        at = np.clip(np.arange(n) - rotor_offset / signals.period, 0, n - 1)
-        speeds = np.column_stack([np.interp(at, np.arange(n), x) for x in signals.rotor_speeds.T])
+    if rotors != 0.0:
+        n = np.arange(len(signals.t))
+        at = n - rotors / signals.period
+        speeds = np.column_stack([np.interp(at, n, x) for x in signals.rotor_speeds.T])
         signals = replace(signals, rotor_speeds=speeds)
-    if (spread := offsets.get(ROTOR_SPREAD[1], 0.0)) != 0.0:
+    if spread != 0.0:
         over = np.sqrt(spread) / signals.period
         smooth = gaussian_filter1d(signals.rotor_speeds, over, axis=0, mode="nearest")
         signals = replace(signals, rotor_speeds=smooth)
-    if (velocity_offset := offsets.get(VELOCITY_TIME_OFFSET[1], 0.0)) != 0.0:
-        signals = replace(
-            signals, velocity=signals.velocity - velocity_offset * signals.acceleration
-        )
-    if attitude_offset != 0.0:
-        turn = Rotation.from_rotvec(-attitude_offset * signals.angular_velocity).as_matrix()
+    if velocity != 0.0:
+        signals = replace(signals, velocity=signals.velocity - velocity * signals.acceleration)
+    if attitude != 0.0:
+        turn = Rotation.from_rotvec(-attitude * signals.angular_velocity).as_matrix()
         signals = replace(signals, rotation=signals.rotation @ turn)
     return signals

@@ -49,10 +49,6 @@ class Delay:
     std: float  # s
     log_likelihood_ratio: float  # over moments that do not show at all
 
-    def setting(self, effect: str) -> dict[str, dict[str, float]]:
-        """Return an effect that delays the rotors, with its coefficient."""
-        return {effect: {get(effect).coefficients[0].name: self.seconds}}
-
 
 @dataclass(frozen=True, eq=False)
 class _Spectra:

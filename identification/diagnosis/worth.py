@@ -1,6 +1,6 @@
 """How much an effect does, beside what a model with it leaves unexplained."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,7 @@ from scipy.optimize import lsq_linear
 
 from ...dynamics.effects import get
 from .priors import prior_size
-from .regression import Column, Flights, Setting
+from .regression import Flights, Setting, without
 from .row_nuisances import row_nuisances
 from .rows import Rows
 
@@ -50,29 +50,20 @@ def worth(
     columns = rows.columns(setting, flights.columns_of(setting))
     out = {}
     for effect in setting:
-        less = {e: x for e, x in setting.items() if e != effect}
+        less = without(setting, effect)
         part = rows.residual(less) - left
         # in still air a drag cannot do what it does in a wind
         still = get(effect).sets_wind
         others = rows.columns(less, flights.columns_of(less)) if still else columns
-        own = _scaled(flights, others, effect, first)
+        # what any set has, and what is of another family
+        own = [
+            x * prior_size(c, flights)
+            for c, x in others.items()
+            if c[0] != effect and (c[0] in first or get(c[0]).family != get(effect).family)
+        ]
         X = np.stack([*nuisances, *own], axis=2)[fit] / size[:, None]
         y = part[fit] / size
         most = WORTH.most_in_std
         done = lsq_linear(X.reshape(-1, X.shape[2]), y.ravel(), (-most, most)).x
         out[effect] = float(np.sqrt(np.mean(np.square(y - X @ done), axis=0)).max())
     return out
-
-
-def _scaled(
-    flights: Flights, columns: Mapping[Column, Array], effect: str, first: Collection[str]
-) -> list[Array]:
-    """Return the columns of effects that any set has, and of those of other families, in standard
-    deviations of their priors.
-    """
-    family = get(effect).family
-    return [
-        x * prior_size(c, flights)
-        for c, x in columns.items()
-        if c[0] != effect and (c[0] in first or get(c[0]).family != family)
-    ]

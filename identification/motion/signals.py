@@ -7,7 +7,8 @@ with these signals must pass the same narrower filter afterwards, ``low_pass``: 
 output against unfiltered regressors biases drag by a quarter.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,15 @@ class Signals:
     angular_acceleration: Array  # (n, 3) rad/s2, body
     rotor_speeds: Array  # (n, 4) rad/s, of the interval that ends at the sample
     voltage: Array | None  # (n,) V
+
+    def at(self, samples: slice | NDArray[np.integer[Any]]) -> "Signals":
+        """Return the signals at some samples, with the period as it was."""
+        sampled: dict[str, Any] = {
+            name: x[samples]
+            for name, x in vars(self).items()
+            if isinstance(x, np.ndarray) and len(x) == len(self.t)
+        }
+        return replace(self, **sampled)
 
     def columns(self) -> tuple[Array, Array, Array, Array, Array, Array]:
         """Return rotor speeds, voltage (0 where unknown), position, rotation, velocity and angular

@@ -190,6 +190,14 @@ CASES = {
     ),
     # at one speed friction is a drag; how the flight begins says that it is none, if little more
     "friction on a circle": Case(on_a_circle(outsider="dry_friction"), among=""),
+    # it is bent to the limits of a drag's law
+    "quick: friction in climbs": Case(
+        lambda: (
+            fly_practice(VEHICLE, (), "vertical", 40.0, 3, "dry_friction", sensor=2.0),
+            VEHICLE,
+        ),
+        among="",
+    ),
     "a drag on a circle": Case(
         on_a_circle(EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4})), {"rotor_drag": False}
     ),

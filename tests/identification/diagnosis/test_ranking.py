@@ -12,8 +12,8 @@ import pytest
 from tests.support.alike import assert_alike
 from tests.support.flown import DRAG, VEHICLE, settings
 from tests.support.paths import ROOT
-from windwrench.identification.diagnosis.likelihood import LIKELIHOOD, Likelihood
-from windwrench.identification.diagnosis.priors import in_prior_units
+from windwrench.identification.diagnosis.likelihood import Likelihood
+from windwrench.identification.diagnosis.priors import PRIORS
 from windwrench.identification.diagnosis.ranking import rank
 from windwrench.identification.diagnosis.regression import Flights
 from windwrench.studies.trials.practice_flights import fly_practice
@@ -73,11 +73,9 @@ def test_equal_offsets_of_mass_and_marker_are_told_by_the_thrust_alone():
     """Both at one place: the measured point is the centre of mass again, and nothing but the
     thrust's arm is left; along z it has none.
     """
-    likelihood = Likelihood(flown(), {})
-    wanted = [("com_offset", "cz"), ("marker_offset", "mz")]
-    sums = likelihood.sums(wanted, {}, unknown=False)
-    at = [sums.columns.index(c) for c in wanted]
-    (a, b), (_, d) = sums.blocks.sum(axis=0)[np.ix_(at, at)]
+    base = Likelihood(flown(), {}).base(("com_offset", "marker_offset"), {})
+    at = base.at([("com_offset", "cz"), ("marker_offset", "mz")])
+    (a, b), (_, d) = base.total[np.ix_(at, at)] / np.outer(base.size[at], base.size[at])
     assert a + 2.0 * b + d < 1e-5 * (a - 2.0 * b + d)
 
 
@@ -86,9 +84,9 @@ def test_the_gain_of_a_torque_is_known_where_rotors_leave_their_rounding():
     for trajectory in ("hover", "excite"):
         log = fly_practice(VEHICLE, settings({}), trajectory, 12.0, seed=5)
         flights = Flights([log], VEHICLE)
-        base = in_prior_units(flights, Likelihood(flights, {}).sums([], {}, False), {}, {})
+        base = Likelihood(flights, {}).base((), {})
         sizes[trajectory] = base.size[base.columns["", "model error of torque x"]]
-    assert LIKELIHOOD.model_error <= sizes["excite"] < 0.02
+    assert PRIORS.model_error <= sizes["excite"] < 0.02
     assert sizes["hover"] > 5.0 * sizes["excite"]
 
 

@@ -6,7 +6,7 @@ import pytest
 from tests.support.imu_flights import imu_flight, pose_removed
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
-from windwrench.identification.diagnosis.likelihood import NUISANCE
+from windwrench.identification.diagnosis.priors import NUISANCE
 from windwrench.identification.diagnosis.regression import Flights
 from windwrench.identification.diagnosis.row_nuisances import answered, followers
 from windwrench.identification.diagnosis.row_ranking import rank_by_rows
