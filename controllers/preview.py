@@ -74,7 +74,6 @@ class _PreviewLaw:
     foresight: int  # decisions; the environment's is set to it
     axes: tuple[int, ...]  # of the world, that are commanded
     vehicle: Vehicle = field(default_factory=standard_vehicle)
-    period: ClassVar[float]  # s, of a decision
     largest: ClassVar[float]  # command
     tells: ClassVar[str]  # entry of ``info`` with what is to come
 
@@ -158,7 +157,6 @@ class WindOracle(_PreviewLaw):
     effort: float = 1e-5  # as of ``LQG``
     foresight: int = 12
     axes: tuple[int, ...] = (0, 1, 2)
-    period = WIND_PERIOD
     largest = MAX_ACCELERATION
     tells = "wrench_ahead"
 
@@ -192,7 +190,6 @@ class Oracle(_PreviewLaw):
     effort: float = 3e-4
     foresight: int = 30
     axes: tuple[int, ...] = (1,)
-    period = DECISION_PERIOD
     largest = MAX_COMMAND
     tells = "fan_ahead"
 

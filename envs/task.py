@@ -14,6 +14,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from ..controllers.briefing import Briefing
 from ..dynamics.effects import check_setting
 from ..dynamics.motion import Array
 from ..dynamics.rotation import quaternion_to_matrix
@@ -216,20 +217,36 @@ class Task(gym.Env[Frame, Frame], ABC):
             raise InputError(f"{self.name}: call reset before step")
         return self._loop
 
+    @property
+    def declared(self) -> Vehicle:
+        """The declared vehicle, with the scenario's measurement of the pose."""
+        scenario = self.scenario
+        mocap = Mocap(1.0 / TICK, scenario.sigma_position, scenario.sigma_attitude)
+        return replace(self.vehicle, mocap=mocap)
+
+    @property
+    def tuning(self) -> UKFTuning:
+        """What the filter is told."""
+        return UKFTuning.for_vehicle(self.declared, TICK, self.scenario.rise_time)
+
+    def briefing(self) -> Briefing:
+        """Return what a designed controller may know of itself before it flies: nothing of what is
+        drawn anew in an episode, and nothing of undeclared effects.
+        """
+        return Briefing(self.vehicle)
+
     def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> ClosedLoop:
         """Return the closed loop of a true vehicle, before the undeclared effects; the filter knows
         the declared one.
         """
-        scenario = self.scenario
-        mocap = Mocap(1.0 / TICK, scenario.sigma_position, scenario.sigma_attitude)
-        declared = replace(self.vehicle, mocap=mocap)
+        declared = self.declared
         drawn: dict[str, Any] = {
             n: v for n, v in self.drawn.items() if n in Drawn.__dataclass_fields__
         }
         return ClosedLoop(
             declared,
-            replace(vehicle, mocap=mocap, effects=(*vehicle.effects, *self.effects)),
-            UKFTuning.for_vehicle(declared, TICK, scenario.rise_time),
+            replace(vehicle, mocap=declared.mocap, effects=(*vehicle.effects, *self.effects)),
+            self.tuning,
             fan,
             replace(self.settings or PlantSettings.for_vehicle(self.truth), **drawn),
             drawn=self.render_mode is not None,

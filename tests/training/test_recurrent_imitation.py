@@ -56,7 +56,7 @@ def test_what_is_taught_is_the_fan_s_place_and_velocity():
     observation, info = env.reset(seed=training_seed(3, 0, 0))
     features, fan, offsets, speeds = features_of(config), [], [], []
     for k in range(40):
-        seen = features.frames(observation[None], {})[0]
+        seen = features.frames(observation[None])[0]
         np.testing.assert_array_equal(flown.seen[k, 0, :5], seen[:5])
         fan.append(info["fan_y"])
         offsets.append(info["fan_y"] - info["y"])
