@@ -8,7 +8,7 @@ position error against its command in one number.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -33,9 +33,8 @@ DISTURBANCE_TIME = 0.3  # s, over which the actuators' disturbance lasts
 Step = tuple[Wide, Wide, Wide]  # A (n, n), B (n, 1) and D (n, d) of a decision
 
 
-def standard_vehicle() -> Vehicle:
-    """Return the vehicle of the tasks."""
-    return load_vehicle("ardrone2")
+# the vehicle of the tasks
+standard_vehicle = partial(load_vehicle, "ardrone2")
 
 
 def regulator(A: Wide, B: Wide, effort: float) -> tuple[Wide, Wide, Wide]:

@@ -79,21 +79,21 @@ class Flights:
         lesson: what is seen and taught: a ``FanLesson``, or what has its constants and methods.
         config: ``rounds``, ``wander`` (``size`` and ``time``, s, of an error of the commands).
         seed: of the run.
-        rng: of the errors of the commands.
+        advance: called with the number of decisions flown so far.
     """
 
     def __init__(
-        self, envs: list[Any], lesson: Any, config: Config, seed: int, rng: np.random.Generator
+        self,
+        envs: list[Any],
+        lesson: Any,
+        config: Config,
+        seed: int,
+        advance: Callable[[int], None] = lambda decisions: None,
     ) -> None:
         self._envs, self._lesson, self._wander = envs, lesson, config["wander"]
-        self._seed, self._rng = seed, rng
+        self._seed, self._rng, self._advance = seed, np.random.default_rng(seed), advance
         self._flown: list[Sequences] = []
         self.episodes = 0
-
-    @property
-    def episodes_a_round(self) -> int:
-        """How many episodes a round has."""
-        return sum(env.num_envs for env in self._envs)
 
     def sequences(self) -> Sequences:
         """Return all that were flown."""
@@ -104,37 +104,20 @@ class Flights:
             )
         )
 
-    def fly(
-        self, network: BeliefNetwork | None, shares: Frames, advance: Callable[[float], None]
-    ) -> None:
-        """Fly a round, with the teacher where there is no network.
-
-        Args:
-            network: whose means are flown.
-            shares: (axes, taught) of the means that are commanded.
-            advance: called with the share of the round that is flown.
+    def fly(self, network: BeliefNetwork | None, shares: Frames) -> None:
+        """Fly a round at ``shares`` (axes, taught) of the network's means, or with the teacher
+        where there is no network.
         """
-        before = self.episodes
         for env in self._envs:
             n = env.num_envs
             size = self._wander["size"] * self._rng.random(n)
             if network is not None:
                 size *= self._rng.random(n) >= _CALM
-            first = (self.episodes - before) / self.episodes_a_round
-
-            def tell(share: float, first: float = first, n: int = n) -> None:
-                advance(first + share * n / self.episodes_a_round)
-
-            self._flown.append(self._fly(env, network, shares, size[:, None], tell))
+            self._flown.append(self._fly(env, network, shares, size[:, None]))
             self.episodes += n
 
     def _fly(
-        self,
-        env: Any,
-        network: BeliefNetwork | None,
-        shares: Frames,
-        size: Array,
-        advance: Callable[[float], None],
+        self, env: Any, network: BeliefNetwork | None, shares: Frames, size: Array
     ) -> Sequences:
         lesson, n, state = self._lesson, env.num_envs, None
         shape = n, env.single_action_space.shape[0]
@@ -156,13 +139,18 @@ class Flights:
             observation, _, lost, _, infos = env.step(given)
             flying = flying & ~lost
             kept.append(flying)
-            advance((k + 1) / lesson.decisions)
+            self._advance(self.episodes * lesson.decisions + n * (k + 1))
         lesson.look(observation, infos)
         truth, counts = lesson.taught(np.array(kept))
         return Sequences(np.array(seen), truth.astype(np.float32), counts.astype(np.float32))
 
 
-def fan_flights(config: Config, scenario: str, seed: int, rng: np.random.Generator) -> Flights:
+def fan_flights(
+    config: Config,
+    scenario: str,
+    seed: int,
+    advance: Callable[[int], None] = lambda decisions: None,
+) -> Flights:
     """Return flights of FanTracking in each scenario of a tier.
 
     Raises:
@@ -175,4 +163,4 @@ def fan_flights(config: Config, scenario: str, seed: int, rng: np.random.Generat
         make_training_envs(name, each * scenarios.count(name), config["estimator"])
         for name in dict.fromkeys(scenarios)
     ]
-    return Flights(envs, FanLesson(config), config, seed, rng)
+    return Flights(envs, FanLesson(config), config, seed, advance)

@@ -117,7 +117,7 @@ def teach(task: str, seed: int, rounds: int, episodes: int, epochs: int) -> Task
     envs = SyncVectorEnv(
         [lambda: _environment(task)] * episodes, autoreset_mode=AutoresetMode.NEXT_STEP
     )
-    flights = Flights([envs], lesson, config, seed, np.random.default_rng(seed))
+    flights = Flights([envs], lesson, config, seed)
     mirrored = _TURNED if lesson.of_fan else None
     for last in taught_in_rounds(
         network, flights, lesson.shares(_GAINS[1]), config, seed, mirrored

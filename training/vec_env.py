@@ -12,6 +12,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from ..controllers.features import Features, History
 from ..envs.fan_tracking import LOST_OFFSET
+from ..envs.vector import TaskVectorEnv
 
 Array = NDArray[np.float32]
 
@@ -26,8 +27,7 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
     another run, ``reset`` goes on with the episodes that follow.
 
     Args:
-        envs: the vector environment, (8,) observations; its ``reset`` takes a list of seeds and a
-            ``reset_mask``.
+        envs: of FanTracking.
         features: of the policy.
         seed_of: from environment and episode to the episode's seed.
         reward: weights of the terms ``tracking``, ``change`` and ``squared`` (minus the squared
@@ -38,7 +38,7 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
 
     def __init__(
         self,
-        envs: gym.vector.VectorEnv[Any, Any, Any],
+        envs: TaskVectorEnv,
         features: Features,
         seed_of: Callable[[int, int], int],
         reward: Mapping[str, float] | None = None,
@@ -58,10 +58,7 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
         """Start the next episode of the environments ``which``."""
         self.episode[which] += 1
         seeds = [self._seed_of(i, int(e)) for i, e in enumerate(self.episode)]
-        reset: Callable[..., Any] = (
-            self.envs.reset
-        )  # Gymnasium's vector environments take a list, which its types leave out
-        observations, _ = reset(seed=seeds, options={"reset_mask": which.copy()})
+        observations, _ = self.envs.reset(seed=seeds, options={"reset_mask": which.copy()})
         self._history.restart(self.features.frames(observations), which)
         for sums in (self._length, self._returns, self._squares):
             sums[which] = 0
