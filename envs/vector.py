@@ -210,12 +210,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
 
     def _hover(self, which: list[int], seeds: Sequence[int | None]) -> None:
         """Draw an episode of some environments, and let their vehicles hover at its start."""
-
-        def hover(n: int) -> None:
-            i = which[n]
-            self.envs[i].reset(seed=seeds[i])
-
-        self._spread(hover, len(which))
+        self._spread(lambda i: self.envs[i].reset(seed=seeds[i]), which)
         for i in which:
             self._draw(i, self.envs[i])
             self._see(i)
@@ -224,13 +219,12 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         """Fly a decision in some environments at their commands."""
         flying = np.flatnonzero(which).tolist()
 
-        def fly(n: int) -> None:
-            env = self.envs[flying[n]]
-            env.command[:] = self._episodes.commands[flying[n]]
-            env.fly()
+        def fly(i: int) -> None:
+            self.envs[i].command[:] = self._episodes.commands[i]
+            self.envs[i].fly()
 
         with Untimed():
-            self._spread(fly, len(flying))
+            self._spread(fly, flying)
         for i in flying:
             self._see(i)
 
@@ -262,23 +256,23 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
             self._compiled[function] = specialised(function, *arguments)
         self._compiled[function](*arguments)
 
-    def _spread(self, work: Callable[[int], None], count: int) -> None:
-        """Call ``work`` with 0 to ``count - 1``, once each.
+    def _spread(self, work: Callable[[int], object], which: Sequence[int]) -> None:
+        """Call ``work`` with each number, once.
 
         A thread that is done takes the next number, so that no thread waits for a slow one.
         """
-        numbers = iter(range(count))
+        numbers, threads = iter(which), min(self.threads, len(which))
 
         def take_numbers() -> None:
             for n in numbers:
                 work(n)
 
-        if min(self.threads, count) < 2:
+        if threads < 2:
             take_numbers()
             return
         if self._pool is None:
             self._pool = ThreadPoolExecutor(self.threads)
-        working = [self._pool.submit(take_numbers) for _ in range(min(self.threads, count))]
+        working = [self._pool.submit(take_numbers) for _ in range(threads)]
         wait(working)
         for each in working:
             each.result()

@@ -116,7 +116,7 @@ class TaskLanes(TaskVectorEnv):
             finally:
                 self._works.append(work)
 
-        self._spread(fly, parts)
+        self._spread(fly, range(parts))
 
     def _fly(self, which: Flags) -> None:
         slots = np.full(len(self._flying) * WIDTH, -1)
