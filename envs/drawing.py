@@ -145,6 +145,7 @@ class Viewer:
         m/s.
         """
         fan, drops, jet = loop.record["fan"].copy()[0], self._drops, np.empty(3)
+        axial, radial = loop.jet_table
         place = np.array([0.0, fan["y"], fan["height"]])
         loop.data.mocap_pos[0] = _AWAY if in_wind else place
         low, high = _WIND_BOX if in_wind else place + _BOX
@@ -152,7 +153,7 @@ class Viewer:
         drops[gone] = self._rng.uniform(low, high, (int(gone.sum()), 3))
         air = loop.winds.velocity(drops, max(loop.time, 0.0))
         for drop, wind in zip(drops, air, strict=True):
-            jet_at(fan, *loop.jet_table, drop[0], drop[1], drop[2], jet)
+            jet_at(fan, axial, radial, drop[0], drop[1], drop[2], jet)
             wind += jet
         drops += step * air + 0.004 * self._rng.standard_normal(drops.shape)
         return air
