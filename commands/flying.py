@@ -39,7 +39,7 @@ def fly(
     from ..envs.fan_tracking import EPISODE_SECONDS
     from ..envs.video import FPS
     from ..evaluation.benchmark import check_request
-    from ..evaluation.episodes import fly_episode, loop_of, time_series
+    from ..evaluation.episodes import fly_episode, time_series
     from ..evaluation.pictures import draw_episode
     from ..evaluation.tasks import make_pilot, short_names, task_of
     from .filming import SIZE, Tally, caption_of, films, written
@@ -73,7 +73,7 @@ def fly(
             progress(more=1)
             if kinds:
                 tally.add(info)
-                film(env.render, lambda: caption_of(loop_of(env), env.viewer, title, info, tally))
+                film(env.render, lambda: caption_of(env.loop, env.viewer, title, info, tally))
 
         episode = fly_episode(env, make_pilot(controller, task), seed, each, known.decisions)
     env.close()

@@ -4,11 +4,13 @@ kind of fan, and for those that say so, how the fan is known to move.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..dynamics.vehicle import Vehicle
 from ..dynamics.vehicle_file import load_vehicle
@@ -70,6 +72,18 @@ class Jet:
     kd: float = 0.020  # N/(m/s), drag of each rotor
     area: float = 0.060  # m2, drag area of the hull
     distance: float = 2.3  # m, of the vehicle from it
+
+
+# places (n,) m after times (s) of motions with a largest speed (m/s) over a travel (m), from 0 to
+# positive places first
+PLACES: dict[str, Callable[..., NDArray[np.float64]]] = {
+    "still": lambda speed, travel, time: 0.0 * (speed * time),
+    "sine": lambda speed, travel, time: travel * np.sin(speed / travel * time),
+    "triangle": lambda speed, travel, time: (
+        travel * 2 / math.pi * np.arcsin(np.sin(math.pi / 2 * speed / travel * time))
+    ),
+    "ramp": lambda speed, travel, time: np.minimum(speed * time, 0.8 + (travel - 0.5) * 8 / 7),
+}
 
 
 @dataclass(frozen=True)

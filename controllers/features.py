@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,7 +30,6 @@ class Quantity:
 
     scale: float  # N, Nm, m/s or m
     column: int
-    source: str = "observation"  # or the entry of the environment's ``info``
     summed: bool = False  # over the decisions since the episode's start, times their period
     odd: bool = False  # changes its sign where left and right change places
 
@@ -47,12 +45,6 @@ QUANTITIES: dict[str, Quantity] = {
     "command": Quantity(1.0, LAST_COMMAND, odd=True),
     # how far it has flown along y since the episode's start, by its own estimated velocity
     "path_y": Quantity(1.0, VELOCITY_Y, summed=True, odd=True),
-    # what only a simulator knows, and the filter's deviations: for ablations
-    "true_torque_z": Quantity(0.03, 2, "torque", odd=True),
-    "true_force_x": Quantity(0.5, 0, "force"),
-    "true_force_y": Quantity(0.5, 1, "force", odd=True),
-    "std_torque_z": Quantity(0.005, 2, "std_torque"),
-    "std_force_x": Quantity(0.05, 0, "std_force"),
 }
 
 
@@ -92,23 +84,10 @@ class Features:
         """How many numbers a policy sees."""
         return self.history * len(self.frame)
 
-    @property
-    def sources(self) -> frozenset[str]:
-        """Entries of ``info`` that are needed beside the observation."""
-        return frozenset(QUANTITIES[name].source for name in self.frame) - {"observation"}
-
-    def frames(self, observations: ArrayLike, info: Mapping[str, Any]) -> Array:
-        """Return scaled frames (n, quantities) of n environments: observations (n, 8), ``info``
-        with (n, 3) entries.
-        """
+    def frames(self, observations: ArrayLike) -> Array:
+        """Return scaled frames (n, quantities) of n environments' observations (n, 8)."""
         rows = np.asarray(observations, dtype=np.float64)
-        columns = [
-            np.asarray(
-                rows if QUANTITIES[name].source == "observation" else info[QUANTITIES[name].source]
-            )[:, QUANTITIES[name].column]
-            for name in self.frame
-        ]
-        scaled = np.stack(columns, axis=1) / np.array(self.scale)
+        scaled = rows[:, [QUANTITIES[name].column for name in self.frame]] / np.array(self.scale)
         scaled[:, self.summed] *= DECISION_PERIOD  # what one decision adds
         clipped: Array = np.clip(scaled, -10.0, 10.0).astype(np.float32)
         return clipped

@@ -8,7 +8,7 @@ position error against its command in one number.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -33,9 +33,8 @@ DISTURBANCE_TIME = 0.3  # s, over which the actuators' disturbance lasts
 Step = tuple[Wide, Wide, Wide]  # A (n, n), B (n, 1) and D (n, d) of a decision
 
 
-def standard_vehicle() -> Vehicle:
-    """Return the vehicle of the tasks."""
-    return load_vehicle("ardrone2")
+# the vehicle of the tasks
+standard_vehicle = partial(load_vehicle, "ardrone2")
 
 
 def regulator(A: Wide, B: Wide, effort: float) -> tuple[Wide, Wide, Wide]:
@@ -74,7 +73,6 @@ class _PreviewLaw:
     foresight: int  # decisions; the environment's is set to it
     axes: tuple[int, ...]  # of the world, that are commanded
     vehicle: Vehicle = field(default_factory=standard_vehicle)
-    period: ClassVar[float]  # s, of a decision
     largest: ClassVar[float]  # command
     tells: ClassVar[str]  # entry of ``info`` with what is to come
 
@@ -158,7 +156,6 @@ class WindOracle(_PreviewLaw):
     effort: float = 1e-5  # as of ``LQG``
     foresight: int = 12
     axes: tuple[int, ...] = (0, 1, 2)
-    period = WIND_PERIOD
     largest = MAX_ACCELERATION
     tells = "wrench_ahead"
 
@@ -192,7 +189,6 @@ class Oracle(_PreviewLaw):
     effort: float = 3e-4
     foresight: int = 30
     axes: tuple[int, ...] = (1,)
-    period = DECISION_PERIOD
     largest = MAX_COMMAND
     tells = "fan_ahead"
 

@@ -2,8 +2,8 @@
 noise, and its own yaw, in arrays for compiled code.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,14 +22,16 @@ _TYPICAL = 0.15  # m off the axis, where the noise is taken whose colour stands 
 SETTLED = 19  # decisions of 80 ms that the filter has settled before the first observation
 
 
-@dataclass(frozen=True, eq=False)
-class SensorModel:
+class SensorModel(NamedTuple):
     """Arrays that ``weigh`` takes, and how the vehicle yaws."""
 
+    # over the offset: mean, slopes with velocity and yaw rate, standard deviation
     tables: Array  # (COUNT, 4, AXES)
-    keep: Array  # (AXES, 3, 3)
+    keep: Array  # (AXES, 3, 3), of the filter's error
     enter: Array  # (AXES, 3)
-    regression: Array  # (ORDER + 1, AXES, ORDER), of the first decisions and of all others
+    # of the residual, in standard deviations, on those before: of the first decisions, and of all
+    # others; and what they leave
+    regression: Array  # (ORDER + 1, AXES, ORDER)
     variance: Array  # (ORDER + 1, AXES)
     yaw: Array  # (3, 5): integral, angle and rate of yaw after a decision; torque and its rate
 
@@ -96,25 +98,10 @@ class Sensing:
         """Write log-likelihoods (n,) of this decision's observation (8,) into ``out``; ``look``
         comes first.
         """
-        m, order = self.model, min(self.count - 1, ORDER)
-        seen = np.array(
-            [observation[TORQUE_Z], observation[FORCE_X], observation[FORCE_Y]], dtype=np.float64
-        )
-        weigh(
-            place,
-            level,
-            memory,
-            self.own,
-            np.array([self.velocity, self._yaw[2]]),
-            seen,
-            m.tables,
-            m.keep,
-            m.enter,
-            m.regression[order],
-            m.variance[order],
-            self.count == 1,
-            out,
-        )
+        axes = observation[TORQUE_Z], observation[FORCE_X], observation[FORCE_Y]
+        own = self.own, self.velocity, float(self._yaw[2])
+        seen = np.array(axes, dtype=np.float64)
+        weigh(place, level, memory, own, seen, self.model, self.count - 1, out)
 
     def look(self, observation: NDArray[np.floating]) -> None:
         """Carry the own motion on to this observation (8,)."""

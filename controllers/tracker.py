@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .axis_models import PLACE, SPEED
-from .briefing import Air, Briefing
-from .fan_motion import PLACES
+from .briefing import PLACES, Air, Briefing
 from .observation import DECISION_PERIOD, MAX_COMMAND
 from .preview import Oracle, lasting, preview, pushing
 from .sensor_model import Sensing, sensor_model

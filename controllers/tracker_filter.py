@@ -1,6 +1,7 @@
 """The inner loop of the trackers: how likely each particle makes what the filter shows."""
 
 import math
+from typing import Any
 
 from ..dynamics.motion import Array
 from ..runtime.compiled import compiled
@@ -17,15 +18,10 @@ def weigh(
     place: Array,
     level: Array,
     memory: Array,
-    own: float,
-    motion: Array,
+    own: tuple[float, float, float],
     seen: Array,
-    tables: Array,
-    keep: Array,
-    enter: Array,
-    regression: Array,
-    variance: Array,
-    first: bool,
+    model: Any,
+    decision: int,
     out: Array,
 ) -> None:
     """Write the log-likelihood of an observation for each particle into ``out`` (n,), and carry
@@ -35,21 +31,19 @@ def weigh(
         place: (n,) m, of the fan.
         level: (n,) of the noise, 1: as expected.
         memory: (n, MEMORY).
-        own: m, place of the vehicle.
-        motion: (2,) its own velocity in m/s and its yaw rate in rad/s.
+        own: m, place of the vehicle, its velocity in m/s and its yaw rate in rad/s.
         seen: (AXES,) the estimated torque and forces.
-        tables: (COUNT, 4, AXES) over the offset: mean, slopes with velocity and yaw rate, standard
-            deviation.
-        keep: (AXES, 3, 3), of the filter's error.
-        enter: (AXES, 3).
-        regression: (AXES, ORDER) of the residual, in standard deviations, on those before.
-        variance: (AXES,) of what they leave.
-        first: whether the filter has settled on the jet where it is now.
+        model: a ``SensorModel``.
+        decision: of the episode; at the first, 0, the filter has settled on the jet where it is.
         out: (n,).
     """
+    tables, keep, enter = model.tables, model.keep, model.enter
+    order = min(decision, ORDER)
+    regression, variance = model.regression[order], model.variance[order]
+    y, velocity, yaw_rate = own
     for i in range(len(place)):
         m = memory[i]
-        column = (own - place[i] - FIRST) / STEP
+        column = (y - place[i] - FIRST) / STEP
         column = min(max(column, 0.0), COUNT - 1.001)
         j = int(column)
         b = column - j
@@ -57,11 +51,11 @@ def weigh(
         total = 0.0
         for a in range(AXES):
             mean = (1 - b) * left[0, a] + b * right[0, a]
-            mean += motion[0] * ((1 - b) * left[1, a] + b * right[1, a])
-            turning = motion[1] * ((1 - b) * left[2, a] + b * right[2, a])
+            mean += velocity * ((1 - b) * left[1, a] + b * right[1, a])
+            turning = yaw_rate * ((1 - b) * left[2, a] + b * right[2, a])
             deviation = level[i] * ((1 - b) * left[3, a] + b * right[3, a])
             e = ERROR + 3 * a
-            if first:
+            if decision == 0:
                 m[e] = m[e + 1] = m[e + 2] = 0.0
             else:
                 change = mean - m[FELT + a]

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..runtime.archives import check_archive
 from ..runtime.errors import InputError
 from ..runtime.file_limits import LIMITS
+from ..runtime.page_files import write_text
 from ..runtime.regular_files import read_bytes, read_json
 from ..runtime.whole_files import replaced
 from .features import Features, History
@@ -203,10 +204,7 @@ class TrainedPolicy(_Network):
     ) -> Array:
         """Return the command (1,) m/s for an observation (8,)."""
         if self._count % self._repeat == 0:
-            batch = {
-                source: np.asarray((info or {})[source])[None] for source in self.features.sources
-            }
-            frames = self.features.frames(np.asarray(observation)[None], batch)
+            frames = self.features.frames(np.asarray(observation)[None])
             if self._count == 0:
                 self._history.restart(frames, [0])
             else:
@@ -256,17 +254,17 @@ def save_policy(card: Mapping[str, Any], weights: Weights, path: Path) -> Path:
     full = {"format": FORMAT, **card, "sha256": hashlib.sha256(data).hexdigest()}
     with replaced(path) as partial:
         partial.write_bytes(data)
-    with replaced(path.with_suffix(".json")) as partial:
-        partial.write_text(json.dumps(full, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    write_text(json.dumps(full, indent=1, allow_nan=False) + "\n", path.with_suffix(".json"))
     return path
 
 
-def read_policy(path: str | Path) -> tuple[Path, dict[str, Any], Weights]:
-    """Return a policy's file, card and weights, from its ``.npz`` or its card.
+def load_policy(path: str | Path) -> Any:
+    """Return the policy of a ``.npz`` file or of its card: a ``TrainedPolicy``, or where the
+    card names another task, a ``TaskPolicy``.
 
     Raises:
         InputError: a file is missing, not readable, of another format, larger than ``FileLimits``
-            allows, or the two are not of one policy.
+            allows, or card and weights do not go together.
     """
     file = Path(path).with_suffix(".npz")
     card_file = file.with_suffix(".json")
@@ -296,17 +294,6 @@ def read_policy(path: str | Path) -> tuple[Path, dict[str, Any], Weights]:
     ]
     if bad:
         raise InputError(f"{file}: {bad[0]} must be a vector or a matrix of finite numbers")
-    return file, card, weights
-
-
-def load_policy(path: str | Path) -> Any:
-    """Return the policy of a ``.npz`` file or of its card: a ``TrainedPolicy``, or where the
-    card names another task, a ``TaskPolicy``.
-
-    Raises:
-        InputError: as ``read_policy``, or card and weights do not go together.
-    """
-    file, card, weights = read_policy(path)
     kind = TaskPolicy if "task" in card else TrainedPolicy
     return kind(card, weights, str(file))
 

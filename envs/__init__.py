@@ -1,6 +1,6 @@
 """Worlds: the plant in MuJoCo, the fan and its jet, winds, and the four tasks."""
 
-from . import headless  # noqa: F401  before anything that imports MuJoCo
+from . import display  # noqa: F401  before anything that imports MuJoCo
 from .closed_loop import ClosedLoop, Stage
 from .copies import Copyable
 from .fan import Fan

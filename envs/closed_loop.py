@@ -46,7 +46,7 @@ from ..estimator.filter_record import FILTER
 from ..estimator.tuning import UKFTuning
 from ..estimator.ukf import WrenchUKF
 from ..runtime.addresses import call_at, call_step
-from ..runtime.compiled import Record, compiled, specialised
+from ..runtime.compiled import Record, compiled, compiled_without_gil, specialised
 from ..runtime.errors import InputError, unknown_name
 from .fan import FAN, STATIONS, Fan, fan_record, jet_table
 from .observing import Motion
@@ -231,20 +231,10 @@ def _steer(record: Record, world: World, path: Array, noise: Array, k: int) -> N
 def _actuate(record: Record, world: World, path: Array, noise: Array, k: int) -> None:
     """Write the wrench of this tick for MuJoCo; an accelerometer feels the tick's wrench."""
     loop = record[0]
-    plant, xfrc = loop.plant, world.xfrc
+    plant, fan, command, xfrc = loop.plant, loop.fan, loop.flight.command, world.xfrc
     row = min(k, len(path) - 1)
-    loop.fan.y, loop.fan.height = path[row, 0], path[row, 1]
-    actuate(
-        plant,
-        loop.flight.command,
-        loop.fan,
-        world.jet[0],
-        world.jet[1],
-        world.qpos,
-        world.qvel,
-        noise[k],
-        xfrc,
-    )
+    fan.y, fan.height = path[row, 0], path[row, 1]
+    actuate(plant, command, fan, world.jet, world.qpos, world.qvel, noise[k], xfrc)
     if noise.shape[1] > NOISE:
         if k == 0:
             for j in range(3):
@@ -278,7 +268,7 @@ def accelerate(loop: Record, xfrc: Array, noise: Array) -> None:
         loop.thrust[j] += E[j, 2] * thrust / body.mass
 
 
-@compiled
+@compiled_without_gil
 def run_ticks(record: Record, world: World, path: Array, noise: Array, move: int) -> None:
     """Run a tick for each row of ``noise`` in one call: what flies without a user's own stages and
     winds.
@@ -359,6 +349,10 @@ class ClosedLoop:
         sample: (11,) rotor speeds, position and quaternion as they were measured last.
         unrounded: (4,) rad/s, these rotor speeds before they are rounded.
         air: (STATIONS, 3) m/s, world, of the winds at the stations.
+        position: (3,) m, world, true, of the geometric centre; ``quaternion`` (4,), body to world,
+            and ``velocity`` (3,) m/s, world, likewise.
+        motion: MuJoCo's generalised position and velocity: the vehicle's are the first (7,) and
+            (6,).
         external: (6,) true external force N and torque Nm, world; of it ``jet`` is the jet's part,
             ``disturbance`` that of the actuators, and ``applied`` what a user applies.
         specific: (3,) m/s2, world, specific force by the accelerometer, mean of the last run.
@@ -403,10 +397,8 @@ class ClosedLoop:
         self.accelerometer = accelerometer
         self.noise_size = NOISE
         if accelerometer is not None:
-            self.noise_size, loop["accelerometer_sigma"] = (
-                NOISE + ACCELEROMETER_NOISE,
-                accelerometer[0],
-            )
+            self.noise_size += ACCELEROMETER_NOISE
+            loop["accelerometer_sigma"] = accelerometer[0]
         self.ukf = ESTIMATORS[estimator](declared, tuning, TICK)
         loop["filter"] = self.ukf.record[0]
         self.winds, self.reference = Sum(), np.zeros((0, REFERENCE_SIZE))
@@ -463,32 +455,10 @@ class ClosedLoop:
 
     def _look_at_world(self) -> None:
         """Take the arrays of MuJoCo's data, which a reset of it may move."""
-        self._qpos: Array = self.data.qpos
-        self._qvel: Array = self.data.qvel
+        p, v = self.motion = self.data.qpos, self.data.qvel
+        self.position, self.quaternion, self.velocity = p[:3], p[3:7], v[:3]
         xfrc: Array = self.data.xfrc_applied[self.model.body("vehicle").id]
-        self.world = World(
-            self.jet_table, self._qpos[:7], self._qvel[:6], xfrc, self.reference, self.winds.calls
-        )
-
-    @property
-    def motion(self) -> tuple[Array, Array]:
-        """MuJoCo's generalised position and velocity: the vehicle's are the first (7,) and (6,)."""
-        return self._qpos, self._qvel
-
-    @property
-    def position(self) -> Array:
-        """True position (3,) of the geometric centre, m, world."""
-        return self._qpos[:3]
-
-    @property
-    def quaternion(self) -> Array:
-        """True attitude (4,), body to world."""
-        return self._qpos[3:7]
-
-    @property
-    def velocity(self) -> Array:
-        """True velocity (3,), m/s, world."""
-        return self._qvel[:3]
+        self.world = World(self.jet_table, p[:7], v[:6], xfrc, self.reference, self.winds.calls)
 
     @property
     def seen(self) -> bool:
@@ -509,11 +479,6 @@ class ClosedLoop:
     def ticks(self) -> int:
         """Ticks since the start of the episode; below zero while the filter settles."""
         return int(self._ticks.item())
-
-    @property
-    def flight(self) -> tuple[np.ndarray, World, int]:
-        """What ``run_ticks`` takes: record, world, and the address of MuJoCo's step."""
-        return self.record, self.world, self._move_address
 
     def reset(
         self,
@@ -560,15 +525,15 @@ class ClosedLoop:
             loop["accelerometer_bias"] = self.accelerometer[1] * rng.standard_normal(3)
         loop["ticks"], self._settled = -settle, settle
         reset_plant(loop["plant"], self._body)
-        self._qpos[:3], self._qpos[3:7] = position, quaternion_of_yaw(yaw)
-        loop["plant"]["past_poses"] = self._qpos[:7]
+        self.position[:], self.quaternion[:] = position, quaternion_of_yaw(yaw)
+        loop["plant"]["past_poses"] = self.world.qpos
         self.setpoint[:] = 0.0
         self.setpoint[:3], self.setpoint[9] = position, yaw
         reset_flight(loop["flight"])
         self.air[:] = 0.0
         loop["fan"]["gusts"] = loop["fan"]["mixing"] @ rng.standard_normal((STATIONS, 3))
         noise = rng.standard_normal(NOISE)
-        sense(self.record[0:1]["plant"][0], self._qpos, noise)
+        sense(self.record[0:1]["plant"][0], self.motion[0], noise)
         self.ukf.reset(self.sample[4:7], self.sample[7:11])
         loop["filter"] = self.ukf.record[0]
         if self.load is not None:
@@ -618,7 +583,7 @@ class ClosedLoop:
             )
         self.noise, self.fan_path = noise, path
         with Untimed():
-            if not self.has_own_parts:
+            if not self.own_stages and not self.winds.own:  # which are called from Python
                 self._run_ticks(self.record, self.world, path, noise, self._move_address)
                 return
             for k in range(count):
@@ -637,11 +602,6 @@ class ClosedLoop:
         """Let MuJoCo integrate the rigid body over the tick."""
         mujoco.mj_step(self.model, self.data, SUBSTEPS)
         self._ticks += 1
-
-    @property
-    def has_own_parts(self) -> bool:
-        """Whether a user's own stages or winds fly, which are called from Python."""
-        return bool(self.own_stages or self.winds.own)
 
     @property
     def was_reset(self) -> bool:

@@ -1,5 +1,8 @@
-"""Whether this machine can show a window: MuJoCo's viewer ends the interpreter where it cannot."""
+"""How this machine draws, which is settled before MuJoCo is imported, and whether it can show a
+window: MuJoCo's viewer ends the interpreter where it cannot.
+"""
 
+import ctypes
 import os
 import sys
 import warnings
@@ -9,13 +12,49 @@ from typing import Any
 from ..runtime.errors import InputError
 
 _VARIABLES = ("DISPLAY", "WAYLAND_DISPLAY")
+_LINUX = sys.platform.startswith("linux")
+
+
+def _choose() -> None:
+    """Choose how MuJoCo draws on a machine without a screen, unless the user has."""
+    if not _LINUX or any(os.environ.get(name) for name in (*_VARIABLES, "MUJOCO_GL")):
+        return
+    for backend, library in (("egl", "libEGL.so.1"), ("osmesa", "libOSMesa.so.8")):
+        try:
+            ctypes.CDLL(library)
+        except OSError:
+            continue
+        os.environ["MUJOCO_GL"] = backend
+        return
+
+
+def _import_mujoco() -> None:
+    """Import MuJoCo, which refuses a way to draw that it does not know or cannot load.
+
+    Raises:
+        InputError: it does.
+    """
+    try:
+        import mujoco  # noqa: F401
+    except Exception as error:
+        asked = os.environ.get("MUJOCO_GL")
+        if asked is None:
+            raise
+        raise InputError(
+            f"MUJOCO_GL={asked}: MuJoCo cannot draw that way ({error}); expected egl, osmesa, glfw "
+            f"or disable, or the variable not set"
+        ) from error
+
+
+_choose()
+_import_mujoco()
 
 
 def modes_shown(metadata: Mapping[str, Any]) -> list[str]:
     """Return those of the render modes of an environment's ``metadata`` that this machine can show:
     no ``human`` where nothing names a display.
     """
-    windows = not sys.platform.startswith("linux") or any(os.environ.get(v) for v in _VARIABLES)
+    windows = not _LINUX or any(os.environ.get(v) for v in _VARIABLES)
     return [mode for mode in metadata["render_modes"] if mode != "human" or windows]
 
 
@@ -25,7 +64,7 @@ def need_display() -> None:
     Raises:
         InputError: there is no display, or the library for windows does not find it.
     """
-    if not sys.platform.startswith("linux"):
+    if not _LINUX:
         return  # elsewhere there is a display, and windows belong to the main thread
     named = [f"{name}={os.environ[name]}" for name in _VARIABLES if os.environ.get(name)]
     why = "DISPLAY and WAYLAND_DISPLAY are not set"

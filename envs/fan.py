@@ -137,12 +137,10 @@ def gust(f: Record, noise: Array) -> None:
 @compiled
 def jet_wrench(
     f: Record,
-    axial: Array,
-    radial: Array,
+    jet: Array,
     position: Array,
     rotation: Array,
     velocity: Array,
-    omega: Array,
     com: Array,
     wind: Array,
     out: Array,
@@ -151,15 +149,16 @@ def jet_wrench(
     into ``out``.
 
     Drag acts at the stations, each in its own wind: that is why a symmetric vehicle feels a torque
-    where the jet falls off across its span. ``velocity`` is that of the geometric centre in the
-    world, ``omega`` in the body frame; ``wind`` (3,) is scratch.
+    where the jet falls off across its span. ``velocity`` (6,) is that of the geometric centre in
+    the world, and the angular velocity in the body frame; ``wind`` (3,) is scratch; ``jet`` (2,
+    COUNT_X, COUNT_R) is the table of axial and radial speeds.
     """
-    R = rotation
+    R, axial, radial = rotation, jet[0], jet[1]
     for i in range(6):
         out[i] = 0.0
-    ox = R[0, 0] * omega[0] + R[0, 1] * omega[1] + R[0, 2] * omega[2]
-    oy = R[1, 0] * omega[0] + R[1, 1] * omega[1] + R[1, 2] * omega[2]
-    oz = R[2, 0] * omega[0] + R[2, 1] * omega[1] + R[2, 2] * omega[2]
+    ox = R[0, 0] * velocity[3] + R[0, 1] * velocity[4] + R[0, 2] * velocity[5]
+    oy = R[1, 0] * velocity[3] + R[1, 1] * velocity[4] + R[1, 2] * velocity[5]
+    oz = R[2, 0] * velocity[3] + R[2, 1] * velocity[4] + R[2, 2] * velocity[5]
     cx = R[0, 0] * com[0] + R[0, 1] * com[1] + R[0, 2] * com[2]
     cy = R[1, 0] * com[0] + R[1, 1] * com[1] + R[1, 2] * com[2]
     cz = R[2, 0] * com[0] + R[2, 1] * com[1] + R[2, 2] * com[2]

@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from ..controllers.briefing import Air, Briefing, FilterNoise, Jet, Motions
 from ..dynamics.motion import Array
 from ..runtime.compiled import compiled_without_gil
 from ..runtime.errors import InputError
 from .fan import Fan
 from .observing import LIMITS, SCALES, Episodes, Motion, View
-from .plant import TICK
+from .plant import TICK, PlantSettings
 from .scenarios import SCENARIOS, draw_fan_path
 from .task import (
     COMMON_VALUES,
@@ -46,6 +47,24 @@ class FanTask(Task):
     def __init__(self, *shared: Any, fan: Fan, **named: Any) -> None:
         super().__init__(*shared, **named)
         self.fan = replace(fan, turbulence=self.scenario.turbulence)
+
+    def briefing(self) -> Briefing:
+        """Return beside the declared vehicle the standard fan, the tuning of the filter, the
+        scenario's motions and its air.
+        """
+        fan, scenario = self.fan, self.scenario
+        plant = self.settings or PlantSettings.for_vehicle(self.vehicle)
+        air = Air(
+            plant.disturbance_force,
+            plant.disturbance_torque,
+            plant.disturbance_time,
+            fan.turbulence,
+            fan.gust_length,
+            fan.gust_time,
+        )
+        jet = Jet(fan.speed, fan.rotor_drag, fan.hull_area, DISTANCE)
+        motions = Motions(scenario.motions, scenario.speed, offset=scenario.offset)
+        return Briefing(self.vehicle, FilterNoise.of(self.tuning, TICK), air, jet, motions)
 
     def _start(self, path: Array, settle: int, offset: Array) -> None:
         """Hover ``offset`` (2,) m beside the fan's axis for ``settle`` ticks."""
@@ -222,39 +241,6 @@ class FanTrackingEnv(FanTask):
         offset = float(rng.uniform(*scenario.offset) * rng.choice([-1.0, 1.0]))
         path = np.column_stack([fan_y, np.full(len(fan_y), self.fan.height)])
         self._start(path, settle, np.array([offset, 0.0]))
-
-
-TRUTH = frozenset({"force", "torque"})  # what every environment's ``info`` holds
-
-
-class SensingFanTracking(FanTrackingEnv):
-    """``FanTrackingEnv`` with more in ``info``, for ablations.
-
-    ``std_force``, ``std_torque``: the filter's standard deviations (3,) N and Nm.
-    """
-
-    def _get_info(self) -> dict[str, Any]:
-        info = super()._get_info()
-        std = np.sqrt(np.diagonal(self.loop.covariance)[12:18])
-        info["std_torque"], info["std_force"] = std[:3].copy(), std[3:].copy()
-        return info
-
-
-def scenario_env(
-    scenario: str, sources: frozenset[str] = frozenset(), estimator: str = "ukf"
-) -> FanTrackingEnv:
-    """Return a scenario's environment, with what a policy must find in its ``info``.
-
-    Args:
-        scenario: name.
-        sources: what ``info`` must hold, as ``controllers.features.Features.sources`` names it.
-        estimator: ``ukf``, or ``constant-gain``, its fast stand-in.
-
-    Raises:
-        InputError: a name that does not exist.
-    """
-    kind = SensingFanTracking if sources - TRUTH else FanTrackingEnv
-    return kind(scenario, estimator=estimator)
 
 
 __all__ = ["DECISION_TICKS", "EPISODE_SECONDS", "LOST_OFFSET", "FanTrackingEnv"]

@@ -109,7 +109,6 @@ class View:
         self._scales = np.array(scales if normalize else np.ones(len(scales)), dtype=np.float32)[
             kept
         ]
-        self.is_plain = observe == "wrench" and not normalize  # the frame is seen as it is
         self._past = np.zeros((count, FRAMES, len(self._limits)), dtype=np.float32)
         self._begins = np.ones(count, dtype=np.bool_)  # no frame of the episode was seen
         self._start = np.zeros((count, 3))  # m

@@ -135,10 +135,8 @@ def plant_record(vehicle: Vehicle, settings: PlantSettings) -> tuple[np.ndarray,
     p["omega_lsb"] = vehicle.omega_lsb
     p["sigma_position"] = vehicle.mocap.sigma_pos_m if settings.sensor_noise else 0.0
     p["sigma_attitude"] = vehicle.mocap.sigma_att_rad if settings.sensor_noise else 0.0
-    p["disturbance_force"], p["disturbance_torque"] = (
-        settings.disturbance_force,
-        settings.disturbance_torque,
-    )
+    for name in ("disturbance_force", "disturbance_torque", "battery_life"):
+        p[name] = getattr(settings, name)
     p["disturbance_keep"] = math.exp(-TICK / settings.disturbance_time)
     for name in ("actuator", "pose", "imu"):
         delay = getattr(settings, f"{name}_delay")
@@ -158,14 +156,11 @@ def plant_record(vehicle: Vehicle, settings: PlantSettings) -> tuple[np.ndarray,
                 f"share of {share:g} is lost, got {settings.dropout_burst!r}"
             )
         # Gilbert, Bell System Technical Journal 39 (1960): a chain of two states
-        share, leaves = (
-            TICK / settings.dropout_burst * share / leaves,
-            TICK / settings.dropout_burst,
-        )
-    p["dropout"], p["dropout_kept"] = ndtri(share), ndtri(1.0 - leaves)
-    if settings.dropout_burst == 0.0:
-        p["dropout_kept"] = p["dropout"]
-    p["voltage_ref"], p["battery_life"] = vehicle.voltage_ref, settings.battery_life
+        ends = TICK / settings.dropout_burst
+        share, leaves = ends * share / leaves, ends
+    p["dropout"] = ndtri(share)
+    p["dropout_kept"] = ndtri(1.0 - leaves) if settings.dropout_burst != 0.0 else p["dropout"]
+    p["voltage_ref"] = vehicle.voltage_ref
     return record, amended
 
 
@@ -226,11 +221,7 @@ def load_world(
         for part in (*spec.cameras, *spec.lights, spec.body("fan")):
             spec.delete(part)
     model = spec.compile()
-    if (
-        load is None
-        # whose thread is the world's one constraint, and the one that could have a spring or a
-        # damper
-    ):
+    if load is None:  # whose thread is the world's one constraint, and could have a spring
         flags = mujoco.mjtDisableBit
         model.opt.disableflags |= (
             int(flags.mjDSBL_CONSTRAINT) | int(flags.mjDSBL_SPRING) | int(flags.mjDSBL_DAMPER)
@@ -327,26 +318,13 @@ def log_speeds(p: Record, speeds: Array) -> None:
 
 
 @compiled
-def blow(
-    p: Record, fan: Record, axial: Array, radial: Array, qpos: Array, qvel: Array, noise: Array
-) -> None:
+def blow(p: Record, fan: Record, jet: Array, qpos: Array, qvel: Array, noise: Array) -> None:
     """Let the gusts age by one tick and write the jet's wrench at ``p.rotation`` into ``p.jet``."""
     blows = any_of(fan.speed > 0.0)
     if blows:
         gust(fan, noise[_GUSTS:_DROPOUT])
     if blows or fan.blown > 0:
-        jet_wrench(
-            fan,
-            axial,
-            radial,
-            qpos[0:3],
-            p.rotation,
-            qvel[0:3],
-            qvel[3:6],
-            p.body.com,
-            p.scratch,
-            p.jet,
-        )
+        jet_wrench(fan, jet, qpos, p.rotation, qvel, p.body.com, p.scratch, p.jet)
 
 
 @compiled
@@ -394,8 +372,7 @@ def actuate(
     p: Record,
     command: Array,
     fan: Record,
-    axial: Array,
-    radial: Array,
+    jet: Array,
     qpos: Array,
     qvel: Array,
     noise: Array,
@@ -422,7 +399,7 @@ def actuate(
     drive(p, p.speeds, TICK, p.battery)
     quaternion_to_matrix(qpos[3:7], p.rotation)
     apply_effects(p, qpos[0:3], p.rotation, qvel[0:3], qvel[3:6])
-    blow(p, fan, axial, radial, qpos, qvel, noise)
+    blow(p, fan, jet, qpos, qvel, noise)
     disturb(p, noise)
     add_up(p, xfrc)
     p.time += TICK

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from ..controllers.fan_motion import PLACES
+from ..controllers.briefing import PLACES
 from ..dynamics.vehicle import NotNegative
 from ..runtime.errors import unknown_name
 from ..runtime.forms import STRICT, Positive, checked, expected

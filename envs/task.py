@@ -14,6 +14,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from ..controllers.briefing import Briefing
 from ..dynamics.effects import check_setting
 from ..dynamics.motion import Array
 from ..dynamics.rotation import quaternion_to_matrix
@@ -25,7 +26,6 @@ from ..runtime.errors import InputError, unknown_name
 from .closed_loop import ESTIMATORS, REFERENCE_SIZE, ClosedLoop, Stage, is_healthy, write_motion
 from .display import modes_shown, need_display
 from .fan import Fan
-from .normals import draw_normals, generator_list
 from .observing import Episodes, Motion, View
 from .plant import TICK, PlantSettings
 from .scenarios import Drawn, find_scenario
@@ -152,7 +152,6 @@ class Task(gym.Env[Frame, Frame], ABC):
         self._loop: ClosedLoop | None = None
         self.drawn: dict[str, float] = {}  # of an episode, where the scenario varies
         self._in_flight = False
-        self._generator: np.random.Generator | None = None  # that the normals are drawn from
         self.command: Array = np.zeros(self.action_size)  # the last one, in SI units
         self.foresight = 0  # decisions to come that ``info`` tells of, for the oracle
         self._see_by(View("wrench", self.normalize, self.limits, self.scales))
@@ -171,16 +170,14 @@ class Task(gym.Env[Frame, Frame], ABC):
         """Return how many decisions an episode has."""
         return round(EPISODE_SECONDS / (TICK * cls.decision_ticks))
 
-    # what a copy makes anew: windows, and what holds compiled code
-    _made_anew: ClassVar = ("viewer", "_generator", "_generators", "_draw_normals", "_look")
-
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy in the middle of an episode starts from."""
-        return {name: v for name, v in self.__dict__.items() if name not in self._made_anew}
+        """Return what a copy in the middle of an episode starts from: all but the window and
+        compiled code.
+        """
+        return self.__dict__ | {"viewer": None, "_look": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        self.viewer = self._generator = None
         self._compile()
 
     def _compile(self) -> None:
@@ -216,20 +213,36 @@ class Task(gym.Env[Frame, Frame], ABC):
             raise InputError(f"{self.name}: call reset before step")
         return self._loop
 
+    @property
+    def declared(self) -> Vehicle:
+        """The declared vehicle, with the scenario's measurement of the pose."""
+        scenario = self.scenario
+        mocap = Mocap(1.0 / TICK, scenario.sigma_position, scenario.sigma_attitude)
+        return replace(self.vehicle, mocap=mocap)
+
+    @property
+    def tuning(self) -> UKFTuning:
+        """What the filter is told."""
+        return UKFTuning.for_vehicle(self.declared, TICK, self.scenario.rise_time)
+
+    def briefing(self) -> Briefing:
+        """Return what a designed controller may know of itself before it flies: nothing of what is
+        drawn anew in an episode, and nothing of undeclared effects.
+        """
+        return Briefing(self.vehicle)
+
     def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> ClosedLoop:
         """Return the closed loop of a true vehicle, before the undeclared effects; the filter knows
         the declared one.
         """
-        scenario = self.scenario
-        mocap = Mocap(1.0 / TICK, scenario.sigma_position, scenario.sigma_attitude)
-        declared = replace(self.vehicle, mocap=mocap)
+        declared = self.declared
         drawn: dict[str, Any] = {
             n: v for n, v in self.drawn.items() if n in Drawn.__dataclass_fields__
         }
         return ClosedLoop(
             declared,
-            replace(vehicle, mocap=mocap, effects=(*vehicle.effects, *self.effects)),
-            UKFTuning.for_vehicle(declared, TICK, scenario.rise_time),
+            replace(vehicle, mocap=declared.mocap, effects=(*vehicle.effects, *self.effects)),
+            self.tuning,
             fan,
             replace(self.settings or PlantSettings.for_vehicle(self.truth), **drawn),
             drawn=self.render_mode is not None,
@@ -291,12 +304,7 @@ class Task(gym.Env[Frame, Frame], ABC):
 
     def _get_obs(self) -> Frame:
         """Return what the agent sees now."""
-        frames = self._frames
-        seen: Frame = (
-            frames[0].copy()
-            if self.view.is_plain
-            else self.view.of(_ALL, frames, self._motion.state[..., 0])[0]
-        )
+        seen: Frame = self.view.of(_ALL, self._frames, self._motion.state[..., 0])[0]
         return seen
 
     def _get_info(self) -> dict[str, Any]:
@@ -393,18 +401,13 @@ class Task(gym.Env[Frame, Frame], ABC):
 
     def fly(self) -> None:
         """Fly a decision at ``command``, with the normals of ``np_random.standard_normal``."""
-        generator = self.np_random
-        if generator is not self._generator:
-            self._generator, self._generators = generator, generator_list([generator])
-            self._normals = np.empty((self.decision_ticks, self.loop.noise_size))
-            self._draw_normals = specialised(draw_normals, self._generators, 0, self._normals)
-        self._draw_normals(self._generators, 0, self._normals)
         loop = self.loop
+        normals = self.np_random.standard_normal((self.decision_ticks, loop.noise_size))
         if self.accelerates:
             loop.action[:] = self.command
         else:
             loop.setpoint[4 : 4 + self.action_size] = self.command
-        loop.run(self._normals, self.path[min(loop.ticks, len(self.path) - 1) :])
+        loop.run(normals, self.path[min(loop.ticks, len(self.path) - 1) :])
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture (height, width, 3) of vehicle, wind and wrench, or show it in a window.

@@ -4,6 +4,7 @@ which takes more than half of the step of a single free body.
 
 import ctypes
 from functools import cache
+from threading import Lock
 from typing import Any
 
 import mujoco
@@ -22,14 +23,22 @@ def _clock() -> Any:
 
 
 class Untimed:
-    """Within ``with Untimed():`` no step of this process is timed; then MuJoCo's own clock runs
-    again, or the one that a user had set.
+    """Within ``with Untimed():`` no step of this process is timed; after the last of them, in any
+    thread, MuJoCo's own clock runs again, or the one that a user had set.
     """
 
+    _lock, _inside = Lock(), 0
+    _before: Any = None
+
     def __enter__(self) -> None:
-        clock = mujoco.get_mjcb_time()
-        self._clock = None if clock is _clock() else clock  # another thread's steps are untimed
-        mujoco.set_mjcb_time(_clock())
+        with Untimed._lock:
+            if Untimed._inside == 0:
+                Untimed._before = mujoco.get_mjcb_time()
+                mujoco.set_mjcb_time(_clock())
+            Untimed._inside += 1
 
     def __exit__(self, *_error: object) -> None:
-        mujoco.set_mjcb_time(self._clock)
+        with Untimed._lock:
+            Untimed._inside -= 1
+            if Untimed._inside == 0:
+                mujoco.set_mjcb_time(Untimed._before)

@@ -1,5 +1,5 @@
-"""Many environments of a task in one process: one compiled call flies a decision of all of them,
-and one writes what came of it.
+"""Many environments of a task in one process: each flies its own loop, and one compiled call writes
+what came of all of them.
 """
 
 from collections.abc import Callable, Sequence
@@ -9,15 +9,13 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode
-from numba import typed, typeof
 from numpy.typing import NDArray
 
 from ..dynamics.motion import Array
-from ..runtime.compiled import compiled_without_gil, specialised
+from ..runtime.compiled import specialised
 from ..runtime.errors import InputError, unknown_name
-from .closed_loop import run_ticks, write_motion
+from .closed_loop import write_motion
 from .fan_tracking import FanTrackingEnv
-from .normals import draw_normals, generator_list
 from .observing import Episodes, Flags, Motion
 from .task import Frame, Task
 from .untimed import Untimed
@@ -69,7 +67,6 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
             if value < 1:
                 raise InputError(f"{task.name}: {name} must be at least 1, got {value}")
         self.task, self.autoreset_mode = task, _mode(autoreset_mode, task.name)
-        self._given = num_envs, max_episode_steps, threads, autoreset_mode, task, kwargs
         self.num_envs, self.max_episode_steps = num_envs, max_episode_steps
         self.threads = min(threads, num_envs)
         self.envs = self._make_envs(kwargs)
@@ -83,14 +80,11 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         self._decisions = np.zeros(num_envs, dtype=np.int64)  # of the episode in hand
         self._begun = np.zeros(num_envs, dtype=np.bool_)
         self._over = np.zeros(num_envs, dtype=np.bool_)  # episodes that ended at the last step
-        # each environment's own; one that was not reset yet has another's
-        self._generators = generator_list([np.random.default_rng(0)] * num_envs)
         self._episodes = Episodes.alike(num_envs, task.action_size, first.path, first.reference)
         self._view = first.view.of_many(num_envs)
         self._frames = np.zeros(self.observation_space.shape or (), dtype=np.float32)
-        self._whole = self._frames  # frames before a view is taken of them
-        if not self._view.is_plain:
-            self._whole = np.zeros((num_envs, len(task.limits)), dtype=np.float32)
+        # frames before a view is taken of them
+        self._whole = np.zeros((num_envs, len(task.limits)), dtype=np.float32)
         self._table = np.zeros(num_envs, dtype=task.values)
         self._labels = np.zeros(num_envs, dtype=object)
         self._all = np.ones(num_envs, dtype=np.bool_)
@@ -107,21 +101,8 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         return values | {self.task.label: self._labels}
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy starts from: arguments, arrays, generators and environments."""
-        kept = ("_decisions", "_begun", "_over", "_episodes", "_view", "_frames", "_whole")
-        names = *kept, "_table", "_labels", "envs", "_np_random", "_np_random_seed"
-        state = {name: getattr(self, name) for name in names}
-        return state | {"_given": self._given, "_generators": list(self._generators)}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        count, steps, threads, mode, task, kwargs = state["_given"]
-        type(self).__init__(self, count, steps, threads, mode, task, **kwargs)
-        for name in ("_decisions", "_begun", "_over", "_frames", "_whole", "_table", "_labels"):
-            getattr(self, name)[...] = state[name]
-        for name in ("_episodes", "_view", "_np_random", "_np_random_seed"):
-            setattr(self, name, state[name])
-        self._generators = generator_list(state["_generators"])
-        self._take_envs(state)
+        """Return what a copy starts from: all but threads and compiled code."""
+        return self.__dict__ | {"_pool": None, "_compiled": {}}
 
     def reset(
         self,
@@ -171,8 +152,10 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         if not self._begun.all():
             raise InputError(f"{task.name}: call reset before step")
         flying = ~self._over
-        given = env.action_scale, task.largest_action, self._episodes
-        self._call(take_commands, flying, wanted, *given)
+        limit, commands = task.largest_action, self._episodes.commands
+        given = np.clip(env.action_scale * wanted, -limit, limit)
+        self._episodes.changes[flying] = (given - commands)[flying]
+        commands[flying] = given[flying]
         self._fly(flying)
         self._look(flying)
         self._decisions += 1
@@ -212,21 +195,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
 
     def _make_memory(self) -> Motion:
         """Make what ``_fly`` works on; return the motion of all, which ``_fly`` writes."""
-        # an environment that was not reset yet has the first one's flight
-        first = self.envs[0]
-        flight = first.make_loop(first.truth, first.fan).flight
-        self._flights = typed.List.empty_list(typeof(flight))
-        for _ in range(self.num_envs):
-            self._flights.append(flight)
         return Motion.zeros(self.num_envs)
-
-    def _take_envs(self, state: dict[str, Any]) -> None:
-        """Take the environments of another, whose generators are those of ``_generators``."""
-        self.envs = state["envs"]
-        for i in np.flatnonzero(self._begun).tolist():
-            env = self.envs[i]
-            self._generators[i], self._flights[i] = env.np_random, env.loop.flight
-        self._move(self._begun, 0)
 
     def _draw(self, i: int, env: Task) -> None:
         """Write down the episode that an environment has drawn."""
@@ -241,44 +210,29 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
 
     def _hover(self, which: list[int], seeds: Sequence[int | None]) -> None:
         """Draw an episode of some environments, and let their vehicles hover at its start."""
-
-        def hover(n: int) -> None:
-            i = which[n]
-            self.envs[i].reset(seed=seeds[i])
-
-        self._spread(hover, len(which))
+        self._spread(lambda i: self.envs[i].reset(seed=seeds[i]), which)
         for i in which:
-            env = self.envs[i]
-            self._generators[i], self._flights[i] = env.np_random, env.loop.flight
-            self._draw(i, env)
-        self._move(np.isin(np.arange(self.num_envs), which), 0)
+            self._draw(i, self.envs[i])
+            self._see(i)
 
     def _fly(self, which: Flags) -> None:
         """Fly a decision in some environments at their commands."""
-        flying, ticks, episodes = np.flatnonzero(which).tolist(), 0, self._episodes
-        if any(self.envs[i].loop.has_own_parts for i in flying):
-            for i in flying:
-                self.envs[i].command[:] = episodes.commands[i]
-                self.envs[i].fly()
-                episodes.ticks[i] += self.task.decision_ticks
-        else:
-            ticks = self.task.decision_ticks
-        self._move(which, ticks)
-        for i in flying:
-            episodes.broken[i] = self.envs[i].loop.was_reset
+        flying = np.flatnonzero(which).tolist()
 
-    def _move(self, which: Flags, ticks: int) -> None:
-        """Run some ticks of the kit's own stages, and write ``_motion``."""
-        parts = 1 if self.threads == 1 else self.num_envs
-        noise_size = self.envs[0].loop.noise_size
-        given = self._flights, self._generators, which, self._episodes, ticks, noise_size
-
-        def move(part: int) -> None:
-            first, last = part * self.num_envs // parts, (part + 1) * self.num_envs // parts
-            self._call(fly_loops, first, last, *given, self.task.accelerates, self._motion)
+        def fly(i: int) -> None:
+            self.envs[i].command[:] = self._episodes.commands[i]
+            self.envs[i].fly()
 
         with Untimed():
-            self._spread(move, parts)
+            self._spread(fly, flying)
+        for i in flying:
+            self._see(i)
+
+    def _see(self, i: int) -> None:
+        """Write where environment ``i`` stands."""
+        loop, episodes = self.envs[i].loop, self._episodes
+        self._call(write_motion, loop.record, loop.world, self._motion, i)
+        episodes.ticks[i], episodes.broken[i] = loop.ticks, loop.was_reset
 
     @property
     def _states(self) -> Array:
@@ -292,8 +246,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         """Write frames and values of some environments, as their task has them."""
         given = self._episodes, self._motion, self._whole, self._table
         self._call(self.task.look, which, *given)
-        if not self._view.is_plain:
-            self._frames[which] = self._view.of(which, self._whole, self._states)
+        self._frames[which] = self._view.of(which, self._whole, self._states)
         if self.render_mode == "human":
             self.render()
 
@@ -303,31 +256,26 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
             self._compiled[function] = specialised(function, *arguments)
         self._compiled[function](*arguments)
 
-    def _spread(self, work: Callable[[int], None], count: int) -> None:
-        """Call ``work`` with 0 to ``count - 1``, once each; this thread works, too.
+    def _spread(self, work: Callable[[int], object], which: Sequence[int]) -> None:
+        """Call ``work`` with each number, once.
 
         A thread that is done takes the next number, so that no thread waits for a slow one.
         """
-        numbers = iter(range(count))
+        numbers, threads = iter(which), min(self.threads, len(which))
 
         def take_numbers() -> None:
             for n in numbers:
                 work(n)
 
-        helpers = min(self.threads, count) - 1
-        if helpers < 1:
+        if threads < 2:
             take_numbers()
             return
         if self._pool is None:
-            self._pool = ThreadPoolExecutor(self.threads - 1)
-        others = [self._pool.submit(take_numbers) for _ in range(helpers)]
-        try:
-            take_numbers()
-        finally:
-            others = [other for other in others if not other.cancel()]  # the rest came too late
-            wait(others)
-        for other in others:
-            other.result()
+            self._pool = ThreadPoolExecutor(self.threads)
+        working = [self._pool.submit(take_numbers) for _ in range(threads)]
+        wait(working)
+        for each in working:
+            each.result()
 
     def _infos(self, which: Flags) -> Infos:
         """Return what some environments say as Gymnasium's vector environments do: an array and a
@@ -361,62 +309,6 @@ def _mode(given: AutoresetMode | str, task: str) -> AutoresetMode:
         f"{task}: autoreset_mode must be {' or '.join(m.name for m in known)} of "
         f"gymnasium.vector.AutoresetMode, got {given!r}"
     )
-
-
-@compiled_without_gil
-def take_commands(
-    which: Flags, wanted: Array, scale: float, limit: float, episodes: Episodes
-) -> None:
-    """Write the commands of the environments ``which``, within ``limit``, and their changes."""
-    for n in np.flatnonzero(which):
-        for i in range(wanted.shape[1]):
-            value = min(max(scale * wanted[n, i], -limit), limit)
-            episodes.changes[n, i] = value - episodes.commands[n, i]
-            episodes.commands[n, i] = value
-
-
-@compiled_without_gil
-def fly_loops(
-    begin: int,
-    end: int,
-    flights: Any,
-    generators: Any,
-    which: Flags,
-    episodes: Episodes,
-    count: int,
-    noise_size: int,
-    accelerates: bool,
-    motion: Motion,
-) -> None:
-    """Fly ``count`` ticks of those environments from ``begin`` to ``end - 1`` that fly.
-
-    Args:
-        begin: an environment.
-        end: likewise.
-        flights: (n,) of ``ClosedLoop.flight``; a typed list.
-        generators: (n,) that the noise is drawn from; a typed list.
-        which: (n,) booleans, whether they fly.
-        episodes: whose ticks are written.
-        count: of ticks.
-        noise_size: unit normals of a tick.
-        accelerates: whether the commands are accelerations, or velocities along y and z.
-        motion: written.
-    """
-    commands, ticks = episodes.commands, episodes.ticks
-    for n in range(begin, end):
-        if not which[n]:
-            continue
-        record, world, move = flights[n]
-        loop, noise, path = record[0], np.empty((count, noise_size)), episodes.paths[n]
-        for i in range(commands.shape[1]):
-            if accelerates:
-                loop.action[i] = commands[n, i]
-            else:
-                loop.flight.setpoint[4 + i] = commands[n, i]
-        draw_normals(generators, n, noise)
-        run_ticks(record, world, path[min(ticks[n], len(path) - 1) :], noise, move)
-        ticks[n] += count
-        write_motion(record, world, motion, n)
 
 
 FanTrackingVectorEnv = TaskVectorEnv  # its name where it flew FanTracking alone

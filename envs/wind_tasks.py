@@ -228,12 +228,12 @@ class WindHoverEnv(Task):
         loop, R, wind = self.loop, np.empty((3, 3)), np.empty(3)
         fan = loop.record["fan"].copy()[0]
         quaternion_to_matrix(loop.quaternion, R)
-        moving = loop.velocity, loop.motion[1][3:6], loop.record[0]["plant"]["body"]["com"]
-        ahead, (axial, radial) = np.empty((self.foresight, 6)), loop.jet_table
+        com, ahead = loop.record[0]["plant"]["body"]["com"], np.empty((self.foresight, 6))
+        jet, now = loop.jet_table, (loop.position, R, loop.world.qvel, com)
         at = loop.time + 0.5 * WIND_PERIOD
         for k in range(self.foresight):
             fan["air"] = loop.winds.velocity(loop.points.T, at + k * WIND_PERIOD)
-            jet_wrench(fan, axial, radial, loop.position, R, *moving, wind, ahead[k])
+            jet_wrench(fan, jet, *now, wind, ahead[k])
         return super()._truth() | {
             "disturbance": loop.disturbance.copy(),
             "wrench_ahead": ahead,

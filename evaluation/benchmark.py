@@ -8,7 +8,7 @@ from ..envs.scenarios import find_scenario
 from ..runtime.errors import InputError
 from ..runtime.workers import every
 from .episodes import Episode, benchmark_seeds, fly_episode
-from .tasks import TASKS, make_environment, make_pilot, task_of
+from .tasks import TASKS, make_pilot, task_of
 
 _CHUNK = 5  # episodes that a worker flies at a time
 _SEEDS = 2**32  # of a benchmark
@@ -104,12 +104,12 @@ def _flown(
         return ((chunk, _fly_chunk(chunk)) for chunk in chunks)
     if cluster is None:
         task, _, scenario, _ = chunks[0]
-        make_environment(task, scenario).reset(seed=0)  # compiles, once for all processes
+        TASKS[task].environment(scenario).reset(seed=0)  # compiles, once for all processes
     return every(_fly_chunk, chunks, None if cluster else jobs, cluster)
 
 
 def _fly_chunk(chunk: Chunk) -> list[Episode]:
     task, name, scenario, seeds = chunk
-    pilot = make_pilot(name, task)
-    env = make_environment(task, scenario, pilot)
-    return [fly_episode(env, pilot, seed, decisions=TASKS[task].decisions) for seed in seeds]
+    known, pilot = TASKS[task], make_pilot(name, task)
+    env = known.environment(scenario)
+    return [fly_episode(env, pilot, seed, decisions=known.decisions) for seed in seeds]

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..envs.fan_tracking import LOST_OFFSET, FanTrackingEnv
-from .briefing import briefing_of
 
 Array = NDArray[np.float64]
 DECISIONS = FanTrackingEnv.decisions()
@@ -67,12 +66,6 @@ class Episode:
         return float(np.sqrt(np.mean(self.offset**2)))
 
 
-def loop_of(env: Any) -> Any:
-    """Return the closed loop that flies in an environment that has been reset."""
-    inner = getattr(env.unwrapped, "current", env.unwrapped)  # of a mixture of scenarios
-    return inner.loop
-
-
 def fly_episode(
     env: Any,
     controller: Any,
@@ -85,21 +78,19 @@ def fly_episode(
     Args:
         env: the environment.
         controller: called with ``observation`` and ``info``. Its ``brief`` and its ``reset``,
-            where it has them, are called first, the former with ``briefing_of(env)``; its
-            ``foresight`` is how many
-            decisions ahead it sees wind or fan.
+            where it has them, are called first, the former with ``Task.briefing``; its
+            ``foresight`` is how many decisions ahead it sees wind or fan.
         seed: of the episode.
         each: called with the ``info`` of every decision.
         decisions: of a whole episode.
     """
-    if hasattr(env.unwrapped, "foresight"):
-        env.unwrapped.foresight = getattr(controller, "foresight", 0)
+    env.unwrapped.foresight = getattr(controller, "foresight", 0)
     observation, info = env.reset(seed=seed)
     if hasattr(controller, "brief"):
-        controller.brief(briefing_of(env))
+        controller.brief(env.unwrapped.briefing())
     if hasattr(controller, "reset"):
         controller.reset()
-    loop, rows, observations, total = loop_of(env), [], [], 0.0
+    loop, rows, observations, total = env.unwrapped.loop, [], [], 0.0
     for _ in range(decisions):
         action = controller(observation, info)
         observation, reward, lost, _, info = env.step(np.asarray(action, dtype=np.float32))

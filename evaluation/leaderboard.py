@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..controllers.registry import STANDARD_TASK
-from ..runtime.whole_files import replaced
+from ..runtime.page_files import write_text
 from .benchmark import Results
 from .episodes import Episode
 from .statistics import (
@@ -161,8 +161,7 @@ def write_leaderboard(rows: Sequence[Standing], folder: Path) -> Path:
         {key: None if value != value else value for key, value in asdict(row).items()}
         for row in rows
     ]
-    with replaced(path) as partial:
-        partial.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", path)
     return path
 
 

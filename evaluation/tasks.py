@@ -7,9 +7,9 @@ from typing import Any
 
 from ..controllers.own_file import is_file_name, load_controller
 from ..controllers.registry import STANDARD_TASK, TASK_LAWS, make_controller, shipped_policies
-from ..controllers.trained_policy import TrainedPolicy, is_policy_path, load_policy
+from ..controllers.trained_policy import is_policy_path, load_policy
 from ..envs import task as environments
-from ..envs.fan_tracking import FanTrackingEnv, scenario_env
+from ..envs.fan_tracking import FanTrackingEnv
 from ..envs.fan_tracking_2d import FanTracking2DEnv
 from ..envs.wind_tasks import WindHoverEnv, WindTrajectoryEnv
 from ..runtime.errors import InputError, unknown_name
@@ -111,13 +111,6 @@ def make_pilot(name: str, task: str = STANDARD_TASK) -> Any:
     if task == STANDARD_TASK and name not in known.laws:
         raise unknown_name("controller", name, [*known.laws, *shipped])
     return make_controller(name, task)
-
-
-def make_environment(task: str, scenario: str, controller: Any = None) -> Any:
-    """Return the environment of a scenario, with what a trained policy needs in its ``info``."""
-    if isinstance(controller, TrainedPolicy):
-        return scenario_env(scenario, controller.features.sources)
-    return TASKS[task].environment(scenario)
 
 
 def short_names(names: Sequence[str]) -> dict[str, str]:

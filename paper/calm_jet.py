@@ -26,12 +26,12 @@ def calm_jet(fan: Fan, vehicle: Vehicle, x: Array, y: Array) -> Array:
         y: offsets (n,) m from its axis.
     """
     record = fan_record(fan, vehicle.positions, TICK)  # its gusts are zero until aged
-    axial, radial = jet_table(fan.radius, fan.hub_radius)
-    rotation, rest, wind = matrix_of(quaternion_of_yaw(math.pi)), np.zeros(3), np.empty(3)
+    jet = np.stack(jet_table(fan.radius, fan.hub_radius))
+    rotation, rest, wind = matrix_of(quaternion_of_yaw(math.pi)), np.zeros(6), np.empty(3)
     wrench = np.empty((len(x), 6))
     for i in range(len(x)):
         at = np.array([x[i], y[i], fan.height])
-        jet_wrench(record[0], axial, radial, at, rotation, rest, rest, vehicle.com, wind, wrench[i])
+        jet_wrench(record[0], jet, at, rotation, rest, vehicle.com, wind, wrench[i])
     return wrench
 
 

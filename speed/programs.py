@@ -77,7 +77,6 @@ def decisions() -> list[Contender]:
     """Return the time within which the trackers take 99 % of their decisions of an episode."""
     from ..controllers import make_controller
     from ..envs.fan_tracking import FanTrackingEnv
-    from ..evaluation.briefing import briefing_of
     from ..evaluation.episodes import fly_episode
 
     env = FanTrackingEnv("base")
@@ -87,7 +86,7 @@ def decisions() -> list[Contender]:
         seen = fly_episode(env, pilot, _EPISODE).observation
 
         def run(pilot: object = pilot, seen: np.ndarray = seen) -> float:
-            pilot.brief(briefing_of(env))  # type: ignore[attr-defined]
+            pilot.brief(env.briefing())  # type: ignore[attr-defined]
             pilot.reset()  # type: ignore[attr-defined]
             taken = []
             for observation in seen:

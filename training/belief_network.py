@@ -1,6 +1,5 @@
 """A network that says what a tracker would believe, and how it is fitted to episodes."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -91,7 +90,6 @@ def fit(
     rates: tuple[float, float],
     generator: torch.Generator,
     mirrored: Array | None = None,
-    advance: Callable[[float], None] = lambda share: None,
 ) -> float:
     """Fit means and deviations to what is taught, over whole episodes; return the last epoch's
     mean loss.
@@ -111,7 +109,6 @@ def fit(
         mirrored: signs (quantities,) of a frame where left and right change places, and all that is
             taught changes its sign: each time that an episode is learned from, it is mirrored or
             not. Default: none is.
-        advance: called after each epoch with the share of them that is done.
     """
     seen, truth, counts = (
         torch.from_numpy(x) for x in (episodes.seen, episodes.truth, episodes.counts)
@@ -122,7 +119,7 @@ def fit(
     optimiser = torch.optim.Adam(network.parameters(), lr=rates[0], fused=True)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, updates, eta_min=rates[1])
     losses: list[float] = []
-    for epoch in range(epochs):
+    for _ in range(epochs):
         losses.clear()
         for batch in torch.randperm(count, generator=generator).split(batch_size):  # type: ignore[no-untyped-call]
             frames, taught = seen[:, batch], truth[:, batch]
@@ -141,5 +138,4 @@ def fit(
             optimiser.step()
             schedule.step()
             losses.append(loss.item())
-        advance((epoch + 1) / epochs)
     return float(np.mean(losses))

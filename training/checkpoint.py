@@ -1,9 +1,9 @@
 """Checkpoints from which a run goes on as if it had never stopped.
 
 A checkpoint holds all that the rest of a run depends on: networks, optimisers, replay memory, the
-state of every random generator, and of each environment the episode's number and the actions since
-its start, from which the environment is flown back to where it was. It is one file of tensors and
-text, and reading it runs no code.
+state of every random generator, and the number of each environment's episode. Whether it was killed
+there or not, a run begins the episodes that follow. A checkpoint is one file of tensors and text,
+and reading it runs no code.
 """
 
 import json
@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import torch
 
-from ..evaluation.episodes import DECISIONS
 from ..runtime.archives import check_archive
 from ..runtime.errors import InputError
 from ..runtime.file_limits import LIMITS
@@ -26,10 +25,9 @@ _NORMALS = ("_n_updates", "_episode_num", "num_timesteps")
 
 
 def save_checkpoint(learner: Any, env: FeatureVecEnv, extra: dict[str, Any], path: Path) -> None:
-    """Write where a run stands, between two calls of ``learn``; ``extra`` is text, numbers and
-    lists of the run's own.
+    """Write where a run stands, between two calls of ``learn``, of which the next one begins new
+    episodes; ``extra`` is text, numbers and lists of the run's own.
     """
-    memory = env.memory()
     kind, keys, *rest = np.random.get_state()  # noqa: NPY002  the generator that SB3 draws from
     state: dict[str, Any] = {
         "parameters": learner.get_parameters(),
@@ -40,19 +38,13 @@ def save_checkpoint(learner: Any, env: FeatureVecEnv, extra: dict[str, Any], pat
             {
                 "numpy": [kind, *rest],
                 "actions": learner.action_space.np_random.bit_generator.state,
-                "episode": memory["episode"],
-                "recent": list(learner.ep_info_buffer or []),
+                "episode": env.episode.tolist(),
                 "extra": extra,
             }
         ),
-        "flown": [torch.from_numpy(a) for a in memory["actions"]],
-        "seen": torch.from_numpy(np.array(learner._last_obs)),
-        "starts": torch.from_numpy(np.array(learner._last_episode_starts)),
     }
     if hasattr(learner, "log_ent_coef"):
         state["log_ent_coef"] = learner.log_ent_coef.detach().clone()
-    if getattr(learner, "_last_lstm_states", None) is not None:
-        state["lstm"] = [[t.clone() for t in pair] for pair in learner._last_lstm_states]
     buffer = getattr(learner, "replay_buffer", None)
     if buffer is not None:
         used = buffer.buffer_size if buffer.full else buffer.pos
@@ -60,6 +52,7 @@ def save_checkpoint(learner: Any, env: FeatureVecEnv, extra: dict[str, Any], pat
         state["replay_position"] = [buffer.pos, buffer.full]
     with replaced(path) as partial:
         torch.save(state, partial)
+    learner._last_obs = None
 
 
 def load_checkpoint(learner: Any, env: FeatureVecEnv, path: Path) -> dict[str, Any]:
@@ -67,8 +60,8 @@ def load_checkpoint(learner: Any, env: FeatureVecEnv, path: Path) -> dict[str, A
     ``extra``.
 
     Raises:
-        InputError: not a checkpoint of this configuration, one that is cut or larger than
-            ``FileLimits`` allows, or its environments do not fly back to where they were.
+        InputError: not a checkpoint of this configuration, or one that is cut or larger than
+            ``FileLimits`` allows.
     """
     what = "a checkpoint"
     check_regular(path, what, LIMITS.checkpoint)
@@ -77,9 +70,7 @@ def load_checkpoint(learner: Any, env: FeatureVecEnv, path: Path) -> dict[str, A
             check_archive(path, file, LIMITS.checkpoint, what, packed=False)
             state = torch.load(file, weights_only=True)
         _check_tensors(state, set())
-        if max(map(len, state["flown"])) > DECISIONS:
-            raise ValueError(f"an episode of more than {DECISIONS} decisions")
-        return _restore(learner, env, state, path)
+        return _restore(learner, env, state)
     except InputError:
         raise
     except Exception as error:  # whatever a parser, or a part of a learner, makes of spoiled bytes
@@ -103,7 +94,7 @@ def _check_tensors(value: Any, known: set[int]) -> None:
             _check_tensors(part, known)
 
 
-def _restore(learner: Any, env: FeatureVecEnv, state: dict[str, Any], path: Path) -> dict[str, Any]:
+def _restore(learner: Any, env: FeatureVecEnv, state: dict[str, Any]) -> dict[str, Any]:
     learner.set_parameters(state["parameters"], exact_match=True, device="cpu")
     text = json.loads(state["text"])
     buffer = getattr(learner, "replay_buffer", None)
@@ -115,22 +106,7 @@ def _restore(learner: Any, env: FeatureVecEnv, state: dict[str, Any], path: Path
         setattr(learner, name, value)
     if "log_ent_coef" in state:
         learner.log_ent_coef.data.copy_(state["log_ent_coef"])
-    if "lstm" in state:
-        learner._last_lstm_states = type(learner._last_lstm_states)(
-            *(tuple(pair) for pair in state["lstm"])
-        )
-    learner._last_obs = env.recall(
-        {"episode": text["episode"], "actions": [t.numpy() for t in state["flown"]]}
-    )
-    learner._last_episode_starts = state["starts"].numpy()
-    if not np.array_equal(learner._last_obs, state["seen"].numpy()):
-        raise InputError(
-            f"{path}: the environments no longer fly as they did when it was written; start anew"
-        )
-    from collections import deque
-
-    learner.ep_info_buffer = deque(text["recent"], maxlen=learner._stats_window_size)
-    learner.ep_success_buffer = deque(maxlen=learner._stats_window_size)
+    env.episode[:] = text["episode"]
     learner.action_space.np_random.bit_generator.state = text["actions"]
     torch.set_rng_state(state["torch"])
     kind, *rest = text["numpy"]

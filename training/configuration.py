@@ -17,7 +17,7 @@ from ..runtime.yaml_file import parse_yaml, read_yaml
 Config = dict[str, Any]
 IMITATIONS = ("imitation", "recurrent-imitation")
 ALGORITHMS = ("sac", "ppo", "recurrent-ppo", "td3", *IMITATIONS, "tune")
-_COUNTS = ("steps", "environments", "repeat", "rounds", "state", "ahead", "checkpoint")
+_COUNTS = ("steps", "environments", "rounds", "state", "ahead", "checkpoint")
 
 
 def load_config(algorithm: str, overrides: Sequence[str] = (), file: Path | None = None) -> Config:

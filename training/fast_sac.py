@@ -18,7 +18,7 @@ _SMALLEST = 1e-6  # keeps the logarithm of the squashing's derivative finite
 
 
 class FastSAC(SAC):  # type: ignore[misc]
-    """``SAC`` for small fully connected networks with ReLU, two critics and one action."""
+    """``SAC`` for small fully connected networks with ReLU and two critics."""
 
     def _setup_model(self) -> None:
         super()._setup_model()
@@ -37,7 +37,7 @@ class FastSAC(SAC):  # type: ignore[misc]
         self.actor.optimizer = torch.optim.Adam(self._actor_parameters, lr=rate, fused=True)
 
     def _act(self, observations: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Draw actions (n, 1) and return them with their log-probabilities (n, 1)."""
+        """Draw actions (n, k) and return them with the logarithm of their probability (n, 1)."""
         x = observations
         for layer in self._hidden:
             x = torch.relu(torch.nn.functional.linear(x, layer.weight, layer.bias))
@@ -53,7 +53,7 @@ class FastSAC(SAC):  # type: ignore[misc]
             - _HALF_LOG_TWO_PI
             - torch.log(1.0 - action.square() + _SMALLEST)
         )
-        return action, log_prob
+        return action, log_prob.sum(dim=1, keepdim=True)
 
     def train(self, gradient_steps: int, batch_size: int = 64) -> None:
         """Do ``gradient_steps`` updates."""

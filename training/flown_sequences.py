@@ -1,11 +1,10 @@
 """Training flights as sequences: what a policy saw, and what a simulator knows of each decision."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import torch
-from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from ..controllers.features import History
@@ -22,40 +21,15 @@ Frames = NDArray[np.float32]
 _CALM = 0.5  # share of the episodes, after the first round, in which nothing leads off the path
 
 
-class Lesson(Protocol):
-    """What a network sees of n episodes side by side, and what is taught."""
-
-    decisions: int  # of an episode
-    period: float  # s, of a decision
-    largest: float  # command
-
-    def begin(self, count: int) -> None:
-        """Start ``count`` episodes."""
-        ...
-
-    def look(self, observations: Frames, infos: dict[str, Any]) -> tuple[Frames, Array]:
-        """Return frames (n, quantities) of the next decision, and the teacher's command (n, axes)
-        there; after the last decision once more.
-        """
-        ...
-
-    def taught(self, kept: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
-        """Return what is taught (decisions, n, quantities) of the episodes since ``begin``, and
-        what counts (decisions, n); ``kept`` (decisions + 1, n) says where a vehicle still flies.
-        """
-        ...
-
-
 class FanLesson:
     """FanTracking: the command of a law that sees the fan (its velocity, and a gain on the offset),
     or where the fan is ``ahead`` decisions later.
     """
 
+    decisions, period, largest = DECISIONS, DECISION_PERIOD, MAX_COMMAND
+
     def __init__(self, config: Config) -> None:
         self._config, self._features = config, features_of(config)
-        self.decisions = DECISIONS // config["repeat"]
-        self.period = DECISION_PERIOD * config["repeat"]
-        self.largest = MAX_COMMAND
 
     def begin(self, count: int) -> None:
         """Start ``count`` episodes."""
@@ -63,8 +37,10 @@ class FanLesson:
         self._known: list[Array] = []
 
     def look(self, observations: Frames, infos: dict[str, Any]) -> tuple[Frames, Array]:
-        """Return frames (n, quantities) and the teacher's command (n, 1)."""
-        frames = self._features.frames(observations, infos)
+        """Return frames (n, quantities) of the next decision, and the teacher's command (n, axes)
+        there; after the last decision once more.
+        """
+        frames = self._features.frames(observations)
         if self._history is None:
             self._history = History(self._features, len(frames))
             self._history.restart(frames, list(range(len(frames))))
@@ -76,7 +52,10 @@ class FanLesson:
         return self._history.flat(), wanted[:, None]
 
     def taught(self, kept: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the command (decisions, n, 1), or the fan's offset, its velocity and that less the
+        """Return what is taught of the episodes since ``begin``, and what counts (decisions, n);
+        ``kept`` (decisions + 1, n) says where a vehicle still flies.
+
+        Taught is the command (decisions, n, 1), or the fan's offset, its velocity and that less the
         vehicle's own (decisions, n, 3).
         """
         fan, own, speed, wanted = np.stack(self._known, axis=1)
@@ -97,24 +76,24 @@ class Flights:
     Args:
         envs: vector environments in which each round is flown; one that has lost its vehicle goes
             on with another episode.
-        lesson: what is seen and taught.
+        lesson: what is seen and taught: a ``FanLesson``, or what has its constants and methods.
         config: ``rounds``, ``wander`` (``size`` and ``time``, s, of an error of the commands).
         seed: of the run.
-        rng: of the errors of the commands.
+        advance: called with the number of decisions flown so far.
     """
 
     def __init__(
-        self, envs: list[Any], lesson: Lesson, config: Config, seed: int, rng: np.random.Generator
+        self,
+        envs: list[Any],
+        lesson: Any,
+        config: Config,
+        seed: int,
+        advance: Callable[[int], None] = lambda decisions: None,
     ) -> None:
         self._envs, self._lesson, self._wander = envs, lesson, config["wander"]
-        self._seed, self._rng = seed, rng
+        self._seed, self._rng, self._advance = seed, np.random.default_rng(seed), advance
         self._flown: list[Sequences] = []
         self.episodes = 0
-
-    @property
-    def episodes_a_round(self) -> int:
-        """How many episodes a round has."""
-        return sum(env.num_envs for env in self._envs)
 
     def sequences(self) -> Sequences:
         """Return all that were flown."""
@@ -125,37 +104,20 @@ class Flights:
             )
         )
 
-    def fly(
-        self, network: BeliefNetwork | None, shares: Frames, advance: Callable[[float], None]
-    ) -> None:
-        """Fly a round, with the teacher where there is no network.
-
-        Args:
-            network: whose means are flown.
-            shares: (axes, taught) of the means that are commanded.
-            advance: called with the share of the round that is flown.
+    def fly(self, network: BeliefNetwork | None, shares: Frames) -> None:
+        """Fly a round at ``shares`` (axes, taught) of the network's means, or with the teacher
+        where there is no network.
         """
-        before = self.episodes
         for env in self._envs:
             n = env.num_envs
             size = self._wander["size"] * self._rng.random(n)
             if network is not None:
                 size *= self._rng.random(n) >= _CALM
-            first = (self.episodes - before) / self.episodes_a_round
-
-            def tell(share: float, first: float = first, n: int = n) -> None:
-                advance(first + share * n / self.episodes_a_round)
-
-            self._flown.append(self._fly(env, network, shares, size[:, None], tell))
+            self._flown.append(self._fly(env, network, shares, size[:, None]))
             self.episodes += n
 
     def _fly(
-        self,
-        env: Any,
-        network: BeliefNetwork | None,
-        shares: Frames,
-        size: Array,
-        advance: Callable[[float], None],
+        self, env: Any, network: BeliefNetwork | None, shares: Frames, size: Array
     ) -> Sequences:
         lesson, n, state = self._lesson, env.num_envs, None
         shape = n, env.single_action_space.shape[0]
@@ -177,13 +139,18 @@ class Flights:
             observation, _, lost, _, infos = env.step(given)
             flying = flying & ~lost
             kept.append(flying)
-            advance((k + 1) / lesson.decisions)
+            self._advance(self.episodes * lesson.decisions + n * (k + 1))
         lesson.look(observation, infos)
         truth, counts = lesson.taught(np.array(kept))
         return Sequences(np.array(seen), truth.astype(np.float32), counts.astype(np.float32))
 
 
-def fan_flights(config: Config, scenario: str, seed: int, rng: np.random.Generator) -> Flights:
+def fan_flights(
+    config: Config,
+    scenario: str,
+    seed: int,
+    advance: Callable[[int], None] = lambda decisions: None,
+) -> Flights:
     """Return flights of FanTracking in each scenario of a tier.
 
     Raises:
@@ -193,14 +160,7 @@ def fan_flights(config: Config, scenario: str, seed: int, rng: np.random.Generat
     episodes = -(-config["steps"] // (config["rounds"] * DECISIONS))
     each = -(-episodes // len(scenarios))
     envs = [
-        make_training_envs(
-            name,
-            each * scenarios.count(name),
-            config["estimator"],
-            config["repeat"],
-            features_of(config).sources,
-            AutoresetMode.NEXT_STEP,
-        )
+        make_training_envs(name, each * scenarios.count(name), config["estimator"])
         for name in dict.fromkeys(scenarios)
     ]
-    return Flights(envs, FanLesson(config), config, seed, rng)
+    return Flights(envs, FanLesson(config), config, seed, advance)

@@ -39,7 +39,6 @@ def rounds(
     config: Config,
     seed: int,
     mirrored: Array | None,
-    advance: Callable[[float], None] = lambda share: None,
 ) -> Iterator[bool]:
     """Fly and fit round after round; yield after each whether the round was the last.
 
@@ -50,15 +49,10 @@ def rounds(
         config: ``rounds``, ``epochs``, ``last_epochs``, ``batch_size`` and ``learning_rate``.
         seed: of the order of the episodes.
         mirrored: as of ``belief_network.fit``.
-        advance: called with the share of all rounds that is done; half of a round is flown.
     """
     order, rate = torch.Generator().manual_seed(seed), config["learning_rate"]
     for number in range(config["rounds"]):
-
-        def tell(share: float, first: float = number) -> None:
-            advance((first + share) / config["rounds"])
-
-        flights.fly(None if number == 0 else network, shares, lambda x: tell(0.5 * x))
+        flights.fly(None if number == 0 else network, shares)
         last = number == config["rounds"] - 1
         flown = flights.sequences()
         fit(
@@ -69,7 +63,6 @@ def rounds(
             (rate, 0.0 if last else _LEAST_RATE * rate),
             order,
             mirrored,
-            lambda x: tell(0.5 + 0.5 * x),
         )
         yield last
 
@@ -80,7 +73,7 @@ def imitate(run: Run, advance: Callable[[int], None]) -> Path:
     Args:
         run: of ``imitation`` or ``recurrent-imitation``; there is no checkpoint, a run that was
             killed starts anew.
-        advance: called with the number of decisions that the run stands at.
+        advance: called with the number of decisions flown so far.
 
     Raises:
         InputError: as ``fan_flights``.
@@ -96,17 +89,8 @@ def imitate(run: Run, advance: Callable[[int], None]) -> Path:
     )
     pairs = list(itertools.product(config["gains"], config["dampings"]))
     shares = _shares(config, *pairs[len(pairs) // 2])
-    flights = fan_flights(config, run.scenario, seed, np.random.default_rng(seed))
-    whole = flights.episodes_a_round * config["rounds"] * DECISIONS
-    for last in rounds(
-        network,
-        flights,
-        shares,
-        config,
-        seed,
-        features.mirrored,
-        lambda share: advance(round(share * whole)),
-    ):
+    flights = fan_flights(config, run.scenario, seed, advance)
+    for last in rounds(network, flights, shares, config, seed, features.mirrored):
         flown = flights.episodes * DECISIONS
         if not run.is_due(flown, last):
             continue

@@ -1,8 +1,6 @@
 """A run of training in its folder: what the run is, how it goes, and the best policy so far."""
 
-import json
 import platform
-import re
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, fields
@@ -19,8 +17,8 @@ from ..evaluation.episodes import fly_episode
 from ..evaluation.tasks import TASKS
 from ..runtime.errors import InputError
 from ..runtime.forms import STRICT, checked
+from ..runtime.page_files import write_json
 from ..runtime.regular_files import read_json
-from ..runtime.whole_files import replaced
 from .configuration import Config, features_of
 from .seeds import FIRST_VALIDATION_SEED, validation_seeds
 from .training_envs import check_training_env, make_training_env
@@ -108,7 +106,7 @@ def card_of(config: Config, scenario: str, seed: int, steps: int) -> dict[str, A
     return {
         **origin(config["algorithm"], scenario, seed, steps, config["activation"]),
         "features": asdict(features_of(config)),
-        "repeat": config["repeat"],
+        "repeat": 1,  # decisions that a command is held
         "seeds": {
             "training": [0, FIRST_VALIDATION_SEED - 1],
             "validation": [FIRST_VALIDATION_SEED, last],
@@ -160,8 +158,7 @@ class Run:
         self._claim()
         self.progress, self._report = Progress(), report
         self._began = time.perf_counter()
-        sources = features_of(config).sources
-        self.judge = make_training_env(scenario, sources=sources)
+        self.judge = make_training_env(scenario)
         self.best = folder / "best.npz"
 
     def _claim(self) -> None:
@@ -231,11 +228,3 @@ class Run:
         """Write how the run goes to ``progress.json``."""
         self.progress.seconds = time.perf_counter() - self._began
         write_json(asdict(self.progress), self.folder / "progress.json")
-
-
-def write_json(data: Any, path: Path) -> None:
-    """Write JSON at once or not at all, each list of numbers on a line of its own."""
-    text = json.dumps(data, indent=1, allow_nan=False)
-    text = re.sub(r"\[\s+([^][{}]*?)\s+\]", lambda found: f"[{' '.join(found[1].split())}]", text)
-    with replaced(path) as partial:
-        partial.write_text(text + "\n", encoding="utf-8")

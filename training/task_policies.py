@@ -62,6 +62,12 @@ class TaskLesson:
         self.decisions, self.period = kind.decisions(), TICK * kind.decision_ticks
         self.largest, self.scale = kind.largest_action, np.array(kind.scales, dtype=np.float32)
 
+    def card(self, kind: str, seed: int, steps: int, activation: str) -> dict[str, Any]:
+        """Return the card of a policy."""
+        scale = [float(f"{x:.6g}") for x in self.scale]
+        told = {"task": self._task, "scale": scale, "largest": self.largest}
+        return origin(kind, SCENARIO, seed, steps, activation) | told
+
     def begin(self, count: int) -> None:
         """Start ``count`` episodes."""
         self._oracles = [make_controller("oracle", self._task) for _ in range(count)]
@@ -117,13 +123,13 @@ def teach(task: str, seed: int, rounds: int, episodes: int, epochs: int) -> Task
     envs = SyncVectorEnv(
         [lambda: _environment(task)] * episodes, autoreset_mode=AutoresetMode.NEXT_STEP
     )
-    flights = Flights([envs], lesson, config, seed, np.random.default_rng(seed))
+    flights = Flights([envs], lesson, config, seed)
     mirrored = _TURNED if lesson.of_fan else None
     for last in taught_in_rounds(
         network, flights, lesson.shares(_GAINS[1]), config, seed, mirrored
     ):
         print(f"{flights.episodes} episodes{', the last' if last else ''}", flush=True)
-    card = card_of(task, "gru", seed, flights.episodes * lesson.decisions, _ACTIVATION)
+    card = lesson.card("gru", seed, flights.episodes * lesson.decisions, _ACTIVATION)
     tried = [
         TaskPolicy({**card, "gain": gain}, network.policy_weights(lesson.shares(gain)))
         for gain in (_GAINS if lesson.of_fan else _GAINS[:1])
@@ -143,18 +149,8 @@ def sac(task: str, seed: int, steps: int) -> TaskPolicy:
     config = load_config("sac", [*_SAC, entropy, f"steps={steps}"])
     learner = make_learner(config, env, seed)
     learner.learn(steps)
-    return TaskPolicy(card_of(task, "sac", seed, steps, "relu"), weights_of(learner, "sac"))
-
-
-def card_of(task: str, kind: str, seed: int, steps: int, activation: str) -> dict[str, Any]:
-    """Return the card of a policy."""
-    lesson = TaskLesson(task)
-    return {
-        **origin(kind, SCENARIO, seed, steps, activation),
-        "task": task,
-        "scale": [float(f"{x:.6g}") for x in lesson.scale],
-        "largest": lesson.largest,
-    }
+    card = TaskLesson(task).card("sac", seed, steps, "relu")
+    return TaskPolicy(card, weights_of(learner, "sac"))
 
 
 def main() -> None:

@@ -50,9 +50,7 @@ def train(
     from .vec_env import FeatureVecEnv
 
     features, algorithm, whole = features_of(config), config["algorithm"], config["steps"]
-    envs = make_training_envs(
-        scenario, config["environments"], config["estimator"], config["repeat"], features.sources
-    )
+    envs = make_training_envs(scenario, config["environments"], config["estimator"])
     env = FeatureVecEnv(
         envs, features, lambda i, episode: training_seed(seed, i, episode), config["reward"]
     )

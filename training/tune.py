@@ -11,9 +11,9 @@ import yaml
 from ..controllers.registry import STANDARD_TASK
 from ..envs.scenarios import find_scenario
 from ..evaluation.episodes import fly_episode
-from ..evaluation.tasks import TASKS, make_environment, task_of
+from ..evaluation.tasks import TASKS, task_of
 from ..runtime.errors import InputError, unknown_name
-from ..runtime.whole_files import replaced
+from ..runtime.page_files import write_text
 from ..runtime.yaml_file import read_yaml
 from .seeds import validation_seeds
 from .training_envs import check_training_env, make_training_env
@@ -85,8 +85,7 @@ def tune(
 
     check_request(task, law, scenario, trials, episodes)
     known, ranges, seeds = task_of(task), RANGES[task][law], validation_seeds(episodes)
-    in_tier = task == STANDARD_TASK
-    env: Any = make_training_env(scenario) if in_tier else make_environment(task, scenario)
+    env: Any = (make_training_env if task == STANDARD_TASK else known.environment)(scenario)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
 
     def objective(trial: Any) -> float:
@@ -149,5 +148,4 @@ def keep_gains(found: dict[str, Any], path: Path, command: str) -> None:
         **{k: v for k, v in found.items() if k not in ("gains", "task", "law", places[1])},
         "command": command,
     }
-    with replaced(path) as partial:
-        partial.write_text(yaml.safe_dump(kept, sort_keys=False, width=120), encoding="utf-8")
+    write_text(yaml.safe_dump(kept, sort_keys=False, width=120), path)

@@ -12,6 +12,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from ..controllers.features import Features, History
 from ..envs.fan_tracking import LOST_OFFSET
+from ..envs.vector import TaskVectorEnv
 
 Array = NDArray[np.float32]
 
@@ -22,12 +23,11 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
     Each environment on its own: where an episode ends, ``infos[i]["terminal_observation"]`` holds
     the features that ended it, ``infos[i]["TimeLimit.truncated"]`` says that only the clock ended
     it, and the observation returned is the first of its next episode. Every episode's seed is given
-    by ``seed_of``, so where an environment stands follows from its episode's number and the actions
-    since: ``memory`` returns these and ``recall`` flies them again.
+    by ``seed_of``. ``episode`` (n,) holds the numbers of the episodes in flight: set to those of
+    another run, ``reset`` goes on with the episodes that follow.
 
     Args:
-        envs: the vector environment, (8,) observations; its ``reset`` takes a list of seeds and a
-            ``reset_mask``.
+        envs: of FanTracking.
         features: of the policy.
         seed_of: from environment and episode to the episode's seed.
         reward: weights of the terms ``tracking``, ``change`` and ``squared`` (minus the squared
@@ -38,7 +38,7 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
 
     def __init__(
         self,
-        envs: gym.vector.VectorEnv[Any, Any, Any],
+        envs: TaskVectorEnv,
         features: Features,
         seed_of: Callable[[int, int], int],
         reward: Mapping[str, float] | None = None,
@@ -49,30 +49,22 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
         space = gym.spaces.Box(-10.0, 10.0, (features.size,), np.float32)
         super().__init__(envs.num_envs, space, envs.single_action_space)
         self._history = History(features, self.num_envs)
-        self._episode = np.zeros(self.num_envs, dtype=np.int64)
-        self._taken: list[list[Array]] = [[] for _ in range(self.num_envs)]
+        self.episode = np.full(self.num_envs, -1)  # none has begun
+        self._length = np.zeros(self.num_envs, dtype=np.int64)  # decisions since the start
         self._returns, self._squares = np.zeros(self.num_envs), np.zeros(self.num_envs)
         self._commands = np.zeros((self.num_envs, 1), dtype=np.float32)
 
-    def _begin(self, which: NDArray[np.bool_]) -> dict[str, Any]:
-        """Start the present episode of the environments ``which`` anew; return the environments'
-        information.
-        """
-        seeds = [self._seed_of(i, int(e)) for i, e in enumerate(self._episode)]
-        reset: Callable[..., Any] = (
-            self.envs.reset
-        )  # Gymnasium's vector environments take a list, which its types leave out
-        infos: dict[str, Any]
-        observations, infos = reset(seed=seeds, options={"reset_mask": which.copy()})
-        self._history.restart(self.features.frames(observations, infos), which)
-        for i in np.flatnonzero(which).tolist():
-            self._taken[i] = []
-        self._returns[which], self._squares[which] = 0.0, 0.0
-        return infos
+    def _begin(self, which: NDArray[np.bool_]) -> None:
+        """Start the next episode of the environments ``which``."""
+        self.episode[which] += 1
+        seeds = [self._seed_of(i, int(e)) for i, e in enumerate(self.episode)]
+        observations, _ = self.envs.reset(seed=seeds, options={"reset_mask": which.copy()})
+        self._history.restart(self.features.frames(observations), which)
+        for sums in (self._length, self._returns, self._squares):
+            sums[which] = 0
 
     def reset(self) -> Array:
-        """Start with the first episode everywhere."""
-        self._episode[:] = 0
+        """Start the next episode everywhere; return the features (n, size) of its beginning."""
         self._begin(np.ones(self.num_envs, dtype=np.bool_))
         return self._history.flat()
 
@@ -93,57 +85,22 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
         ).astype(np.float32)
         self._returns += rewards
         self._squares += offset**2
-        self._history.push(self.features.frames(observations, infos))
+        self._length += 1
+        self._history.push(self.features.frames(observations))
         dones = lost | over
         told: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        for i in range(self.num_envs):
-            self._taken[i].append(self._commands[i].copy())
         if dones.any():
             last = self._history.flat()
             for i in np.flatnonzero(dones).tolist():
-                length = len(self._taken[i])
+                length = int(self._length[i])
                 told[i] = {
                     "terminal_observation": last[i],
                     "TimeLimit.truncated": bool(over[i] and not lost[i]),
                     "episode": {"r": float(self._returns[i]), "l": length, "t": 0.0},
                     "rmse": float(np.sqrt(self._squares[i] / length)),
                 }
-            self._episode[dones] += 1
             self._begin(dones)
         return self._history.flat(), rewards, dones, told
-
-    def memory(self) -> dict[str, Any]:
-        """Return the episodes' numbers (n,) and, of each, the actions since its start."""
-        return {
-            "episode": self._episode.tolist(),
-            "actions": [np.array(taken, dtype=np.float32).reshape(-1, 1) for taken in self._taken],
-        }
-
-    def recall(self, memory: Mapping[str, Any]) -> Array:
-        """Fly back to where ``memory`` was taken; return the features (n, size) there, bit for bit
-        the same.
-        """
-        self._episode[:] = memory["episode"]
-        plans = [np.asarray(a, dtype=np.float32) for a in memory["actions"]]
-        longest = max(len(plan) for plan in plans)
-        self._begin(np.ones(self.num_envs, dtype=np.bool_))
-        for k in range(longest):
-            # those with fewer actions idle until the others have come as far, and begin anew then
-            first = np.array([k > 0 and k == longest - len(plan) for plan in plans])
-            if first.any():
-                self._begin(first)
-            self.step_async(
-                np.array(
-                    [plan[k - longest] if k >= longest - len(plan) else [0.0] for plan in plans]
-                )
-            )
-            before = self._episode.copy()
-            self.step_wait()
-            self._episode[:] = before  # an idle one that was lost on the way counts for nothing
-        idle = np.array([len(plan) == 0 and longest > 0 for plan in plans])
-        if idle.any():
-            self._begin(idle)
-        return self._history.flat()
 
     def close(self) -> None:
         """Close the environments."""

@@ -168,7 +168,7 @@ def fly_freely(loop: Record, dt: float) -> None:
 
 @compiled
 def tick_lanes(
-    address: int, work: int, step: int, axial: Array, radial: Array, accelerates: bool, feels: bool
+    address: int, work: int, step: int, jet: Array, accelerates: bool, feels: bool
 ) -> None:
     """Do what ``closed_loop.run_ticks`` does in a tick but for its winds, and then MuJoCo, with the
     loops whose record lies at ``address``.
@@ -191,7 +191,7 @@ def tick_lanes(
     log_speeds(plant, plant.speeds)
     rotor_wrench(plant.body, plant.speeds, plant.rotor_wrench)
     quaternion_to_matrix(qpos[3:7], plant.rotation)
-    blow(plant, fan, axial, radial, qpos, qvel, loop.noise)
+    blow(plant, fan, jet, qpos, qvel, loop.noise)
     disturb(plant, loop.noise)
     add_up(plant, loop.xfrc)
     if feels:
@@ -281,7 +281,7 @@ def fly_blocks(
                 generator = generators[n]
                 for i in range(noise_size):
                     drawn.noise[b, i, lane] = generator.standard_normal()
-            tick_lanes(loop, work, step, jet[0], jet[1], accelerates, feels)
+            tick_lanes(loop, work, step, jet, accelerates, feels)
         for n in members:
             if n >= 0:
                 first[n] += ticks

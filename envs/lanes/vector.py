@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium.utils.seeding import np_random
+from numba import typed, typeof
 
 from ...dynamics.motion import Array
 from ...estimator.ukf_lanes import new_work, step_address
@@ -24,6 +25,7 @@ from ..wind_tasks import WindHoverEnv, WindTrajectoryEnv
 from .flight import Blocks, fly_blocks
 
 _LARGEST = 1e10  # of a number that MuJoCo goes on with
+_GENERATOR = typeof(np.random.default_rng(0))
 
 
 class TaskLanes(TaskVectorEnv):
@@ -58,6 +60,8 @@ class TaskLanes(TaskVectorEnv):
         env = self.envs[0]
         self._like = env.make_loop(env.truth, env.fan)
         _refuse(env, self._like)
+        # each environment's own; one that was not reset yet has another's
+        self._generators = generator_list([np.random.default_rng(0)] * self.num_envs)
         self._step = step_address()
         self._flying = Blocks(-(-self.num_envs // WIDTH), self._like)
         self._settling = Blocks(0, self._like)
@@ -76,18 +80,17 @@ class TaskLanes(TaskVectorEnv):
             self._calls[i, : len(winds.calls)] = winds.calls
 
     def __getstate__(self) -> dict[str, Any]:
-        return (
-            super().__getstate__()
-            | {name: getattr(self, name) for name in ("_seeded", "_blowing")}
-            | {"_flying": (self._flying.loops, self._flying.filters)}
-        )
+        state = super().__getstate__()
+        for name in ("_like", "_motion", "_settling", "_works"):
+            del state[name]
+        memory = self._flying.loops, self._flying.filters
+        return state | {"_generators": list(self._generators), "_flying": memory}
 
-    def _take_envs(self, state: dict[str, Any]) -> None:
-        self.envs, self._seeded, self._blowing = (
-            state["envs"],
-            state["_seeded"],
-            state["_blowing"],
-        )
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._motion = self._make_memory()
+        self._generators = generator_list(state["_generators"])
+        self._seeded, self._blowing = state["_seeded"], state["_blowing"]
         self._flying.loops[...], self._flying.filters[...] = state["_flying"]
         self._lay_calls()
 
@@ -113,7 +116,7 @@ class TaskLanes(TaskVectorEnv):
             finally:
                 self._works.append(work)
 
-        self._spread(fly, parts)
+        self._spread(fly, range(parts))
 
     def _fly(self, which: Flags) -> None:
         slots = np.full(len(self._flying) * WIDTH, -1)
@@ -161,6 +164,14 @@ class TaskLanes(TaskVectorEnv):
         self._fly_blocks(settling, slots, SETTLE_TICKS)
         for i, (block, lane) in places.items():
             self._flying.take(i // WIDTH, lane, settling, block)
+
+
+def generator_list(generators: Sequence[np.random.Generator]) -> Any:
+    """Return generators as a typed list, which compiled code takes at no cost a generator."""
+    listed = typed.List.empty_list(_GENERATOR)
+    for generator in generators:
+        listed.append(generator)
+    return listed
 
 
 @compiled

@@ -54,7 +54,7 @@ def exportable_policy(name: str) -> Mapping[str, Any]:
     frame = []
     for quantity, scale in zip(policy.features.frame, policy.features.scale, strict=True):
         known = QUANTITIES[quantity]
-        if known.source != "observation" or known.summed:
+        if known.summed:
             raise InputError(
                 f"--policy {name}: sees {quantity}, which is not in an estimate by itself; "
                 "such a policy cannot be exported"

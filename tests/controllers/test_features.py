@@ -9,13 +9,6 @@ from windwrench.evaluation.episodes import FIRST_TEST_SEED, benchmark_seeds
 from windwrench.training.seeds import FIRST_VALIDATION_SEED, training_seed, validation_seeds
 
 
-def test_truth_comes_from_info():
-    features = Features(("true_torque_z", "true_force_x"), 1, (1.0, 1.0))
-    assert features.sources == {"torque", "force"}
-    info = {"torque": np.array([[0.1, 0.2, 0.3]]), "force": np.array([[1.0, 2.0, 3.0]])}
-    np.testing.assert_allclose(features.frames(np.zeros((1, 8)), info), [[0.3, 1.0]], rtol=1e-6)
-
-
 def test_what_is_mirrored_is_known():
     features = Features(("torque_z", "force_x", "path_y"), 2)
     np.testing.assert_array_equal(features.mirrored, [-1, 1, -1, -1, 1, -1])

@@ -18,7 +18,7 @@ from windwrench.dynamics import InputError, load_vehicle
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.plant import TICK, PlantSettings
 from windwrench.evaluation.episodes import fly_episode
-from windwrench.evaluation.tasks import make_environment
+from windwrench.evaluation.tasks import TASKS
 
 
 @pytest.mark.parametrize("pushed", ["action", "force", "torque", "set point"])
@@ -81,7 +81,7 @@ def _hovering():
 
 def test_who_knows_more_flies_better():
     """In the wash of another vehicle, on validation episodes, which the laws were not made for."""
-    env = make_environment("WindHover", "wash")
+    env = TASKS["WindHover"].environment("wash")
     rmse = {
         name: np.mean(
             [

@@ -9,7 +9,7 @@ from windwrench.controllers.wind_observation import WIND_OBSERVATION_SIZE
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.rotation import quaternion_to_matrix
 from windwrench.evaluation.episodes import fly_episode
-from windwrench.evaluation.tasks import TASKS, make_environment, make_pilot
+from windwrench.evaluation.tasks import TASKS, make_pilot
 from windwrench.studies.kept_results import kept
 
 SEEDS = range(900_200, 900_206)  # of validation episodes, on which nothing was chosen
@@ -43,7 +43,7 @@ def test_the_command_is_the_first_of_those_that_are_best(law, axis):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_who_foresees_nothing_is_told_what_everybody_is(task):
-    plain, knowing = make_environment(task, "base"), make_environment(task, "base")
+    plain, knowing = TASKS[task].environment("base"), TASKS[task].environment("base")
     knowing.foresight = 3
     action = np.full(plain.action_size, 0.2, dtype=np.float32)
     for seen, told in (
@@ -58,7 +58,7 @@ def test_who_foresees_nothing_is_told_what_everybody_is(task):
 @pytest.mark.parametrize("task", TASKS)
 def test_what_the_oracle_is_told_is_true(task):
     """The motion is the plant's now, and what is to come is what then comes."""
-    env, R = make_environment(task, "base"), np.empty((3, 3))
+    env, R = TASKS[task].environment("base"), np.empty((3, 3))
     env.foresight = 4
     infos, jets = [env.reset(seed=900_200)[1]], []
     for k in range(12):
@@ -86,7 +86,7 @@ def test_what_the_oracle_is_told_is_true(task):
 @pytest.mark.parametrize("task", ["FanTracking", "FanTracking2D"])
 def test_no_law_beats_the_oracle_on_an_episode(task):
     """Over 8 s, the start included, which is most of the oracle's error."""
-    env = make_environment(task, "base")
+    env = TASKS[task].environment("base")
 
     def flown(name):
         law = make_pilot(name, task)
@@ -116,7 +116,7 @@ def test_the_oracle_says_what_it_needs():
 
 
 def test_a_command_stays_within_its_bounds():
-    env = make_environment("FanTracking", "far")
+    env = TASKS["FanTracking"].environment("far")
     env.foresight = Oracle().foresight
     observation, info = env.reset(seed=900_200)
     command = Oracle()(observation, info)

@@ -11,7 +11,6 @@ from windwrench.controllers.briefing import Briefing, Motions
 from windwrench.controllers.jet_map import COUNT, FIRST, STEP, jet_map
 from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.envs.scenarios import SCENARIOS
-from windwrench.evaluation.briefing import briefing_of
 from windwrench.evaluation.episodes import fly_episode
 
 BRIEFING = Briefing()
@@ -72,11 +71,11 @@ def test_a_tracker_does_not_look_at_the_truth(make):
 def test_a_briefing_says_what_the_scenario_measures_with_and_no_more():
     env = FanTrackingEnv("noisy")
     env.reset(seed=0)
-    noisy = briefing_of(env)
+    noisy = env.briefing()
     assert (noisy.noise.position, noisy.noise.attitude) == (0.01, 0.05)
     slow = FanTrackingEnv("slow-filter")
-    assert briefing_of(slow).noise.torque_walk == pytest.approx(noisy.noise.torque_walk * 0.45)
-    base = briefing_of(FanTrackingEnv("base"))
+    assert slow.briefing().noise.torque_walk == pytest.approx(noisy.noise.torque_walk * 0.45)
+    base = FanTrackingEnv("base").briefing()
     standard = Briefing(base.vehicle)
     assert base.jet == standard.jet
     assert base.motions == standard.motions
@@ -84,11 +83,11 @@ def test_a_briefing_says_what_the_scenario_measures_with_and_no_more():
     # a varied episode's own fan stays unknown
     varied = FanTrackingEnv("varied")
     varied.reset(seed=1)
-    assert briefing_of(varied).jet == standard.jet
+    assert varied.briefing().jet == standard.jet
 
 
 def test_only_the_limit_is_told_of_gusts():
-    gusty = briefing_of(FanTrackingEnv("gusty"))
+    gusty = FanTrackingEnv("gusty").briefing()
     assert gusty.air.turbulence == 0.35
     for make, told in ((Tracker, 0.10), (InformedTracker, 0.10), (Limit, 0.35)):
         pilot = make(particles=10)

@@ -328,11 +328,10 @@ def test_the_fan_jet_is_that_of_the_environment_without_gusts(heading):
     record = fan_record(fan, VEHICLE.positions, PERIOD)
     jet_wrench(
         record[0],
-        *jet_table(fan.radius, fan.hub_radius),
+        np.stack(jet_table(fan.radius, fan.hub_radius)),
         position,
         np.ascontiguousarray(turn.T @ R),
-        turn.T @ V,
-        OMEGA,
+        np.concatenate([turn.T @ V, OMEGA]),
         com,
         np.zeros(3),
         out,

@@ -17,13 +17,13 @@ from windwrench.envs.fan import (
 VEHICLE = load_vehicle("ardrone2")
 PERIOD = 0.005
 FAN = Fan(turbulence=0.0)
-AXIAL, RADIAL = jet_table(FAN.radius, FAN.hub_radius)
+JET = np.stack(jet_table(FAN.radius, FAN.hub_radius))
 DISTANCE = 2.3
 
 
 def wind(x, y, z, fan=FAN):
     out = np.full(3, np.nan)
-    jet_at(fan_record(fan, VEHICLE.positions, PERIOD)[0], AXIAL, RADIAL, x, y, z, out)
+    jet_at(fan_record(fan, VEHICLE.positions, PERIOD)[0], *JET, x, y, z, out)
     return out
 
 
@@ -34,12 +34,10 @@ def wrench(
     out = np.full(6, np.nan)
     jet_wrench(
         fan_record(fan, VEHICLE.positions, PERIOD)[0],
-        AXIAL,
-        RADIAL,
+        JET,
         np.array([x, y, z]),
         Rotation.from_euler("z", yaw).as_matrix(),
-        np.array(velocity),
-        np.zeros(3),
+        np.array([*velocity, 0.0, 0.0, 0.0]),
         np.array(com),
         np.empty(3),
         out,

@@ -48,7 +48,7 @@ class Bench:
         self.model, self.data = load_world(body)
         self.data.qpos[:3], self.data.qpos[3:7] = position, quaternion
         self.fan = fan_record(Fan(speed=0.0), vehicle.positions, TICK)
-        self.table = jet_table(0.45, 0.10)
+        self.table = np.stack(jet_table(0.45, 0.10))
 
     def run(self, command, ticks, noise=None):
         """Hold rotor speeds (4,) for some ticks; return position, attitude, velocity and body rate
@@ -61,7 +61,7 @@ class Bench:
                 self.plant,
                 np.asarray(command, float),
                 self.fan[0],
-                *self.table,
+                self.table,
                 self.data.qpos,
                 self.data.qvel,
                 np.zeros(NOISE) if noise is None else noise[k],

@@ -46,8 +46,8 @@ def test_a_policy_commands_its_shares_of_what_the_network_says(cell):
 
 def test_what_is_taught_is_the_fan_s_place_and_velocity():
     config = config_of("steps=500", "rounds=1", "wander.size=0.0")
-    flights = fan_flights(config, "fast", 3, np.random.default_rng(0))
-    flights.fly(None, np.zeros((1, 3), dtype=np.float32), lambda steps: None)
+    flights = fan_flights(config, "fast", 3)
+    flights.fly(None, np.zeros((1, 3), dtype=np.float32))
     flown = flights.sequences()
     assert flown.seen.shape == (250, 2, 6)
     assert flown.counts.min() == 1.0
@@ -56,7 +56,7 @@ def test_what_is_taught_is_the_fan_s_place_and_velocity():
     observation, info = env.reset(seed=training_seed(3, 0, 0))
     features, fan, offsets, speeds = features_of(config), [], [], []
     for k in range(40):
-        seen = features.frames(observation[None], {})[0]
+        seen = features.frames(observation[None])[0]
         np.testing.assert_array_equal(flown.seen[k, 0, :5], seen[:5])
         fan.append(info["fan_y"])
         offsets.append(info["fan_y"] - info["y"])
@@ -72,8 +72,8 @@ def test_what_is_taught_is_the_fan_s_place_and_velocity():
 
 def test_nothing_is_taught_where_the_vehicle_is_lost():
     config = config_of("steps=1000", "rounds=1", "wander.size=20.0", "wander.time=30.0")
-    flights = fan_flights(config, "base", 0, np.random.default_rng(0))
-    flights.fly(None, np.zeros((1, 3), dtype=np.float32), lambda steps: None)
+    flights = fan_flights(config, "base", 0)
+    flights.fly(None, np.zeros((1, 3), dtype=np.float32))
     flown = flights.sequences()
     ended = np.flatnonzero(flown.counts.min(axis=0) == 0.0)
     assert len(ended) > 0

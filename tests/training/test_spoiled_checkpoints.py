@@ -79,15 +79,13 @@ CHECKPOINTS = {
     "packed": packed,
     "no mapping": with_state(lambda state: [1, 2]),
     "lacks an entry": with_state(
-        lambda state: {name: value for name, value in state.items() if name != "flown"}
+        lambda state: {name: value for name, value in state.items() if name != "counters"}
     ),
     "a text for tensors": with_state(lambda state: {**state, "replay": "none"}),
     "a tensor of no memory": with_state(
         lambda state: {**state, "numpy": torch.zeros(1, dtype=torch.int64).expand(10**9)}
     ),
-    "an endless episode": with_state(
-        lambda state: {**state, "flown": [torch.zeros(10**6, 1)] * len(state["flown"])}
-    ),
+    "episodes of other environments": with_text(episode=[0, 0, 0]),
     "progress of another kind": with_text(extra={"steps": 3}),
     "progress that is a list": with_text(extra=[1]),
     "no generator": with_text(numpy=["MT19937"]),

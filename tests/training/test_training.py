@@ -4,6 +4,7 @@ would.
 
 import json
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -18,6 +19,7 @@ pytest.importorskip(
 )
 import stable_baselines3 as sb3
 import torch
+from stable_baselines3.common.vec_env import DummyVecEnv
 
 from windwrench.training.checkpoint import load_checkpoint
 from windwrench.training.configuration import features_of
@@ -86,7 +88,13 @@ def test_the_shipped_policy_does_what_the_learner_would(algorithm):
         np.testing.assert_allclose(policy.act(x), expected[0], atol=1e-5)
 
 
-def test_the_fast_update_is_that_of_stable_baselines3():
+def wind_env(config):
+    """An environment with three actions."""
+    return DummyVecEnv([lambda: gym.make("windwrench/WindHover-v1")])
+
+
+@pytest.mark.parametrize("make_env", [make_env, wind_env])
+def test_the_fast_update_is_that_of_stable_baselines3(make_env):
     config = tiny("sac", "learning_rate_end=0.0008")
     learned = []
     for kind in (sb3.SAC, None):

@@ -1,5 +1,5 @@
-"""The environments as stable-baselines3 sees them: where each one's episode ends, and how it is
-flown back to.
+"""The environments as stable-baselines3 sees them: where each one's episode ends, and which
+episode follows.
 """
 
 import numpy as np
@@ -7,8 +7,9 @@ import pytest
 
 from windwrench.controllers.features import Features, History
 from windwrench.envs.fan_tracking import FanTrackingEnv
+from windwrench.envs.scenarios import SCENARIOS
 from windwrench.envs.vector import TaskVectorEnv
-from windwrench.training.training_envs import MixedFanTracking, make_training_envs
+from windwrench.training.training_envs import MixedFanTracking
 
 pytest.importorskip(
     "stable_baselines3", reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'"
@@ -36,11 +37,11 @@ def lone_flight(seed, commands, scenario="static"):
     """Features, rewards and losses of a single environment, computed by itself."""
     env, history = FanTrackingEnv(scenario), History(FEATURES, 1)
     observation, info = env.reset(seed=seed)
-    history.restart(FEATURES.frames(observation[None], {}), [0])
+    history.restart(FEATURES.frames(observation[None]), [0])
     seen, rewards = [history.flat()[0]], []
     for command in commands:
         observation, reward, lost, _, info = env.step(np.array([command], dtype=np.float32))
-        history.push(FEATURES.frames(observation[None], {}))
+        history.push(FEATURES.frames(observation[None]))
         seen.append(history.flat()[0])
         rewards.append(reward)
         if lost:
@@ -109,36 +110,12 @@ def test_rewards_are_weighted_terms():
     assert squared.step(np.array([[0.0]]))[1][0] == pytest.approx(-0.64, abs=0.1)  # about 0.8 m off
 
 
-@pytest.mark.parametrize("repeat", [1, 2])
-def test_recall_flies_back_to_where_memory_was_taken(repeat):
-    def fresh():
-        return FeatureVecEnv(make_training_envs("static", 3, repeat=repeat), FEATURES, seed_of)
-
-    env, rng, direction = fresh(), np.random.default_rng(0), away(seed_of(1, 0))
-    env.reset()
-    plan = rng.uniform(-0.3, 0.3, (45, 3, 1)).astype(np.float32)
-    plan[:30, 1] = direction  # lost on the way, so that the environments stand at different places
-    for actions in plan:
-        seen, *_ = env.step(actions)
-    memory = env.memory()
-    assert memory["episode"][1] > memory["episode"][0] == 0
-    assert len({len(a) for a in memory["actions"]}) > 1
-    other = fresh()
-    np.testing.assert_array_equal(other.recall(memory), seen)
-    for _ in range(5):
-        actions = rng.uniform(-1, 1, (3, 1)).astype(np.float32)
-        for a, b in zip(env.step(actions), other.step(actions), strict=True):
-            if isinstance(a, np.ndarray):
-                np.testing.assert_array_equal(a, b)
-    assert env.memory()["episode"] == other.memory()["episode"]
-
-
 def test_the_scenario_of_a_mixed_episode_says_nothing_of_its_motion():
     env = MixedFanTracking(("base", "fast"), estimator="constant-gain")
     moved = {"base": set(), "fast": set()}
     for seed in range(60):
         _, info = env.reset(seed=seed)
-        moved["base" if env.current is env.envs["base"] else "fast"].add(info["fan_motion"])
+        moved["base" if env.scenario is SCENARIOS["base"] else "fast"].add(info["fan_motion"])
     assert moved == {
         "base": {"sine", "triangle", "ramp", "still"},
         "fast": {"sine", "triangle", "ramp"},
