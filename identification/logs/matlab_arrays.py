@@ -34,7 +34,8 @@ def main() -> None:
     except ImportError:  # Windows
         pass
     else:
-        resource.setrlimit(resource.RLIMIT_DATA, (int(sys.argv[1]),) * 2)
+        most = int(sys.argv[1])
+        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
     data = sys.stdin.buffer.read()
     if data.startswith(b"MATLAB 7.3"):  # HDF5, with its axes turned
         with import_module("h5py").File(io.BytesIO(data), "r") as file:

@@ -33,8 +33,9 @@ class TopicReader:
     """
 
     def __init__(self, name: str, kind: str, log_map: LogMap, vehicle: Vehicle) -> None:
-        others = {n: None for n, part in log_map.sections.items() if part.topic != name}
-        own = replace(log_map, **others)  # type: ignore[arg-type]
+        others = [n for n, part in log_map.sections.items() if part.topic != name]
+        left_out: dict[str, Any] = dict.fromkeys(others)
+        own = replace(log_map, **left_out)
         wanted = [column for part in own.sections.values() for column in part.named]
         self._name, self._numbers = name, Fields(name, kind, wanted)
         self._fields = FieldMap(own, vehicle, name)

@@ -68,8 +68,8 @@ def map_of(
         why = refused.get(section) or f"{section}: {_missing(types, section, where)}"
         raise InputError(f"{source}: {why}")
     is_ned = types.get(_topic_of(found.get("position")) or "") in stated()["ned"]
-    clock = {"time": {"column": "stamp", "unit": "ns"}}
-    clock |= {"world": "ned", "body": "frd"} if is_ned else {}  # type: ignore[dict-item]
+    clock: dict[str, Any] = {"time": {"column": "stamp", "unit": "ns"}}
+    clock |= {"world": "ned", "body": "frd"} if is_ned else {}
     log_map = parse_map({**clock, **given, **found}, where)
     sensed = {part.body for part in (log_map.accelerometer, log_map.gyro) if part is not None}
     frames = [f"world {log_map.world}, body {log_map.body}", *sorted(sensed - {"", log_map.body})]

@@ -92,7 +92,8 @@ def read(
                 if held.keys() & {*given, "position", "rotors"}:
                     raise
                 notes.append(f"no {', '.join(held)}: {error}")  # nobody asked for it
-                log_map = replace(log_map, **dict.fromkeys(held, None))  # type: ignore[arg-type]
+                left_out: dict[str, Any] = dict.fromkeys(held)
+                log_map = replace(log_map, **left_out)
                 continue
             decoded.append((times, columns, topic))
             notes += [f"{topic}: {doubt}; the times of recording were taken"] if doubt else []
