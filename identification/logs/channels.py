@@ -5,7 +5,7 @@ With W from the log's world and B from its body axes to this kit's, positions be
 W R B' and what a sensor measures B v.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -31,6 +31,10 @@ class Samples:
     topic: str = ""  # of the message in which they stood, where a log has several
     table: Table | None = None  # in which they stand
     rows: Rows | None = None  # (N,) of it
+
+    def read(self, names: Sequence[str]) -> dict[str, Array]:
+        """Return columns (N,) by their names."""
+        return {name: self.columns[name] for name in names}
 
     def values(self, part: Columns) -> Array:
         """Return a section's columns (N, k), with their signs and scale; a constant such as ``=0``

@@ -9,7 +9,7 @@ are looked at by threes and fours that stand side by side.
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import takewhile
@@ -20,7 +20,7 @@ from scipy.integrate import cumulative_trapezoid
 from .column_names import Group, Name, groups_of, named_alone, side_by_side, words
 from .log_map import UNITS
 from .magnitudes import MAGNITUDES, within
-from .table import Array, Table
+from .table import Array
 
 _FOURS = (("1", "2", "3", "4"), ("0", "1", "2", "3"))
 _TRIPLES = (("x", "y", "z"), ("roll", "pitch", "yaw"))  # of which no column is another group's
@@ -339,18 +339,28 @@ def _judged(
     yield Candidate(group, score + PARTS.numbers * sum(strengths.values()), "; ".join(said))
 
 
-def further_rotors(columns: Sequence[str], table: Table) -> list[str]:
+def further_rotors(
+    columns: Sequence[str],
+    others: Sequence[str],
+    read: Callable[[Sequence[str]], Mapping[str, Array]],
+    are_speeds: bool = False,
+) -> list[str]:
     """Return the columns that go on with the numbers of four motors' columns, and turn as they do:
     those of a vehicle of more rotors. An output that is not a motor's by name may be a servo's, and
     counts where it is a sum of the four: all are mixed of thrust, roll, pitch and yaw.
 
+    Args:
+        columns: the four.
+        others: the columns that are there.
+        read: returns columns (N,) by their names.
+        are_speeds: the four are measured speeds, which no servo has.
+
     Raises:
-        InputError: the table cannot be read.
+        InputError: a table cannot be read.
     """
     out = []
-    for name in numbered_alike(columns, table.numeric or table.header):
-        data = table.read([*columns, name])
-        rows = np.column_stack(list(data.values()))
+    for name in numbered_alike(columns, others):
+        rows = np.column_stack(list(read([*columns, name]).values()))
         rows = rows[np.isfinite(rows).all(axis=1)]
         if len(rows) < PARTS.fewest or np.ptp(rows[:, 4]) == 0.0:
             continue
@@ -358,7 +368,7 @@ def further_rotors(columns: Sequence[str], table: Table) -> list[str]:
         moves = rows - rows.mean(axis=0)
         left = np.linalg.lstsq(moves[:, :4], moves[:, 4])[1]
         share = float(left[0] / np.sum(moves[:, 4] ** 2)) if len(left) else 0.0
-        is_motor = re.search(words()["motor_words"], name.lower())
+        is_motor = are_speeds or re.search(words()["motor_words"], name.lower())
         if (is_motor or share < PARTS.left) and within(size, PARTS.rotor_sizes):
             out.append(name)
     return out

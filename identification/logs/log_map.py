@@ -13,10 +13,9 @@ columns the log has, with numbers in them.
 * ``notes``: said of every log
 * ``world``: enu (z up; also nwu, flu), ned (z down; also frd), y_up (motion capture)
 * ``body``: flu (forward, left, up), frd (forward, right, down) or y_up (forward, up, right)
-* ``rows``: mixed (default: fields may be empty where a channel has no sample; streams is another
-  word for it), messages (as mixed, and every row of a position is one of the log's: one of NaN was
-  lost) or whole (every field of a pose is filled, or all are empty; times strictly increase; every
-  row is one of the log's)
+* ``rows``, of a table: mixed (default: fields may be empty where a channel has no sample) or whole
+  (every field of a pose is filled, or all are empty; times strictly increase; every row is one of
+  the log's); messages, of a recording, as mixed, and a position that stands still is one
 * ``stray_rows``: how many rows at the start are dropped, at most, where a gap follows them
 * ``time``: column (numbers, dates or times of day), unit (s, ms, us, ns, min), nanoseconds (column
   beside one of whole seconds), offset (s; default: the flight begins at 0); or rate_hz alone, where
@@ -325,7 +324,7 @@ class LogMap:
     recognise: tuple[str, ...] = ()
     name: str = ""  # where it comes from: a shipped map's name or a file
     notes: tuple[str, ...] = ()
-    rows: Literal["mixed", "whole", "streams", "messages"] = "mixed"
+    rows: Literal["mixed", "whole", "messages"] = "mixed"
     stray_rows: Annotated[int, Field(ge=0)] = 0
     extra: Mapping[str, Annotated[Columns, _section(0)]] = field(default_factory=dict)
     # further ways to fill a section (``time`` among them), in their order

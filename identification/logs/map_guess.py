@@ -209,10 +209,11 @@ class _Guessing:
         if not {"position", "attitude"} <= set(self.parts):
             self.parts = {k: v for k, v in self.parts.items() if k not in ("position", "attitude")}
         self.parts = {p: g for p, g in self.parts.items() if set(g.columns) <= set(data)}
+        motors = {p: self.parts[p].columns for p in ("motors", "commands") if p in self.parts}
         self.further = {
             part: further
-            for part in ("motors", "commands")
-            if part in self.parts and (further := further_rotors(self.parts[part].columns, table))
+            for part, four in motors.items()
+            if (further := further_rotors(four, table.numeric or table.header, table.read))
         }
         self.by_name = {
             p: self.ranked[p][0].why.startswith("by") for p in self.parts if p in self.ranked

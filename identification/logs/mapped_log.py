@@ -75,7 +75,8 @@ def map_table(
     vehicle = flown_vehicle(vehicle, log_map.vehicle)
     log_map = fitted(table, log_map, vehicle, reader)
     for motors in filter(None, (log_map.rotors, log_map.commands)):
-        if further := further_rotors(motors.columns, table):
+        there = table.numeric or table.header
+        if further := further_rotors(motors.columns, there, table.read):
             raise InputError(f"{table.path}: {rotors_said(motors.columns, further)}")
     columns = table.read(log_map.wanted)
     if log_map.is_own and rows_apart(Samples(np.arange(float(table.rows)), columns), log_map):
@@ -125,6 +126,15 @@ def recording_of(
             f"{path}: no motors that turn; expected {' or '.join(wanted)}, found "
             f"{', '.join(dict.fromkeys(names[:20])) or 'nothing'}"
         )
+    for turning in [
+        part for part in (log_map.rotors, log_map.commands) if part and flown == UNSTATED
+    ]:
+        samples = sources["rotors" if isinstance(turning, Rotors) else "commands"]
+        if further := further_rotors(
+            turning.columns, [*samples.columns], samples.read, isinstance(turning, Rotors)
+        ):
+            topic = f"{turning.topic}: " if turning.topic else ""
+            raise InputError(f"{path}: {topic}{rotors_said(turning.columns, further)}")
     said = [*notes, *of_clock, *(part.note for part in log_map.sections.values() if part.note)]
     streams: dict[str, Stream] = {}
     for name, part in log_map.sections.items():
@@ -248,14 +258,14 @@ def _pose(
 
 
 def _kept_rows(samples: Samples, log_map: LogMap, part: Columns) -> Mask:
-    """Return which rows (N,) of a group are those of a section's stream: its own, where channels
-    stand in rows of their own; else those with a position or an inertial sensor's sample; all,
-    where most have a position, which the others lost.
+    """Return which rows (N,) of a group are those of a section's stream: all messages. Of a table
+    its own, where channels stand in rows of their own; else those with a position or an inertial
+    sensor's sample; all, where most have a position, which the others lost.
     """
     everything: Mask = np.ones(len(samples.t), bool)
-    if log_map.rows in ("whole", "messages"):
+    if log_map.rows == "whole" or samples.table is None:
         return everything
-    if samples.table is not None and rows_apart(samples, log_map):
+    if rows_apart(samples, log_map):
         return samples.there(part)
     place = log_map.position
     if place is not None and samples.has(place) and np.mean(samples.there(place)) > 0.5:

@@ -18,9 +18,11 @@ from .log_map import OWN_MAP, load_map
 from .magnitudes import check_magnitudes, unit_doubts
 from .mapped_log import map_table
 from .readers import (
+    READERS,
     find_reader,
     reader_by_columns,
     reader_by_content,
+    rosbag,
     table_readers,
     unknown_content,
 )
@@ -115,6 +117,8 @@ def _read(
     if map is not None:
         if reader is not None:
             raise InputError(f"{path}: both a reader and a map; expected one of them")
+        if reader_by_content(path) is READERS["rosbag"]:
+            return rosbag.read(path, vehicle, str(map), piece)
         return map_table(open_table(path), load_map(map), vehicle, piece=piece)
     chosen = reader_by_content(path) if reader is None else find_reader(reader)
     if chosen is not None and not chosen.signature:

@@ -2,19 +2,21 @@
 
 ``ros2:TOPICS.yaml`` names them as the map of a bag does (``identification.logs.readers.rosbag``);
 ``ros2:?pose=/vicon/drone&rotors=/motors`` does so on the command line (pose, rotors, command,
-voltage, imu). Published are ``windwrench/wrench`` (geometry_msgs/WrenchStamped) and its twin with a
-covariance, ``windwrench/external_acceleration`` (geometry_msgs/AccelWithCovarianceStamped), in the
-frame ``?frame=world``.
+voltage, imu), for messages that state their units. Published are ``windwrench/wrench``
+(geometry_msgs/WrenchStamped) and its twin with a covariance, ``windwrench/external_acceleration``
+(geometry_msgs/AccelWithCovarianceStamped), in the frame ``?frame=world``.
 """
 
 import importlib
 import time
+from collections.abc import Mapping
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ...identification.logs.readers.topic_map import Setting, topic_map
+from ...identification.logs.readers.ros_topics import SECTIONS, map_of
+from ...identification.logs.readers.rosbag import given_map
 from ...runtime.errors import InputError
 from ..filtering import Output
 from ..messages import Sample
@@ -28,7 +30,13 @@ from .ros_conversions import (
     wrench_message,
 )
 
-_PARTS = ("pose", "rotors", "command", "voltage", "imu")
+_SECTIONS = {  # of a map, by the options
+    "pose": "position",
+    "rotors": "rotors",
+    "command": "commands",
+    "voltage": "battery",
+    "imu": "accelerometer",
+}
 _FOUND = 10.0  # s that topics are waited for
 _AT_ONCE = 64  # messages taken before their estimates are out
 
@@ -36,18 +44,24 @@ _AT_ONCE = 64  # messages taken before their estimates are out
 class Ros2(Source):
     """Messages of topics."""
 
-    kind, options, answers = "ros2", (*_PARTS, "frame"), True
+    kind, options, answers = "ros2", (*_SECTIONS, "frame"), True
 
     def _prepare(self) -> None:
         text, address = self.name, self.address
         self._frame = address.options.get("frame", "world")
-        settings: dict[str, Setting] = {}
-        if address.path:
-            settings, _ = topic_map(Path("."), address.path)
-        for part in _PARTS:
-            if part in address.options:
-                settings[part] = Setting(address.options[part])
-        if "pose" not in settings or not {"rotors", "command"} & set(settings):
+        given: dict[str, Any] = dict(given_map(Path(address.path))) if address.path else {}
+        given |= {
+            section: {"topic": address.options[option]}
+            for option, section in _SECTIONS.items()
+            if option in address.options
+        }
+        self._topics: dict[str, str] = {}  # by section
+        for section in SECTIONS:
+            said = given.get(section)
+            topic = said.get("topic") if isinstance(said, Mapping) else said
+            if isinstance(topic, str):
+                self._topics[section] = topic
+        if "position" not in self._topics or not {"rotors", "commands"} & set(self._topics):
             raise InputError(
                 f"{text}: expected topics of a pose and of rotors or command: ros2:TOPICS.yaml, or "
                 "ros2:?pose=/vicon/drone&rotors=/motors"
@@ -57,7 +71,7 @@ class Ros2(Source):
                 f"{text}: rclpy is not there; expected a ROS 2 installation whose setup.bash was "
                 "sourced in this shell (it is not on PyPI)"
             )
-        self._settings = settings
+        self._given = given
         self._node: Any = None
         self._executor: Any = None
         self._rclpy: Any = None
@@ -78,13 +92,12 @@ class Ros2(Source):
         self._node = self._rclpy.create_node("windwrench_live")
         self._executor = executors.SingleThreadedExecutor()
         self._executor.add_node(self._node)
-        names = {part: setting.topic for part, setting in self._settings.items()}
-        kinds = self._kinds(set(names.values()))
-        for part, topic in names.items():
-            setting = self._settings[part]
-            read = TopicReader(part, topic, kinds[topic], setting, self.vehicle)
+        kinds = self._kinds(set(self._topics.values()))
+        log_map, _ = map_of(kinds, self._given, "ros2", "the map of topics")
+        for topic, kind in kinds.items():
+            read = TopicReader(topic, kind, log_map, self.vehicle)
             self._node.create_subscription(
-                get_message(kinds[topic]),
+                get_message(kind),
                 topic,
                 partial(self._take, read),
                 qos.qos_profile_sensor_data,
@@ -104,7 +117,7 @@ class Ros2(Source):
             known = {name: kinds[0] for name, kinds in self._node.get_topic_names_and_types()}
             missing = sorted(topics - set(known))
             if not missing:
-                return known
+                return {name: known[name] for name in sorted(topics)}
             if time.monotonic() > deadline:
                 raise InputError(
                     f"{self.name}: no topic {', '.join(missing)}; found "
@@ -150,5 +163,5 @@ class Ros2(Source):
 
     def expected(self) -> str:
         """Return what must come."""
-        topics = ", ".join(f"{s.topic} ({part})" for part, s in self._settings.items())
+        topics = ", ".join(f"{topic} ({section})" for section, topic in self._topics.items())
         return f"messages on {topics}"

@@ -4,14 +4,15 @@ Written against the fields alone, so that messages of rclpy and of rosbags do al
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ...dynamics.rotation import matrix_of
 from ...dynamics.vehicle import Vehicle
-from ...identification.logs.readers.ros_messages import stamp
-from ...identification.logs.readers.topic_map import Setting, topic_of
+from ...identification.logs.log_map import LogMap
+from ...identification.logs.readers.ros_messages import Fields, stamp
 from ..field_map import FieldMap
 from ..filtering import Output
 from ..messages import Array, Malformed, Sample
@@ -25,19 +26,19 @@ class TopicReader:
     """From a topic's messages to what they hold.
 
     Args:
-        part: that the topic holds.
         name: of the topic.
         kind: the type of its messages.
-        setting: of it in the map of topics.
+        log_map: of all topics.
         vehicle: that flies.
-
-    Raises:
-        InputError: messages of this type hold no such part, or need a unit that is not given.
     """
 
-    def __init__(self, part: str, name: str, kind: str, setting: Setting, vehicle: Vehicle) -> None:
-        self._topic = topic_of(part, name, kind, setting, ("ros2", "the map of topics"))
-        self._fields = FieldMap(self._topic.log_map, vehicle, name)
+    def __init__(self, name: str, kind: str, log_map: LogMap, vehicle: Vehicle) -> None:
+        others = [n for n, part in log_map.sections.items() if part.topic != name]
+        left_out: dict[str, Any] = dict.fromkeys(others)
+        own = replace(log_map, **left_out)
+        wanted = [column for part in own.sections.values() for column in part.named]
+        self._name, self._numbers = name, Fields(name, kind, wanted)
+        self._fields = FieldMap(own, vehicle, name)
 
     def sample(self, message: Any, arrival: int) -> Sample:
         """Return what a message holds.
@@ -46,10 +47,10 @@ class TopicReader:
             Malformed: that is nothing that a flight has.
         """
         try:
-            values = self._topic.values(message).tolist()
-            fields = dict(zip(self._topic.columns, values, strict=True))
+            columns = self._numbers.columns(np.array([self._numbers.take(message)]))
+            fields: dict[str, Any] = {name: float(x[0]) for name, x in columns.items()}
             fields["stamp"] = stamp(message)
-            found = self._fields.sample(self._topic.name, fields, arrival)
+            found = self._fields.sample(self._name, fields, arrival)
         except (IndexError, ValueError, AttributeError, TypeError) as error:
             raise Malformed(str(error)) from error
         found.stamp = found.stamp or None

@@ -161,8 +161,7 @@ def _bag(kind: str) -> dict[str, bytes]:
 
 
 TOPIC_MAP = (
-    b"pose: {topic: /pose, frame: flu}\n"
-    b"rotors:\n  topic: /motors\n  unit: rad/s\n  order: [3, 2, 4, 1]\n"
+    b"position: {topic: /pose}\nrotors:\n  topic: /motors\n  unit: rad/s\n  order: [3, 2, 4, 1]\n"
 )
 
 

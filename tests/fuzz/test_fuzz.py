@@ -179,7 +179,7 @@ def test_a_yaml_file_makes_no_objects(tmp_path, monkeypatch, tag):
         InputError, match=r"v\.yaml: not valid YAML: could not determine a constructor"
     ):
         load_vehicle(path)
-    (tmp_path / "flight.topics.yaml").write_text(f"pose: {tag}\n")
+    (tmp_path / "flight.topics.yaml").write_text(f"position: {tag}\n")
     (tmp_path / "flight.bag").write_bytes(b"#ROSBAG V2.0\n")
     with pytest.raises(InputError, match=r"topics\.yaml: not valid YAML"):
         read_log(tmp_path / "flight.bag", "rosbag")

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from tests.live.stream import VEHICLE, as_csv, as_objects, flight
-from windwrench.identification.logs.readers.topic_map import Setting
 from windwrench.live.filtering import LiveSettings
 from windwrench.live.session import Session
 from windwrench.live.sources.crazyflie import _IMU, _POSE
@@ -225,8 +224,8 @@ def test_ros2(count, monkeypatch):
     world, flown = fake.World(kinds), flight()
     fake.install(monkeypatch, world)
     monkeypatch.setattr(
-        "windwrench.live.sources.ros2.topic_map",
-        lambda *_: ({"pose": Setting("/p"), "rotors": Setting("/m", unit="rad/s")}, {}),
+        "windwrench.live.sources.ros2.given_map",
+        lambda _: {"position": "/p", "rotors": {"topic": "/m", "unit": "rad/s"}},
     )
     stream = Attacked("ros2:topics.yaml")
     stream.source.open()

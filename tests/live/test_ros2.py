@@ -13,7 +13,7 @@ from tests.live.stream import VEHICLE, Pipeline, Running, flight
 from tests.live.test_pipeline import whole
 from windwrench.dynamics import InputError
 from windwrench.dynamics.rotation import matrix_of
-from windwrench.identification.logs.readers.topic_map import Setting
+from windwrench.identification.logs.readers.ros_topics import map_of
 from windwrench.live.messages import Malformed
 from windwrench.live.sources.open import make_source
 from windwrench.live.tallies import Tallies
@@ -29,36 +29,42 @@ from windwrench.live.sources.ros_conversions import (
     wrench_message,
 )
 
+ARRAY = "std_msgs/msg/Float64MultiArray"
+
 
 def test_a_pose_that_goes_over_the_wire():
     flown = flight()
     message = pose(1_700_000_000_123_456_789, flown["position"][7], flown["quaternion"][7])
     data = STORE.serialize_cdr(message, "geometry_msgs/msg/PoseStamped")
     again = STORE.deserialize_cdr(data, "geometry_msgs/msg/PoseStamped")
-    topic = TopicReader("pose", "/p", "geometry_msgs/msg/PoseStamped", Setting(), VEHICLE)
-    sample = topic.sample(again, 5)
+    sample = topics("/p", "geometry_msgs/msg/PoseStamped").sample(again, 5)
     assert sample.stamp == 1_700_000_000_123_456_789
     np.testing.assert_array_equal(sample.position, flown["position"][7])
     np.testing.assert_allclose(sample.quaternion, flown["quaternion"][7], rtol=1e-15)
-    setting = Setting(frame="ned")
-    turned = TopicReader("pose", "/p", "geometry_msgs/msg/PoseStamped", setting, VEHICLE)
+    turned = topics("/p", "geometry_msgs/msg/PoseStamped", world="ned", body="frd")
     ned = turned.sample(again, 5)
     np.testing.assert_array_equal(ned.position, flown["position"][7] * [1, -1, -1])
 
 
+def topics(name, kind, rotors=None, **given):
+    """The reader of a topic beside others."""
+    types = {"/p": "geometry_msgs/msg/PoseStamped", "/m": ARRAY, name: kind}
+    said = {"position": "/p", "rotors": {"topic": "/m", "unit": "rad/s"}} | given
+    log_map, _ = map_of(types, said | ({"rotors": rotors} if rotors else {}), "ros2", "the map")
+    return TopicReader(name, kind, log_map, VEHICLE)
+
+
 def test_rotors_of_a_multi_array_need_a_unit():
-    kind = "std_msgs/msg/Float64MultiArray"
     with pytest.raises(InputError, match=r"ros2: rotors: topic /m is .* states no unit"):
-        TopicReader("rotors", "/m", kind, Setting(), VEHICLE)
-    setting = Setting(unit="rpm", order=(4, 3, 2, 1))
-    topic = TopicReader("rotors", "/m", kind, setting, VEHICLE)
+        topics("/m", ARRAY, "/m")
+    topic = topics("/m", ARRAY, {"topic": "/m", "unit": "rpm", "order": [4, 3, 2, 1]})
     sample = topic.sample(array([10, 20, 30, 40]), 0)
     np.testing.assert_allclose(sample.rotor_speeds, np.array([40, 30, 20, 10]) * np.pi / 30)
     assert sample.stamp is None
     with pytest.raises(Malformed):
         topic.sample(array([1.0, 2.0]), 0)
-    with pytest.raises(InputError, match="ros2: pose: topic /m is of type"):
-        TopicReader("pose", "/m", kind, Setting(), VEHICLE)
+    with pytest.raises(InputError, match="ros2: position: topic /m is of type"):
+        topics("/m", ARRAY, position="/m")
 
 
 def test_the_wrench_and_its_twin_as_ros_writes_them():
@@ -97,7 +103,9 @@ def test_a_node_reads_topics_and_publishes(monkeypatch, tmp_path):
         world.waiting.append(
             ("/vicon/drone", pose(ns, flown["position"][k], flown["quaternion"][k]))
         )
-    (tmp_path / "topics.yaml").write_text("pose: /vicon/drone\nrotors: {topic: /m, unit: rad/s}\n")
+    (tmp_path / "topics.yaml").write_text(
+        "position: /vicon/drone\nrotors: {topic: /m, unit: rad/s}\n"
+    )
     found = run(monkeypatch, world, f"ros2:{tmp_path / 'topics.yaml'}")
     assert len(found.outputs) > 280
     published = world.published["windwrench/wrench"]

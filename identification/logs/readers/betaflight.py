@@ -28,7 +28,6 @@ from ..log_map import recording_map
 from ..mapped_log import recording_of
 from ..streams import MOST_VOLTS
 from ..table import Array, Table
-from ..what_flew import UNSTATED, WhatFlew
 from .blackbox import BEGINS as BEGINS
 from .blackbox import WHAT as WHAT
 from .blackbox import read_blackbox
@@ -101,10 +100,6 @@ def _log(
         InputError: no motors, or no gyro and accelerometer.
     """
     log_map = recording_map("betaflight")
-    # the firmware logs as many motors as its mixer has
-    more = [fields.pop(name) for name in _MORE_MOTORS if name in fields]
-    count = 4 + sum(bool(np.ptp(x) > 0.0) for x in more)
-    flown = UNSTATED if count == 4 else WhatFlew("", f"motor[0] to motor[{count - 1}]", count)
     t = 1e-6 * fields.pop("time")
     groups = {
         kind: [name for name in fields if name.startswith(kind) and name not in stated]
@@ -136,7 +131,7 @@ def _log(
                 "blackbox_decode writes logs of Betaflight before 4.3"
             )
     samples = [Samples(t, fields)]
-    return recording_of(path, samples, log_map, reader, said, piece, flown).log(vehicle)
+    return recording_of(path, samples, log_map, reader, said, piece).log(vehicle)
 
 
 def _gyro_scale(headers: Mapping[str, str]) -> float:

@@ -171,40 +171,46 @@ def _samples(topic: str, fields: Fields, outputs: Outputs) -> Iterator[Samples]:
     sampled = fields.get("timestamp_sample", published)
     plausible = np.all((sampled > 0.0) & (np.abs(published - sampled) < 1e6))
     t = _MICROSECOND * (sampled if plausible else published)
-    columns = {name: x for name, x in fields.items() if "timestamp" not in name}
-    if topic == "esc_status":
-        reported = [f"esc[{slot}].esc_rpm" for slot in slots_of_escs(fields)]
-        if not set(reported) <= set(columns):
-            return
-        columns = {f"esc[{i}].esc_rpm": columns[name] for i, name in enumerate(reported)}
-    elif topic == "actuator_motors":
-        # NaN stands for a motor that is off
-        columns = {n: np.clip(np.nan_to_num(x, nan=0.0), 0.0, 1.0) for n, x in columns.items()}
-        if not any(np.any(columns.get(f"control[{i}]", 0.0) > 0.0) for i in range(4)):
-            return
-    elif topic == "battery_status":
-        if "connected" in columns and "voltage_v" in columns:
-            there = columns["connected"] != 0.0
-            columns["voltage_v"] = np.where(there, columns["voltage_v"], np.nan)
-    elif topic == "actuator_outputs":
-        columns = shares_of_motors(columns, outputs)
-    elif topic.endswith("_odometry"):
-        # in NED or in FRD fixed to the earth, both of which have z down: 1 and 2 since PX4 1.14,
-        # 0 and 1 before
-        known = (1, 2) if "pose_frame" in fields else (0, 1)
-        if not np.all(np.isin(fields.get("pose_frame", fields.get("local_frame", 0)), known)):
-            return
-        if "x" in columns:  # before PX4 1.14
-            columns |= {f"position[{i}]": columns[name] for i, name in enumerate("xyz")}
-    elif topic == _FILTER:
-        for flag, names in (("xy_valid", "xy"), ("z_valid", "z")):
-            for name in names if flag in fields else "":
-                columns[name] = np.where(columns[flag] == 0.0, np.nan, columns[name])
-    elif topic in ("sensor_combined", "vehicle_imu"):
+    if topic in ("sensor_combined", "vehicle_imu"):
         for field, gained in _SENSORS:
             yield _sensor(topic, t, fields, field, gained)
         return
-    yield Samples(t, columns, topic)
+    columns = {name: x for name, x in fields.items() if "timestamp" not in name}
+    if topic == "actuator_outputs":
+        columns = shares_of_motors(columns, outputs)
+    yield Samples(t, unified(topic, columns), topic)
+
+
+def unified(topic: str, fields: Fields) -> dict[str, Array]:
+    """Return a topic's columns as the map names them; none, where it is not in use."""
+    columns = dict(fields)
+    if topic == "esc_status":
+        reported = [f"esc[{slot}].esc_rpm" for slot in slots_of_escs(columns)]
+        if not set(reported) <= set(columns):
+            return {}
+        return {f"esc[{i}].esc_rpm": columns[name] for i, name in enumerate(reported)}
+    if topic == "actuator_motors":
+        # NaN stands for a motor that is off
+        columns = {n: np.clip(np.nan_to_num(x, nan=0.0), 0.0, 1.0) for n, x in columns.items()}
+        is_used = any(np.any(columns.get(f"control[{i}]", 0.0) > 0.0) for i in range(4))
+        return columns if is_used else {}
+    if topic == "battery_status" and {"connected", "voltage_v"} <= set(columns):
+        there = columns["connected"] != 0.0
+        columns["voltage_v"] = np.where(there, columns["voltage_v"], np.nan)
+    elif topic.endswith("_odometry"):
+        # in NED or in FRD fixed to the earth, both of which have z down: 1 and 2 since PX4 1.14,
+        # 0 and 1 before
+        known = (1, 2) if "pose_frame" in columns else (0, 1)
+        frame = columns.get("pose_frame", columns.get("local_frame", np.zeros(1)))
+        if "x" in columns:  # before PX4 1.14
+            columns |= {f"position[{i}]": columns[name] for i, name in enumerate("xyz")}
+        for name in (f"position[{i}]" for i in range(3) if f"position[{i}]" in columns):
+            columns[name] = np.where(np.isin(frame, known), columns[name], np.nan)
+    elif topic == _FILTER:
+        for flag, names in (("xy_valid", "xy"), ("z_valid", "z")):
+            for name in names if flag in columns else "":
+                columns[name] = np.where(columns[flag] == 0.0, np.nan, columns[name])
+    return columns
 
 
 def _sensor(topic: str, t: Array, fields: Fields, field: str, gained: str) -> Samples:

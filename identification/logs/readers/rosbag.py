@@ -1,15 +1,16 @@
 """ROS 1 and ROS 2 bags (``.bag``, ``.db3``, ``.mcap`` or a ROS 2 bag's folder), read with rosbags; no ROS is needed.
 
-Which topic is what, a small YAML file may say: ``NAME.topics.yaml`` beside the bag ``NAME.bag`` (or folder ``NAME``), or the
-file given as the reader's option, ``rosbag:FILE.yaml``::
+Which topic is what, a log map may say (``log_map``): ``NAME.topics.yaml`` beside the bag ``NAME.bag`` (or folder ``NAME``), or the
+file given as ``--map`` or as the reader's option, ``rosbag:FILE.yaml``. A section names its topic, and where the type of its messages
+does not say them, its columns, which are fields of a message::
 
-    pose: {topic: /vicon/drone, frame: flu}        # or ned; default flu
+    position: {topic: /vicon/drone}                # and attitude, where nothing else is said
     rotors: {topic: /motors, unit: rad/s, order: px4-x}
-    command: {topic: /pwm, unit: us, order: [3, 2, 4, 1], range: [1000, 2000]}
-    voltage: {topic: /battery}
-    imu: {topic: /imu, frame: flu}                 # or ned, for body axes forward, right, down
+    commands: {topic: /pwm, columns: ["data[2]", "data[3]", "data[4]", "data[5]"], unit: us, range: [1000, 2000]}
+    battery: {topic: /battery}
+    accelerometer: {topic: /imu, body: frd}        # and gyro; where body axes are forward, right, down
 
-``/topic`` alone stands for ``{topic: /topic}``. Of what the file does not name:
+``/topic`` alone stands for ``{topic: /topic}``. Of what the map does not name:
 
 1. topics whose names say that they are set-points (setpoint, reference, command ...) are not taken for a pose or for rotor speeds;
 2. the bag's only topic of a type that fits is taken;
@@ -17,12 +18,9 @@ file given as the reader's option, ``rosbag:FILE.yaml``::
    of several inertial sensors or others that which no other name extends by ``_raw``; a note says so;
 4. where that leaves several, the bag is refused and they are listed.
 
-Which types hold what, and in which frame, unit and order, says ``maps/recordings/ros.yaml``; a
-multi-array of std_msgs holds rotor speeds or commands where a ``unit`` is given: ``rad/s``, ``rpm``
-or ``Hz``, ``normalised`` or ``us``. ``order`` has a name (``px4-x``, ``betaflight`` ...), or the
-elements, from 1, that are rotors 1 front-left, 2 rear-left, 3 rear-right, 4 front-right. ``range``
-has the values of the commands 0 and 1, of pulses 1000 and 2000 us unless it is given. Without a
-pose, an inertial sensor must be there. Of sensor_msgs/Imu the attitude is not read.
+Which types hold what, and in which frame, unit and order, says ``maps/recordings/ros.yaml``; a multi-array of std_msgs holds rotor
+speeds or commands where a ``unit`` is given. Without a pose, an inertial sensor must be there. Of sensor_msgs/Imu the attitude is
+not read.
 
 A sample's time is its header's (of PX4's types its ``timestamp_sample`` or ``timestamp``), where that runs within a second of the
 bag's clock, else the time it was recorded.
@@ -32,8 +30,9 @@ so that nothing in a file decides what code runs; a bag whose definitions differ
 
 import os
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -45,13 +44,13 @@ from ....runtime.errors import InputError
 from ....runtime.extras import need
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import open_regular
+from ....runtime.yaml_file import read_yaml
 from ..channels import Samples
 from ..flight_log import FlightLog
 from ..mapped_log import recording_of
 from ..table import Array
-from ..what_flew import UNSTATED, WhatFlew, running
-from .ros_messages import MOTORS, definitions, stamp
-from .topic_map import Topic, chosen_topics, joined, topic_map
+from .ros_messages import Fields, definitions, stamp
+from .ros_topics import map_of
 from .unpacking import check_bag_files, limited_unpacking
 
 WHAT = "a ROS bag (ROS 1, SQLite or MCAP)"
@@ -68,57 +67,59 @@ _NANOSECOND = 1e-9  # s
 def read(
     path: Path, vehicle: Vehicle | None = None, option: str = "", piece: int | None = None
 ) -> FlightLog:
-    """Read a bag; ``option`` is the path of a topic map, the default ``NAME.topics.yaml`` beside
-    the bag if it is there.
+    """Read a bag; ``option`` is the path of a map, the default ``NAME.topics.yaml`` beside the bag
+    if it is there.
 
     Raises:
         InputError: rosbags is missing, the bag or the map cannot be read, a topic is missing,
             ambiguous or of another type, or a message cannot be used.
     """
-    settings, where = topic_map(path, option)
-    flown, decoded = UNSTATED, []
+    stem = path.name if os.path.isdir(path) else path.stem
+    file = Path(option) if option else path.with_name(f"{stem}.topics.yaml")
+    given = given_map(file) if option or os.path.exists(file) else {}
+    decoded: list[tuple[NDArray[np.int64], dict[str, Array], str]] = []
     with _opened(path) as (types, messages):
-        topics, doubts = chosen_topics(path, types, settings, where)
-        for part, topic in list(topics.items()):
+        log_map, notes = map_of(types, given, str(path), str(file))
+        for topic in sorted(log_map.topics - {""}):
+            held = {name: part for name, part in log_map.sections.items() if part.topic == topic}
+            wanted = dict.fromkeys(name for part in held.values() for name in part.named)
+            fields = Fields(f"{path}: topic {topic}", types[topic], wanted)
             try:
-                times, columns, doubt, count = _decoded_topic(path, topic, messages)
-                decoded.append((times, columns, topic.name))
-                doubts += [doubt] if doubt else []
-                flown = flown if count is None else WhatFlew(running=count)
+                times, columns, doubt = _decoded_topic(
+                    f"{path}: topic {topic}", fields, messages(topic)
+                )
             except InputError as error:
-                if part in settings or part in ("pose", "rotors"):
+                if held.keys() & {*given, "position", "rotors"}:
                     raise
-                doubts.append(f"no {part}: {error}")  # nobody asked for it
-                del topics[part]
-    if not topics:
-        raise InputError(f"{path}: {doubts[0] if doubts else 'nothing in it can be read'}")
-    notes = [note for topic in topics.values() for note in _notes(topic, types[topic.name])]
+                notes.append(f"no {', '.join(held)}: {error}")  # nobody asked for it
+                left_out: dict[str, Any] = dict.fromkeys(held)
+                log_map = replace(log_map, **left_out)
+                continue
+            decoded.append((times, columns, topic))
+            notes += [f"{topic}: {doubt}; the times of recording were taken"] if doubt else []
+    if not decoded:
+        raise InputError(f"{path}: {notes[-1]}")
     origin = min(int(times[0]) for times, _, _ in decoded)
     recorded = [
         Samples(_NANOSECOND * (times - origin).astype(float), columns, name)
         for times, columns, name in decoded
     ]
-    said = (*notes, *doubts)
-    return recording_of(path, recorded, joined(topics), "rosbag", said, piece, flown).log(vehicle)
+    return recording_of(path, recorded, log_map, "rosbag", notes, piece).log(vehicle)
 
 
-def _notes(topic: Topic, kind: str) -> Iterator[str]:
-    """Yield which topic holds a part, and what was assumed of its frame or order."""
-    part, frame = topic.part, topic.kind.frame
-    yield f"{part}: topic {topic.name} ({kind}){topic.why}"
-    if part in MOTORS:
-        said = f", as on {topic.assumed_order}, which the bag does not state"
-        said = said if topic.assumed_order else ""
-        if part == "command" and topic.kind.unit == "us":
-            low, high = topic.kind.range
-            said += f"; pulses of {low:g} to {high:g} us are the commands 0 to 1"
-        elements = ", ".join(map(str, topic.elements))
-        yield f"{part}: rotors 1, 2, 3, 4 are elements {elements} of the message{said}"
-    elif part != "voltage" and frame == "flu":
-        world = "world z up, " if part == "pose" else ""
-        yield f"{part}: {world}body forward, left, up, as the bag has it"
-    elif part != "voltage":
-        yield f"{part}: turned half a turn about x, from z down to z up"
+def given_map(file: Path) -> Mapping[str, Any]:
+    """Return what a map file of topics says.
+
+    Raises:
+        InputError: it cannot be read, or is none.
+    """
+    found = read_yaml(file, "a map file")
+    if not isinstance(found, Mapping):
+        raise InputError(
+            f"{file}: expected a mapping of position, rotors and so on to topics, got "
+            f"{type(found).__name__}"
+        )
+    return found
 
 
 @contextmanager
@@ -213,42 +214,26 @@ def _decoded(raw: Any, kind: str, stores: list[Any], ros1: bool) -> Any:
 
 
 def _decoded_topic(
-    path: Path, topic: Topic, messages: _Messages
-) -> tuple[NDArray[np.int64], dict[str, Array], str, int | None]:
+    where: str, fields: Fields, messages: Iterator[tuple[int, Any]]
+) -> tuple[NDArray[np.int64], dict[str, Array], str]:
     """Return times (N,) in ns and columns (N,) of a topic by name, and what is wrong with its time
-    stamps; and of more than four commands, whose order nobody stated, how many run as motors do.
+    stamps.
 
     Raises:
         InputError: it has no message or too many, or one that cannot be used.
     """
     recorded, stamped, values = array("q"), array("q"), array("d")
-    every: list[Array] = []
-    where = f"{path}: topic {topic.name}"
-    for index, (received, message) in enumerate(messages(topic.name)):
+    for index, (received, message) in enumerate(messages):
         check_count(where, index + 1, LIMITS.table_rows, "messages")
         recorded.append(received)
         stamped.append(stamp(message))
-        try:
-            values.extend(topic.values(message))
-            if topic.part == "command" and topic.assumed_order:
-                every.append(topic.kind.values(message))
-        except ValueError as error:
-            raise InputError(f"{where}, message {index + 1}: {error}") from error
+        values.extend(fields.take(message))
     if not recorded:
-        raise InputError(
-            f"{path}: {topic.part}: topic {topic.name} has no messages; expected at least two"
-        )
-    table = np.array(values).reshape(len(recorded), -1)
-    columns = dict(zip(topic.columns, table.T, strict=True))
-    received_at, sampled_at, doubt = np.array(recorded), np.array(stamped), ""
+        raise InputError(f"{where} has no messages; expected at least two")
+    columns = fields.columns(np.array(values).reshape(len(recorded), -1))
+    received_at, sampled_at = np.array(recorded), np.array(stamped)
     if not np.any(sampled_at):
-        doubt = "no time stamps"
-    elif np.max(np.abs(sampled_at - received_at)) > _SAME_CLOCK:
-        doubt = "its time stamps are of another clock than the bag's"
-    times = received_at if doubt else sampled_at
-    doubt = f"{topic.name}: {doubt}; the times of recording were taken" if doubt else ""
-    running_outputs = None
-    if len({len(one) for one in every}) == 1 and len(every[0]) > 4:
-        motors = [element - 1 for element in topic.elements]
-        running_outputs = running(np.array(every), motors, *topic.kind.range)
-    return times, columns, doubt, running_outputs
+        return received_at, columns, "no time stamps"
+    if np.max(np.abs(sampled_at - received_at)) > _SAME_CLOCK:
+        return received_at, columns, "its time stamps are of another clock than the bag's"
+    return sampled_at, columns, ""

@@ -87,7 +87,7 @@ def test_each_map_that_ships_is_a_map(name: str) -> None:
         ({"rotors": {**GOOD["rotors"], "unit": "eRPM"}}, "eRPM without pole_pairs"),
         ({"rotors": {**GOOD["rotors"], "signs": [1, -1]}}, "signs of 4 times 1 or -1, got .1, -1"),
         ({"extra": {"sent": {"columns": []}}}, "extra.sent must have some columns of the table"),
-        ({"rows": "some"}, "rows must be mixed, whole, streams or messages, got 'some'"),
+        ({"rows": "some"}, "rows must be mixed, whole or messages, got 'some'"),
         (
             {"gyro": {"columns": ["a", "b", "c"], "unit": "raw"}},
             "gyro has unit raw without a sc",

@@ -167,7 +167,7 @@ def test_the_only_topics_that_fit_are_taken(write, kind, vehicle):
     assert_flight(log)
     np.testing.assert_allclose(log.voltage, 12.0 - T, atol=1e-5)
     assert log.name == "flight"
-    assert "pose: topic /vicon/drone (geometry_msgs/msg/PoseStamped)" in log.notes
+    assert "position: topic /vicon/drone (geometry_msgs/msg/PoseStamped)" in log.notes
     if kind != "bag":
         assert_flight(read_log(next(path.glob(f"*.{kind}")), "rosbag", vehicle))
 
@@ -183,12 +183,12 @@ def test_a_map_states_topics_frames_units_and_order(write, kind, shape, vehicle)
         "/b": pose(),
         "/rpm": ("std_msgs/msg/Float32MultiArray", WIDE, rpm),
     }
-    lines = "pose: {topic: /a, frame: ned}\nrotors: {topic: /rpm, unit: rpm, order: [3, 2, 4, 1]}\n"
+    lines = "world: ned\nbody: frd\nposition: /a\nrotors: {topic: /rpm, unit: rpm, order: px4-x}\n"
     log = read_log(write(topics, kind, lines), "rosbag", vehicle)
     assert_flight(log)
     assert log.voltage is None
-    assert any("elements 3, 2, 4, 1" in note for note in log.notes)
-    assert any("half a turn about x" in note for note in log.notes)
+    assert any("/rpm, rpm, motors 1 front-right" in note for note in log.notes)
+    assert "frames: world ned, body frd" in log.notes
 
 
 @pytest.mark.parametrize("kind", ["bag", "mcap"])
@@ -196,8 +196,10 @@ def test_an_imu_is_taken_in_the_frame_that_the_map_states(write, kind, vehicle):
     path = write(FLIGHT | {"/imu": imu(FLIP)}, kind)
     log = read_log(path, None, vehicle)  # REP 145 has an IMU forward, left, up
     np.testing.assert_allclose(log.gyro, inertial(log.t)[0] @ FLIP, atol=2e-3)
-    assert "imu: body forward, left, up, as the bag has it" in log.notes
-    path.with_name("flight.topics.yaml").write_text("imu: {topic: /imu, frame: ned}")
+    assert "frames: world enu, body flu" in log.notes
+    path.with_name("flight.topics.yaml").write_text(
+        "accelerometer: {topic: /imu, body: frd}\ngyro: {body: frd}\n"
+    )
     log = read_log(path, "rosbag", vehicle)
     assert_inertial(log, log.t, 2e-3)
 
@@ -210,7 +212,7 @@ def test_messages_of_px4_of_several_years(write, kind, variant):
     assert_inertial(log, log.t)
     np.testing.assert_allclose(log.rotor_speeds[0], OURS, atol=0.06)
     np.testing.assert_allclose(log.command, np.tile(SHARE, (len(T), 1)), atol=1e-6)
-    assert any("px4-x, which the bag does not state" in note for note in log.notes)
+    assert any("motors as on px4-x, which the bag does not state" in note for note in log.notes)
 
 
 @pytest.mark.parametrize("kind", ["bag", "mcap"])
@@ -229,7 +231,7 @@ def test_messages_of_mavros(write, kind):
     np.testing.assert_allclose(log.command, np.tile(SHARE, (len(T), 1)), atol=1e-3)
     assert not log.has_rotor_speeds
     text = " ".join(log.notes)
-    assert "pulses of 1000 to 2000 us" in text
+    assert "us, 1000 to 2000 taken as 0 to 1" in text
     assert "/mavros/imu/data (sensor_msgs/msg/Imu), chosen by its name before" in text
     items = [{"rpm": round(w * 30 / np.pi)} for w in PX4]
     topics |= {"/mavros/esc_status": of_mavros("ESCStatus", esc_status=items)}
@@ -246,7 +248,7 @@ def test_six_motors_of_mavros_are_refused(write):
         return {"header": stamp(t), "channels": np.round(pulses).astype(np.uint16)}
 
     topics = {"/pose": pose(), "/out": ("mavros_msgs/msg/RCOut", WIDE, fields)}
-    with pytest.raises(InputError, match="6 outputs run as motors do"):
+    with pytest.raises(InputError, match=r"6 rotors turn \(channels\[0\], "):
         read_log(write(topics))
 
 
@@ -278,23 +280,29 @@ def test_without_a_pose_an_imu_will_do(write):
 
 def test_a_map_may_lie_elsewhere(write, tmp_path, vehicle):
     path = write(FLIGHT | {"/b": pose()}, "bag")
-    (tmp_path / "other.yaml").write_text("pose: /b\n")
+    (tmp_path / "other.yaml").write_text("position: /b\n")
     assert_flight(read_log(path, f"rosbag:{tmp_path / 'other.yaml'}", vehicle))
+    assert_flight(read_log(path, vehicle=vehicle, map=tmp_path / "other.yaml"))
     with pytest.raises(InputError, match=r"reader 'nanobench' takes no option, got 'x'"):
         read_log(path, "nanobench:x", vehicle)
-    with pytest.raises(InputError, match=r"absent.yaml: cannot be read as a topic map"):
+    with pytest.raises(InputError, match=r"absent.yaml: cannot be read as a map file"):
         read_log(path, f"rosbag:{tmp_path / 'absent.yaml'}", vehicle)
 
 
-def test_an_order_picks_four_of_more(write, vehicle):
-    six = np.concatenate([[1.0], OURS[:2], [2.0], OURS[2:]])
+def test_columns_pick_four_of_more(write, vehicle):
+    six = np.concatenate([OURS[3:], OURS[:2], OURS[:1], OURS[2:]])
     path = write({"/a": pose(), "/motors": motors(six)}, "bag")
-    with pytest.raises(InputError, match=r"/motors, message 1: 6 rotor speed.s.; expected 4, or"):
+    with pytest.raises(
+        InputError, match=r"6 rotors turn \(angular_velocities\[0\], .*; expected the four"
+    ):
         read_log(path, "rosbag", vehicle)
-    path.with_name("flight.topics.yaml").write_text("rotors: {order: [2, 3, 5, 6]}\n")
+    four = [f"angular_velocities[{i}]" for i in (1, 2, 4, 5)]
+    path.with_name("flight.topics.yaml").write_text(f"rotors: {{columns: {four}}}\n")
     assert_flight(read_log(path, "rosbag", vehicle))
-    path.with_name("flight.topics.yaml").write_text("rotors: {order: [2, 3, 5, 7]}\n")
-    with pytest.raises(InputError, match="expected at least 7"):
+    path.with_name("flight.topics.yaml").write_text(
+        f"rotors: {{columns: {four}}}\n".replace("5", "6")
+    )
+    with pytest.raises(InputError, match=r"no field angular_velocities\[6\] in its mav_msgs"):
         read_log(path, "rosbag", vehicle)
 
 
@@ -315,28 +323,29 @@ def test_times_that_are_no_use_are_replaced_or_left_out(write, vehicle, topics, 
 @pytest.mark.parametrize(
     ("topic_map", "expected"),
     [
-        ("pose: /nowhere", r"unknown topic '/nowhere'; expected one of /a, /motors, /n"),
-        ("pose: /motors", r"pose: topic /motors is of type mav_msgs\S+; expected geometry_msgs"),
-        ("pos: /a", "unknown key 'pos'; expected one of command, imu, pose, rotors, voltage"),
-        ("pose: {topic: /a, frames: ned}", "pose: unknown key 'frames'; expected one of frame, t"),
+        ("position: /nowhere", r"unknown topic '/nowhere'; expected one of /a, /motors, /n"),
         (
-            "pose: {topic: /a, frame: enu}",
-            "pose: frame: unknown frame 'enu'; expected one of flu, ned",
+            "position: /motors",
+            r"position: topic /motors is of type mav_msgs\S+; expected geometry_msgs.*as columns",
         ),
-        ("pose: {topic: [1]}", r"pose: topic must be a name such as /motors, got \[1\]"),
-        ("pose: 3", "pose: expected a mapping of fields such as topic, frame, got int"),
-        ("rotors: {unit: [rpm]}", "rotors: unit: unknown unit"),
-        ("rotors: {unit: us}", "rotors: unknown unit 'us'; expected one of Hz, rad/s, rpm"),
-        ("rotors: {order: [1, 2, 3, 3]}", "order: expected four different elements"),
-        ("rotors: {order: [0, 1, 2, 3]}", "order: expected four different elements"),
-        ("rotors: {order: 5}", "order: expected four different elements"),
+        (
+            "position: {topic: /motors, columns: [x, y, z]}",
+            "no section attitude; expected position and attitude",
+        ),
+        ("pos: /a", "unknown key 'pos'; expected one of .*position"),
+        ("position: {topic: /a, frame: ned}", "position: unknown key 'frame'; expected one of"),
+        ("world: up", "world: unknown world 'up'; expected one of enu"),
+        ("position: {topic: [1]}", r"unknown topic '\[1\]'; expected one of /a"),
+        ("position: 3", "position must be a mapping of columns"),
+        ("rotors: {topic: /n, unit: [rpm]}", "rotors.unit must be a text"),
+        (
+            "rotors: {topic: /n, unit: us}",
+            "rotors: unknown unit 'us'; expected one of Hz, eRPM, rad/s, rpm",
+        ),
+        ("rotors: {order: [1, 2, 3, 3]}", r"rotors: order: \[1, 2, 3, 3\]; expected one of"),
         ("rotors: {order: wasp}", "rotors: order: unknown rotor order 'wasp'"),
         ("rotors: /n", "rotors: topic /n is .* states no unit; expected unit: rad/s, rpm, Hz"),
-        (
-            "command: {unit: us, range: [2, 1]}",
-            "command: range must be the values of the commands 0 and 1",
-        ),
-        ("- pose", "expected a mapping of pose, rotors, command, voltage, imu to topics, got list"),
+        ("- pose", "expected a mapping of position, rotors and so on to topics, got list"),
         ("pose: [", "not valid YAML"),
     ],
 )
@@ -350,10 +359,13 @@ def test_a_wrong_map_is_named(write, topic_map, expected, vehicle):
 @pytest.mark.parametrize(
     ("topics", "expected"),
     [
-        ({"/motors": motors()}, "pose: no topic of a type that fits; expected one of geometry_ms"),
-        ({"/a": pose()}, r"rotors: no topic .* in \S*flight.topics.yaml. The bag's topics: /a"),
-        (FLIGHT | {"/b": pose()}, r"pose: 2 topics could be it \(/a, /b\); expected one"),
-        (FLIGHT | {"/b": pose(), "/imu": imu()}, r"pose: 2 topics could be it \(/a, /b\)"),
+        (
+            {"/motors": motors()},
+            "position: no topic of a type that fits; expected one of geometry_ms",
+        ),
+        ({"/a": pose()}, r"rotors: no topic .* in \S*flight.topics.yaml. The topics: /a"),
+        (FLIGHT | {"/b": pose()}, r"position: 2 topics could be it \(/a, /b\); expected one"),
+        (FLIGHT | {"/b": pose(), "/imu": imu()}, r"position: 2 topics could be it \(/a, /b\)"),
         (
             {"/goal_pose": pose(), "/motors": motors()},
             r"no topic but set-points by their names \(/goal_pose\)",
@@ -363,11 +375,11 @@ def test_a_wrong_map_is_named(write, topic_map, expected, vehicle):
             r"rotors: /motors could be it, but a multi-array states no unit; expected in \S+"
             r"flight.topics.yaml the line rotors: {topic: /motors, unit: rad/s}",
         ),
-        (FLIGHT | {"/a": pose(times=[])}, "pose: topic /a has no messages"),
+        (FLIGHT | {"/a": pose(times=[])}, "topic /a has no messages"),
         (FLIGHT | {"/a": pose(times=[0.0])}, r"/a: 1 message\(s\); expected at least two"),
         (FLIGHT | {"/motors": motors(times=WIDE + 9)}, "do not overlap"),
         (FLIGHT | {"/motors": motors([1, 2, np.nan, 3])}, "no two samples have four finite"),
-        ({}, "(cannot be read as a ROS|The bag's topics: none)"),
+        ({}, "(cannot be read as a ROS|The topics: none)"),
     ],
 )
 def test_what_is_missing_is_named(write, kind, topics, expected, vehicle):
@@ -380,7 +392,7 @@ def test_what_is_missing_is_named(write, kind, topics, expected, vehicle):
     [
         ("rotors: {topic: /motors, unit: rad/s}", OURS),
         ("rotors: {topic: /motors, unit: rev/s}", OURS * 2 * np.pi),
-        ("command: {topic: /motors, unit: normalized, range: [0, 1000]}", SHARE),
+        ("commands: {topic: /motors, unit: normalized, range: [0, 1000]}", SHARE),
     ],
 )
 def test_an_array_is_what_the_map_says(write, line, wanted, vehicle):
@@ -412,8 +424,8 @@ def test_a_voltage_that_nobody_asked_for_may_be_unreadable(write, vehicle):
     log = read_log(path, "rosbag", vehicle)
     assert_flight(log)
     assert log.voltage is None
-    assert any("no voltage: " in note and "another definition" in note for note in log.notes)
-    path.with_name("flight.topics.yaml").write_text("voltage: /battery")
+    assert any("no battery: " in note and "another definition" in note for note in log.notes)
+    path.with_name("flight.topics.yaml").write_text("battery: /battery")
     with pytest.raises(InputError, match="another definition"):
         read_log(path, "rosbag", vehicle)
 

@@ -200,7 +200,7 @@ def test_a_decoded_blackbox_of_six_motors_and_of_ten_times_the_volts(tmp_path):
         path.write_text(",".join(names[:kept]) + "\n" + text + "\n")
 
     write(6)
-    with pytest.raises(InputError, match=r"motor\[5\] says a vehicle with 6 rotors"):
+    with pytest.raises(InputError, match=r"6 rotors turn \(motor\[0\], .*motor\[5\]\); expected"):
         read_log(path)
     write(4)
     log = read_log(path)

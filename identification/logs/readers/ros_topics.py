@@ -1,0 +1,165 @@
+"""Which topics of a bag, or of a live source, hold the sections of a log map, by the rules that
+``rosbag`` states.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from ....runtime.errors import InputError, unknown_name
+from ..log_map import LogMap, parse_map
+from .ros_messages import stated
+
+SECTIONS = ("position", "attitude", "rotors", "commands", "battery", "accelerometer", "gyro")
+# sections that stand in the messages of another, where a map does not say in which
+BESIDE = {"attitude": "position", "gyro": "accelerometer"}
+MOTORS = ("rotors", "commands")
+
+
+def map_of(
+    types: Mapping[str, str], given: Mapping[str, Any], source: str, where: str
+) -> tuple[LogMap, list[str]]:
+    """Return the log map of topics, and notes.
+
+    Args:
+        types: of the topics' messages, by their names.
+        given: what a map file says; a section's topic and columns may be left out.
+        source: the bag or the live source, for errors.
+        where: the map file, for errors.
+
+    Raises:
+        InputError: the map says something that is not known; a section that is needed is missing or
+            ambiguous; or a topic cannot hold its section.
+    """
+    found: dict[str, Any] = {}
+    refused: dict[str, str] = {}
+    notes: list[str] = []
+    for section in SECTIONS:
+        said = given.get(section) or {}
+        said = {"topic": said} if isinstance(said, str) else said
+        if not isinstance(said, Mapping):  # parse_map takes alternatives as they stand
+            found[section] = said
+            continue
+        beside = _topic_of(found.get(BESIDE.get(section, "")))
+        topic, why = _topic_of(said) or beside, ""
+        try:
+            if topic is None and (said or section not in BESIDE):
+                topic, why = _chosen(types, section, said, where)
+            if topic is None:
+                continue
+            usual = _usual(types, section, said, topic, where)
+        except InputError as error:
+            refused[section] = f"{section}: {error}"
+            if section in given:
+                raise InputError(f"{source}: {refused[section]}") from error
+            continue
+        own = {key: given[key] for key in ("body",) if key in usual and key in given}
+        found[section] = {**usual, **own, **said, "topic": topic}
+        if topic != beside:
+            notes.append(f"{section}: topic {topic} ({types[topic]}){why}")
+        if "order" in usual and not {"order", "columns"} & {*said}:
+            notes.append(f"{section}: motors as on {usual['order']}, which the bag does not state")
+    lacks = []
+    if not {*MOTORS, "wrench"} & {*found, *given}:
+        lacks.append("rotors")
+    # an ambiguous pose is no reason to go on without one
+    if "position" not in found and ("gyro" not in found or "position" in refused):
+        lacks.append("position")
+    for section in lacks[:1]:
+        why = refused.get(section) or f"{section}: {_missing(types, section, where)}"
+        raise InputError(f"{source}: {why}")
+    is_ned = types.get(_topic_of(found.get("position")) or "") in stated()["ned"]
+    clock: dict[str, Any] = {"time": {"column": "stamp", "unit": "ns"}}
+    clock |= {"world": "ned", "body": "frd"} if is_ned else {}
+    log_map = parse_map({**clock, **given, **found}, where)
+    sensed = {part.body for part in (log_map.accelerometer, log_map.gyro) if part is not None}
+    frames = [f"world {log_map.world}, body {log_map.body}", *sorted(sensed - {"", log_map.body})]
+    notes.append(f"frames: {', inertial sensors '.join(frames)}")
+    return log_map, [*notes, *refused.values()]
+
+
+def _topic_of(section: object) -> str | None:
+    """Return the topic that a section states."""
+    topic = section.get("topic") if isinstance(section, Mapping) else None
+    return None if topic is None else str(topic)
+
+
+def _usual(
+    types: Mapping[str, str], section: str, said: Mapping[str, Any], topic: str, where: str
+) -> dict[str, Any]:
+    """Return what messages of a topic say of a section without a map.
+
+    Raises:
+        InputError: the topic is not there, cannot hold the section, or has no unit.
+    """
+    if topic not in types:
+        raise unknown_name("topic", topic, types, f"named in {where}")
+    kind, known = types[topic], stated()[section]
+    array = stated()["arrays"].get(kind) if section in MOTORS else None
+    if array and "unit" not in said:
+        units = "rad/s, rpm, Hz" if section == "rotors" else "normalised, us"
+        raise InputError(
+            f"topic {topic} is a {kind}, which states no unit; expected unit: {units} in {where}"
+        )
+    if array:
+        return {"columns": [f"{array}[{i}]" for i in range(4)]}
+    if kind not in known and not {"columns", "column"} & {*said}:
+        raise InputError(
+            f"topic {topic} is of type {kind}; expected {' or '.join(known)}, or in {where} its "
+            "fields as columns"
+        )
+    return dict(known.get(kind, {}))
+
+
+def _chosen(
+    types: Mapping[str, str], section: str, said: Mapping[str, Any], where: str
+) -> tuple[str | None, str]:
+    """Return the topic of a section, the only one that may hold it or that which its name tells,
+    and how it was chosen; None: there is none.
+
+    Raises:
+        InputError: several may hold it.
+    """
+
+    def named_by(topic: str, words: str) -> bool:
+        return any(word in topic.lower() for word in stated()[words])
+
+    fitting = {*stated()[section], *(stated()["arrays"] if "unit" in said else ())}
+    several = sorted(topic for topic, kind in types.items() if kind in fitting)
+    if section in ("position", "rotors"):
+        flown = [topic for topic in several if not named_by(topic, "setpoint_words")]
+        several = flown or (several if section == "rotors" else [])
+    found = several
+    if section == "position" and len(found) > 1:
+        measured = [topic for topic in several if named_by(topic, "measured_words")]
+        found = measured if len(measured) == 1 else several
+    elif section in ("accelerometer", "gyro") and len(found) > 1:
+        found = [topic for topic in several if not topic.endswith("_raw")] or several
+    if len(found) > 1:
+        raise InputError(
+            f"{len(found)} topics could be it ({', '.join(found)}); expected one: name it in "
+            f"{where}, such as {section}: {{topic: {found[0]}}}"
+        )
+    others = [topic for topic in several if topic not in found]
+    why = f", chosen by its name before {', '.join(others)}; a map says another" if others else ""
+    return (found[0] if found else None), why
+
+
+def _missing(types: Mapping[str, str], section: str, where: str) -> str:
+    """Return what is wrong with topics without rotor speeds and commands, or without a pose and
+    inertial sensors.
+    """
+    topics = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(types.items())) or "none"
+    names = MOTORS if section == "rotors" else (section,)
+    known = dict.fromkeys(kind for name in names for kind in stated()[name])
+    arrays = sorted(topic for topic, kind in types.items() if kind in stated()["arrays"])
+    left_out = sorted(topic for topic, kind in types.items() if kind in known)
+    found = "no topic of a type that fits"
+    found = f"no topic but set-points by their names ({', '.join(left_out)})" if left_out else found
+    wanted = f"one of {' or '.join(known)}, or its topic and columns in {where}"
+    if section == "rotors" and arrays:
+        found = f"{', '.join(arrays)} could be it, but a multi-array states no unit"
+        wanted = (
+            f"in {where} the line rotors: {{topic: {arrays[0]}, unit: rad/s}} (or rpm, Hz), or "
+        )
+        wanted += f"commands: {{topic: {arrays[0]}, unit: us}} (or normalised)"
+    return f"{found}; expected {wanted}. The topics: {topics}"
