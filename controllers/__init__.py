@@ -1,5 +1,6 @@
 """Acting: the inner flight loop, and controllers from the estimated wrench to a velocity."""
 
+from ..runtime.prompt import public
 from .fan_laws import Admittance, AdmittancePID, Hover, Lead, Ratio
 from .preview import Oracle
 from .registry import CONTROLLERS, LAWS, Controller, make_controller
@@ -21,6 +22,4 @@ __all__ = [
     "make_controller",
 ]
 
-
-def __dir__() -> list[str]:
-    return __all__
+__dir__ = public(__all__, globals())

@@ -3,6 +3,7 @@ it.
 """
 
 from ..runtime.errors import InputError
+from ..runtime.prompt import public
 from .vehicle import EffectSetting, Mocap, Vehicle
 from .vehicle_file import dump_vehicle, load_vehicle, preset_names, save_vehicle
 
@@ -17,6 +18,4 @@ __all__ = [
     "save_vehicle",
 ]
 
-
-def __dir__() -> list[str]:
-    return __all__
+__dir__ = public(__all__, globals())

@@ -1,8 +1,8 @@
 """Worlds: the plant in MuJoCo, the fan and its jet, winds, and the four tasks."""
 
+from ..runtime.prompt import public
 from . import headless  # noqa: F401  before anything that imports MuJoCo
 from .closed_loop import ClosedLoop, Stage
-from .copies import Copyable
 from .fan import Fan
 from .fan_tracking import FanTrackingEnv
 from .scenarios import SCENARIOS, Scenario
@@ -10,13 +10,10 @@ from .scenarios import SCENARIOS, Scenario
 __all__ = [
     "SCENARIOS",
     "ClosedLoop",
-    "Copyable",
     "Fan",
     "FanTrackingEnv",
     "Scenario",
     "Stage",
 ]
 
-
-def __dir__() -> list[str]:
-    return __all__
+__dir__ = public(__all__, globals())

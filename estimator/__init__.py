@@ -2,6 +2,7 @@
 are consistent.
 """
 
+from ..runtime.prompt import public
 from .constant_gain import ConstantGainFilter
 from .ekf import WrenchEKF
 from .estimate import WrenchEstimate
@@ -28,6 +29,4 @@ __all__ = [
     "fit_noise",
 ]
 
-
-def __dir__() -> list[str]:
-    return __all__
+__dir__ = public(__all__, globals())

@@ -3,6 +3,8 @@
 from importlib import import_module
 from typing import Any
 
+from ..runtime.prompt import public, readable
+
 # what a name needs is imported when it is asked for: reading a log needs no inference and no page
 _MODULES = {
     "FlightLog": "logs.flight_log",
@@ -17,9 +19,8 @@ __all__ = ["FlightLog", "diagnose", "estimate_log", "predict", "read_log", "repo
 
 def __getattr__(name: str) -> Any:
     if name in _MODULES:
-        return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
+        return readable(getattr(import_module(f"{__name__}.{_MODULES[name]}"), name))
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-def __dir__() -> list[str]:
-    return __all__
+__dir__ = public(__all__, {})

@@ -1,5 +1,6 @@
 """The paper, figure by figure: one file each, run by ``windwrench reproduce``."""
 
+from ..runtime.prompt import public
 from .observer import NonlinearObserver, ObserverTuning
 
 NAMES = ("fig3", "fig4", "fig5", "fig6", "fig7")
@@ -8,6 +9,4 @@ KEPT = ("extension",)
 
 __all__ = ["KEPT", "NAMES", "NonlinearObserver", "ObserverTuning"]
 
-
-def __dir__() -> list[str]:
-    return __all__
+__dir__ = public(__all__, globals())

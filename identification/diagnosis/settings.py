@@ -1,6 +1,6 @@
 """What a user of a diagnosis may set."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
@@ -23,11 +23,6 @@ class DiagnosisSettings:
     # which one is expected, 20 to 1 afterwards
     least_shown: float = 13.0
     most_signature_points: int = 600  # of a plot
-
-    def __repr__(self) -> str:
-        """Return what differs from the defaults, so that a signature can be read."""
-        own = (f for f in fields(self) if getattr(self, f.name) != f.default)
-        return f"DiagnosisSettings({', '.join(f'{f.name}={getattr(self, f.name)!r}' for f in own)})"
 
 
 DIAGNOSIS = DiagnosisSettings()
