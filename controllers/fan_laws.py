@@ -5,6 +5,8 @@ and ``tau_y`` negative above the axis: a vehicle that moves by ``(-k tau_z, +k t
 axis. (In the body frame of a vehicle that faces the fan, y and the sign turn round.)
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

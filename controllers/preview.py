@@ -6,6 +6,8 @@ Their model is that of the flight loop, an axis at a time (``axis_models``). An 
 position error against its command in one number.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache, partial

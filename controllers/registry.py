@@ -2,6 +2,8 @@
 (``tuned.yaml`` says for which scenario and how), and the trained policies that come with the kit.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from functools import cache, partial
 from importlib import resources

@@ -9,6 +9,8 @@ disturbed as a rule. The random numbers come from a generator of the controller'
 anew with every episode.
 """
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -86,6 +86,9 @@ def _definite(value: Array) -> Array:
     return value
 
 
+_Coefficients = Annotated[
+    Mapping[str, Number], BeforeValidator(lambda given: {} if given is None else given)
+]
 # Arrays of numbers as a vehicle file states them
 PerRotor = Annotated[Array, numbers(4), AfterValidator(_positive)]
 InertiaMatrix = Annotated[Array, numbers(3, 3), BeforeValidator(_matrix), AfterValidator(_definite)]
@@ -181,9 +184,7 @@ class EffectSetting:
     __pydantic_config__ = STRICT
 
     name: Annotated[str, Field(coerce_numbers_to_str=True)]
-    coefficients: Annotated[
-        Mapping[str, Number], BeforeValidator(lambda given: {} if given is None else given)
-    ] = field(default_factory=dict)
+    coefficients: _Coefficients = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,7 @@
 """Vehicles as YAML files: the presets in ``vehicles/`` and a user's own."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping
 from dataclasses import fields

@@ -2,7 +2,6 @@
 
 from . import display  # noqa: F401  before anything that imports MuJoCo
 from .closed_loop import ClosedLoop, Stage
-from .copies import Copyable
 from .fan import Fan
 from .fan_tracking import FanTrackingEnv
 from .scenarios import SCENARIOS, Scenario
@@ -10,7 +9,6 @@ from .scenarios import SCENARIOS, Scenario
 __all__ = [
     "SCENARIOS",
     "ClosedLoop",
-    "Copyable",
     "Fan",
     "FanTrackingEnv",
     "Scenario",

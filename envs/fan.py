@@ -2,6 +2,8 @@
 jet: ``dynamics.mean_jet``.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 

@@ -157,8 +157,11 @@ class FanTrackingEnv(FanTask):
     | --------------------- | ---- | ------------------------------------------------------------------ |
     | `"wrench"`            | 8    | the table above                                                    |
     | `"wrench-without-fx"` | 7    | the table above without the force x                                |
-    | `"pose"`              | 8    | no wrench: position since the start x, y, z (m), velocity along y (m/s), the x and y of the body's z axis (its tilt), yaw less 180 degrees (rad), last command; all as the filter estimates them |
-    | `"history"`           | 200  | the table above at the last 25 decisions (2 s), oldest first; before the start: as at the start |
+    | `"pose"`              | 8    | no wrench: the pose, as the filter estimates it                    |
+    | `"history"`           | 200  | the table above at the last 25 decisions (2 s), oldest first       |
+
+    The pose is the position since the start x, y, z (m), the velocity along y (m/s), the x and y of the body's z axis
+    (its tilt), yaw less 180 degrees (rad), and the last command. Before the start the history is as at the start.
 
     In v1, and with ``normalize=True``, each number is divided by a fixed scale, so that it is about 1 in flight:
     force 0.5 N, torque 0.03 Nm, velocity 0.5 m/s, command 1 m/s, position 1 m, tilt 0.1, yaw 0.2 rad.
@@ -168,13 +171,14 @@ class FanTrackingEnv(FanTask):
 
     ``reward = reward_tracking + reward_change``, each of them in ``info``:
 
-    * ``reward_tracking = 1 / (1 + (offset / 0.3)^2)``, where ``offset`` is the true distance from the axis along y, in m;
+    * ``reward_tracking = 1 / (1 + (offset / 0.3)^2)``, where ``offset`` is the true distance from the axis along
+      y, in m;
     * ``reward_change = -0.05 (command - last command)^2``.
 
     ## Starting state
 
-    The vehicle hovers where the scenario says and the filter settles for 1.5 s in the standing jet. Fan path, offset and
-    all noise are drawn from the seed.
+    The vehicle hovers where the scenario says and the filter settles for 1.5 s in the standing jet. Fan path, offset
+    and all noise are drawn from the seed.
 
     ## Episode end
 

@@ -4,6 +4,8 @@ A task states its spaces, its scenarios and its decision as data, and writes ``h
 episode and hover at its start) and ``look``, compiled: what is seen, told and rewarded.
 """
 
+from __future__ import annotations
+
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence

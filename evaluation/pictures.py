@@ -26,7 +26,7 @@ from .tasks import short_names
 
 # of controllers in every picture; all others take turns
 COLOURS = {"hover": GREY, "admittance": SERIES[1], "limit": BLACK, "oracle": SERIES[0]}
-_OTHERS = (*SERIES[2:], "#5f0f40", "#6a994e", "#8c564b")
+_OTHERS = (*SERIES[2:], "#5f0f40", "#6a994e", "#8c564b", "#e08dac", "#3d405b")
 
 
 @styled()

@@ -220,7 +220,6 @@ def draw(steps: Sequence[Step]) -> Figure:
     three curves beside.
     """
     figure = new_figure(7.0)
-    figure.suptitle(f"53 g hung on at {HANG:g} s")
     grid = figure.subplots(3, 3, width_ratios=[1, 1, 1.05])
     for column, noise in enumerate(NOISES):
         shown = [step for step in steps if step.noise == noise and step.actuator]
@@ -233,8 +232,9 @@ def draw(steps: Sequence[Step]) -> Figure:
         ("force z (N)", "pitch torque (mNm)", "lateral force of the mass (N)")
     ):
         grid[row, 0].set_ylabel(name)
-    grid[2, 0].set_ylim(0, 1.55 * grid[2, 0].get_ylim()[1])  # room for the names above the bound
+    grid[2, 0].set_ylim(0, 1.2 * _LATERAL_BOUND)
     _draw_choice(grid[:, 2], steps)
+    figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=4)
     return figure
 
 
@@ -250,16 +250,14 @@ def _draw_response(axes: Any, row: int, shown: Sequence[Step]) -> None:
         pull = step.pull[:, row] * scale
         axes.plot(step.time, pull, color=TRUTH, lw=1, label="true pull of the thread")
     for step, colour in zip(shown, SERIES, strict=False):
-        label = f"tuned to {step.tuned:g} s"
-        if row < 2:
-            label += f": {step.merits[('force_rise_s', 'torque_rise_s')[row]]:.2f} s"
+        label = f"estimate, tuned to {step.tuned:g} s"
         axes.plot(step.time, step.response[:, row] * scale, color=colour, lw=1.8, label=label)
     axes.axvline(HANG, color="black", lw=0.6, ls=":")
     axes.set_xlim(*_SPAN)
-    axes.legend(
-        loc="lower right" if row == 1 else "upper right", title="rise time" if row < 2 else None
-    )
     if row < 2:
+        rises = [step.merits[("force_rise_s", "torque_rise_s")[row]] for step in shown]
+        told = "rise times " + ", ".join(f"{rise:.2f}" for rise in rises) + " s"
+        axes.text(0.97, (0.9, 0.06)[row], told, ha="right", transform=axes.transAxes)
         axes.tick_params(labelbottom=False)
         return
     axes.axhline(_LATERAL_BOUND, color="black", lw=0.8, ls="--")
@@ -315,6 +313,6 @@ def _draw_choice(column: Sequence[Any], steps: Sequence[Step]) -> None:
         axes.set_yscale("log")
         only_ticks(axes.yaxis, ticks)
     column[0].set_title("noise against rise time")
-    column[0].legend()
     column[2].axhline(_LATERAL_BOUND, color="black", lw=0.8, ls="--")
-    column[2].set_ylim(0, None)
+    column[2].set_ylim(0, 1.9 * _LATERAL_BOUND)  # room for the names above the bound
+    column[2].legend(loc="upper left")

@@ -104,10 +104,7 @@ def _draw_ratios(
                 },
             )
         axes.set_ylim(len(labels) - 0.45, -0.55)
-        ticks = [
-            v for v in (0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10, 20) if lowest < v < highest
-        ]
-        only_ticks(axes.xaxis, ticks)
+        only_ticks(axes.xaxis, [v for v in (0.1, 0.2, 0.5, 1, 2, 5, 10) if lowest < v < highest])
         title = error.replace("_", ", ") + (" state" if "steady" in error else "")
         axes.set_title(title, loc="center")
         axes.grid(axis="x", color="0.9", lw=0.6)
@@ -122,7 +119,7 @@ def _draw_ratios(
                 color=_NOISE_COLOURS[noise],
                 label=f"{noise} noise, {flight}",
             )
-    panels[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    figure.legend(*panels[-1].get_legend_handles_labels(), loc="outside lower center", ncols=4)
 
 
 def _draw_pair(

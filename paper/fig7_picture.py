@@ -17,7 +17,7 @@ _GAINS = {6.0: SERIES[2], 18.0: SERIES[1], 36.0: SERIES[3]}
 _RADIUS = 0.45  # m, of the fan
 # field of a row of the search -> line, its style, and its entry in the legend
 _HELD = (
-    ("held", "o-", {"lw": 2.2, "ms": 7}, "held, rise time {:g} s (95 % interval)"),
+    ("held", "o-", {"lw": 2.2, "ms": 7}, "held, rise time {:g} s"),
     ("calm", "^--", {"lw": 1, "ms": 5, "mfc": "white"}, "… in calm air"),
     ("sudden", "s:", {"lw": 1, "ms": 4, "mfc": "white"}, "… in calm air, sudden start"),
 )
@@ -42,8 +42,8 @@ def draw_tracking(
         at: the offset where it acts, m.
         held_offset: offset that ends a flight of that search, m.
     """
-    figure = new_figure(11.0)
-    grid = figure.add_gridspec(4, 3, height_ratios=[1, 1.05, 0.7, 1.15])
+    figure = new_figure(11.6)
+    grid = figure.add_gridspec(4, 3, height_ratios=[1, 1.15, 0.75, 1.4])
     rise_times = sorted({rise for rise, _ in captures})
     first = None
     for column, rise_time in enumerate(rise_times):
@@ -112,7 +112,7 @@ def _follow(axes: Any, flights: Mapping[float, list[Episode]]) -> None:
         label += f", {lost:.0%} lost" if lost else ""
         axes.plot(some[0].time, some[0].y, color=_GAINS[gain], lw=1.8, label=label)
     axes.legend(loc="upper left")
-    axes.set(xlabel="time (s)", ylabel="y (m)", ylim=(-1.7, 2.9))
+    axes.set(xlabel="time (s)", ylabel="y (m)", ylim=(-1.7, 3.6))
 
 
 def _torque(axes: Any, episode: Episode, largest: float) -> None:
@@ -123,7 +123,7 @@ def _torque(axes: Any, episode: Episode, largest: float) -> None:
     axes.plot(episode.time, estimated, color=ESTIMATE, lw=1.6, label="estimated")
     axes.axhline(0, color="black", lw=0.5)
     axes.legend(ncols=2, loc="upper right")
-    axes.set(xlabel="time (s)", ylabel=r"$\tau_z$ (mNm)", ylim=(-62, 62))
+    axes.set(xlabel="time (s)", ylabel=r"$\tau_z$ (mNm)", ylim=(-62, 90))
 
 
 def _held(axes: Any, fastest: Sequence[Any], scale: Any) -> list[Any]:
@@ -131,7 +131,7 @@ def _held(axes: Any, fastest: Sequence[Any], scale: Any) -> list[Any]:
     what the legend names.
     """
     entries = []
-    for rise, colour in zip(sorted({f.rise_time for f in fastest}), SERIES, strict=False):
+    for rise, colour in zip(sorted({f.rise_time for f in fastest}), SERIES[4:], strict=False):
         some = [f for f in fastest if f.rise_time == rise]
         scales = np.array([scale(f) for f in some])
         held = np.array([f.held for f in some])
@@ -160,10 +160,10 @@ def _speeds(axes: Any, fastest: Sequence[Any], largest: float) -> None:
     bound = np.minimum(
         line * largest, max(f.bound for f in fastest) if largest * gains[-1] > 1 else np.inf
     )
-    label = r"bound $k\,\tau_{max}$ (and the largest command, 1 m/s)"
+    label = r"bound $k\,\tau_{max}$, at most 1 m/s"
     entries = axes.plot(line, bound, color="black", lw=1.6, label=label)
     words = "beyond it no fan can be followed"
-    entries.append(axes.fill_between(line, bound, 1.3, color=PALE, lw=0, label=words))
+    entries.append(axes.fill_between(line, bound, 2.0, color=PALE, lw=0, label=words))
     entries += _held(axes, fastest, lambda f: 1.0)
     for gain in gains:
         some = sorted((f for f in fastest if f.gain == gain), key=lambda f: f.rise_time)
@@ -174,6 +174,9 @@ def _speeds(axes: Any, fastest: Sequence[Any], largest: float) -> None:
             ha="left" if gain < gains[-1] else "center",
         )
     # in the order drawn; a legend of its own making has bars with intervals last
-    axes.legend(handles=entries, loc="upper left")
-    axes.set(title="the fastest fan held by four flights of five", ylabel="speed of the fan (m/s)")
-    axes.set(xlabel="gain k (m/s per Nm)", ylim=(0, 1.2), xlim=(0, line[-1]))
+    axes.legend(handles=entries, loc="upper left", ncols=2)
+    axes.set(
+        title="the fastest fan held by four flights of five, 95 % interval",
+        ylabel="speed of the fan (m/s)",
+    )
+    axes.set(xlabel="gain k (m/s per Nm)", ylim=(0, 1.75), xlim=(0, line[-1]))

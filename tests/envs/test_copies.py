@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from tests.support.vector_flights import TASKS, fly_alone
-from windwrench.dynamics import EffectSetting, InputError
-from windwrench.envs import Copyable
+from windwrench.dynamics import EffectSetting
 
 LAG = [EffectSetting("motor_lag", {"tau": 0.03}), EffectSetting("rotor_drag", {"kdx": 1e-4})]
 COPIES = {"deepcopy": copy.deepcopy, "pickle": lambda env: pickle.loads(pickle.dumps(env))}
@@ -48,17 +47,3 @@ def test_a_copy_goes_on_in_another_process(tmp_path):
     command = [sys.executable, "-c", code, str(tmp_path / "env")]
     there = subprocess.run(command, capture_output=True, check=True).stdout
     assert there == fly_alone(env).tobytes()
-
-
-def test_the_wrapper_of_version_1_copies_and_says_what_to_call():
-    with pytest.warns(DeprecationWarning, match=r"copy\.deepcopy"):
-        env = Copyable(lambda: gym.make("windwrench/FanTracking-v0", scenario="gusty"))
-    env.reset(seed=5)
-    other = env.copy()
-    np.testing.assert_array_equal(fly_alone(env), fly_alone(other))
-
-
-@pytest.mark.parametrize("wrong", [gym.spaces.Discrete(2), lambda: 3, "FanTracking"])
-def test_what_makes_no_environment_is_refused(wrong):
-    with pytest.raises(InputError, match="expected a function that makes an environment"):
-        Copyable(wrong)
