@@ -135,9 +135,10 @@ def _step_with_covariance(f: Record, sample: Array, usable: int, dt: float) -> N
 def _correct_with_covariance(f: Record, sample: Array, usable: int) -> None:
     if usable > 0:
         w, z = heading(f.x[3:7])
-        turn_world(f, sample[4:11], w, -z)
+        here, origin = f.x[0:3].copy(), np.zeros(3)
+        turn_world(f, sample[4:11], w, -z, here, origin)
         correct_parts(f, sample, usable)
-        turn_world(f, sample[4:11], w, z)
+        turn_world(f, sample[4:11], w, z, origin, here)
 
 
 @compiled

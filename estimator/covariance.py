@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from ..runtime.compiled import Record, compiled, compiled_for_vectors, compiled_inline
-from ..runtime.vector_lanes import choose, first_below, first_column, lanes_by
+from ..runtime.vector_lanes import all_of, choose, first_below, first_column, lanes_by
 from .estimate import Array
 from .filter_record import N
 
@@ -285,12 +285,17 @@ def carry_by_jacobian(P: Array, A: Array, G: Array) -> None:
 
 
 @compiled_inline
-def add_squares(P: Array, rows: Array, first: int, sign: float, size: int) -> None:
+def add_squares(
+    P: Array, rows: Array, first: int, sign: float, size: int, written: bool = False
+) -> None:
     """Add ``sign r' r`` to the first ``size`` rows and columns of P for six rows (18,) of ``rows``
-    from ``first`` on; six at once for speed.
+    from ``first`` on; six at once for speed. What ``written`` says is that rows 0-2 and 6-8 are
+    written anew afterwards, so that pairs of these are left out.
     """
     r0, r1, r2, r3, r4, r5 = first, first + 1, first + 2, first + 3, first + 4, first + 5
     for i in range(0, size, 2):
+        if written and (i == 0 or i == 6):
+            continue
         a0, a1, a2 = sign * rows[r0, i], sign * rows[r1, i], sign * rows[r2, i]
         a3, a4, a5 = sign * rows[r3, i], sign * rows[r4, i], sign * rows[r5, i]
         b0, b1, b2 = sign * rows[r0, i + 1], sign * rows[r1, i + 1], sign * rows[r2, i + 1]
@@ -387,7 +392,7 @@ def subtract_squares(f: Record) -> None:
     written as such: the difference would be rounding alone where the noise R is a 1e-16 of them.
     """
     P, W, L, c, T, noise = f.P, f.W, f.L, f.scales, f.E, f.noise
-    add_squares(P, W, 0, -1.0, N)
+    add_squares(P, W, 0, -1.0, N, all_of((c[0] > 0.0) & (c[3] > 0.0)))
     for j in range(N):
         t5 = W[5, j] * c[5]
         t4 = (W[4, j] - L[5, 4] * t5) * c[4]

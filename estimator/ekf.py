@@ -7,6 +7,9 @@ rho]x) R for small errors.
 """
 
 import math
+from typing import Any
+
+from numba import carray
 
 from ..dynamics.model import apply_effects
 from ..runtime.compiled import Record, compiled
@@ -14,7 +17,7 @@ from .bias_states import carry_with_jacobian
 from .covariance import add_noise, carry_by_jacobian
 from .error_state import symmetrise
 from .estimate import NIS, Array
-from .filter_record import N, drive, propagate
+from .filter_record import FILTER, N, drive, propagate
 from .model_uncertainty import follow_loads
 from .recovery import after_prediction
 from .ukf import WrenchUKF, step_by, step_with_biases_by
@@ -222,6 +225,11 @@ def _step_with_biases(record: Record, parts: int, dt: float, voltage: float) -> 
     return step_with_biases_by(record[0], parts, dt, voltage, predict, carry_with_jacobian)
 
 
+def _step_at(pointer: Any, parts: int, dt: float, voltage: float) -> int:
+    f = carray(pointer, 1, FILTER)[0]
+    return step_by(f, f.z, parts, dt, voltage, predict)
+
+
 class WrenchEKF(WrenchUKF):
     """Extended Kalman filter for the external force and torque on a quadrotor: ``WrenchUKF``,
     linearised.
@@ -233,3 +241,4 @@ class WrenchEKF(WrenchUKF):
 
     _compiled_step = staticmethod(_step_record)
     _compiled_step_with_biases = staticmethod(_step_with_biases)
+    _step_by_address = staticmethod(_step_at)

@@ -108,14 +108,21 @@ class WrenchEstimate:
         return np.sqrt(self.numbers[..., MODEL])
 
     @property
+    def std_wrench(self) -> Array:
+        """Standard deviations (6,) of torque, Nm, and force, N: of noise and of the vehicle's
+        uncertainty.
+        """
+        return np.hypot(self.std[..., 12:], self.model_std)
+
+    @property
     def std_torque(self) -> Array:
-        """Standard deviation (3,) of the torque, Nm: of noise and of the vehicle's uncertainty."""
-        return np.hypot(self.std[..., 12:15], self.model_std[..., :3])
+        """Those (3,) of the torque, Nm."""
+        return self.std_wrench[..., :3]
 
     @property
     def std_force(self) -> Array:
-        """Standard deviation (3,) of the force, N, likewise."""
-        return np.hypot(self.std[..., 15:18], self.model_std[..., 3:])
+        """Those (3,) of the force, N."""
+        return self.std_wrench[..., 3:]
 
     @property
     def position(self) -> Array:

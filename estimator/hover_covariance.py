@@ -70,25 +70,32 @@ def heading(q: Array) -> tuple[float, float]:
 
 
 @compiled
-def turn_world(f: Record, pose: Array, w: float, z: float) -> None:
-    """Turn the world about the vertical: estimate, pose (7,) and remembered poses; cosine ``w`` and
-    sine ``z`` of half the angle.
+def turn_world(f: Record, pose: Array, w: float, z: float, before: Array, after: Array) -> None:
+    """Turn the world about the vertical through ``before`` (3,), which moves to ``after`` (3,):
+    estimate, pose (7,) and remembered poses; cosine ``w`` and sine ``z`` of half the angle.
+
+    About the vehicle, so that single precision turns what is small: 17 m away the rounding of a
+    turn about the origin was 0.2 % of a pose's noise, in each step.
     """
     cosine, sine = w * w - z * z, 2.0 * w * z
-    _turn_pose(f.x, w, z)
-    _turn_pose(pose, w, z)
-    _turn_pose(f.poses.seen, w, z)
+    _turn_pose(f.x, w, z, before, after)
+    _turn_pose(pose, w, z, before, after)
+    _turn_pose(f.poses.seen, w, z, before, after)
     turn_vectors(f.x[7:10], 1, cosine, sine)
     turn_vectors(f.x[13:19], 2, cosine, sine)
     if f.gated > 0:
-        _turn_pose(f.poses.doubted, w, z)
+        _turn_pose(f.poses.doubted, w, z, before, after)
         turn_vectors(f.poses.pace, 2, cosine, sine)
 
 
 @compiled
-def _turn_pose(pose: Array, w: float, z: float) -> None:
+def _turn_pose(pose: Array, w: float, z: float, before: Array, after: Array) -> None:
     """Turn position and quaternion, which a pose begins with."""
+    for i in range(3):
+        pose[i] -= before[i]
     turn_vectors(pose[0:3], 1, w * w - z * z, 2.0 * w * z)
+    for i in range(3):
+        pose[i] += after[i]
     for i in range(2):
         a, b = pose[3 + i], pose[6 - i]
         pose[3 + i] = w * a - z * b

@@ -125,10 +125,6 @@ def write_lanes(blocks: np.ndarray, block: int, lanes: slice, record: np.ndarray
     _BLOCK.write(blocks, block, lanes, record[0])
 
 
-def _each(blocks: np.ndarray, name: str) -> Array:
-    return np.concatenate(list(np.moveaxis(blocks[name], -1, 1)))
-
-
 class Blocks:
     """Memory of ``count`` filters side by side, all like the one in ``record`` (1,), and their
     step.
@@ -175,4 +171,4 @@ class Blocks:
         return self._each("P")
 
     def _each(self, name: str) -> Array:
-        return _each(self._blocks, name)[: self.count]
+        return np.concatenate(list(np.moveaxis(self._blocks[name], -1, 1)))[: self.count]

@@ -174,7 +174,8 @@ class LiveFilter:
 
     def _output(self, row: Row, estimate: WrenchEstimate) -> Output:
         assert self._timed is not None
-        std = np.concatenate([estimate.std_force, estimate.std_torque])
+        torque_and_force = estimate.std_wrench
+        std = np.concatenate([torque_and_force[3:], torque_and_force[:3]])
         if row.has_pose and estimate.status == "rejected":
             self._tallies.counts["refused"] += 1
         return Output(row, self._timed.time, estimate, std)

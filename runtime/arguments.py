@@ -14,7 +14,10 @@ def real_numbers(value: object) -> NDArray[np.float64] | None:
         array: NDArray[Any] = np.asanyarray(value)
         if array.dtype.kind not in "biuf":
             return None
-        return np.asarray(np.ma.filled(array.astype(np.float64), np.nan))
+        numbers = array.astype(np.float64)
+        # which a plain array need not be asked for: 1 us, in each step of a filter
+        masked = isinstance(numbers, np.ma.MaskedArray)
+        return np.asarray(np.ma.filled(numbers, np.nan) if masked else numbers)
     except (TypeError, ValueError):
         return None
 

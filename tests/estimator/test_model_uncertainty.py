@@ -60,7 +60,7 @@ def test_intervals_hold_what_they_say(source):
 @pytest.mark.parametrize("name", ["ardrone2", "crazyflie"])
 def test_intervals_hold_on_flights_of_another_model(name):
     """60 flights of 20 s in MuJoCo in turbulence, estimated as ``windwrench estimate`` does. Hover
-    falls short: there the tuning takes the turbulence for noise, and the estimate is its mean.
+    falls short along x and y: turbulence changes within 0.2 s, the walk that is fitted in 1 s.
     """
     vehicle, inside = load_vehicle(name), {"hover": [], "circle": [], "fast": [], "excite": []}
     for seed, trajectory in enumerate(15 * list(inside)):
