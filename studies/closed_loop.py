@@ -47,8 +47,9 @@ EFFECTS: Mapping[str, tuple[str, Mapping[str, float]]] = {
 def _amended(name: str) -> Vehicle:
     """Return the vehicle with what a diagnosis of one minute of flight adds to it."""
     vehicle, (trajectory, values) = load_vehicle("ardrone2"), EFFECTS[name]
-    flown = record_flight(vehicle, (EffectSetting(name, values),), trajectory, 60.0, seed=0)
-    return diagnose([FlightLog(**flown)], vehicle).amended
+    columns: Any = record_flight(vehicle, (EffectSetting(name, values),), trajectory, 60.0, seed=0)
+    amended: Vehicle = diagnose([FlightLog(**columns)], vehicle).amended
+    return amended
 
 
 def flown(name: str, model: str, task: str, scenario: str, episodes: int) -> list[float]:
