@@ -40,7 +40,7 @@ from .rotor_orders import order_names, order_words
 from .streams import Recording, Stream, readable, slerp
 from .table import Mask, Table
 from .table_rows import LONGEST_STEPS, check_rows, rows_apart, rows_of
-from .what_flew import UNSTATED, WhatFlew, check_flown
+from .what_flew import UNSTATED, WhatFlew
 
 _SHOWN = 30  # columns that an error lists
 NO_QUATERNION = 0.5  # length; shorter stands for one that is not there
@@ -84,10 +84,9 @@ def map_table(
     notes = [*table.notes, *log_map.notes, *([log_map.time.note] if log_map.time.note else [])]
     if not log_map.is_own or log_map.rows == "mixed":
         notes.insert(0, f"columns: by the map {log_map.name}")
-    samples, words = rows_of(table, columns, log_map, piece)
-    log_map, _ = chosen([samples], log_map)
-    notes += [*words, *check_rows(samples, log_map)]
-    return recording_of(table.path, [samples], log_map, reader, notes).log(vehicle)
+    samples, words = rows_of(table, columns, log_map)
+    notes += words
+    return recording_of(table.path, [samples], log_map, reader, notes, piece).log(vehicle)
 
 
 def recording_of(
@@ -111,14 +110,14 @@ def recording_of(
         flown: what the log states of its vehicle.
 
     Raises:
-        InputError: no quadrotor, no such piece, no motors, neither a pose nor gyro and
+        InputError: more than four rotors, no such piece, no motors, neither a pose nor gyro and
             accelerometer, or numbers that no flight has.
     """
-    check_flown(path, flown)
     recorded, of_clock = on_one_clock(path, recorded, piece)
     motors = (*log_map.ways("rotors"), *log_map.ways("commands"))
     poses = log_map.ways("position")
     log_map, sources = chosen(recorded, log_map)
+    of_clock += [note for s in recorded if s.table for note in check_rows(s, log_map)]
     if not (log_map.rotors or log_map.commands or log_map.wrench):
         names = [s.topic for s in recorded if s.topic] or [x for s in recorded for x in s.columns]
         wanted = [f"{w.topic + ' with ' if w.topic else ''}{w.columns[0]} ..." for w in motors]
@@ -127,7 +126,7 @@ def recording_of(
             f"{', '.join(dict.fromkeys(names[:20])) or 'nothing'}"
         )
     for turning in [
-        part for part in (log_map.rotors, log_map.commands) if part and flown == UNSTATED
+        part for part in (log_map.rotors, log_map.commands) if part and not flown.airframe
     ]:
         samples = sources["rotors" if isinstance(turning, Rotors) else "commands"]
         if further := further_rotors(

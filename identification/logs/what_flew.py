@@ -16,7 +16,6 @@ from ...runtime.errors import InputError
 from ...runtime.yaml_file import read_yaml
 from .log_map import MAPS
 from .rotor_orders import Order
-from .table import Array
 
 QUADROTOR = "a quadrotor"
 _ROTORS = {QUADROTOR: 4, "a tricopter": 3, "a hexarotor": 6, "an octorotor": 8}
@@ -37,25 +36,12 @@ def airframes() -> dict[str, dict[Any, str]]:
 
 
 @dataclass(frozen=True)
-class RunningSettings:
-    """When an output beside the four motors runs as they do."""
-
-    level: float = 0.25  # of the span of the motors' range: how far its median is off theirs
-    moves: float = 0.02  # of that span: the least that it moves
-    correlation: float = 0.5  # with the mean of the four
-
-
-RUNNING = RunningSettings()
-
-
-@dataclass(frozen=True)
 class WhatFlew:
     """What a log states of its vehicle; empty and None: nothing."""
 
     airframe: str = ""  # in words, such as "a hexarotor"
     by: str = ""  # the parameter, message or header that says so
     rotors: int | None = None  # how many it has
-    running: int | None = None  # how many outputs run as motors do
     outputs: str = ""  # protocol and range of the motors' outputs, in words
 
     def refusal(self) -> str:
@@ -65,11 +51,6 @@ class WhatFlew:
         if self.airframe not in ("", QUADROTOR) or with_rotors:
             what = self.airframe or "a vehicle"
             return f"{self.by} says {what}{with_rotors}; expected a quadrotor"
-        if self.running not in (None, 4) and not self.airframe:
-            return (
-                f"{self.running} outputs run as motors do, so it is no quadrotor; expected four, "
-                "or a log that states a quadrotor"
-            )
         return ""
 
     def rows(self) -> list[tuple[str, str, str]]:
@@ -77,7 +58,6 @@ class WhatFlew:
         told = [
             ("airframe", self.airframe.partition(" ")[2], self.by),
             ("rotors", "" if self.rotors is None else str(self.rotors), self.by),
-            ("running", "" if self.running is None else f"{self.running} outputs", "their values"),
             ("outputs", self.outputs, ""),
         ]
         return [row for row in told if row[1]]
@@ -90,30 +70,10 @@ def check_flown(path: object, flown: WhatFlew) -> None:
     """Check that a log is a quadrotor's.
 
     Raises:
-        InputError: it states another vehicle, or other outputs than four run.
+        InputError: it states another vehicle.
     """
     if why := flown.refusal():
         raise InputError(f"{path}: {why}")
-
-
-def running(outputs: Array, motors: Sequence[int], low: float, high: float) -> int:
-    """Return how many outputs (N, k) run as the motors do.
-
-    Args:
-        outputs: in any unit; NaN: not sent.
-        motors: which of them, from 0, are the four motors.
-        low: end of the motors' range, where they stand.
-        high: the other end.
-    """
-    x = (np.nan_to_num(outputs, nan=low) - low) / (high - low)
-    mean = x[:, motors].mean(axis=1)
-    flying = mean > 0.5 * float(np.quantile(mean, 0.9))
-    x, mean, count = x[flying], mean[flying], len(motors)
-    for i in set(range(x.shape[1])) - set(motors) if len(x) > 1 else ():
-        near = abs(float(np.median(x[:, i])) - float(np.median(mean))) < RUNNING.level
-        moves = float(np.ptp(x[:, i])) > RUNNING.moves
-        count += near and moves and np.corrcoef(x[:, i], mean)[0, 1] > RUNNING.correlation
-    return int(count)
 
 
 def slots_of_motors(functions: Sequence[int], first: int) -> list[int]:

@@ -36,7 +36,7 @@ from .px4_motors import (
     Outputs,
     motor_order,
     outputs_of,
-    shares_of_motors,
+    shares_of_outputs,
     slots_of_escs,
     what_flew,
     with_motors,
@@ -90,8 +90,8 @@ def channels(
     flown = what_flew(stated, topics.pop(_STATUS, []))
     check_flown(path, flown)
     parameters = stated if has_ranges else without_ranges(stated)
-    outputs, count = outputs_of(path, topics.get("actuator_outputs", []), parameters)
-    flown = replace(flown, running=count, outputs=outputs.words)
+    outputs = outputs_of(path, topics.get("actuator_outputs", []), parameters)
+    flown = replace(flown, outputs=outputs.words)
     order, order_note = motor_order(path, stated, vehicle)
     log_map = with_motors(recording_map("px4"), order, parameters, outputs)
     notes = [*log_map.notes, order_note]
@@ -177,7 +177,7 @@ def _samples(topic: str, fields: Fields, outputs: Outputs) -> Iterator[Samples]:
         return
     columns = {name: x for name, x in fields.items() if "timestamp" not in name}
     if topic == "actuator_outputs":
-        columns = shares_of_motors(columns, outputs)
+        columns = shares_of_outputs(columns, outputs)
     yield Samples(t, unified(topic, columns), topic)
 
 
