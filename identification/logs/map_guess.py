@@ -47,23 +47,11 @@ from .log_map import (
     Sensor,
     TimeColumn,
 )
-from .magnitudes import MAGNITUDES, likely_unit, within
-from .motor_units import motor_unit
+from .magnitudes import MAGNITUDES, likely_unit, motor_unit, within
 from .readings import DECLARED, OTHER, ROTORS, rotations, table_readings
 from .rotor_orders import ORDERS, Order, order_names, order_words
 from .table import Array, Table
 
-
-@dataclass(frozen=True)
-class GuessSettings:
-    """When a field is certain."""
-
-    fast_gyro: float = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
-    slow_gyro: float = 6.0  # below which 99.5 % of a flight's angular velocities lie in rad/s
-    rates: tuple[float, float] = (0.5, 20_000.0)  # Hz of rows, beyond which no name is believed
-
-
-GUESS = GuessSettings()
 _Choice = tuple[str, bool, str]  # what is taken, whether it is certain, and why
 _G = UNITS["accelerometer"]["g"]
 _TURNS = ("world", "body", "sense", "order", "pitch_sign", "unit")  # what shows how a body turns
@@ -306,7 +294,8 @@ class _Guessing:
         guessed, sure = likely_unit("time", step)
         rate = f"{1.0 / max(step * UNITS['time'][guessed], 1e-300):.4g} rows a second"
         if clock.unit in UNITS["time"]:  # an unusual rate is no reason to doubt a name
-            sure &= not within(1.0 / max(step * UNITS["time"][clock.unit], 1e-300), GUESS.rates)
+            named = 1.0 / max(step * UNITS["time"][clock.unit], 1e-300)
+            sure &= not within(named, MAGNITUDES.named_rates)
         unit = self.unit("time", "s" if nanoseconds else clock.unit, (guessed, sure, rate))
         t = np.asarray((raw - raw[np.isfinite(raw)][0]) * UNITS["time"][unit])
         middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
@@ -404,8 +393,8 @@ class _Guessing:
             told = {(r.section, r.field) for r in self.reasons if r.certain}
             self.say("gyro", "body", ("accelerometer", "body") in told, "as the accelerometer's")
             high = float(np.nanquantile(np.abs(values), 0.995))
-            unit = "deg/s" if high > GUESS.slow_gyro else "rad/s"
-            sure, why = high > GUESS.fast_gyro, f"its fast values are {high:.3g}"
+            unit = "deg/s" if high > MAGNITUDES.slow_gyro else "rad/s"
+            sure, why = high > MAGNITUDES.fast_gyro, f"its fast values are {high:.3g}"
         else:
             good, rotation = rotations(self.values["attitude"], self.ranking.best)
             times, units = self.t[good], ("rad/s", "deg/s")
