@@ -75,30 +75,9 @@ Findings = Iterable[str]
 
 
 def screen_log(
-    log: FlightLog, vehicle: Vehicle, least_seconds: float = LEAST_SECONDS
-) -> tuple[str, ...]:
-    """Return doubts about a log, or refuse it.
-
-    Args:
-        log: the flight as it was read.
-        vehicle: as declared.
-        least_seconds: of unbroken pose in flight that the log must have; several short logs of one
-            vehicle may make up for one another.
-
-    Returns:
-        Notes: what is doubtful, but does not spoil a diagnosis.
-
-    Raises:
-        InputError: the log is too short, sampled too slowly, its pose lost too often, its clock
-            jumps, its pose leaps, nothing flew, or it follows another convention than it declares;
-            the message names the file, what was found and what to do.
-    """
-    return screened(log, vehicle, least_seconds)[1]
-
-
-def screen_for_estimate(log: FlightLog, vehicle: Vehicle) -> tuple[FlightLog, tuple[str, ...]]:
-    """Return a log as a filter is to see it and doubts about it, or refuse it, in the words of
-    ``screen_log``.
+    log: FlightLog, vehicle: Vehicle, least_seconds: float | None = LEAST_SECONDS
+) -> tuple[FlightLog, tuple[str, ...]]:
+    """Return a log as a filter is to see it, and doubts about it, or refuse it.
 
     Of a pose that repeats the one before to the last digit only the first is valid in the log that
     comes back: the others are no measurements. A log too short to tell its conventions (3 s of
@@ -107,22 +86,18 @@ def screen_for_estimate(log: FlightLog, vehicle: Vehicle) -> tuple[FlightLog, tu
     Args:
         log: the flight as it was read.
         vehicle: as declared.
+        least_seconds: of unbroken pose in flight that the log must have for a diagnosis; several
+            short logs of one vehicle may make up for one another. None: for an estimate.
 
     Returns:
-        The log, and notes: what spoils a part of the estimate, and which part.
+        The log, and notes: what is doubtful, but does not spoil a diagnosis; for an estimate what
+        spoils a part of it, and which part.
 
     Raises:
-        InputError: every number of an estimate would be wrong: other units or conventions than the
-            log declares, nothing flew, or no pose is another one.
-    """
-    return screened(log, vehicle, None)
-
-
-def screened(
-    log: FlightLog, vehicle: Vehicle, least: float | None
-) -> tuple[FlightLog, tuple[str, ...]]:
-    """Return a log without held poses, and notes, after all checks in their order; ``least`` is the
-    unbroken flight in s that a diagnosis needs, None for an estimate.
+        InputError: the log is too short, sampled too slowly, its pose lost too often, its clock
+            jumps, its pose leaps, nothing flew, or it follows another convention than it declares;
+            for an estimate, where every number of it would be wrong. The message names the file,
+            what was found and what to do.
     """
     source, by_imu = log.source or log.name or "log", reads_imu(log)
     notes: list[str] = []
@@ -130,7 +105,7 @@ def screened(
     def hear(findings: Findings) -> None:
         for text in findings:
             kind = type(text)
-            if kind is Refused or (kind is not Note and least is not None):
+            if kind is Refused or (kind is not Note and least_seconds is not None):
                 raise InputError(f"{source}: {text}")
             if kind is not Needed:
                 notes.append(str(text) if kind is Note else f"warning: {text}")
@@ -144,9 +119,9 @@ def screened(
             column[bad] = np.interp(log.t[bad], log.t[~bad], column[~bad])
         log = replace(log, rotor_speeds=speeds)
     if by_imu:
-        hear(_imu(log, vehicle, least or 0.0))
+        hear(_imu(log, vehicle, least_seconds or 0.0))
     else:
-        if least is not None:  # a filter predicts over steps of any length
+        if least_seconds is not None:  # a filter predicts over steps of any length
             hear(_uneven_steps(log))
         seen, same = np.flatnonzero(log.valid), np.zeros(len(log.t), np.bool_)
         pose = np.column_stack([log.position, log.quaternion])[seen]
@@ -166,7 +141,7 @@ def screened(
         hear([Refused(f"{says}. As logged, the {whose}")])
     if not by_imu:
         hear(_steps(log))
-        hear([] if least is None else _length(log, vehicle, least))
+        hear([] if least_seconds is None else _length(log, vehicle, least_seconds))
     hear(Fault(reading.says) for reading in others[:1])
     return log, tuple(notes)
 
