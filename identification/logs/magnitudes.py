@@ -67,14 +67,19 @@ def within(value: float, limits: tuple[float, float]) -> bool:
 
 
 def likely_unit(section: str, size: float) -> tuple[str, bool]:
-    """Return the first unit of a section's column in which a size is likely, or the first of all,
-    and whether that is certain: of a battery, a median voltage; of the time, a median step.
+    """Return the first unit of a section's columns in which a size is likely, or the first of all,
+    and whether that is certain: of a battery, a median voltage; of the time, a median step; of an
+    accelerometer, a median length.
     """
-    sizes = {unit: size * one for unit, one in UNITS[section].items() if unit != "min"}
+    units = {unit: one for unit, one in UNITS[section].items() if unit not in ("min", "raw")}
+    sizes = {unit: size * one for unit, one in units.items()}
     likely, sure = MAGNITUDES.voltages, MAGNITUDES.sure_voltages
     if section == "time":
         sizes = {unit: 1.0 / max(step, 1e-300) for unit, step in sizes.items()}
         likely, sure = MAGNITUDES.rates, MAGNITUDES.sure_rates
+    elif section == "accelerometer":
+        sizes = {unit: force / units["g"] for unit, force in sizes.items()}
+        likely = sure = MAGNITUDES.gravity
     unit = next((unit for unit in sizes if within(sizes[unit], likely)), next(iter(sizes)))
     return unit, within(sizes[unit], sure)
 
@@ -204,7 +209,7 @@ def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
             )
     if log.accelerometer is not None:
         size = float(np.nanmedian(np.linalg.norm(log.accelerometer, axis=1)))
-        if within(size, MAGNITUDES.gravity):
+        if likely_unit("accelerometer", size) == ("g", True):
             doubts.append(
                 f"ax, ay, az look like g: their median size is {size:.3g}; expected m/s2: "
                 f"multiply by {UNITS['accelerometer']['g']:g}"

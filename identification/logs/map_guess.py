@@ -27,9 +27,7 @@ from .column_parts import (
     PARTS,
     Numbers,
     find_parts,
-    further_rotors,
     named_columns,
-    rotors_said,
 )
 from .evidence import EVIDENCE, Evidence, Ranking, likelihood
 from .excerpt import LONGEST
@@ -51,6 +49,7 @@ from .magnitudes import MAGNITUDES, likely_unit, motor_unit, within
 from .readings import DECLARED, OTHER, ROTORS, rotations, table_readings
 from .rotor_orders import ORDERS, Order, order_names, order_words
 from .table import Array, Table
+from .what_flew import more_rotors
 
 _Choice = tuple[str, bool, str]  # what is taken, whether it is certain, and why
 _G = UNITS["accelerometer"]["g"]
@@ -103,13 +102,12 @@ class Guess:
         return tuple(reason for reason in self.reasons if not reason.certain)
 
 
-def guess_map(table: Table, vehicle: Vehicle | None = None, name: str = "guess") -> Guess:
+def guess_map(table: Table, vehicle: Vehicle | None = None) -> Guess:
     """Return a guessed map of a table.
 
     Args:
         table: of any columns, with a line of units where it has one.
         vehicle: that flew, whose weight and rotors tell the rotors' unit; None: not known.
-        name: of the map.
 
     Raises:
         InputError: the table cannot be read.
@@ -127,7 +125,7 @@ def guess_map(table: Table, vehicle: Vehicle | None = None, name: str = "guess")
     used = {*found.time_columns, *(c for part in parts for c in part.columns)}
     unused = tuple(column for column in table.header if column not in used)
     found.sections.setdefault("time", TimeColumn(UNKNOWN))
-    return Guess(LogMap(**found.sections, name=name), tuple(found.reasons), unused, missing)
+    return Guess(LogMap(**found.sections, name="guess"), tuple(found.reasons), unused, missing)
 
 
 def _numbers_of(table: Table, names: Sequence[Name]) -> dict[str, Array]:
@@ -163,16 +161,6 @@ def _time_column(names: Sequence[Name], data: Mapping[str, Array]) -> Name | Non
     return None
 
 
-def _nanoseconds(names: Sequence[Name], clock: Name) -> str:
-    """Return the column of the nanoseconds beside a clock of whole seconds; empty: there is
-    none.
-    """
-    key = re.sub("(^|_)secs?$", "", clock.base)
-    known = words()["nanoseconds"]
-    fine = {f"{key}_{word}".strip("_") for word in known}
-    return next((name.column for name in names if name.base in fine), "")
-
-
 class _Guessing:
     """What was found so far: the columns of each part, the sections of the map, and reasons."""
 
@@ -186,7 +174,11 @@ class _Guessing:
         self.clock = _time_column(names, data)
         self.t = np.asarray(0.01 * np.arange(table.rows), dtype=np.float64)
         if self.clock is not None:
-            self.t = self.time(self.clock, data, _nanoseconds(names, self.clock))
+            # a column of nanoseconds may stand beside a clock of whole seconds
+            key = re.sub("(^|_)secs?$", "", self.clock.base)
+            fine = {f"{key}_{word}".strip("_") for word in words()["nanoseconds"]}
+            beside = next((name.column for name in names if name.base in fine), "")
+            self.t = self.time(self.clock, data, beside)
         self.numbers = Numbers(self.t, data)
         rest = [name for name in names if name.column not in self.time_columns]
         self.ranked = find_parts(rest, self.numbers)
@@ -199,9 +191,9 @@ class _Guessing:
         self.parts = {p: g for p, g in self.parts.items() if set(g.columns) <= set(data)}
         motors = {p: self.parts[p].columns for p in ("motors", "commands") if p in self.parts}
         self.further = {
-            part: further
+            part: said
             for part, four in motors.items()
-            if (further := further_rotors(four, table.numeric or table.header, table.read))
+            if (said := more_rotors(four, table.numeric or table.header, table.read))
         }
         self.by_name = {
             p: self.ranked[p][0].why.startswith("by") for p in self.parts if p in self.ranked
@@ -249,8 +241,7 @@ class _Guessing:
                 if made.unit:
                     self.say(part, "unit", False, f"{made.unit}: values up to {most:.3g}")
                 self.sections[part] = made
-        for part in self.further:
-            why = rotors_said(self.parts[part].columns, self.further[part])
+        for part, why in self.further.items():
             lack(part, "rotors", why)
         if not {"rotors", "commands"} & set(self.sections) and not self.further:
             why = "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
@@ -340,10 +331,7 @@ class _Guessing:
         best = self.ranking.best
         length = self.unit("position", place.unit, self.by_motion("length"))
         told = [("world", "", "world"), ("body", "", "body"), ("attitude", "sense", "sense")]
-        made = Attitude(group.columns, order=best.order, sense=best.sense)
         if not is_quaternion:
-            signs = (1, best.pitch_sign, 1) if best.pitch_sign < 0 else ()
-            made = replace(made, unit=best.unit, euler=best.euler, signs=signs)
             beyond = best.unit, best.unit != group.unit, "angles beyond pi"
             guessed = self.by_motion("unit") if len(units) > 1 else beyond
             self.unit("attitude", group.unit, guessed)
@@ -356,7 +344,7 @@ class _Guessing:
             self.take(section, name, self.by_motion(prop))
         position = Columns(place.columns, length)
         self.sections |= {"world": best.world, "body": best.body}
-        self.sections |= {"position": position, "attitude": made}
+        self.sections |= {"position": position, "attitude": best.part(group.columns)}
 
     def accelerometer(self, part: str) -> None:
         """Find unit and axes of the accelerometer by gravity."""
@@ -367,12 +355,11 @@ class _Guessing:
         sure = abs(z) > 0.8 and (z > 0.0 or self.ranking is not None)
         why = f"along z it reads {'+' if z > 0 else '-'}{abs(z):.2f} of its size"
         axes = self.take("accelerometer", "body", ("flu" if z > 0.0 else "frd", sure, why))
-        units = {"m/s2": 1.0, "g": _G}
-        likely = [u for u, one in units.items() if within(size * one / _G, MAGNITUDES.gravity)]
-        why, scale = f"its median size is {size:.4g}", 1.0
-        if group.unit in units or likely:
-            likely = likely or [group.unit]
-            unit = self.unit("accelerometer", group.unit, (likely[0], True, why))
+        guessed, is_gravity = likely_unit("accelerometer", size)
+        units, why, scale = UNITS["accelerometer"], f"its median size is {size:.4g}", 1.0
+        if group.unit in units or is_gravity:
+            guessed = guessed if is_gravity else group.unit
+            unit = self.unit("accelerometer", group.unit, (guessed, True, why))
             if unit == group.unit and not within(size * units[unit] / _G, MAGNITUDES.doubtful):
                 self.say("accelerometer", "unit", False, f"{unit}: {why}, which is not gravity's")
         else:

@@ -91,9 +91,9 @@ def _refuse(samples: Samples, name: str, column: Array, bad: Mask, expected: str
         i = int(np.argmax(bad))
         value = f"{column[i]:g}"
         found = {"nan": "empty or NaN", "inf": "infinite", "-inf": "infinite"}.get(value, value)
-        raise InputError(
-            f"{samples.path}: column {name}, {samples.place(i)} is {found}; expected {expected}"
-        )
+        assert samples.table is not None
+        where = f"{samples.table.path}: column {name}, {samples.place(i)}"
+        raise InputError(f"{where} is {found}; expected {expected}")
 
 
 def _check_whole(samples: Samples, log_map: LogMap) -> None:

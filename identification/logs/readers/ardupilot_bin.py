@@ -23,7 +23,7 @@ from ....runtime.errors import InputError
 from ..channels import Samples
 from ..clocks import in_order
 from ..flight_log import FlightLog
-from ..log_map import Commands, LogMap, recording_map
+from ..log_map import Commands, LogMap, shipped_map
 from ..mapped_log import recording_of
 from ..rotor_orders import ORDERS, Order, order_words
 from ..streams import MOST_VOLTS, Stream
@@ -33,7 +33,6 @@ from ..what_flew import (
     UNSTATED,
     WhatFlew,
     airframes,
-    check_flown,
     order_by_places,
     slots_of_motors,
 )
@@ -59,7 +58,7 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
         InputError: the file is no such log, is not a quadrotor's, or lacks motors, or a pose and
             inertial sensors.
     """
-    log_map = recording_map("ardupilot")
+    log_map = shipped_map("recordings/ardupilot")
     messages, skipped = read_dataflash(path, {*log_map.topics, "PARM", "MSG", "MOT", "TIME"})
     if "StartTime" in messages.pop("TIME", {}):
         raise InputError(
@@ -68,7 +67,7 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
         )
     parameters = _parameters(messages.pop("PARM", {}))
     flown = _what_flew(parameters, messages.pop("MSG", {}))
-    check_flown(path, flown)
+    flown.check(path)
     pulses = messages.get("RCOU")
     if "MOT" in messages and pulses is None:
         raise InputError(
