@@ -269,7 +269,7 @@ class Evidence:
 
     def _pushes(self, delay: float) -> tuple[Mask, Array]:
         """Return which samples compared (n,) less a delay lie within their piece, and the first
-        thrusts (m, 9) of ``_driving`` there less their means.
+        thrusts (n, 9) of ``_driving`` there less their means; zero elsewhere.
         """
         out = []
         for x, p in self._each(self._driving):
@@ -280,8 +280,8 @@ class Evidence:
             out.append(np.where(((at >= 0.0) & (at <= len(x) - 1))[:, None], between, np.nan))
         thrusts = np.concatenate(out)
         there: Mask = np.isfinite(thrusts[:, 0])
-        thrusts = thrusts[there]
-        return there, thrusts - thrusts.mean(axis=0) if len(thrusts) else thrusts
+        thrusts -= thrusts[there].mean(axis=0) if there.any() else 0.0
+        return there, np.where(there[:, None], thrusts, 0.0)
 
     def _moving(self, *attitude: Any) -> tuple[Array, Array]:
         """Return what moves the body by one way to turn columns into rotations: specific thrust
@@ -359,16 +359,18 @@ class Evidence:
             rows[3:] *= -1.0
         gains = [self._gains[0], *[self._gains[1]] * len(mixing)]
         horizontal, cost, motion = self._moved(*reading.moves)
+        needed = motion[:, : len(rows)] - motion[:, : len(rows)].mean(axis=0)
+        squares = np.square(needed)
 
         def left(delay: float) -> list[float]:
             there, thrusts = self._delayed(delay)
-            if len(thrusts) < EVIDENCE.fewest:
+            if np.count_nonzero(there) < EVIDENCE.fewest:
                 return [EVIDENCE.most_share] * len(rows)
-            given, needed = thrusts @ rows.T, motion[there, : len(rows)]
-            needed = needed - needed.mean(axis=0)
+            given = thrusts @ rows.T
             products = (
-                np.einsum("ni,ni->i", a, b)
-                for a, b in ((needed, needed), (given, given), (needed, given))
+                there @ squares,
+                np.sum(given * given, axis=0),
+                np.sum(given * needed, axis=0),
             )
             return [share(*each) for each in zip(*products, gains, strict=True)]
 

@@ -307,7 +307,8 @@ def rotations(columns: Array, reading: Reading) -> tuple[Mask, Rotation]:
 
 def as_written(columns: Array, reading: Reading) -> tuple[Mask, Rotation]:
     """Return the same, body to world, in the columns' own frames."""
-    good, part = np.isfinite(columns).all(axis=1), reading.part()
+    part = reading.part()
+    good: Mask = np.asarray(np.isfinite(columns).all(axis=1))
     if not reading.euler:
         good &= np.linalg.norm(np.nan_to_num(columns), axis=1) > 0.5
     turns = quaternions(part, scaled(part, columns[good]))
