@@ -30,7 +30,7 @@ from ..estimator.row_steps import steps_between
 from ..runtime.errors import InputError
 from .inertial_wrench import inertial_wrench
 from .logs.flight_log import FlightLog
-from .logs.screening import screen_for_estimate
+from .logs.screening import screen_log
 from .logs.source_rates import MOTOR_RATES, between_samples
 from .logs.tables import write_csv
 from .motion.inertial_signals import reads_imu
@@ -108,9 +108,9 @@ def estimate_log(
 
     Raises:
         InputError: the log has no pose at all, is of other units or conventions than it declares
-            (``screen_for_estimate``), or its rotor speeds make the filter's numbers overflow.
+            (``screen_log``), or its rotor speeds make the filter's numbers overflow.
     """
-    log, doubts = screen_for_estimate(log, vehicle)
+    log, doubts = screen_log(log, vehicle, None)
     report = report or (lambda share: None)
     return _estimate(log, vehicle, tuning, report, smooth, gate, doubts)
 
@@ -124,7 +124,7 @@ def _estimate(
     gate: float | None = GATE,
     doubts: tuple[str, ...] = (),
 ) -> WrenchSeries:
-    """Return the estimate of a log as ``screen_for_estimate`` gives it back, with its doubts."""
+    """Return the estimate of a log as ``screen_log`` gives it back, with its doubts."""
     if log.commanded:
         vehicle = replace(vehicle, omega_source="commanded")
     both = log.gyro is not None and log.accelerometer is not None
@@ -264,7 +264,7 @@ def tune_to_log(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = Non
     ``UKFTuning.for_vehicle(vehicle, log.period)``; see ``estimator.noise_fit``.
 
     Raises:
-        InputError: the log is none to estimate a wrench from (``screen_for_estimate``), too few
+        InputError: the log is none to estimate a wrench from (``screen_log``), too few
             poses are left to fit a tuning to, or its pose was filtered so that neither its noise
             nor a walk is found.
     """
@@ -291,7 +291,7 @@ def _of_poses(
     judge: Callable[..., T], log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None
 ) -> T:
     """Return what is found of a tuning in the columns of a log."""
-    log, _ = screen_for_estimate(log, vehicle)
+    log, _ = screen_log(log, vehicle, None)
     if reads_imu(log):
         raise InputError(
             f"{log.source or log.name}: has no pose, or one that is too slow, to fit a tuning to; "

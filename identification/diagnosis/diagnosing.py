@@ -17,7 +17,7 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError, unknown_name
 from ..findings import CHANNELS, Diagnosis, Errors, NamedEffect, Signature, Trace
 from ..logs.flight_log import FlightLog
-from ..logs.screening import LEAST_SECONDS, screened
+from ..logs.screening import LEAST_SECONDS, screen_log
 from ..motion.noise_spectrum import filtering_notes, pose_was_filtered
 from ..motion.smoothing import CUTOFFS
 from ..prediction import nis_without_wrench_state, rollout_error
@@ -65,7 +65,7 @@ def diagnose(
     least = (
         LEAST_SECONDS if len(every) == 1 and not every[0].commanded else settings.least_seconds_each
     )
-    checked = [screened(log, vehicle, least) for log in every]
+    checked = [screen_log(log, vehicle, least) for log in every]
     doubts = [f"{log.name}: {note}" for log, found in checked for note in found]
     flights = Flights(logs, vehicle, test)
     notes = [*(f"{log.name}: {note}" for log in flights.logs for note in log.notes), *doubts]

@@ -7,7 +7,6 @@ W R B' and what a sensor measures B v.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -60,12 +59,6 @@ class Samples:
         rows = None if self.rows is None else self.rows[keep]
         return replace(self, t=self.t[keep], columns=columns, rows=rows)
 
-    @property
-    def path(self) -> Path:
-        """The table's file."""
-        assert self.table is not None
-        return self.table.path
-
     def place(self, index: int) -> str:
         """Return where a sample stands, for errors: the table's row, else its time."""
         if self.table is None or self.rows is None:
@@ -102,7 +95,7 @@ def quaternions(part: Attitude, values: Array) -> Array:
     their own axes and of the length that they have.
     """
     if not part.euler:
-        return values[:, [3, 0, 1, 2]] if part.order == "xyzw" else values
+        return values[:, [part.order.index(name) for name in "wxyz"]]
     order = ["xyz".index(axis) for axis in part.euler]
     turn = Rotation.from_euler(part.euler.upper(), values[:, order] * UNITS["attitude"][part.unit])
     return np.asarray(turn.as_quat(scalar_first=True))

@@ -9,17 +9,16 @@ are looked at by threes and fours that stand side by side.
 """
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import takewhile
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from .column_names import Group, Name, groups_of, named_alone, side_by_side, words
 from .log_map import UNITS
-from .magnitudes import MAGNITUDES, within
+from .magnitudes import likely_unit, within
 from .table import Array
 
 _FOURS = (("1", "2", "3", "4"), ("0", "1", "2", "3"))
@@ -42,8 +41,6 @@ class PartSettings:
     same_size: float = 1.3  # up to which rates in one unit are of one size
     alike: float = 1.6  # ratio of medians of four rotors
     felt: float = 0.5  # correlation of rotors with the specific force
-    left: float = 0.5  # share of a further rotor's variance that the four leave, at most
-    rotor_sizes: tuple[float, float] = (0.5, 2.0)  # of its median by theirs
     shown: int = 4  # candidates that a map lists
 
 
@@ -156,7 +153,8 @@ class Numbers:
         ratio = float(np.mean(size[good]) / max(float(np.mean(self.rate[good])), 1e-12))
         one = 1.0 / PARTS.same_size, PARTS.same_size
         units = (unit for unit in ("rad/s", "deg/s") if within(ratio * UNITS["gyro"][unit], one))
-        return (next(units, ""), alike) if alike > PARTS.follows else ("", 0.0)
+        unit = next(units, "")
+        return (unit, alike) if unit and alike > PARTS.follows else ("", 0.0)
 
     def gravity_unit(self, columns: Sequence[str]) -> tuple[str, float]:
         """Return the unit in which three columns have the size of gravity, and 1, or less where it
@@ -167,10 +165,8 @@ class Numbers:
         size, middle = float(np.median(length)), np.abs(np.median(x, axis=0))
         if np.std(length) < 1e-6 * size or middle.max() < 0.8 * size:
             return "", 0.0  # a direction, or all that turns
-        one = UNITS["accelerometer"]["g"]
-        sizes = {"m/s2": size / one, "g": size}
-        unit = next((u for u, by_g in sizes.items() if within(by_g, MAGNITUDES.gravity)), "")
-        return unit, 1.0 if middle.argmax() == 2 else 0.8
+        unit, is_gravity = likely_unit("accelerometer", size)
+        return (unit, 1.0 if middle.argmax() == 2 else 0.8) if is_gravity else ("", 0.0)
 
     def follows_tilt(self, columns: Sequence[str]) -> float:
         """Return how the second difference of two of three columns follows the tilt, at most 1; 0
@@ -315,77 +311,22 @@ def _judged(
     """Yield a group with its score, more where its numbers obey the part's physics; nothing where
     they contradict it.
     """
-    columns = group.columns
+    columns, strength, words = group.columns, 0.0, ""
     if not len(numbers.rows(columns)[0]):
-        yield Candidate(group, score, why)
-        return
-    strengths: dict[str, float] = {}
-    if part == "attitude" and len(columns) == 4:
+        pass
+    elif part == "attitude" and len(columns) == 4:
         if not numbers.is_quaternion(columns):
             return
-        strengths["their length is 1"] = 1.0
+        strength, words = 1.0, "their length is 1"
     elif part == "accelerometer":
         unit, strength = numbers.gravity_unit(columns)
-        strengths[f"their size is gravity's, in {unit}"] = strength if unit else 0.0
+        words = f"their size is gravity's, in {unit}"
     elif part == "gyro":
         unit, strength = numbers.gyro_unit(columns)
-        strengths[f"they turn as the attitude does, in {unit}"] = strength if unit else 0.0
+        words = f"they turn as the attitude does, in {unit}"
     elif part == "position":
-        strengths["their acceleration follows the tilt"] = numbers.follows_tilt(columns)
-    elif part in ("motors", "commands"):
-        together = float(numbers.moves_together(columns))
-        strengths["they move together with the specific force"] = together
-    said = [*filter(None, [why]), *(words for words, strength in strengths.items() if strength)]
-    yield Candidate(group, score + PARTS.numbers * sum(strengths.values()), "; ".join(said))
-
-
-def further_rotors(
-    columns: Sequence[str],
-    others: Sequence[str],
-    read: Callable[[Sequence[str]], Mapping[str, Array]],
-    are_speeds: bool = False,
-) -> list[str]:
-    """Return the columns that go on with the numbers of four motors' columns, and turn as they do:
-    those of a vehicle of more rotors. An output that is not a motor's by name may be a servo's, and
-    counts where it is a sum of the four: all are mixed of thrust, roll, pitch and yaw.
-
-    Args:
-        columns: the four.
-        others: the columns that are there.
-        read: returns columns (N,) by their names.
-        are_speeds: the four are measured speeds, which no servo has.
-
-    Raises:
-        InputError: a table cannot be read.
-    """
-    out = []
-    for name in numbered_alike(columns, others):
-        rows = np.column_stack(list(read([*columns, name]).values()))
-        rows = rows[np.isfinite(rows).all(axis=1)]
-        if len(rows) < PARTS.fewest or np.ptp(rows[:, 4]) == 0.0:
-            continue
-        size = abs(float(np.median(rows[:, 4]) / max(np.median(np.abs(rows[:, :4])), 1e-12)))
-        moves = rows - rows.mean(axis=0)
-        left = np.linalg.lstsq(moves[:, :4], moves[:, 4])[1]
-        share = float(left[0] / np.sum(moves[:, 4] ** 2)) if len(left) else 0.0
-        is_motor = are_speeds or re.search(words()["motor_words"], name.lower())
-        if (is_motor or share < PARTS.left) and within(size, PARTS.rotor_sizes):
-            out.append(name)
-    return out
-
-
-def rotors_said(columns: Sequence[str], further: Sequence[str]) -> str:
-    """Return in words that a vehicle has more than four rotors."""
-    turning = [*columns, *further]
-    return f"{len(turning)} rotors turn ({', '.join(turning)}); expected the four of a quadrotor"
-
-
-def numbered_alike(columns: Sequence[str], others: Sequence[str]) -> list[str]:
-    """Return which other columns differ from four in a number alone, the next ones up."""
-    for found in zip(*(re.finditer(r"\d+", name) for name in columns), strict=False):
-        if len({match[0] for match in found}) == len(columns):
-            first, last = found[0], max(int(match[0]) for match in found)
-            before, behind = first.string[: first.start()], first.string[first.end() :]
-            following = (f"{before}{n:0{len(first[0])}d}{behind}" for n in range(last + 1, 16))
-            return list(takewhile(others.__contains__, following))
-    return []
+        strength, words = numbers.follows_tilt(columns), "their acceleration follows the tilt"
+    elif part in ("motors", "commands") and numbers.moves_together(columns):
+        strength, words = 1.0, "they move together with the specific force"
+    said = [why, words] if strength else [why]
+    yield Candidate(group, score + PARTS.numbers * strength, "; ".join(filter(None, said)))

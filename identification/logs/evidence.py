@@ -92,6 +92,7 @@ def share(total: float, power: float, cross: float, gain: tuple[float, float]) -
 class Fit:
     """Shares of variance that a reading leaves unexplained, and its score."""
 
+    reading: Reading
     horizontal: float  # of the horizontal specific force
     torques: tuple[float, ...]  # about x, y and, with a vehicle, z
     score: float  # log-likelihood less what the reading must make up for being less usual
@@ -171,7 +172,6 @@ class Evidence:
         self._pieces = self._cut(np.flatnonzero(there))
         self._motion, self._delayed = lru_cache(self._moving), lru_cache(16)(self._pushes)
         self._moved = lru_cache(2)(self._balances)
-        self._covaried = lru_cache(16)(self._covariances)
 
     @classmethod
     def of_log(cls, log: FlightLog, vehicle: Vehicle, by_imu: bool = False) -> "Evidence":
@@ -267,9 +267,9 @@ class Evidence:
     def _each(self, values: list[Array]) -> Iterator[tuple[Array, _Piece]]:
         return zip(values, self._pieces, strict=True)
 
-    def _pushes(self, delay: float) -> tuple[Mask, Array, Array]:
-        """Return which samples compared (n,) less a delay lie within their piece, the first thrusts
-        (m, 9) of ``_driving`` there less their means, and their covariances (9, 9).
+    def _pushes(self, delay: float) -> tuple[Mask, Array]:
+        """Return which samples compared (n,) less a delay lie within their piece, and the first
+        thrusts (n, 9) of ``_driving`` there less their means; zero elsewhere.
         """
         out = []
         for x, p in self._each(self._driving):
@@ -280,9 +280,8 @@ class Evidence:
             out.append(np.where(((at >= 0.0) & (at <= len(x) - 1))[:, None], between, np.nan))
         thrusts = np.concatenate(out)
         there: Mask = np.isfinite(thrusts[:, 0])
-        thrusts = thrusts[there]
-        thrusts -= thrusts.mean(axis=0) if len(thrusts) else 0.0
-        return there, thrusts, thrusts.T @ thrusts / max(len(thrusts) - 1, 1)
+        thrusts -= thrusts[there].mean(axis=0) if there.any() else 0.0
+        return there, np.where(there[:, None], thrusts, 0.0)
 
     def _moving(self, *attitude: Any) -> tuple[Array, Array]:
         """Return what moves the body by one way to turn columns into rotations: specific thrust
@@ -350,18 +349,6 @@ class Evidence:
         motion = np.column_stack([along, self._torques(reading)])
         return share(*variances, EVIDENCE.force_gain), float(cost), motion
 
-    def _covariances(self, delay: float, *moves: Any) -> Array:
-        """Return the covariances (13, 13) of the thrusts at a delay (s) and the motion; of thrusts
-        that fit nothing where too little of the flight is left.
-        """
-        there, thrusts, own = self._delayed(delay)
-        if len(thrusts) < EVIDENCE.fewest:
-            return np.eye(13)
-        motion = self._moved(*moves)[2][there]
-        motion -= motion.mean(axis=0)
-        both = motion.T @ np.column_stack([thrusts, motion]) / (len(thrusts) - 1)
-        return np.block([[own, both[:, :9].T], [both]])
-
     def fit(self, reading: Reading, torques: bool = True) -> Fit:
         """Return how well a reading explains the flight; without torques, by forces alone."""
         mixing = self._mixing if torques else self._mixing[:0]
@@ -371,19 +358,26 @@ class Evidence:
         if reading.mirrored:
             rows[3:] *= -1.0
         gains = [self._gains[0], *[self._gains[1]] * len(mixing)]
+        horizontal, cost, motion = self._moved(*reading.moves)
+        needed = motion[:, : len(rows)] - motion[:, : len(rows)].mean(axis=0)
+        squares = np.square(needed)
 
         def left(delay: float) -> list[float]:
-            c = self._covaried(delay, *reading.moves)
-            powers = np.sum(rows @ c[:9, :9] * rows, axis=1)
-            crosses = np.sum(rows * c[9 : 9 + len(rows), :9], axis=1)
-            variances = zip(np.diag(c)[9:], powers, crosses, gains, strict=False)
-            return [share(*each) for each in variances]
+            there, thrusts = self._delayed(delay)
+            if np.count_nonzero(there) < EVIDENCE.fewest:
+                return [EVIDENCE.most_share] * len(rows)
+            given = thrusts @ rows.T
+            products = (
+                there @ squares,
+                np.sum(given * given, axis=0),
+                np.sum(given * needed, axis=0),
+            )
+            return [share(*each) for each in zip(*products, gains, strict=True)]
 
         delays = (-reading.late,) if reading.late or not torques else EVIDENCE.delays
         vertical, *others = max((left(delay) for delay in delays), key=likelihood)
-        horizontal, cost, _ = self._moved(*reading.moves)
         score = likelihood([horizontal, horizontal, vertical, *others]) - cost - reading.unlikely
-        return Fit(horizontal, tuple(others), score)
+        return Fit(reading, horizontal, tuple(others), score)
 
     def turns(self, reading: Reading) -> float:
         """Return the root mean square of roll and pitch rates in the band of turning, rad/s."""
@@ -393,40 +387,37 @@ class Evidence:
 
 @dataclass(frozen=True, eq=False)
 class Ranking:
-    """Readings, the likeliest first, each with its fit."""
+    """Fits of readings, the likeliest first."""
 
-    ranked: Sequence[tuple[Reading, Fit]]
+    ranked: Sequence[Fit]
 
     @classmethod
     def of(cls, evidence: Evidence, readings: Sequence[Reading], torques: bool = True) -> "Ranking":
         """Return the ranking of readings; where a flight does not tell, the usual come first."""
-        nothing = Fit(1.0, (), 0.0)
-        fits = [
-            evidence.fit(r, torques) if evidence.enough else replace(nothing, score=-r.unlikely)
+        fits = (
+            evidence.fit(r, torques) if evidence.enough else Fit(r, 1.0, (), -r.unlikely)
             for r in readings
-        ]
-        return cls(
-            sorted(zip(readings, fits, strict=True), key=lambda item: item[1].score, reverse=True)
         )
+        return cls(sorted(fits, key=lambda fit: fit.score, reverse=True))
 
     @property
     def best(self) -> Reading:
         """The reading that is taken."""
-        return self.ranked[0][0]
+        return self.ranked[0].reading
 
     @property
     def fit(self) -> Fit:
         """How well the best reading explains the flight."""
-        return self.ranked[0][1]
+        return self.ranked[0]
 
     def other(self, name: str) -> tuple[object, float]:
         """Return the next best value of a property, and the log-likelihood ratio of the best over
         that value (0 where the flight tells nothing, infinite where there is no other value).
         """
         tells = self.fit.horizontal <= EVIDENCE.good
-        for reading, fit in self.ranked:
-            if getattr(reading, name) != getattr(self.best, name):
-                return getattr(reading, name), self.fit.score - fit.score if tells else 0.0
+        for fit in self.ranked:
+            if (value := getattr(fit.reading, name)) != getattr(self.best, name):
+                return value, self.fit.score - fit.score if tells else 0.0
         return None, np.inf if tells else 0.0
 
     def certain(self, *names: str) -> bool:
@@ -445,4 +436,5 @@ def departures(evidence: Evidence) -> list[Reading]:
     if best is DECLARED or left > most:
         return []
     least = ranking.fit.score - EVIDENCE.certain
-    return [r for r, fit in ranking.ranked if fit.score >= least and r is not DECLARED]
+    readings = [fit.reading for fit in ranking.ranked if fit.score >= least]
+    return [reading for reading in readings if reading is not DECLARED]

@@ -390,7 +390,7 @@ def load_map(name: str | Path) -> LogMap:
     """
     path = Path(name)
     if str(name) in map_names():
-        return _shipped_map(str(name))
+        return shipped_map(str(name))
     if path.suffix.lower() not in (".yaml", ".yml") and not path.exists():
         raise unknown_name("map", str(name), [*map_names(), "the path of a YAML file"])
     found = read_yaml(path, "a map file")
@@ -407,13 +407,11 @@ def load_map(name: str | Path) -> LogMap:
     return parse_map(found, str(path), str(path))
 
 
-def recording_map(name: str) -> LogMap:
-    """Return the map of an autopilot's messages, which its reader decodes."""
-    return _shipped_map(f"recordings/{name}")
-
-
 @cache
-def _shipped_map(name: str) -> LogMap:
+def shipped_map(name: str) -> LogMap:
+    """Return a map that ships with the kit: of tables, or in ``recordings`` of an autopilot's
+    messages, which its reader decodes.
+    """
     return parse_map(read_yaml(MAPS / f"{name}.yaml", "a map"), f"map {name}", name)
 
 

@@ -4,12 +4,14 @@ The guess of a map, the reading of a log and its screening ask here, so that all
 and say the same sentence.
 """
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
+from .column_names import Group, words
 from .flight_log import FlightLog, parts_of
 from .flight_phases import usual_thrust
 from .log_map import UNITS
@@ -36,6 +38,18 @@ class Magnitudes:
     doubtful: tuple[float, float] = (0.5, 2.0)  # the same, beyond which it may be
     gravity: tuple[float, float] = (0.85, 1.15)  # specific force by 1 g: the unit is certain
     fastest_gyro: float = 70.0  # rad/s, the range of the fastest gyros (4000 deg/s)
+    fast_gyro: float = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
+    slow_gyro: float = 6.0  # below which 99.5 % of a flight's angular velocities lie in rad/s
+    named_rates: tuple[float, float] = (0.5, 20_000.0)  # Hz of rows, beyond which no name counts
+    # of four motors' columns: the median above which no unit but rpm is left, since no propeller
+    # turns at that rate in rad/s; above which rpm is likelier (in rad/s a palm-sized vehicle alone
+    # hovers at that); and above which rpm may also be a command of 16 bits
+    rpm: float = 4500.0
+    fast: float = 2600.0
+    counts: float = 20_000.0
+    # power by which the specific force grows: of rotor speeds, and from which on of pulses
+    squares: tuple[float, float] = (1.5, 2.5)
+    offset: float = 2.8
 
 
 MAGNITUDES = Magnitudes()
@@ -53,14 +67,19 @@ def within(value: float, limits: tuple[float, float]) -> bool:
 
 
 def likely_unit(section: str, size: float) -> tuple[str, bool]:
-    """Return the first unit of a section's column in which a size is likely, or the first of all,
-    and whether that is certain: of a battery, a median voltage; of the time, a median step.
+    """Return the first unit of a section's columns in which a size is likely, or the first of all,
+    and whether that is certain: of a battery, a median voltage; of the time, a median step; of an
+    accelerometer, a median length.
     """
-    sizes = {unit: size * one for unit, one in UNITS[section].items() if unit != "min"}
+    units = {unit: one for unit, one in UNITS[section].items() if unit not in ("min", "raw")}
+    sizes = {unit: size * one for unit, one in units.items()}
     likely, sure = MAGNITUDES.voltages, MAGNITUDES.sure_voltages
     if section == "time":
         sizes = {unit: 1.0 / max(step, 1e-300) for unit, step in sizes.items()}
         likely, sure = MAGNITUDES.rates, MAGNITUDES.sure_rates
+    elif section == "accelerometer":
+        sizes = {unit: force / units["g"] for unit, force in sizes.items()}
+        likely = sure = MAGNITUDES.gravity
     unit = next((unit for unit in sizes if within(sizes[unit], likely)), next(iter(sizes)))
     return unit, within(sizes[unit], sure)
 
@@ -112,6 +131,72 @@ def rotor_doubt(thrust: float, vehicle: Vehicle) -> str:
     )
 
 
+def motor_unit(
+    group: Group, values: Array, vehicle: Vehicle | None, power: float = np.nan
+) -> tuple[str, str, bool, str]:
+    """Return whether columns are rotors or commands, their unit, if that is certain, and why: by
+    the first rule that holds. ``power`` is that by which the specific force grows with them; NaN:
+    unknown.
+    """
+    # of a path such as /fmu/out/esc_status/rotor_speed.00 the last word
+    names = " ".join(re.sub(r"^.*/(?=.*[a-z])", "", name.lower()) for name in group.columns)
+    turning = np.abs(values[np.isfinite(values) & (values != 0.0)])
+    if not turning.size:
+        return "commands", "normalised", False, "all are zero"
+    low, middle, high = (float(x) for x in np.quantile(turning, [0.01, 0.5, 1.0]))
+    named = group.unit or next((unit for unit in ("eRPM", "rpm") if unit.lower() in names), "")
+    commanded = any(word in names for word in words()["command_words"])
+    speeds = any(word in names for word in ("omega", "speed", "rotor", "rpm"))
+    speeds |= within(power, MAGNITUDES.squares) and not commanded
+    pulses = low >= 850.0 and high <= 2250.0
+    carrying: list[str] = []
+    if vehicle is not None and not commanded:
+        there = values[np.isfinite(values).all(axis=1)]
+        carrying = [
+            u for u in carrying_units(thrust_by_weight(there, vehicle)) if u in UNITS["rotors"]
+        ]
+    # numbers of 1000 to 2000 may be pulses as well, whatever they would carry
+    doubt = "pulses in us" if pulses else "percents" if high <= 100.0 else ""
+    doubt = "" if speeds else doubt
+    by_names, between = "by the columns' names", f"values from {low:.4g} to {high:.4g}"
+    if not np.isnan(power):
+        between += f", and the specific force grows with their power of {power:.2g}"
+    up_to = f"values up to {high:.6g}"
+    carries = f"in it the rotors carry the weight of {vehicle.name if vehicle else ''}"
+    carries += f", though they may be {doubt}" if doubt else ""
+    # by the vehicle's weight a name may be wrong, but poles of eRPM are unknown
+    lifts = len(carrying) == 1 and named in UNITS["rotors"] and named not in ("eRPM", *carrying)
+    rules = (
+        (lifts, "rotors", "".join(carrying), False, f"{carries}, not in {named} as names say"),
+        (named in UNITS["rotors"], "rotors", named, True, by_names),
+        (high <= 1.0, "commands", "normalised", "omega" not in names, up_to),
+        (named in ("us", "percent"), "commands", named, True, by_names),
+        (commanded and pulses, "commands", "us", True, between),
+        (commanded and high <= 100.0, "commands", "percent", False, up_to),
+        (commanded and high <= 65535.0, "commands", "counts", False, up_to),
+        (pulses and power >= MAGNITUDES.offset, "commands", "us", True, between),
+        (len(carrying) == 1, "rotors", "".join(carrying), not doubt, carries),
+        (
+            not commanded and middle > MAGNITUDES.counts and high <= 65535.5,
+            *("commands", "counts", False),
+            f"{up_to}, which may be 16 bits of a command, or rpm",
+        ),
+        (
+            not commanded and middle > MAGNITUDES.rpm,
+            *("rotors", "rpm", True),
+            f"the median is {middle:.5g}, too fast for rad/s",
+        ),
+        (pulses and not speeds, "commands", "us", False, between),
+        (
+            middle > MAGNITUDES.fast,
+            *("rotors", "rpm", False),
+            f"the median is {middle:.4g}: few rotors turn as fast in rad/s",
+        ),
+    )
+    otherwise = f"the median is {middle:.4g}; it might be rpm or Hz"
+    return next((rule[1:] for rule in rules if rule[0]), ("rotors", "rad/s", False, otherwise))
+
+
 def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
     """Return what the sizes of a log's numbers say against its units."""
     doubts = [time_doubt(log.period)]
@@ -124,7 +209,7 @@ def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
             )
     if log.accelerometer is not None:
         size = float(np.nanmedian(np.linalg.norm(log.accelerometer, axis=1)))
-        if within(size, MAGNITUDES.gravity):
+        if likely_unit("accelerometer", size) == ("g", True):
             doubts.append(
                 f"ax, ay, az look like g: their median size is {size:.3g}; expected m/s2: "
                 f"multiply by {UNITS['accelerometer']['g']:g}"

@@ -27,9 +27,7 @@ from .column_parts import (
     PARTS,
     Numbers,
     find_parts,
-    further_rotors,
     named_columns,
-    rotors_said,
 )
 from .evidence import EVIDENCE, Evidence, Ranking, likelihood
 from .excerpt import LONGEST
@@ -47,23 +45,12 @@ from .log_map import (
     Sensor,
     TimeColumn,
 )
-from .magnitudes import MAGNITUDES, likely_unit, within
-from .motor_units import motor_unit
+from .magnitudes import MAGNITUDES, likely_unit, motor_unit, within
 from .readings import DECLARED, OTHER, ROTORS, rotations, table_readings
 from .rotor_orders import ORDERS, Order, order_names, order_words
 from .table import Array, Table
+from .what_flew import more_rotors
 
-
-@dataclass(frozen=True)
-class GuessSettings:
-    """When a field is certain."""
-
-    fast_gyro: float = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
-    slow_gyro: float = 6.0  # below which 99.5 % of a flight's angular velocities lie in rad/s
-    rates: tuple[float, float] = (0.5, 20_000.0)  # Hz of rows, beyond which no name is believed
-
-
-GUESS = GuessSettings()
 _Choice = tuple[str, bool, str]  # what is taken, whether it is certain, and why
 _G = UNITS["accelerometer"]["g"]
 _TURNS = ("world", "body", "sense", "order", "pitch_sign", "unit")  # what shows how a body turns
@@ -115,13 +102,12 @@ class Guess:
         return tuple(reason for reason in self.reasons if not reason.certain)
 
 
-def guess_map(table: Table, vehicle: Vehicle | None = None, name: str = "guess") -> Guess:
+def guess_map(table: Table, vehicle: Vehicle | None = None) -> Guess:
     """Return a guessed map of a table.
 
     Args:
         table: of any columns, with a line of units where it has one.
         vehicle: that flew, whose weight and rotors tell the rotors' unit; None: not known.
-        name: of the map.
 
     Raises:
         InputError: the table cannot be read.
@@ -139,7 +125,7 @@ def guess_map(table: Table, vehicle: Vehicle | None = None, name: str = "guess")
     used = {*found.time_columns, *(c for part in parts for c in part.columns)}
     unused = tuple(column for column in table.header if column not in used)
     found.sections.setdefault("time", TimeColumn(UNKNOWN))
-    return Guess(LogMap(**found.sections, name=name), tuple(found.reasons), unused, missing)
+    return Guess(LogMap(**found.sections, name="guess"), tuple(found.reasons), unused, missing)
 
 
 def _numbers_of(table: Table, names: Sequence[Name]) -> dict[str, Array]:
@@ -175,16 +161,6 @@ def _time_column(names: Sequence[Name], data: Mapping[str, Array]) -> Name | Non
     return None
 
 
-def _nanoseconds(names: Sequence[Name], clock: Name) -> str:
-    """Return the column of the nanoseconds beside a clock of whole seconds; empty: there is
-    none.
-    """
-    key = re.sub("(^|_)secs?$", "", clock.base)
-    known = words()["nanoseconds"]
-    fine = {f"{key}_{word}".strip("_") for word in known}
-    return next((name.column for name in names if name.base in fine), "")
-
-
 class _Guessing:
     """What was found so far: the columns of each part, the sections of the map, and reasons."""
 
@@ -198,7 +174,11 @@ class _Guessing:
         self.clock = _time_column(names, data)
         self.t = np.asarray(0.01 * np.arange(table.rows), dtype=np.float64)
         if self.clock is not None:
-            self.t = self.time(self.clock, data, _nanoseconds(names, self.clock))
+            # a column of nanoseconds may stand beside a clock of whole seconds
+            key = re.sub("(^|_)secs?$", "", self.clock.base)
+            fine = {f"{key}_{word}".strip("_") for word in words()["nanoseconds"]}
+            beside = next((name.column for name in names if name.base in fine), "")
+            self.t = self.time(self.clock, data, beside)
         self.numbers = Numbers(self.t, data)
         rest = [name for name in names if name.column not in self.time_columns]
         self.ranked = find_parts(rest, self.numbers)
@@ -211,9 +191,9 @@ class _Guessing:
         self.parts = {p: g for p, g in self.parts.items() if set(g.columns) <= set(data)}
         motors = {p: self.parts[p].columns for p in ("motors", "commands") if p in self.parts}
         self.further = {
-            part: further
+            part: said
             for part, four in motors.items()
-            if (further := further_rotors(four, table.numeric or table.header, table.read))
+            if (said := more_rotors(four, table.numeric or table.header, table.read))
         }
         self.by_name = {
             p: self.ranked[p][0].why.startswith("by") for p in self.parts if p in self.ranked
@@ -261,8 +241,7 @@ class _Guessing:
                 if made.unit:
                     self.say(part, "unit", False, f"{made.unit}: values up to {most:.3g}")
                 self.sections[part] = made
-        for part in self.further:
-            why = rotors_said(self.parts[part].columns, self.further[part])
+        for part, why in self.further.items():
             lack(part, "rotors", why)
         if not {"rotors", "commands"} & set(self.sections) and not self.further:
             why = "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
@@ -306,7 +285,8 @@ class _Guessing:
         guessed, sure = likely_unit("time", step)
         rate = f"{1.0 / max(step * UNITS['time'][guessed], 1e-300):.4g} rows a second"
         if clock.unit in UNITS["time"]:  # an unusual rate is no reason to doubt a name
-            sure &= not within(1.0 / max(step * UNITS["time"][clock.unit], 1e-300), GUESS.rates)
+            named = 1.0 / max(step * UNITS["time"][clock.unit], 1e-300)
+            sure &= not within(named, MAGNITUDES.named_rates)
         unit = self.unit("time", "s" if nanoseconds else clock.unit, (guessed, sure, rate))
         t = np.asarray((raw - raw[np.isfinite(raw)][0]) * UNITS["time"][unit])
         middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
@@ -351,10 +331,7 @@ class _Guessing:
         best = self.ranking.best
         length = self.unit("position", place.unit, self.by_motion("length"))
         told = [("world", "", "world"), ("body", "", "body"), ("attitude", "sense", "sense")]
-        made = Attitude(group.columns, order=best.order, sense=best.sense)
         if not is_quaternion:
-            signs = (1, best.pitch_sign, 1) if best.pitch_sign < 0 else ()
-            made = replace(made, unit=best.unit, euler=best.euler, signs=signs)
             beyond = best.unit, best.unit != group.unit, "angles beyond pi"
             guessed = self.by_motion("unit") if len(units) > 1 else beyond
             self.unit("attitude", group.unit, guessed)
@@ -367,7 +344,7 @@ class _Guessing:
             self.take(section, name, self.by_motion(prop))
         position = Columns(place.columns, length)
         self.sections |= {"world": best.world, "body": best.body}
-        self.sections |= {"position": position, "attitude": made}
+        self.sections |= {"position": position, "attitude": best.part(group.columns)}
 
     def accelerometer(self, part: str) -> None:
         """Find unit and axes of the accelerometer by gravity."""
@@ -378,12 +355,11 @@ class _Guessing:
         sure = abs(z) > 0.8 and (z > 0.0 or self.ranking is not None)
         why = f"along z it reads {'+' if z > 0 else '-'}{abs(z):.2f} of its size"
         axes = self.take("accelerometer", "body", ("flu" if z > 0.0 else "frd", sure, why))
-        units = {"m/s2": 1.0, "g": _G}
-        likely = [u for u, one in units.items() if within(size * one / _G, MAGNITUDES.gravity)]
-        why, scale = f"its median size is {size:.4g}", 1.0
-        if group.unit in units or likely:
-            likely = likely or [group.unit]
-            unit = self.unit("accelerometer", group.unit, (likely[0], True, why))
+        guessed, is_gravity = likely_unit("accelerometer", size)
+        units, why, scale = UNITS["accelerometer"], f"its median size is {size:.4g}", 1.0
+        if group.unit in units or is_gravity:
+            guessed = guessed if is_gravity else group.unit
+            unit = self.unit("accelerometer", group.unit, (guessed, True, why))
             if unit == group.unit and not within(size * units[unit] / _G, MAGNITUDES.doubtful):
                 self.say("accelerometer", "unit", False, f"{unit}: {why}, which is not gravity's")
         else:
@@ -404,8 +380,8 @@ class _Guessing:
             told = {(r.section, r.field) for r in self.reasons if r.certain}
             self.say("gyro", "body", ("accelerometer", "body") in told, "as the accelerometer's")
             high = float(np.nanquantile(np.abs(values), 0.995))
-            unit = "deg/s" if high > GUESS.slow_gyro else "rad/s"
-            sure, why = high > GUESS.fast_gyro, f"its fast values are {high:.3g}"
+            unit = "deg/s" if high > MAGNITUDES.slow_gyro else "rad/s"
+            sure, why = high > MAGNITUDES.fast_gyro, f"its fast values are {high:.3g}"
         else:
             good, rotation = rotations(self.values["attitude"], self.ranking.best)
             times, units = self.t[good], ("rad/s", "deg/s")

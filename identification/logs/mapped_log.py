@@ -21,7 +21,6 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from .channels import Samples, in_kit_axes, in_kit_units, quaternions
 from .clocks import on_one_clock
-from .column_parts import further_rotors, rotors_said
 from .commanded_speeds import flown_vehicle
 from .flight_log import NORM_TOLERANCE, FlightLog, vehicle_of_columns
 from .log_map import (
@@ -40,7 +39,7 @@ from .rotor_orders import order_names, order_words
 from .streams import Recording, Stream, readable, slerp
 from .table import Mask, Table
 from .table_rows import LONGEST_STEPS, check_rows, rows_apart, rows_of
-from .what_flew import UNSTATED, WhatFlew, check_flown
+from .what_flew import UNSTATED, WhatFlew, more_rotors
 
 _SHOWN = 30  # columns that an error lists
 NO_QUATERNION = 0.5  # length; shorter stands for one that is not there
@@ -76,18 +75,17 @@ def map_table(
     log_map = fitted(table, log_map, vehicle, reader)
     for motors in filter(None, (log_map.rotors, log_map.commands)):
         there = table.numeric or table.header
-        if further := further_rotors(motors.columns, there, table.read):
-            raise InputError(f"{table.path}: {rotors_said(motors.columns, further)}")
+        if said := more_rotors(motors.columns, there, table.read):
+            raise InputError(f"{table.path}: {said}")
     columns = table.read(log_map.wanted)
     if log_map.is_own and rows_apart(Samples(np.arange(float(table.rows)), columns), log_map):
         log_map = replace(log_map, rows="mixed")
     notes = [*table.notes, *log_map.notes, *([log_map.time.note] if log_map.time.note else [])]
     if not log_map.is_own or log_map.rows == "mixed":
         notes.insert(0, f"columns: by the map {log_map.name}")
-    samples, words = rows_of(table, columns, log_map, piece)
-    log_map, _ = chosen([samples], log_map)
-    notes += [*words, *check_rows(samples, log_map)]
-    return recording_of(table.path, [samples], log_map, reader, notes).log(vehicle)
+    samples, words = rows_of(table, columns, log_map)
+    notes += words
+    return recording_of(table.path, [samples], log_map, reader, notes, piece).log(vehicle)
 
 
 def recording_of(
@@ -111,14 +109,14 @@ def recording_of(
         flown: what the log states of its vehicle.
 
     Raises:
-        InputError: no quadrotor, no such piece, no motors, neither a pose nor gyro and
+        InputError: more than four rotors, no such piece, no motors, neither a pose nor gyro and
             accelerometer, or numbers that no flight has.
     """
-    check_flown(path, flown)
     recorded, of_clock = on_one_clock(path, recorded, piece)
     motors = (*log_map.ways("rotors"), *log_map.ways("commands"))
     poses = log_map.ways("position")
     log_map, sources = chosen(recorded, log_map)
+    of_clock += [note for s in recorded if s.table for note in check_rows(s, log_map)]
     if not (log_map.rotors or log_map.commands or log_map.wrench):
         names = [s.topic for s in recorded if s.topic] or [x for s in recorded for x in s.columns]
         wanted = [f"{w.topic + ' with ' if w.topic else ''}{w.columns[0]} ..." for w in motors]
@@ -126,19 +124,14 @@ def recording_of(
             f"{path}: no motors that turn; expected {' or '.join(wanted)}, found "
             f"{', '.join(dict.fromkeys(names[:20])) or 'nothing'}"
         )
-    for turning in [
-        part for part in (log_map.rotors, log_map.commands) if part and flown == UNSTATED
-    ]:
-        samples = sources["rotors" if isinstance(turning, Rotors) else "commands"]
-        if further := further_rotors(
-            turning.columns, [*samples.columns], samples.read, isinstance(turning, Rotors)
-        ):
-            topic = f"{turning.topic}: " if turning.topic else ""
-            raise InputError(f"{path}: {topic}{rotors_said(turning.columns, further)}")
     said = [*notes, *of_clock, *(part.note for part in log_map.sections.values() if part.note)]
     streams: dict[str, Stream] = {}
     for name, part in log_map.sections.items():
         samples = sources[name]
+        if isinstance(part, Rotors | Commands) and not flown.airframe:
+            others, are_speeds = [*samples.columns], isinstance(part, Rotors)
+            if more := more_rotors(part.columns, others, samples.read, are_speeds):
+                raise InputError(f"{path}: {f'{part.topic}: ' if part.topic else ''}{more}")
         if name == "position":
             streams[name], words = _pose(path, log_map, samples, sources.get("attitude"))
             said += words

@@ -14,7 +14,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...runtime.yaml_file import read_yaml
-from .log_map import SENSES, UNITS
+from .channels import quaternions, scaled
+from .log_map import SENSES, UNITS, Attitude
 from .rotor_orders import ORDERS, Order, order_names
 from .table import Array, Mask
 
@@ -112,6 +113,13 @@ class Reading:
     def attitude(self) -> tuple[Any, ...]:
         """What turns columns into rotations: the first five fields."""
         return self.order, self.euler, self.unit, self.pitch_sign, self.sense
+
+    def part(self, columns: tuple[str, ...] = ()) -> Attitude:
+        """Return the section of a map by which columns hold the attitude."""
+        signs = (1, self.pitch_sign, 1) if self.pitch_sign < 0 else ()
+        unit = self.unit if self.euler else ""
+        order, euler, sense = self.order, self.euler, self.sense
+        return Attitude(columns, unit, signs=signs, order=order, euler=euler, sense=sense)
 
     @property
     def moves(self) -> tuple[Any, ...]:
@@ -299,12 +307,10 @@ def rotations(columns: Array, reading: Reading) -> tuple[Mask, Rotation]:
 
 def as_written(columns: Array, reading: Reading) -> tuple[Mask, Rotation]:
     """Return the same, body to world, in the columns' own frames."""
+    part = reading.part()
     good: Mask = np.asarray(np.isfinite(columns).all(axis=1))
-    if reading.euler:
-        angles = columns[good] * UNITS["attitude"][reading.unit] * [1.0, reading.pitch_sign, 1.0]
-        axes = ["xyz".index(axis) for axis in reading.euler]
-        rotation = Rotation.from_euler(reading.euler.upper(), angles[:, axes])
-    else:
+    if not reading.euler:
         good &= np.linalg.norm(np.nan_to_num(columns), axis=1) > 0.5
-        rotation = Rotation.from_quat(columns[good][:, [reading.order.index(a) for a in "xyzw"]])
+    turns = quaternions(part, scaled(part, columns[good]))
+    rotation = Rotation.from_quat(turns, scalar_first=True)
     return good, rotation if reading.sense == "body_to_world" else rotation.inv()

@@ -14,6 +14,7 @@ them. Length, rate and even steps are what a diagnosis needs to have evidence; a
 
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
@@ -30,8 +31,7 @@ from .inertial import INERTIAL, gravity_doubt, is_stuck
 from .magnitudes import MAGNITUDES, rotor_doubt, thrust_by_weight, time_doubt, within
 from .readings import Reading
 from .source_rates import MOTOR_RATES
-from .stuck_channels import stretches, stuck_notes
-from .table import Mask, Rows
+from .table import Array, Mask, Rows
 
 LEAST_SECONDS = 10.0  # of unbroken pose in flight
 _LEAST_PIECE = SIGNALS.shortest_piece  # s; a shorter piece is all edge to the filters
@@ -52,6 +52,11 @@ _HELD = 0.2  # s in flight that a pose may repeat itself: four of the slowest pe
 _NEVER = 1.0  # s of log in which some pose must differ from another
 _STOPPED = 0.3  # s that one rotor may read 0 while the others carry the vehicle
 _ABOVE_MOST = 1.5  # of the vehicle's fastest rotor speed: no rotor turns that fast
+_STILL = 0.5  # s that a channel stands still; a busy link repeats a few samples
+# changes of each sister meanwhile: of channels that change equally often, the chance that one does
+# not at all is at most exp(-20)
+_SISTERS_CHANGE = 20
+_AT_LIMIT = 0.99  # of the fastest rotor speed: a rotor at its limit stands still rightly
 _BEYOND = 20.0  # of the median rotor speed: the same where the vehicle states no fastest
 
 
@@ -75,30 +80,9 @@ Findings = Iterable[str]
 
 
 def screen_log(
-    log: FlightLog, vehicle: Vehicle, least_seconds: float = LEAST_SECONDS
-) -> tuple[str, ...]:
-    """Return doubts about a log, or refuse it.
-
-    Args:
-        log: the flight as it was read.
-        vehicle: as declared.
-        least_seconds: of unbroken pose in flight that the log must have; several short logs of one
-            vehicle may make up for one another.
-
-    Returns:
-        Notes: what is doubtful, but does not spoil a diagnosis.
-
-    Raises:
-        InputError: the log is too short, sampled too slowly, its pose lost too often, its clock
-            jumps, its pose leaps, nothing flew, or it follows another convention than it declares;
-            the message names the file, what was found and what to do.
-    """
-    return screened(log, vehicle, least_seconds)[1]
-
-
-def screen_for_estimate(log: FlightLog, vehicle: Vehicle) -> tuple[FlightLog, tuple[str, ...]]:
-    """Return a log as a filter is to see it and doubts about it, or refuse it, in the words of
-    ``screen_log``.
+    log: FlightLog, vehicle: Vehicle, least_seconds: float | None = LEAST_SECONDS
+) -> tuple[FlightLog, tuple[str, ...]]:
+    """Return a log as a filter is to see it, and doubts about it, or refuse it.
 
     Of a pose that repeats the one before to the last digit only the first is valid in the log that
     comes back: the others are no measurements. A log too short to tell its conventions (3 s of
@@ -107,22 +91,18 @@ def screen_for_estimate(log: FlightLog, vehicle: Vehicle) -> tuple[FlightLog, tu
     Args:
         log: the flight as it was read.
         vehicle: as declared.
+        least_seconds: of unbroken pose in flight that the log must have for a diagnosis; several
+            short logs of one vehicle may make up for one another. None: for an estimate.
 
     Returns:
-        The log, and notes: what spoils a part of the estimate, and which part.
+        The log, and notes: what is doubtful, but does not spoil a diagnosis; for an estimate what
+        spoils a part of it, and which part.
 
     Raises:
-        InputError: every number of an estimate would be wrong: other units or conventions than the
-            log declares, nothing flew, or no pose is another one.
-    """
-    return screened(log, vehicle, None)
-
-
-def screened(
-    log: FlightLog, vehicle: Vehicle, least: float | None
-) -> tuple[FlightLog, tuple[str, ...]]:
-    """Return a log without held poses, and notes, after all checks in their order; ``least`` is the
-    unbroken flight in s that a diagnosis needs, None for an estimate.
+        InputError: the log is too short, sampled too slowly, its pose lost too often, its clock
+            jumps, its pose leaps, nothing flew, or it follows another convention than it declares;
+            for an estimate, where every number of it would be wrong. The message names the file,
+            what was found and what to do.
     """
     source, by_imu = log.source or log.name or "log", reads_imu(log)
     notes: list[str] = []
@@ -130,7 +110,7 @@ def screened(
     def hear(findings: Findings) -> None:
         for text in findings:
             kind = type(text)
-            if kind is Refused or (kind is not Note and least is not None):
+            if kind is Refused or (kind is not Note and least_seconds is not None):
                 raise InputError(f"{source}: {text}")
             if kind is not Needed:
                 notes.append(str(text) if kind is Note else f"warning: {text}")
@@ -144,9 +124,9 @@ def screened(
             column[bad] = np.interp(log.t[bad], log.t[~bad], column[~bad])
         log = replace(log, rotor_speeds=speeds)
     if by_imu:
-        hear(_imu(log, vehicle, least or 0.0))
+        hear(_imu(log, vehicle, least_seconds or 0.0))
     else:
-        if least is not None:  # a filter predicts over steps of any length
+        if least_seconds is not None:  # a filter predicts over steps of any length
             hear(_uneven_steps(log))
         seen, same = np.flatnonzero(log.valid), np.zeros(len(log.t), np.bool_)
         pose = np.column_stack([log.position, log.quaternion])[seen]
@@ -154,7 +134,7 @@ def screened(
         hear(_held_pose(log, same))
         log = replace(log, valid=log.valid & ~same)
         hear(_pose_rate(log))
-    notes += stuck_notes(log, vehicle)
+    hear(stuck_channels(log, vehicle))
     others: list[Reading] = []
     if by_imu or _pieces(log):
         evidence = Evidence.of_log(excerpt([log])[0], vehicle, by_imu)
@@ -166,7 +146,7 @@ def screened(
         hear([Refused(f"{says}. As logged, the {whose}")])
     if not by_imu:
         hear(_steps(log))
-        hear([] if least is None else _length(log, vehicle, least))
+        hear([] if least_seconds is None else _length(log, vehicle, least_seconds))
     hear(Fault(reading.says) for reading in others[:1])
     return log, tuple(notes)
 
@@ -224,7 +204,7 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
     if doubt := time_doubt(float(np.median(np.diff(times)))):
         yield Refused(doubt)
     for i, column in enumerate(speeds.T):
-        if stopped := stretches(
+        if stopped := _stretches(
             (column == 0.0) & carrying(np.square(speeds).max(axis=1)), log.t, _STOPPED
         ):
             yield Fault(f"omega{i + 1} {zero}, for {stopped}; {all_four}")
@@ -289,7 +269,7 @@ def _held_pose(log: FlightLog, same: Mask) -> Findings:
     if log.t[seen[-1]] - log.t[seen[0]] > _NEVER and np.all(same[seen[1:]]):
         yield Refused("the pose never changes, to the last digit; expected the poses of a flight")
     fastest = np.square(log.rotor_speeds).max(axis=1)
-    if held := stretches((same & carrying(fastest))[seen], log.t[seen], _HELD):
+    if held := _stretches((same & carrying(fastest))[seen], log.t[seen], _HELD):
         yield Note(
             f"warning: the pose is frozen for {held}: it repeats to the last digit while the "
             "rotors turn. These rows count as without a pose"
@@ -386,3 +366,59 @@ def _length(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
         yield Refused(f"{words}; expected at least {least:g} s")
     if left < (1.0 - _LOST_SHARE) * whole:
         yield Note(words)
+
+
+def stuck_channels(log: FlightLog, vehicle: Vehicle) -> Findings:
+    """Note each channel that repeats to the last digit, for half a second or more in flight, while
+    the other channels of its kind change, as a hung sensor leaves it, and rotor speeds that stand
+    there twice, as a wrong column does.
+    """
+    rotors, seen = log.rotor_speeds, np.flatnonzero(log.valid)
+    aloft = np.square(rotors) @ vehicle.k > 0.3 * vehicle.weight
+    turning = (rotors > 0.0) & (rotors < (_AT_LIMIT * vehicle.omega_max or np.inf))
+    place, turn, flown = log.position[seen], log.quaternion[seen], aloft[seen]
+    for i in range(4):
+        others = np.delete(rotors, i, axis=1), "the other rotor speeds"
+        yield from _still(f"omega{i + 1}", log.t, aloft & turning[:, i], rotors[:, [i]], *others)
+    for i, axis in enumerate("xyz"):
+        others = np.delete(place, i, axis=1), "the other coordinates"
+        yield from _still(f"p{axis}", log.t[seen], flown, place[:, [i]], *others)
+    yield from _still("the attitude", log.t[seen], flown, turn, place, "the coordinates")
+    # in every row; a flight in one plane without noise has two such pairs
+    alike = [
+        (i + 1, j + 1)
+        for i, j in combinations(range(4), 2)
+        if np.count_nonzero(np.diff(rotors[:, i])) >= _SISTERS_CHANGE
+        and np.array_equal(rotors[:, i], rotors[:, j])
+    ]
+    if len(alike) == 1:
+        yield Note(
+            "warning: the columns omega{} and omega{} are the same in every row: if one is written "
+            "under both names, force and torque are wrong".format(*alike[0])
+        )
+
+
+def _still(name: str, t: Array, rows: Mask, channel: Array, sisters: Array, names: str) -> Findings:
+    """Note the stretches of rows (N,) in which a channel (N, k) stands still and its sisters
+    (N, m), called ``names``, do not.
+    """
+    still = np.append(False, np.all(np.diff(channel, axis=0) == 0.0, axis=1)) & rows
+    changes = np.cumsum(np.diff(sisters, axis=0, prepend=sisters[:1]) != 0.0, axis=0)
+    for first, end in runs_of(still):
+        if np.min(changes[end - 1] - changes[first]) < _SISTERS_CHANGE:
+            still[first:end] = False
+    if found := _stretches(still, t, _STILL):
+        wrong = "what depends on it there is wrong if its sensor hung"
+        yield Note(f"warning: {name} stands still for {found} while {names} change: {wrong}")
+
+
+def _stretches(rows: Mask, t: Array, least: float) -> str:
+    """Return the longest run of rows (N,) that lasts at least ``least`` s, and how many do, in
+    words; nothing where none does.
+    """
+    runs = [(float(t[end - 1] - t[first]), float(t[first])) for first, end in runs_of(rows)]
+    found = [run for run in runs if run[0] >= least]
+    if not found:
+        return ""
+    seconds, begin = max(found, key=lambda run: run[0])
+    return f"{seconds:.3g} s from t = {begin:.6g} s ({len(found)} such stretch(es))"

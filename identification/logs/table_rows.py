@@ -12,7 +12,6 @@ import numpy as np
 
 from ...runtime.errors import InputError
 from .channels import Samples
-from .clocks import check_piece, on_one_clock
 from .log_map import UNITS, Columns, LogMap
 from .table import Array, Mask, Rows, Table
 
@@ -28,13 +27,13 @@ _FEWEST = 10  # samples of a channel that tell in which rows it stands
 
 
 def rows_of(
-    table: Table, columns: Mapping[str, Array], log_map: LogMap, piece: int | None = None
+    table: Table, columns: Mapping[str, Array], log_map: LogMap
 ) -> tuple[Samples, list[str]]:
-    """Return what the map's columns hold, in the order of time, and notes.
+    """Return what the map's columns hold, as they were written, and notes.
 
     Raises:
         InputError: many times go back, they cannot be told apart, or are fewer than two; of whole
-            rows, one goes back, or a row lacks a number; or there is no such piece (``clocks``).
+            rows, one goes back, or a row lacks a number.
     """
     clock, is_whole = log_map.time, log_map.rows == "whole"
     notes = []
@@ -75,7 +74,6 @@ def rows_of(
         )
     samples = replace(samples, t=t)
     if is_whole:
-        check_piece(table.path, piece, 1)
         _check_whole(samples, log_map)
         stray, words = _stray_rows(t, log_map.stray_rows)
         return samples.cut(slice(stray, None)), notes + words
@@ -84,8 +82,7 @@ def rows_of(
         notes.append(f"{len(t) - len(first)} row(s) repeat a time and were joined to the one row")
         joined = {name: _last_of(column, first) for name, column in samples.columns.items()}
         samples = replace(samples.cut(np.append(first[1:], len(t)) - 1), columns=joined)
-    (samples,), words = on_one_clock(table.path, [samples], piece)
-    return samples, notes + words
+    return samples, notes
 
 
 def _refuse(samples: Samples, name: str, column: Array, bad: Mask, expected: str = _FINITE) -> None:
@@ -94,9 +91,9 @@ def _refuse(samples: Samples, name: str, column: Array, bad: Mask, expected: str
         i = int(np.argmax(bad))
         value = f"{column[i]:g}"
         found = {"nan": "empty or NaN", "inf": "infinite", "-inf": "infinite"}.get(value, value)
-        raise InputError(
-            f"{samples.path}: column {name}, {samples.place(i)} is {found}; expected {expected}"
-        )
+        assert samples.table is not None
+        where = f"{samples.table.path}: column {name}, {samples.place(i)}"
+        raise InputError(f"{where} is {found}; expected {expected}")
 
 
 def _check_whole(samples: Samples, log_map: LogMap) -> None:

@@ -4,9 +4,11 @@ A quadrotor is what this kit knows. Every reader fills the same form from what i
 one gate refuses what is none, before four of six motors are taken for a quadrotor's.
 """
 
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ...runtime.yaml_file import read_yaml
+from .column_names import words
 from .log_map import MAPS
 from .rotor_orders import Order
 from .table import Array
@@ -25,6 +28,9 @@ _ROTORS |= {"a decarotor": 10, "a dodecarotor": 12}
 PLUS = ((0.0, -1.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 0.0))
 _QUADRANTS = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))  # x forward, y left
 _APART = np.radians(30.0)  # by which a motor may stand off the rotor that it is
+# of a further rotor's column: share of its variance that the four leave, and its median by theirs
+_LEFT, _SIZES = 0.5, (0.5, 2.0)
+_FEWEST = 30  # rows that decide
 
 
 @cache
@@ -37,47 +43,31 @@ def airframes() -> dict[str, dict[Any, str]]:
 
 
 @dataclass(frozen=True)
-class RunningSettings:
-    """When an output beside the four motors runs as they do."""
-
-    level: float = 0.25  # of the span of the motors' range: how far its median is off theirs
-    moves: float = 0.02  # of that span: the least that it moves
-    correlation: float = 0.5  # with the mean of the four
-
-
-RUNNING = RunningSettings()
-
-
-@dataclass(frozen=True)
 class WhatFlew:
     """What a log states of its vehicle; empty and None: nothing."""
 
     airframe: str = ""  # in words, such as "a hexarotor"
     by: str = ""  # the parameter, message or header that says so
     rotors: int | None = None  # how many it has
-    running: int | None = None  # how many outputs run as motors do
     outputs: str = ""  # protocol and range of the motors' outputs, in words
 
-    def refusal(self) -> str:
-        """Return why the log is none of a quadrotor, as a sentence; empty where it may be one."""
+    def check(self, path: object) -> None:
+        """Check that a log is a quadrotor's.
+
+        Raises:
+            InputError: it states another vehicle.
+        """
         count = self.rotors if self.rotors is not None else _ROTORS.get(self.airframe)
         with_rotors = "" if count in (None, 4) else f" with {count} rotors"
         if self.airframe not in ("", QUADROTOR) or with_rotors:
-            what = self.airframe or "a vehicle"
-            return f"{self.by} says {what}{with_rotors}; expected a quadrotor"
-        if self.running not in (None, 4) and not self.airframe:
-            return (
-                f"{self.running} outputs run as motors do, so it is no quadrotor; expected four, "
-                "or a log that states a quadrotor"
-            )
-        return ""
+            what = f"{self.airframe or 'a vehicle'}{with_rotors}"
+            raise InputError(f"{path}: {self.by} says {what}; expected a quadrotor")
 
     def rows(self) -> list[tuple[str, str, str]]:
         """Return what is known, as rows of a table: what, its value, and what says it."""
         told = [
             ("airframe", self.airframe.partition(" ")[2], self.by),
             ("rotors", "" if self.rotors is None else str(self.rotors), self.by),
-            ("running", "" if self.running is None else f"{self.running} outputs", "their values"),
             ("outputs", self.outputs, ""),
         ]
         return [row for row in told if row[1]]
@@ -86,34 +76,53 @@ class WhatFlew:
 UNSTATED = WhatFlew()
 
 
-def check_flown(path: object, flown: WhatFlew) -> None:
-    """Check that a log is a quadrotor's.
-
-    Raises:
-        InputError: it states another vehicle, or other outputs than four run.
-    """
-    if why := flown.refusal():
-        raise InputError(f"{path}: {why}")
-
-
-def running(outputs: Array, motors: Sequence[int], low: float, high: float) -> int:
-    """Return how many outputs (N, k) run as the motors do.
+def more_rotors(
+    columns: Sequence[str],
+    others: Sequence[str],
+    read: Callable[[Sequence[str]], Mapping[str, Array]],
+    are_speeds: bool = False,
+) -> str:
+    """Return in words that a vehicle has more than four rotors; nothing where it has not: columns
+    go on with the numbers of four motors', and turn as they do. An output that is not a motor's by
+    name may be a servo's, and counts where it is a sum of the four: all are mixed of thrust, roll,
+    pitch and yaw.
 
     Args:
-        outputs: in any unit; NaN: not sent.
-        motors: which of them, from 0, are the four motors.
-        low: end of the motors' range, where they stand.
-        high: the other end.
+        columns: the four.
+        others: the columns that are there.
+        read: returns columns (N,) by their names.
+        are_speeds: the four are measured speeds, which no servo has.
+
+    Raises:
+        InputError: a table cannot be read.
     """
-    x = (np.nan_to_num(outputs, nan=low) - low) / (high - low)
-    mean = x[:, motors].mean(axis=1)
-    flying = mean > 0.5 * float(np.quantile(mean, 0.9))
-    x, mean, count = x[flying], mean[flying], len(motors)
-    for i in set(range(x.shape[1])) - set(motors) if len(x) > 1 else ():
-        near = abs(float(np.median(x[:, i])) - float(np.median(mean))) < RUNNING.level
-        moves = float(np.ptp(x[:, i])) > RUNNING.moves
-        count += near and moves and np.corrcoef(x[:, i], mean)[0, 1] > RUNNING.correlation
-    return int(count)
+    turning = [*columns]
+    for name in _numbered_on(columns, others):
+        rows = np.column_stack(list(read([*columns, name]).values()))
+        rows = rows[np.isfinite(rows).all(axis=1)]
+        if len(rows) < _FEWEST or np.ptp(rows[:, 4]) == 0.0:
+            continue
+        size = abs(float(np.median(rows[:, 4]) / max(np.median(np.abs(rows[:, :4])), 1e-12)))
+        moves = rows - rows.mean(axis=0)
+        left = np.linalg.lstsq(moves[:, :4], moves[:, 4])[1]
+        share = float(left[0] / np.sum(moves[:, 4] ** 2)) if len(left) else 0.0
+        is_motor = are_speeds or re.search(words()["motor_words"], name.lower())
+        if (is_motor or share < _LEFT) and _SIZES[0] <= size <= _SIZES[1]:
+            turning.append(name)
+    if len(turning) == len(columns):
+        return ""
+    return f"{len(turning)} rotors turn ({', '.join(turning)}); expected the four of a quadrotor"
+
+
+def _numbered_on(columns: Sequence[str], others: Sequence[str]) -> list[str]:
+    """Return which other columns differ from four in a number alone, the next ones up."""
+    for found in zip(*(re.finditer(r"\d+", name) for name in columns), strict=False):
+        if len({match[0] for match in found}) == len(columns):
+            first, last = found[0], max(int(match[0]) for match in found)
+            before, behind = first.string[: first.start()], first.string[first.end() :]
+            following = (f"{before}{n:0{len(first[0])}d}{behind}" for n in range(last + 1, 16))
+            return list(takewhile(others.__contains__, following))
+    return []
 
 
 def slots_of_motors(functions: Sequence[int], first: int) -> list[int]:

@@ -164,7 +164,7 @@ def _doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
             "no vehicle is given: units and frames were not checked against its rotors",
         ]
     try:
-        doubts += screen_log(log, vehicle)
+        doubts += screen_log(log, vehicle)[1]
     except InputError as error:
         where = f"{log.source}: "
         doubts.append(f"a diagnosis refuses it: {str(error).removeprefix(where)}")

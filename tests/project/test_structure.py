@@ -29,7 +29,7 @@ FLOOR = {room: height for height, rooms in enumerate(FLOORS) for room in rooms}
 STOREYS = (
     {"logs"},
     {"motion"},
-    {"logs.evidence", "logs.inertial", "logs.stuck_channels"},
+    {"logs.evidence", "logs.inertial"},
     {"logs.screening", "findings"},
     {"inertial_wrench"},
     {"wrench_series"},

@@ -22,9 +22,8 @@ from tests.support.paths import ROOT
 from tests.support.random_tables import fields_of, flight, random_table, save
 from windwrench.dynamics.vehicle_file import load_vehicle
 from windwrench.identification import read_log
-from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.map_guess import guess_map
-from windwrench.identification.logs.screening import screen_for_estimate, screen_log
+from windwrench.identification.logs.screening import LEAST_SECONDS, screen_log
 from windwrench.identification.logs.tables import is_table, open_table
 from windwrench.identification.report.log_check import check_log
 from windwrench.runtime.errors import InputError
@@ -182,25 +181,24 @@ def _hostile(name):
         vehicle = load_vehicle(log.vehicle)
     log = replace(log, source="flight.csv")
     said = {"diagnosis": {}, "estimate": {}}
-    for use, screen, kinds in (
-        ("diagnosis", screen_log, ("as it is", *HOSTILE)),
-        ("estimate", screen_for_estimate, ESTIMATED),
+    for use, least, kinds in (
+        ("diagnosis", LEAST_SECONDS, ("as it is", *HOSTILE)),
+        ("estimate", None, ESTIMATED),
     ):
         for kind in kinds:
             make, words = HOSTILE.get(kind, (lambda same: same, "^$"))
-            told = _screened(screen, make(log), vehicle, words)
+            told = _screened(make(log), vehicle, least, words)
             said[use].setdefault(told, []).append(kind)
     return said
 
 
-def _screened(screen, log, vehicle, words):
+def _screened(log, vehicle, least, words):
     """Return whether a log's convention was named, or the sentence by which it was refused."""
     try:
-        said = screen(log, vehicle)
+        notes = screen_log(log, vehicle, least)[1]
     except InputError as error:
         text = str(error).removeprefix("flight.csv: ")
         return "named" if re.search(words, text) else text
-    notes = said[1] if said and isinstance(said[0], FlightLog) else said
     return "named" if any(re.search(words, note) for note in notes) else "passed"
 
 

@@ -12,7 +12,6 @@ Betaflight, of DJI, and clockwise from front-right; X is assumed where the log d
 """
 
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -24,7 +23,7 @@ from ....runtime.errors import InputError
 from ..channels import Samples
 from ..clocks import in_order
 from ..flight_log import FlightLog
-from ..log_map import Commands, LogMap, recording_map
+from ..log_map import Commands, LogMap, shipped_map
 from ..mapped_log import recording_of
 from ..rotor_orders import ORDERS, Order, order_words
 from ..streams import MOST_VOLTS, Stream
@@ -34,9 +33,7 @@ from ..what_flew import (
     UNSTATED,
     WhatFlew,
     airframes,
-    check_flown,
     order_by_places,
-    running,
     slots_of_motors,
 )
 from .dataflash import BEGINS as BEGINS
@@ -61,7 +58,7 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
         InputError: the file is no such log, is not a quadrotor's, or lacks motors, or a pose and
             inertial sensors.
     """
-    log_map = recording_map("ardupilot")
+    log_map = shipped_map("recordings/ardupilot")
     messages, skipped = read_dataflash(path, {*log_map.topics, "PARM", "MSG", "MOT", "TIME"})
     if "StartTime" in messages.pop("TIME", {}):
         raise InputError(
@@ -70,7 +67,7 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
         )
     parameters = _parameters(messages.pop("PARM", {}))
     flown = _what_flew(parameters, messages.pop("MSG", {}))
-    check_flown(path, flown)
+    flown.check(path)
     pulses = messages.get("RCOU")
     if "MOT" in messages and pulses is None:
         raise InputError(
@@ -80,15 +77,13 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
     # Ch before Copter 3.4, Chan before 3.3
     letter = next((x for x in ("Ch", "Chan") if pulses is not None and f"{x}1" in pulses), "C")
     log_map, notes = _with_parameters(path, log_map, parameters, vehicle, letter)
-    if pulses is not None:
-        flown = replace(flown, running=_running(pulses, log_map))
     volts = messages.get("CURR", {}).get("Volt")
     if volts is not None and float(np.median(volts)) > MOST_VOLTS:
         messages["CURR"]["Volt"] = 0.01 * volts
         notes.append("CURR: hundredths of a volt, as Copter before 3.4 logged them")
     telemetry, telemetry_notes = _telemetry(messages.pop("ESC", {}), parameters)
     notes += telemetry_notes
-    columns = {*log_map.wanted, *_PLACE}
+    columns = {*log_map.wanted, *_PLACE, *(f"{letter}{i + 1}" for i in range(_CHANNELS))}
     groups = (_samples(name, rows, columns) for name, rows in messages.items())
     recorded = [samples for samples in groups if samples is not None]
     if skipped:
@@ -156,18 +151,6 @@ def _what_flew(parameters: Parameters, messages: Messages) -> WhatFlew:
         return WhatFlew(airframe, f"parameter FRAME_CLASS = {number}")
     motors = len({*_functions(parameters)} & {*range(_MOTOR1, _MOTOR1 + 8)})
     return WhatFlew("", "SERVOn_FUNCTION", motors) if motors else UNSTATED
-
-
-def _running(pulses: Messages, log_map: LogMap) -> int | None:
-    """Return how many outputs run as the motors do; None where the motors' are not there."""
-    sent = log_map.commands
-    assert sent is not None
-    assert sent.range is not None
-    names = [name for name in pulses if re.fullmatch(r"C(h|han)?\d+", name)]
-    if not set(sent.columns) <= set(names):
-        return None
-    outputs = np.column_stack([pulses[name] for name in names])
-    return running(outputs, [names.index(name) for name in sent.columns], *sent.range)
 
 
 def _functions(parameters: Parameters) -> list[int]:

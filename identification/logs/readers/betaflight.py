@@ -24,7 +24,7 @@ from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ..channels import Samples
 from ..flight_log import FlightLog
-from ..log_map import recording_map
+from ..log_map import shipped_map
 from ..mapped_log import recording_of
 from ..streams import MOST_VOLTS
 from ..table import Array, Table
@@ -55,7 +55,7 @@ def read(
             motors or inertial sensors.
     """
     _magnet_poles(path, option, "")  # a wrong option is said before a wrong file
-    wanted = [*recording_map("betaflight").wanted, *_MORE_MOTORS]
+    wanted = [*shipped_map("recordings/betaflight").wanted, *_MORE_MOTORS]
     headers, fields, notes = read_blackbox(path, wanted, piece)
     return _log(path, "betaflight", fields, set(), headers, option, vehicle, notes)
 
@@ -69,7 +69,7 @@ def read_table(
         InputError: the numbers are none of a blackbox.
     """
     path = table.path
-    wanted = {*recording_map("betaflight").wanted, *_MORE_MOTORS}
+    wanted = {*shipped_map("recordings/betaflight").wanted, *_MORE_MOTORS}
     scales, names = {}, {"time": "time (us)"}
     for name in table.header:
         field, _, unit = name.removesuffix(")").partition(" (")
@@ -99,7 +99,7 @@ def _log(
     Raises:
         InputError: no motors, or no gyro and accelerometer.
     """
-    log_map = recording_map("betaflight")
+    log_map = shipped_map("recordings/betaflight")
     t = 1e-6 * fields.pop("time")
     groups = {
         kind: [name for name in fields if name.startswith(kind) and name not in stated]

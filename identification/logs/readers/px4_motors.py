@@ -20,7 +20,6 @@ from ..what_flew import (
     WhatFlew,
     airframes,
     order_by_places,
-    running,
     slots_of_motors,
 )
 
@@ -113,7 +112,8 @@ def with_motors(log_map: LogMap, order: Order, parameters: Parameters, outputs: 
         f"f x^2 + (1 - f) x with THR_MDL_FAC f = {factor:g}; motors 1 to 4 at outputs "
         f"{', '.join(str(slot + 1) for slot in outputs.slots)}"
     )
-    sent = replace(sent, order=order, thrust_factor=factor, note=note)
+    columns = tuple(f"output[{slot}]" for slot in outputs.slots)
+    sent = replace(sent, columns=columns, order=order, thrust_factor=factor, note=note)
     return replace(
         log_map,
         rotors=replace(rotors, order=order),
@@ -134,11 +134,8 @@ def slots_of_escs(fields: Mapping[str, Array]) -> list[int]:
     return slots_of_motors(named, MOTOR1) or list(range(4))
 
 
-def outputs_of(
-    path: Path, sent: Sequence[Mapping[str, Array]], parameters: Parameters
-) -> tuple[Outputs, int | None]:
-    """Return which outputs the motors are, and what of them is 0 and 1; and how many outputs run as
-    motors do, None where none was sent.
+def outputs_of(path: Path, sent: Sequence[Mapping[str, Array]], parameters: Parameters) -> Outputs:
+    """Return which outputs the motors are, and what of them is 0 and 1.
 
     Args:
         path: the file, for errors.
@@ -153,24 +150,25 @@ def outputs_of(
         functions = [int(parameters.get(f"{prefix}{i + 1}", 0.0)) for i in range(_OUTPUTS)]
         if found := slots_of_motors(functions, MOTOR1):
             bank, slots = name, found
-    used = next((fields for fields in sent if _of_motors(fields, slots) is not None), None)
-    if used is None:
-        return _range(path, parameters, bank, slots, np.zeros((0, 4))), None
-    names = [f"output[{i}]" for i in range(_OUTPUTS)]
-    table = np.column_stack([used[name] for name in names if name in used])
-    outputs = _range(path, parameters, bank, slots, table[:, slots])
-    return outputs, running(table, slots, float(outputs.low.min()), float(outputs.high.max()))
+    each = (_of_motors(fields, slots) for fields in sent)
+    used = next((motors for motors in each if motors is not None), np.zeros((0, 4)))
+    return _range(path, parameters, bank, slots, used)
 
 
-def shares_of_motors(columns: Mapping[str, Array], outputs: Outputs) -> dict[str, Array]:
-    """Return what was sent to motors 1 to 4 (N,) as 0 to 1, in their order; nothing, where one of
-    the outputs never changes.
+def shares_of_outputs(columns: Mapping[str, Array], outputs: Outputs) -> dict[str, Array]:
+    """Return what was sent to each output (N,) as 0 to 1, of those that are no motors' in the
+    motors' range; nothing, where a motor's never changes.
     """
-    sent = _of_motors(columns, outputs.slots)
-    if sent is None:
+    if _of_motors(columns, outputs.slots) is None:
         return {}
-    shares = np.clip((sent - outputs.low) / (outputs.high - outputs.low), 0.0, 1.0)
-    return {f"output[{motor}]": share for motor, share in enumerate(shares.T)}
+    low, high = (np.full(_OUTPUTS, end) for end in (outputs.low.min(), outputs.high.max()))
+    low[outputs.slots], high[outputs.slots] = outputs.low, outputs.high
+    names = [f"output[{i}]" for i in range(_OUTPUTS)]
+    return {
+        name: np.clip((np.nan_to_num(columns[name]) - low[i]) / (high[i] - low[i]), 0.0, 1.0)
+        for i, name in enumerate(names)
+        if name in columns
+    }
 
 
 def _of_motors(columns: Mapping[str, Array], slots: Sequence[int]) -> Array | None:

@@ -27,16 +27,15 @@ from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import check_regular, open_regular
 from ..channels import Samples
 from ..flight_log import FlightLog
-from ..log_map import recording_map
+from ..log_map import shipped_map
 from ..mapped_log import recording_of
 from ..streams import Recording
 from ..table import Array
-from ..what_flew import check_flown
 from .px4_motors import (
     Outputs,
     motor_order,
     outputs_of,
-    shares_of_motors,
+    shares_of_outputs,
     slots_of_escs,
     what_flew,
     with_motors,
@@ -88,12 +87,12 @@ def channels(
     """
     topics, stated, is_damaged = read_ulog(path)
     flown = what_flew(stated, topics.pop(_STATUS, []))
-    check_flown(path, flown)
+    flown.check(path)
     parameters = stated if has_ranges else without_ranges(stated)
-    outputs, count = outputs_of(path, topics.get("actuator_outputs", []), parameters)
-    flown = replace(flown, running=count, outputs=outputs.words)
+    outputs = outputs_of(path, topics.get("actuator_outputs", []), parameters)
+    flown = replace(flown, outputs=outputs.words)
     order, order_note = motor_order(path, stated, vehicle)
-    log_map = with_motors(recording_map("px4"), order, parameters, outputs)
+    log_map = with_motors(shipped_map("recordings/px4"), order, parameters, outputs)
     notes = [*log_map.notes, order_note]
     if is_damaged:
         notes.append("the file is damaged or was cut; what could be read of it was used")
@@ -129,7 +128,7 @@ def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bo
     need("pyulog", "logs", path)
     from pyulog import ULog as Parser
 
-    wanted = recording_map("px4").topics | {_STATUS}
+    wanted = shipped_map("recordings/px4").topics | {_STATUS}
     check_regular(path, WHAT, LIMITS.ulog_file)
     try:
         # pyulog prints its doubts; the notes say them
@@ -177,7 +176,7 @@ def _samples(topic: str, fields: Fields, outputs: Outputs) -> Iterator[Samples]:
         return
     columns = {name: x for name, x in fields.items() if "timestamp" not in name}
     if topic == "actuator_outputs":
-        columns = shares_of_motors(columns, outputs)
+        columns = shares_of_outputs(columns, outputs)
     yield Samples(t, unified(topic, columns), topic)
 
 

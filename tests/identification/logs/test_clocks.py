@@ -91,19 +91,3 @@ def test_of_two_boots_the_longest_is_read_or_the_one_that_is_asked_for(tmp_path)
     assert any("piece 1, was read" in note for note in first.notes)
     with pytest.raises(InputError, match=r"two\.BIN: piece 3: it has 2; expected 1 to 2"):
         read_log(path, piece=3)
-
-
-def test_a_file_of_one_piece_has_no_second(tmp_path):
-    path = tmp_path / "flight.csv"
-    names = "t,px,py,pz,qw,qx,qy,qz,omega1,omega2,omega3,omega4"
-    rows = np.column_stack([T, np.zeros((600, 3)), np.ones(600), np.zeros((600, 3))])
-    np.savetxt(
-        path,
-        np.column_stack([rows, np.full((600, 4), 400.0)]),
-        "%g",
-        ",",
-        header=names,
-        comments="",
-    )
-    with pytest.raises(InputError, match="piece 2: it has 1"):
-        read_log(path, piece=2)

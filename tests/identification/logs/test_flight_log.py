@@ -59,6 +59,8 @@ def test_a_good_log_reads(path, rows):
     np.testing.assert_array_equal(log.rotor_speeds[0], 376.0)
     assert log.voltage is None
     assert log.force is None
+    with pytest.raises(InputError, match="piece 2: it has 1"):
+        read_log(path, piece=2)
 
 
 def test_a_short_gap_of_a_rotor_is_interpolated_and_counted(path, rows):
@@ -86,14 +88,22 @@ def change(rows, k, **fields):
     return rows
 
 
-def test_truth_comes_whole_or_not_at_all(path, rows):
+@pytest.mark.parametrize(
+    ("names", "section"),
+    [("fx, fy, fz", "force"), ("ax, ay, az", "accelerometer"), ("gx, gy, gz", "gyro")],
+)
+def test_three_columns_come_together(path, rows, names, section):
+    first, second, third = names.split(", ")
     for row in rows:
-        row["fx"] = "0"
-    with pytest.raises(InputError, match=r"'fy' of force \(all or none\), 'fz' of force"):
+        row |= {first: "0", third: "9.8"}
+    with pytest.raises(InputError, match=rf"'{second}' of {section} \(all or none\)"):
         read_log(write_text(path, rows))
     for row in rows:
-        row |= {"fy": "0", "fz": "0"}
-    with pytest.raises(InputError, match="force and torque come together; expected both"):
+        row[second] = "0"
+    change(rows, 2, **{second: ""})
+    words = f"column {second}, row 3 .* only {names} together may be"
+    words = "force and torque come together; expected both" if section == "force" else words
+    with pytest.raises(InputError, match=words):
         read_log(write_text(path, rows))
 
 
@@ -132,6 +142,26 @@ def test_a_gap_in_time_is_a_note(path, rows):
     assert log.notes == (
         "1 gap(s) in time; the longest is 1 s, at t = 0.09 s (median step 0.005 s)",
     )
+
+
+@pytest.mark.parametrize(
+    ("step", "message"),
+    [
+        (1e-310, "column t: the median time step is 1e-310 s"),
+        (1e-25, "column t: the median time step is 1e-25 s"),
+        (1e300, r"column t, row \d+: 1e\+300 s after the row before"),
+    ],
+)
+def test_times_of_no_flight_are_refused(path, rows, step, message):
+    for k in range(len(rows)):
+        change(rows, k, t=repr(step * k))
+    with pytest.raises(InputError, match=rf"flight\.csv: {message}"):
+        read_log(write_text(path, rows))
+
+
+@pytest.mark.parametrize("step", [1e-310, 1e-25, 1e-9])
+def test_one_short_step_is_a_flight_s(path, rows, step):
+    assert read_log(write_text(path, change(rows, 1, t=repr(step)))).t[1] == step
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from windwrench.dynamics import InputError, load_vehicle
+from windwrench.dynamics import load_vehicle
 from windwrench.identification.logs.flight_log import FlightLog, with_rows, write_log
 from windwrench.identification.logs.inertial import check_inertial
 from windwrench.identification.logs.reading import read_log
@@ -137,23 +137,3 @@ def test_a_sensor_faster_than_the_pose_has_rows_of_its_own(tmp_path):
     np.testing.assert_array_equal(read.gyro, log.gyro)
     thinned = with_rows(read, every)
     np.testing.assert_array_equal(thinned.accelerometer, log.accelerometer[every])
-
-
-@pytest.mark.parametrize("sensor", ["ax,ay,az", "gx,gy,gz"])
-def test_three_columns_come_together(tmp_path, sensor):
-    names = sensor.split(",")
-    path = tmp_path / "flight.csv"
-    write_log(flight(1.0), path)
-    header, *rows = path.read_text().splitlines()
-    at = header.split(",").index(names[1])
-    cut = [",".join(x for i, x in enumerate(row.split(",")) if i != at) for row in [header, *rows]]
-    path.write_text("\n".join(cut))
-    with pytest.raises(InputError, match=rf"no column '{names[1]}' of \w+ \(all or none\)"):
-        read_log(path)
-    fields = rows[2].split(",")
-    fields[at] = ""
-    path.write_text("\n".join([header, *rows[:2], ",".join(fields), *rows[3:]]))
-    with pytest.raises(
-        InputError, match=f"column {names[1]}, row 3 .* only {', '.join(names)} together may be"
-    ):
-        read_log(path)

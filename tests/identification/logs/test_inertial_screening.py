@@ -10,7 +10,7 @@ from tests.support.imu_flights import imu_flight, pose_removed
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.logs.flight_log import FlightLog, with_rows, write_log
 from windwrench.identification.logs.reading import read_log
-from windwrench.identification.logs.screening import screen_for_estimate, screen_log
+from windwrench.identification.logs.screening import screen_log
 from windwrench.identification.motion.inertial_signals import pose_rate, reads_imu
 from windwrench.runtime.errors import InputError
 
@@ -30,8 +30,8 @@ def test_a_log_without_a_pose_passes(flown: FlightLog) -> None:
     log = pose_removed(flown)
     assert reads_imu(log)
     assert not reads_imu(flown)
-    assert screen_log(log, VEHICLE) == ()
-    assert screen_for_estimate(log, VEHICLE)[1] == ()
+    assert screen_log(log, VEHICLE)[1] == ()
+    assert screen_log(log, VEHICLE, None)[1] == ()
 
 
 @pytest.mark.parametrize(
@@ -83,4 +83,4 @@ def test_positions_without_an_attitude_are_a_log(flown: FlightLog, tmp_path: Pat
     assert not back.has_pose
     assert pose_rate(back) == pytest.approx(10.0)
     np.testing.assert_allclose(back.position[::20], flown.position[::20], rtol=1e-9)
-    assert screen_log(back, VEHICLE) == ()
+    assert screen_log(back, VEHICLE)[1] == ()

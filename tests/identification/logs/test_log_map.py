@@ -147,18 +147,20 @@ def test_orders_are_what_their_names_say(name: str, words: str) -> None:
     assert rotor_order(list(ORDERS[name])) == ORDERS[name]
 
 
-def test_a_table_of_several_rates_has_the_rows_of_its_pose(tmp_path: Path) -> None:
-    """Pose at 50 Hz, rotors at 100 Hz in other rows, a voltage now and then."""
-    count = 80
+def apart(first: int, empty: str = "") -> dict[str, object]:
+    """Return 80 rows of a pose in every second row, from ``first`` on, and of rotors between."""
     pose = {
-        name: [value if k % 2 == 0 else "" for k in range(count)]
+        name: [value if k % 2 == first else "" for k in range(80)]
         for name, value in zip(("x", "y", "z", "qx", "qy", "qz", "qw"), "0010001", strict=True)
     }
-    rotors = {
-        f"m{i}": [f"{3600 + k}" if k % 2 else "NaN" for k in range(count)] for i in (1, 2, 3, 4)
-    }
-    volts = {"v": [f"{11 + 0.01 * k:.2f}" if k % 20 == 0 else "" for k in range(count)]}
-    path = table(tmp_path / "a.csv", {**pose, **rotors, **volts}, count)
+    speeds = [empty if k % 2 == first else f"{3600 + k}" for k in range(80)]
+    return {**pose, **dict.fromkeys(("m1", "m2", "m3", "m4"), speeds)}
+
+
+def test_a_table_of_several_rates_has_the_rows_of_its_pose(tmp_path: Path) -> None:
+    """Pose at 50 Hz, rotors at 100 Hz in other rows, a voltage now and then."""
+    volts = {"v": [f"{11 + 0.01 * k:.2f}" if k % 20 == 0 else "" for k in range(80)]}
+    path = table(tmp_path / "a.csv", {**apart(0, "NaN"), **volts}, 80)
     found = map_table(open_table(path), parse_map({**GOOD, "battery": {"column": "v"}}, "m"))
     assert found.valid.all()
     assert len(found.t) == 39  # from the rotors' first sample to their last
@@ -211,12 +213,7 @@ def test_channels_in_rows_of_their_own_meet_at_the_poses_times(
 
 def test_rows_of_one_time_are_one_row(tmp_path: Path) -> None:
     t = [f"{0.01 * (k // 2):.2f}" for k in range(80)]
-    pose = {
-        n: [v if k % 2 else "" for k in range(80)]
-        for n, v in zip(("x", "y", "z", "qx", "qy", "qz", "qw"), "0010001", strict=True)
-    }
-    rotors = {f"m{i}": ["" if k % 2 else "3600" for k in range(80)] for i in (1, 2, 3, 4)}
-    path = table(tmp_path / "a.csv", {"t": t, **pose, **rotors}, 80)
+    path = table(tmp_path / "a.csv", {"t": t, **apart(1)}, 80)
     found = map_table(open_table(path), parse_map(GOOD, "m"))
     assert len(found.t) == 40
     assert found.valid.all()

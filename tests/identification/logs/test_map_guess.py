@@ -15,10 +15,10 @@ from windwrench.identification.logs import table as table_module
 from windwrench.identification.logs.column_names import Group
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.log_map import parse_map
+from windwrench.identification.logs.magnitudes import motor_unit
 from windwrench.identification.logs.map_guess import Guess, guess_map
 from windwrench.identification.logs.map_text import map_yaml
 from windwrench.identification.logs.mapped_log import map_table
-from windwrench.identification.logs.motor_units import motor_unit
 from windwrench.identification.logs.tables import open_table
 from windwrench.runtime.errors import InputError
 

@@ -156,18 +156,14 @@ def test_places_on_the_globe_become_metres(read):
 
 @pytest.mark.parametrize(
     ("kind", "order"),
-    [(1, (3, 1, 0, 2)), (12, (3, 0, 2, 1)), (13, (3, 0, 1, 2)), (14, (3, 2, 1, 0))],
+    # 12 is rear-right, front-right, rear-left, front-left
+    [(1, (3, 1, 0, 2)), (12, (2, 3, 1, 0)), (13, (3, 0, 1, 2)), (14, (3, 2, 1, 0))],
 )
 def test_frame_types_number_their_motors(read, kind, order):
     """``order``: which of our rotors, from 0, each motor of the frame is."""
-    if kind == 12:  # rear-right, front-right, rear-left, front-left
-        order = (2, 3, 1, 0)
     log = read(parm(FRAME_TYPE=float(kind)), *POSE, rcou(T))
     sent = COMMAND[[3, 1, 0, 2]]  # by motor, as rcou has them
-    wanted = np.empty(4)
-    for motor, rotor in enumerate(order):
-        wanted[rotor] = sent[motor]
-    np.testing.assert_allclose(log.command[0], wanted, atol=1e-9)
+    np.testing.assert_allclose(log.command[0, list(order)], sent, atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -240,29 +240,6 @@ def test_messages_of_mavros(write, kind):
     assert any("/vrpn/drone/pose" in n and "chosen by its name before" in n for n in log.notes)
 
 
-def test_six_motors_of_mavros_are_refused(write):
-    share = np.array([*SHARE[THEIRS], *SHARE[:2]])
-
-    def fields(t):
-        pulses = 1000.0 + 1000.0 * share * growth(t)
-        return {"header": stamp(t), "channels": np.round(pulses).astype(np.uint16)}
-
-    topics = {"/pose": pose(), "/out": ("mavros_msgs/msg/RCOut", WIDE, fields)}
-    with pytest.raises(InputError, match=r"6 rotors turn \(channels\[0\], "):
-        read_log(write(topics))
-
-
-@pytest.mark.parametrize(
-    ("kind", "name"),
-    [("bag", "crazyswarm/msg/GenericLogData"), ("mcap", "crazyflie_interfaces/msg/LogDataGeneric")],
-)
-def test_numbers_that_a_crazyflie_logs_are_motors_where_the_map_says_so(write, kind, name):
-    logged = (name, WIDE, lambda t: {"header": stamp(t), "values": OURS * growth(t)})
-    said = "rotors: {topic: /cf1/motors, unit: rad/s}"
-    log = read_log(write({"/pose": pose(), "/cf1/motors": logged}, kind, said))
-    np.testing.assert_allclose(log.rotor_speeds[0], OURS, rtol=1e-6)
-
-
 def test_actuators_of_gazebo_and_a_named_order(write):
     path = write({"/pose": pose(), "/motors": actuators()})
     log = read_log(path)
@@ -387,18 +364,29 @@ def test_what_is_missing_is_named(write, kind, topics, expected, vehicle):
         read_log(write(topics, kind), "rosbag", vehicle)
 
 
+def logged(name):
+    return name, WIDE, lambda t: {"header": stamp(t), "values": OURS}
+
+
 @pytest.mark.parametrize(
-    ("line", "wanted"),
+    ("kind", "array", "line", "wanted"),
     [
-        ("rotors: {topic: /motors, unit: rad/s}", OURS),
-        ("rotors: {topic: /motors, unit: rev/s}", OURS * 2 * np.pi),
-        ("commands: {topic: /motors, unit: normalized, range: [0, 1000]}", SHARE),
+        ("mcap", numbers(OURS, "Float64"), "rotors: {topic: /m, unit: rad/s}", OURS),
+        ("mcap", numbers(OURS), "rotors: {topic: /m, unit: rev/s}", OURS * 2 * np.pi),
+        ("mcap", numbers(OURS), "commands: {topic: /m, unit: normalized, range: [0, 1000]}", SHARE),
+        ("bag", logged("crazyswarm/msg/GenericLogData"), "rotors: {topic: /m, unit: rad/s}", OURS),
+        (
+            "mcap",
+            logged("crazyflie_interfaces/msg/LogDataGeneric"),
+            "rotors: {topic: /m, unit: rad/s}",
+            OURS,
+        ),
     ],
 )
-def test_an_array_is_what_the_map_says(write, line, wanted, vehicle):
-    log = read_log(write({"/a": pose(), "/motors": numbers(OURS, "Float64")}, "mcap", line))
+def test_an_array_is_what_the_map_says(write, kind, array, line, wanted):
+    log = read_log(write({"/a": pose(), "/m": array}, kind, line))
     found = log.command if log.command is not None else log.rotor_speeds
-    np.testing.assert_allclose(found[0], wanted)
+    np.testing.assert_allclose(found[0], wanted, rtol=1e-6)
 
 
 def test_what_is_not_there_is_refused(tmp_path, vehicle):
@@ -449,26 +437,22 @@ def test_packed_chunks_are_unpacked_up_to_a_limit(way, write, vehicle, monkeypat
     assert reader.decompressors == before  # rosbags is left as it was
 
 
-@pytest.mark.parametrize("way", PACKED)
-def test_chunks_are_counted_over_the_whole_bag(way, write, vehicle, monkeypatch):
-    kind, packed = PACKED[way]
+CHUNKS = {"bag_unpacked": 20_000}, "its chunks unpack to more than 20000 bytes"
+
+
+@pytest.mark.parametrize(
+    ("kind", "packed", "limit", "expected"),
+    [
+        *((*way, *CHUNKS) for way in PACKED.values()),
+        ("bag", None, {"bag_index": 100}, "its index has more than 100 entries"),
+        ("mcap", None, {"table_rows": 10}, "topic /a: more than 10 messages; expected one flight"),
+    ],
+)
+def test_what_a_bag_holds_is_counted(kind, packed, limit, expected, write, vehicle, monkeypatch):
     path = write(FLIGHT, kind, packed=packed)
-    monkeypatch.setattr(unpacking, "LIMITS", replace(LIMITS, bag_unpacked=20_000))
-    with pytest.raises(InputError, match="its chunks unpack to more than 20000 bytes"):
-        read_log(path, "rosbag", vehicle)
-
-
-def test_the_index_of_a_bag_is_counted(write, vehicle, monkeypatch):
-    path = write(FLIGHT, "bag")
-    monkeypatch.setattr(unpacking, "LIMITS", replace(LIMITS, bag_index=100))
-    with pytest.raises(InputError, match="its index has more than 100 entries"):
-        read_log(path, "rosbag", vehicle)
-
-
-def test_messages_of_a_topic_are_counted(write, vehicle, monkeypatch):
-    path = write(FLIGHT, "mcap")
-    monkeypatch.setattr(rosbag, "LIMITS", replace(LIMITS, table_rows=10))
-    with pytest.raises(InputError, match="topic /a: more than 10 messages; expected one flight"):
+    for module in (unpacking, rosbag):
+        monkeypatch.setattr(module, "LIMITS", replace(LIMITS, **limit))
+    with pytest.raises(InputError, match=expected):
         read_log(path, "rosbag", vehicle)
 
 

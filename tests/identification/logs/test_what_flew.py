@@ -12,13 +12,13 @@ from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.flight_phases import flew
 from windwrench.identification.logs.reading import read_log
-from windwrench.identification.logs.what_flew import order_by_places, running
+from windwrench.identification.logs.what_flew import order_by_places
 from windwrench.identification.report.log_check import check_log
 
 T = 1.0 + 0.02 * np.arange(300)
 WAVES = np.sin(3.0 * T)[:, None] + 0.3 * np.sin(np.multiply.outer(T, np.arange(5.0, 13.0)))
 SHARES = 0.4 + 0.05 * WAVES  # (300, 8) of motors that answer one flight
-SERVOS = 0.5 + 0.2 * np.sin(np.multiply.outer(T, np.arange(5.0, 9.0)))  # that do not
+SERVOS = 0.5 + 0.2 * np.sin(np.multiply.outer(T, np.arange(14.0, 18.0)))  # that do not
 ARDRONE = load_vehicle("ardrone2")
 ARM = 0.18
 ENDS = [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]]
@@ -66,10 +66,10 @@ def test_px4_says_what_flew(px4, parameters, said):
 
 def test_outputs_that_run_say_it_where_nothing_else_does(px4):
     six = 1000.0 + 1000.0 * SHARES[:, :6]
-    with pytest.raises(InputError, match="6 outputs run as motors do"):
+    with pytest.raises(InputError, match=r"6 rotors turn \(output\[0\]"):
         read_log(px4(six))
     gimbal = np.column_stack([six[:, :4], 1000.0 + 1000.0 * SERVOS])
-    assert read_log(px4(gimbal)).flown.running == 4
+    assert len(read_log(px4(gimbal)).t) == len(T)
     assert len(read_log(px4(six, MAV_TYPE=2)).t) == len(T)  # the log's word counts
 
 
@@ -143,7 +143,7 @@ def ardupilot(tmp_path):
         ({"texts": ["APMrover2 V3"]}, "says a ground rover"),
         ({"FRAME_CLASS": 2.0}, "FRAME_CLASS = 2 says a hexarotor"),
         ({"FRAME_CONFIG": 1.0}, "FRAME_CONFIG says a submarine"),
-        ({"FRAME": 1.0, "count": 6}, "6 outputs run as motors do"),
+        ({"FRAME": 1.0, "count": 6}, r"6 rotors turn \(C1, "),
         ({f"SERVO{i}_FUNCTION": 32.0 + i for i in range(1, 7)}, "with 6 rotors"),
         ({"FRAME": 0.0}, "parameter FRAME is 0, a plus"),
     ],
@@ -177,14 +177,6 @@ def test_rotors_are_found_by_their_directions():
     assert order_by_places(plus, ARDRONE) is None
     assert order_by_places(plus, PLUS) == (3, 2, 4, 1)
     assert order_by_places([(1.0, 1.0)] * 4) is None
-
-
-def test_servos_do_not_run_as_motors_do():
-    four = range(4)
-    assert running(SHARES, four, 0.0, 1.0) == 8
-    assert running(np.column_stack([SHARES[:, :4], SERVOS]), four, 0.0, 1.0) == 4
-    still = np.column_stack([SHARES[:, :4], np.full(len(T), 0.4), np.full(len(T), np.nan)])
-    assert running(still, four, 0.0, 1.0) == 4
 
 
 def test_a_decoded_blackbox_of_six_motors_and_of_ten_times_the_volts(tmp_path):

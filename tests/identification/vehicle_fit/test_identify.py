@@ -89,7 +89,7 @@ def test_a_vehicle_of_rounded_speeds_reads_the_log_that_it_comes_from(crazyflie)
     found = identify([log], crazyflie.mass, parse_geometry(str(crazyflie.arm_l)))
     again = parse_vehicle(dump_vehicle(found.vehicle))
     assert again.omega_lsb == pytest.approx(step)
-    assert not any("reads" in note for note in screen_log(log, again))
+    assert not any("reads" in note for note in screen_log(log, again)[1])
     force = estimate_log(log, again).force
     assert np.abs(np.mean(force[len(force) // 2 :], axis=0)).max() < 0.02 * again.weight
     assert diagnose([log], again).declared.omega_lsb == again.omega_lsb
