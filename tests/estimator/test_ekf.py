@@ -135,7 +135,3 @@ def test_close_to_the_unscented_filter_over_a_yawing_flight():
 def test_close_to_the_unscented_filter_with_effects():
     pairs = both(VEHICLE.with_effects(*EFFECTS), yawing_flight(VEHICLE, 601, seed=4))
     assert_close(pairs[300:], 2e-3, 5e-5)
-
-
-def test_a_compiled_loop_steps_it_as_python_does():
-    assert WrenchEKF(VEHICLE).step_address != WrenchUKF(VEHICLE).step_address

@@ -125,13 +125,6 @@ def test_a_link_is_cut_where_there_is_no_joint_distribution():
     rauch_tung_striebel.link_back(P, C, np.full((18, 18), np.nan), G, K)
     assert not G.any()
 
-    ukf = WrenchUKF(VEHICLE, UKFTuning())
-    ukf.reset((0, 0, 1), (1, 0, 0, 0))
-    link = np.zeros(1, dtype=rauch_tung_striebel.LINK)[0]
-    z = np.array([*[VEHICLE.hover_rate] * 4, 0, 0, 1, 1, 0, 0, 0], dtype=float)
-    rauch_tung_striebel.step_with_link(ukf.record[0], z, 3, PERIOD, 0.0, link)
-    assert link["G"].any()
-
 
 @pytest.mark.parametrize("block", [1, 7])
 def test_blocks_change_nothing(block, monkeypatch):

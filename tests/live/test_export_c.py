@@ -159,7 +159,9 @@ def test_c_and_python_agree_with_an_imu(estimator, tmp_path):
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_compilers_find_nothing_to_say(estimator, compiler, tmp_path):
-    """With everything in it: effects, an offset centre of mass, a policy."""
+    """With everything in it: effects, an offset centre of mass, a policy. What gcc sees only as it
+    optimises is an error wherever ``CompiledFilter`` compiles.
+    """
     needs(compiler)
     model = load_vehicle("ardrone2")
     effects = ("rotor_drag", "motor_lag", "ground_effect", "com_offset", "attitude_gain")
@@ -175,9 +177,7 @@ def test_compilers_find_nothing_to_say(estimator, compiler, tmp_path):
         )
     ):
         folder = write(exported, tmp_path / str(number))
-        # clang finds what it says of before it optimises
-        how = ("-O1", "-c") if compiler == "gcc" and number < 2 else ("-fsyntax-only",)
-        run(compiler, *STRICT, *how, "windwrench_filter.c", "main.c", cwd=folder)
+        run(compiler, *STRICT, "-fsyntax-only", "windwrench_filter.c", "main.c", cwd=folder)
 
 
 def test_only_the_allowed_functions_of_libm_are_called(tmp_path):
@@ -198,7 +198,7 @@ def test_only_the_allowed_functions_of_libm_are_called(tmp_path):
 @pytest.mark.parametrize(
     ("estimator", "steps"),
     [
-        *(("constant-gain", 5_000), ("ekf", 10_000), ("ukf", 5_000)),
+        *(("constant-gain", 5_000), ("ekf", 5_000), ("ukf", 3_000)),
         *(pytest.param(e, 1_000_000, marks=pytest.mark.slow) for e in ESTIMATORS),
     ],
 )
@@ -319,7 +319,7 @@ def test_on_a_cortex_m4_it_says_the_same_within_its_limits(tmp_path):
         ("ukf", 16_384, 168_000),
     ):
         exported = export_c(vehicle_of(name), estimator)
-        board = firmware.fly(exported, flown, tmp_path / estimator, "-Os")
+        board = firmware.fly(exported, flown, tmp_path / estimator)
         assert abs(board.loop - 2_000) < 20
         assert board.code <= 40_960
         assert board.ram <= ram
