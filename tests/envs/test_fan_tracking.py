@@ -63,13 +63,6 @@ def test_an_episode_and_numpy_s_global_random_state_leave_each_other_alone():
     np.testing.assert_array_equal(np.random.random(3), expected)  # noqa: NPY002
 
 
-def test_what_is_there_to_be_drawn_does_not_change_the_flight():
-    np.testing.assert_array_equal(
-        fly_alone(FanTrackingEnv(render_mode="rgb_array"), 15, 3),
-        fly_alone(FanTrackingEnv(), 15, 3),
-    )
-
-
 @pytest.mark.parametrize(
     "path", [lambda t: 0.0, lambda t: t[:-1], lambda t: np.full_like(t, np.nan)]
 )

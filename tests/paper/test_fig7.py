@@ -75,27 +75,6 @@ def test_a_fan_beyond_the_bound_is_lost_and_a_slow_one_held():
     assert not fig7.holds(env, 18.0, fig7.ramp(0.7), 0)
 
 
-def test_as_many_seeds_are_flown_as_it_takes(monkeypatch):
-    def count(outcomes):
-        flown = []
-        monkeypatch.setattr(
-            fig7, "holds", lambda env, gain, path, seed: flown.append(seed) or outcomes[seed]
-        )
-        return fig7.enough_hold(None, 18.0, None, 10), flown
-
-    assert count([True] * 10) == (True, list(range(8)))
-    assert count([False, True, False, False]) == (False, [0, 1, 2, 3])
-    assert count([False, False] + [True] * 8) == (True, list(range(10)))
-
-
-def test_no_two_searches_share_a_seed(monkeypatch):
-    flown = []
-    monkeypatch.setattr(fig7, "holds", lambda env, gain, path, seed: bool(flown.append(seed)))
-    assert fig7.searches(None, 18.0, 0.5, 10) == (0.0,) * fig7.REPEATS
-    # all fail: three seeds a speed are enough to know
-    assert sorted(set(flown)) == [10 * r + k for r in range(fig7.REPEATS) for k in range(3)]
-
-
 def test_the_interval_is_student_s():
     low, high = fig7.interval([0.4, 0.5, 0.6, 0.5, 0.5])
     # a standard deviation of 0.0707 over five, 2.776 of its errors of the mean

@@ -2,14 +2,12 @@
 refused in clear words.
 """
 
-import json
 import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from windwrench.cli import app
 from windwrench.controllers.own_file import is_file_name, load_controller
 from windwrench.dynamics import InputError, effects, load_vehicle
 from windwrench.dynamics.effects import compile_effects, parse_setting
@@ -74,30 +72,6 @@ def test_a_subclass_is_one_too(laws):
         "        super().__init__(40.0)\n"
     )
     assert make_pilot(str(laws)).gain == 40.0
-
-
-def test_workers_fly_it(laws, tmp_path):
-    app(
-        [
-            "benchmark",
-            "--controllers",
-            f"{laws}:Left",
-            "--scenarios",
-            "static",
-            "--episodes",
-            "6",
-            "--jobs",
-            "2",
-            "--quiet",
-            "--out",
-            str(tmp_path / "out"),
-        ],
-        standalone_mode=False,
-    )
-    rows = json.loads((tmp_path / "out" / "leaderboard.json").read_text())
-    (row,) = rows
-    assert row["controller"] == f"{laws}:Left"
-    assert row["lost_fraction"] == 1.0  # it flies off to the left
 
 
 @pytest.mark.parametrize(
