@@ -33,7 +33,7 @@ from windwrench.live.export_c.precision import FUNCTIONS
 from windwrench.runtime.errors import InputError
 
 LARGEST = 0.01  # of a standard deviation
-QUICK, SLOW = 2_000, 20_000  # steps of each of five flights
+QUICK = 2_000  # steps of each of five flights
 POLICY = ROOT / "training" / "policies" / "sac-0.npz"
 
 
@@ -79,20 +79,6 @@ def test_in_double_c_and_python_are_the_same_numbers(estimator, tmp_path):
     assert worst["status"] == 0.0
     assert worst["restarts"] > 5
     assert max(worst[part] for part in (*PARTS, "std")) < 1e-6
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("estimator", "name"), COMBINATIONS)
-def test_c_and_python_agree_along_long_flights(estimator, name, tmp_path):
-    needs("gcc")
-    exported = export_c(vehicle_of(name), estimator)
-    c = CompiledFilter(exported, tmp_path)
-    flown = flight(name, SLOW, seed=1)
-    worst = compare(c, exported.filter, flown, 4)
-    assert worst["status"] == 0.0
-    # now and then a NIS comes so near to a bound that the two decide differently, and agree again
-    # later: the page counts how often
-    assert worst["over"] < 0.03
 
 
 @pytest.mark.parametrize("estimator", ["constant-gain", "ekf"])

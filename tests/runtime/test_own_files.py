@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from windwrench.controllers.own_file import is_file_name, load_controller
+from windwrench.controllers.own_file import is_file_name
 from windwrench.dynamics import InputError, effects, load_vehicle
 from windwrench.dynamics.effects import compile_effects, parse_setting
 from windwrench.evaluation.tasks import make_pilot
@@ -72,29 +72,6 @@ def test_a_subclass_is_one_too(laws):
         "        super().__init__(40.0)\n"
     )
     assert make_pilot(str(laws)).gain == 40.0
-
-
-@pytest.mark.parametrize(
-    ("text", "name", "words"),
-    [
-        (LAWS, "laws.py:Lef", "unknown controller 'Lef'.*Did you mean 'Left'"),
-        (
-            LAWS + LAWS.replace("Left", "Right"),
-            "laws.py",
-            r"holds Left, Right; expected one of them",
-        ),
-        (
-            LAWS + "class Plain:\n    pass\n",
-            "laws.py:Plain",
-            "Plain is no controller; expected a P",
-        ),
-        (LAWS.replace("speed=0.25", "speed"), "laws.py", "cannot be made without arguments"),
-    ],
-)
-def test_what_is_no_controller_is_named(text, name, words, tmp_path):
-    (tmp_path / "laws.py").write_text(text)
-    with pytest.raises(InputError, match=words):
-        load_controller(str(tmp_path / name))
 
 
 def test_a_folder_s_files_join_the_library(folder):

@@ -1,5 +1,6 @@
 """Vehicles identified from nothing but mass and logs."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,8 @@ from tests.identification.vehicle_fit.flown import (
     Y,
     inertial_flights,
 )
+from tests.support.alike import assert_alike
+from tests.support.golden_identification import GOLDEN, made, vehicles
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.dynamics.vehicle_file import dump_vehicle, parse_vehicle
@@ -64,6 +67,11 @@ def check(found, name, truth, within):
     assert estimate.low - 0.02 * truth < truth < estimate.high + 0.02 * truth
 
 
+def test_results_are_those_kept():
+    """All that identification says of made flights: predictions, changes and faults beside."""
+    assert_alike(json.loads(json.dumps(made())), json.loads(GOLDEN.read_text(encoding="utf-8")))
+
+
 def test_commanded_speeds_show_the_vehicle_and_its_lag(crazyflie, commanded):
     found = identify(commanded, crazyflie.mass, parse_geometry(str(crazyflie.arm_l)))
     check(found, "k", crazyflie.k[0], 0.05)
@@ -103,8 +111,8 @@ def test_a_hover_does_not_show_what_it_does_not_excite(crazyflie):
     parse_vehicle(dump_vehicle(found.vehicle))
 
 
-def test_an_imu_and_commands_are_enough(inertial):
-    found = identify([log for log, _ in inertial[:2]], MASS, parse_geometry(str(ARM)))
+def test_an_imu_and_commands_are_enough():
+    found = vehicles()["imu and commands"]
     assert found.sources.force == "accelerometer"
     hover = np.sqrt(MASS * 9.81 / (4 * K)) / FULL
     check(found, "hover command", hover, 0.05)
