@@ -17,7 +17,7 @@ from windwrench.paper.fig5_flights import NOISES
 SHORT = {  # seeds, settings, and constants of the figure's module
     "fig3": (1, {"seconds": 15.0}, {}),
     "fig4": (2, {"sweep": (0.5, 1.0)}, {}),
-    "fig5": (2, {"evaluations": 5}, {}),
+    "fig5": (2, {"evaluations": 1}, {}),
     "fig6": (1, {}, {}),
     "fig7": (
         3,

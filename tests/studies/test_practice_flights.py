@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.support.paths import ROOT
-from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import check_setting, get, names
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals
@@ -17,10 +17,6 @@ from windwrench.studies.trials.practice_flights import (
     SIZES,
     draw_effect,
     fly_practice,
-    practise,
-)
-from windwrench.studies.trials.rotorpy_flights import (
-    rotorpy_flight,
 )
 
 VEHICLE = load_vehicle("ardrone2")
@@ -93,27 +89,6 @@ def test_drawn_effects_are_in_range_and_grow_with_the_size(size):
             drawn = max(abs(value) for value in setting.coefficients.values())
             assert 0.8 * SIZES[size] <= drawn / typical * 1.0000001
             assert drawn / typical <= 1.2500001 * SIZES[size]
-
-
-def test_every_effect_and_every_disturbance_is_flown():
-    every = [("effect", name) for name in names()] + [("outsider", name) for name in OUTSIDERS]
-    flown = [
-        practise(VEHICLE, kind, (name,), "small", seed=i, seconds=0.2)
-        for i, (kind, name) in enumerate(every)
-    ]
-    assert {f.truth[0] for f in flown if f.truth} == set(names())
-    assert {f.outsider for f in flown if f.outsider} == set(OUTSIDERS)
-    assert len({f.name for f in flown}) == len(flown)
-    assert len({f.log.position.tobytes() for f in flown}) == len(flown)
-
-
-def test_without_rotorpy_the_message_says_what_to_install(monkeypatch):
-    from windwrench.studies.trials import rotorpy_flights
-
-    monkeypatch.setattr(rotorpy_flights, "available", lambda: False)
-    rotorpy_flights._parameters.cache_clear()
-    with pytest.raises(InputError, match="pip install rotorpy"):
-        rotorpy_flight("hover", 1.0)
 
 
 if __name__ == "__main__":
