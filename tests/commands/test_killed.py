@@ -17,18 +17,26 @@ from windwrench.identification.logs.flight_log import FlightLog, write_log
 from windwrench.runtime.whole_files import replaced
 
 START = "from windwrench.cli import main; main()"
-COMMANDS = {
-    "benchmark": "benchmark --controllers hover --scenarios static --jobs 2 --out out",
-    "estimate": "estimate flight.csv --no-tune --out out",
-}
+ESTIMATE = "estimate flight.csv --no-tune --out out"
+WORK = """
+import time
+from pathlib import Path
+from windwrench.runtime.workers import every
+
+def work(mark):
+    Path(mark).touch()
+    time.sleep(600.0)
+
+if __name__ == "__main__":
+    list(every(work, ["one", "two"], jobs=2))
+"""
 
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/stat").exists(), reason="looks for processes in Linux's /proc"
 )
 
 
-def start(folder, name, **options):
-    words = ["-c", START, *COMMANDS[name].split()]
+def start(folder, *words, **options):
     streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL} | options
     return subprocess.Popen([sys.executable, *words], cwd=folder, start_new_session=True, **streams)
 
@@ -79,22 +87,21 @@ def flight(tmp_path_factory):
     return path.read_bytes()
 
 
-def test_the_workers_of_a_killed_run_end_and_nothing_is_half_written(tmp_path):
-    run = start(tmp_path, "benchmark")
-    # the command, what tracks its resources, and two workers
-    while len(processes_of(run.pid)) < 4 and run.poll() is None:
+def test_the_workers_of_a_killed_run_end(tmp_path):
+    (tmp_path / "work.py").write_text(WORK)
+    run = start(tmp_path, "work.py")
+    while not ((tmp_path / "one").exists() and (tmp_path / "two").exists()):
+        assert run.poll() is None
         time.sleep(0.05)
-    # the command alone: what becomes of its workers is the question
-    os.kill(run.pid, signal.SIGKILL)
+    os.kill(run.pid, signal.SIGKILL)  # alone: what becomes of its workers is the question
     run.wait()
     assert_ends(run.pid)
-    assert list((tmp_path / "out").iterdir()) == []
 
 
 def test_a_reader_who_goes_away_costs_no_results(tmp_path, flight):
     """As a pipe to ``head`` does: what is written comes before what is said."""
     (tmp_path / "flight.csv").write_bytes(flight)
-    run = start(tmp_path, "estimate", stdout=subprocess.PIPE)
+    run = start(tmp_path, "-c", START, *ESTIMATE.split(), stdout=subprocess.PIPE)
     run.stdout.close()
     run.wait()
     assert {path.name for path in (tmp_path / "out").iterdir()} >= {"wrench.csv", "wrench.png"}

@@ -13,17 +13,11 @@ from windwrench.envs.vector import TaskVectorEnv
 from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF
 from windwrench.estimator.ekf import WrenchEKF
 from windwrench.estimator.reference import ReferenceUKF
-from windwrench.paper import NonlinearObserver
 
 VEHICLE = load_vehicle("ardrone2")
 HOVER = np.full(4, VEHICLE.hover_rate)
 POSE = [0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0]
-FILTERS = {
-    "ukf": WrenchUKF,
-    "ekf": WrenchEKF,
-    "constant-gain": ConstantGainFilter,
-    "observer": NonlinearObserver,
-}
+FILTERS = {"ukf": WrenchUKF, "ekf": WrenchEKF, "constant-gain": ConstantGainFilter}
 
 
 def test_a_turn_of_sixty_radians_a_second_is_the_reference_s():
