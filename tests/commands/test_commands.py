@@ -115,18 +115,6 @@ def test_a_scenario_of_one_s_own_is_a_file(call, tmp_path):
     assert 1.1 < env.drawn["mass"] < 1.2
     assert call("fly", "--scenario", path, "--json")[0] == 0
     assert call("benchmark", "--scenarios", path, "--dry-run")[0] == 0
-    for text, words in (
-        ("speed: [0.3, 0.2]", "speed must be two numbers that are not negative, the lower one fi"),
-        ("motions: [sin]", "motions must be a list of one or more of sine, triangle, ramp and st"),
-        ("spede: 1", "unknown key 'spede'; expected one of motions,"),
-        ("variation: {mass: [0, 1]}", "variation.mass must be two positive numbers, the lower"),
-    ):
-        path.write_text(text)
-        code, _, said = call("benchmark", "--scenarios", path)
-        assert (code, len(said.splitlines())) == (2, 1)
-        assert said.startswith(f"error: {path}: {words}")
-    path.write_text("gusts: -1")
-    assert "gusts must be two" in call("fly", "--task", "WindHover", "--scenario", path)[2]
 
 
 def test_results_go_into_a_folder_or_a_file_that_is_named(call, tmp_path):
@@ -156,16 +144,11 @@ def test_a_recorded_flight_can_be_estimated(call, log, tmp_path):
         f"out/{name}" for name in ("wrench.csv", "wrench.png", "tuning.yaml", "run.json")
     }
     wrench = np.genfromtxt(tmp_path / "out" / "wrench.csv", delimiter=",", names=True)
-    for ending in ("csv", "mcap", "rrd"):
+    for ending in ("mcap", "rrd"):
         track = tmp_path / f"track.{ending}"
         assert call("estimate", log, "--no-smooth", "--no-tune", "--out", track)[0] == 0
         beside = {"track.png", "track.tuning.yaml", "track.run.json", track.name}
         assert beside == {p.name for p in tmp_path.glob("track.*")}
-        if ending == "rrd":
-            reader = [sys.executable, "-m", "rerun", "rrd", "print", track]
-            printed = subprocess.run(reader, capture_output=True, text=True, check=True).stdout
-            assert "/force_x/estimated" in printed
-            assert "/world/vehicle" in printed
         for path in tmp_path.glob("track.*"):
             path.unlink()
     names = "t fx fy fz tx ty tz std_fx std_fy std_fz std_tx std_ty std_tz nis status"

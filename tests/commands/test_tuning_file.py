@@ -1,4 +1,4 @@
-"""A tuning as a file: the same again, for any period, and what a wrong one is told."""
+"""A tuning as a file: the same again, for any period; golden error lines refuse wrong ones."""
 
 from dataclasses import fields
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from windwrench.commands.tuning_file import load_tuning, save_tuning
-from windwrench.dynamics import InputError
 from windwrench.estimator import UKFTuning
 
 TRUE = UKFTuning(force_walk=(0.02, 0.02, 0.008), thrust_noise=0.3)
@@ -23,12 +22,3 @@ def test_a_tuning_is_kept_in_a_file_for_any_period(tmp_path):
     assert np.allclose(halved.force_walk, np.asarray(TRUE.force_walk) / 2**0.5)
     assert halved.thrust_noise == pytest.approx(0.3 * 2**0.5)
     assert halved.position_noise == TRUE.position_noise
-    for text, words in (
-        ("force_wlk: 1", "unknown field 'force_wlk'.*Did you mean 'force_walk'"),
-        ("force_walk: -1", "force_walk must be positive"),
-        ("- 1", "expected a mapping of fields"),
-    ):
-        path.write_text(text)
-        with pytest.raises(InputError, match=words) as caught:
-            load_tuning(path)
-        assert str(path) in str(caught.value)

@@ -86,15 +86,6 @@ def test_a_briefing_says_what_the_scenario_measures_with_and_no_more():
     assert varied.briefing().jet == standard.jet
 
 
-def test_only_the_limit_is_told_of_gusts():
-    gusty = FanTrackingEnv("gusty").briefing()
-    assert gusty.air.turbulence == 0.35
-    for make, told in ((Tracker, 0.10), (InformedTracker, 0.10), (Limit, 0.35)):
-        pilot = make(particles=10)
-        pilot.brief(gusty)
-        assert pilot._briefing.air.turbulence == told
-
-
 def test_the_limit_looks_ahead():
     """With the same beliefs and the trackers' command it is worse on fast fans."""
 

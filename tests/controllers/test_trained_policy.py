@@ -115,14 +115,12 @@ def test_a_cell_is_torch_s(name):
 @pytest.mark.parametrize(
     ("card", "weights", "words"),
     [
-        ({"activation": "gelu"}, {}, "activation"),
         ({"repeat": 0}, {}, "repeat"),
         (
             {"features": {"frame": ["torque_z"], "history": 2, "scale": [1.0]}},
             {},
             r"weight0 must have the shape \(1, 2\), got \(1, 1\)",
         ),
-        ({"features": {}}, {}, "lacks or spoils"),
         (
             {},
             {"weight1": np.zeros((1, 5), np.float32), "bias1": np.zeros(1, np.float32)},

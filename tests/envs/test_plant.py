@@ -155,13 +155,6 @@ def test_the_pose_s_scalar_part_is_never_negative_so_its_sign_flips_facing_backw
     np.testing.assert_allclose(np.linalg.norm(rows[:, 3:], axis=1), 1.0, atol=1e-14)
 
 
-@pytest.mark.parametrize("rate", [0.0, 0.05, 0.4])
-def test_dropouts_come_at_the_stated_rate(rate):
-    _, seen = sensed((1.0, 0.0, 0.0, 0.0), 4000, replace(QUIET, dropout=rate))
-    lost = np.mean(seen == 0)
-    assert abs(lost - rate) <= 4 * math.sqrt(rate * (1 - rate) / 4000)
-
-
 def test_the_filter_flies_on_through_dropouts():
     loop = ClosedLoop(VEHICLE, settings=PlantSettings(dropout=0.3))
     rng = np.random.default_rng(3)

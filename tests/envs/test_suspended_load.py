@@ -60,8 +60,3 @@ def test_reset_takes_the_load_off():
 def test_bad_numbers_are_named(bad):
     with pytest.raises(InputError, match=next(iter(bad))):
         SuspendedLoad(**bad)
-
-
-def test_nothing_to_hang():
-    with pytest.raises(InputError, match="load"):
-        ClosedLoop(VEHICLE).hang_load()

@@ -216,7 +216,6 @@ RATES = [(200, 50, 1), (500, 50, 1), (1000, 50, 1), (1000, 100, 10)]
 @pytest.mark.parametrize(
     ("kind", "vehicle", "rate", "pose_hz", "fine", "runs", "seconds"),
     [
-        (WrenchUKF, VEHICLE, 500, 50, 1, 25, 0.6),
         (WrenchUKF, OFFSET, 500, 50, 1, 25, 0.6),
         *(
             pytest.param(kind, VEHICLE, *rates, 100, 2.0, marks=pytest.mark.slow)

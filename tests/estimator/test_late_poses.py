@@ -158,23 +158,6 @@ def test_what_is_older_than_the_horizon_is_refused_and_changes_nothing():
     assert (timed.late, timed.too_late, timed.fused, timed.time) == (0, 0, None, 0.0)
 
 
-def test_it_says_what_a_late_pose_was_like_at_its_own_time():
-    flight = FLIGHTS["plain"]
-    timed, plain = TimedFilter(make(WrenchUKF, PLAIN)), make(WrenchUKF, PLAIN)
-    start(timed, flight)
-    plain.reset(flight["position"][0], flight["quaternion"][0])
-    for k in range(1, 21):
-        timed.predict(time(k), flight["rotors"][k])
-    pose = flight["position"][10], flight["quaternion"][10]
-    present = timed.correct(time(10), *pose)
-    for k in range(1, 11):
-        plain.predict(flight["rotors"][k], time(k) - time(k - 1))
-    np.testing.assert_array_equal(timed.fused.state, plain.correct(*pose).state)
-    assert np.isfinite(timed.fused.nis)
-    np.testing.assert_array_equal(present.state, timed.estimate.state)
-    assert timed.time == time(20)
-
-
 def test_what_is_wrong_is_named_and_changes_nothing():
     flight = FLIGHTS["plain"]
     timed = TimedFilter(make(WrenchUKF, PLAIN))

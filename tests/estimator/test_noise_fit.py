@@ -7,7 +7,6 @@ import pytest
 
 from tests.support.model_flights import simulate_model
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
-from windwrench.envs.recording import record_flight
 from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.estimator.consistency import chi2_band
 from windwrench.estimator.innovations import innovations, pieces_of
@@ -229,15 +228,3 @@ def test_a_walk_that_is_too_slow_shows_over_a_second_and_not_in_nis():
     assert np.mean([each.nis for each in found]) == pytest.approx(6.0, abs=0.1)
     assert all(each.too_slow for each in found)
     assert not any(consistency_of(VEHICLE, *flight(seed=s), tuning=TRUE).too_slow for s in range(5))
-
-
-def test_a_smooth_force_passes_for_a_slow_walk_until_the_fit():
-    """A linear drag on fast waves, which no random walk is: the default tuning is flagged."""
-    flown = record_flight(
-        VEHICLE, (EffectSetting("rotor_drag", {"kdx": 6e-5, "kdy": 6e-5}),), "fast", 20.0
-    )
-    log = [flown[name] for name in ("t", "rotor_speeds", "position", "quaternion")]
-    fit = fit_noise(VEHICLE, *log)
-    assert fit.before.nis < 6.0
-    assert fit.before.too_slow
-    assert fit.after.nis_over_second < fit.before.nis_over_second

@@ -79,14 +79,27 @@ def test_episodes_and_rows_are_those_that_were_kept(task, flown):
         assert_alike({key: row[key] for key in kept}, kept, name, *tolerance(name))
 
 
-def test_the_number_of_processes_changes_nothing(flown):
+OWN = """
+import numpy as np
+
+class Still:
+    def __call__(self, observation, info=None):
+        return np.zeros(2, dtype=np.float32)
+"""
+
+
+def test_the_number_of_processes_changes_nothing(flown, tmp_path):
+    """Nor whether a law is the kit's or in a file of a user's own."""
     names, results, _ = flown("FanTracking2D")
-    advanced = []
-    split = fly_all(["ratio"], ["base"], EPISODES, SEED, 2, advanced.append, task="FanTracking2D")
-    assert sum(advanced) == count_flights(["ratio"], ["base"], EPISODES, "FanTracking2D") == 8
-    assert set(split) == set(results)
-    for key, each in split.items():
-        assert [e.rmse for e in each] == [e.rmse for e in results[key]]
+    own, advanced = f"{tmp_path / 'laws.py'}:Still", []
+    (tmp_path / "laws.py").write_text(OWN)
+    laws = ["ratio", own]
+    split = fly_all(laws, ["base"], EPISODES, SEED, 2, advanced.append, task="FanTracking2D")
+    assert sum(advanced) == count_flights(laws, ["base"], EPISODES, "FanTracking2D") == 10
+    assert set(split) == {*results, (own, "base")}
+    for (name, scenario), each in split.items():
+        kept = results["hover" if name == own else name, scenario]
+        assert [e.rmse for e in each] == [e.rmse for e in kept]
     assert "ratio" in names
 
 

@@ -10,7 +10,7 @@ import math
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -39,14 +39,11 @@ from tests.support.map_tables import hover_columns, table_text, vehicle_of
 from tests.support.paths import ROOT
 from tests.support.sd_card_writer import sd_card, sd_card_before_2021
 from tests.support.ulog_writer import battery, control, esc, odometry, sensor_combined, ulog_bytes
-from windwrench.controllers import make_controller
 from windwrench.controllers.features import Features
 from windwrench.controllers.trained_policy import load_policy, save_policy
-from windwrench.dynamics.effects import names as effect_names
 from windwrench.dynamics.effects import parse_setting
 from windwrench.dynamics.vehicle import Vehicle
 from windwrench.dynamics.vehicle_file import dump_vehicle, load_vehicle, parse_vehicle
-from windwrench.envs.scenarios import SCENARIOS, find_scenario
 from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.identification.logs.flight_log import FlightLog, write_log
 from windwrench.identification.logs.map_guess import guess_map
@@ -55,9 +52,6 @@ from windwrench.identification.logs.readers import TABLES
 from windwrench.identification.logs.reading import finished, read_log
 from windwrench.identification.logs.tables import open_table
 from windwrench.identification.wrench_series import estimate_log
-from windwrench.runtime.errors import InputError
-from windwrench.runtime.yaml_file import parse_yaml
-from windwrench.training.configuration import load_config
 
 Array = NDArray[np.float64]
 Way = Callable[[bytes], st.SearchStrategy[bytes]]
@@ -217,42 +211,6 @@ def _use_vehicle(path: Path) -> None:
     ukf.step(np.full(4, min(vehicle.hover_rate, vehicle.omega_max)), [0, 0, 1], [1, 0, 0, 0])
 
 
-def _text(path: Path) -> str:
-    return path.read_bytes().decode("utf-8", "replace").strip("\n")
-
-
-def _use_effect(path: Path) -> None:
-    for line in _text(path).split("\n"):
-        parse_setting(line, _vehicle("ardrone2"))
-
-
-def _use_names(path: Path) -> None:
-    scenario, _, rest = _text(path).partition("\n")
-    controller, _, vehicle = rest.partition("\n")
-    find_scenario(scenario, SCENARIOS)
-    make_controller(controller)
-    load_vehicle(vehicle)
-
-
-def _use_tuning(path: Path) -> None:
-    """Make a tuning of whatever values a mapping holds, and let a filter use it."""
-    given = parse_yaml(_text(path), "tuning")
-    known = {f.name for f in fields(UKFTuning)}
-    if not isinstance(given, dict) or set(given) - known:
-        raise InputError(f"{path}: not the names of a tuning")
-    ukf = WrenchUKF(_vehicle("ardrone2"), UKFTuning(**given))
-    ukf.reset([0, 0, 1], [1, 0, 0, 0])
-    ukf.step([376] * 4, [0, 0, 1], [1, 0, 0, 0])
-
-
-def _configuration() -> bytes:
-    return (ROOT / "training" / "configs" / "sac.yaml").read_bytes()
-
-
-def _use_configuration(path: Path) -> None:
-    load_config("sac", file=path)
-
-
 @cache
 def _policy() -> dict[str, bytes]:
     """Return the files of a policy with one hidden layer."""
@@ -301,14 +259,6 @@ def _effects_of_vehicle() -> bytes:
         given = ", ".join(f"{k}: {v:g}" for k, v in setting.coefficients.items())
         text += f"- name: {name}\n  coefficients: {{{given}}}\n"
     return text.encode()
-
-
-def _effects() -> bytes:
-    lines = []
-    for name in effect_names()[::3]:
-        setting = parse_setting(name, _vehicle("ardrone2"))
-        lines.append(f"{name}:" + ",".join(f"{k}={v:g}" for k, v in setting.coefficients.items()))
-    return "\n".join(lines).encode()
 
 
 @cache
@@ -398,7 +348,6 @@ _BYTES = (spoiled_bytes,)
 _CELLS, _WORDS = (spoiled_table, spoiled_bytes), (spoiled_text, spoiled_bytes)
 _PARQUET = (_spoiled_parquet, spoiled_bytes)
 _BAGS = {"rosbag 1": "bag", "rosbag 2, SQLite": "db3", "rosbag 2, MCAP": "mcap"}
-_TUNING = b"torque_walk: 0.001\nposition_noise: [0.1, 0.1, 0.2]\nkappa: 2.0\n"
 
 
 def _form_of_log(
@@ -447,10 +396,6 @@ def forms() -> dict[str, Form]:
             *("table of other columns", "log.csv", _foreign_table, _CELLS, _use_foreign),
             ("check", "--out", "out", "--vehicle", "ardrone2"),
         ),
-        Form("effect settings", "effects.txt", _effects, _WORDS, _use_effect),
-        Form("names", "names.txt", lambda: b"base\nadmittance\nardrone2", _WORDS, _use_names),
-        Form("tuning", "tuning.yaml", lambda: _TUNING, _WORDS, _use_tuning),
-        Form("training configuration", "sac.yaml", _configuration, _WORDS, _use_configuration),
         Form(
             *("policy, weights", "policy.npz", lambda: _policy()["policy.npz"], _BYTES),
             *(_use_policy, scored, lambda: {"policy.json": _policy()["policy.json"]}),

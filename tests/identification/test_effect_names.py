@@ -9,7 +9,7 @@ import pytest
 
 from tests.support.alike import assert_alike
 from tests.support.imu_flights import imu_flight, pose_removed
-from tests.support.own_effects import copied, joined, renamed
+from tests.support.own_effects import renamed
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.identification.diagnosis import diagnose
@@ -72,25 +72,3 @@ def test_a_library_under_other_names_explains_the_same(name):
     order = {effect: i for i, effect in enumerate(names())}
     with renamed(lambda effect: f"law{order[effect]:02d}") as new:
         assert_alike(called_back(report(log), new), own)
-
-
-@pytest.mark.parametrize(
-    ("original", "own", "name"),
-    [
-        ("wind", "breeze", "wind"),
-        pytest.param("latency", "radio_delay", "late", marks=pytest.mark.slow),
-        pytest.param("slung_payload", "hanging_load", "load", marks=pytest.mark.slow),
-    ],
-)
-def test_a_users_own_law_is_found_as_the_kits_is(original, own, name, tmp_path):
-    copied(original, own, tmp_path)
-    log = flight(name)
-    with joined(tmp_path):
-        found = diagnose([log], VEHICLE, without=[original])
-    (effect,) = found.effects
-    assert effect.name == own
-    assert not effect.tentative
-    for key, value in FLIGHTS[name][1][original].items():
-        assert effect.coefficients[key] == pytest.approx(value, rel=0.1, abs=0.0 if value else 0.1)
-    # as of the kit's, no log of pose and rotor speeds tells a delay from a clock that is off
-    assert ("clock_offset" in effect.indistinguishable_from) == (name == "late")

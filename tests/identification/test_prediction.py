@@ -143,13 +143,6 @@ def test_predictions_start_where_a_whole_horizon_follows(clean):
     np.testing.assert_allclose(ahead, 0.005 * made.velocity[:, 1:], atol=2e-3)
 
 
-def test_a_missing_mass_falls_as_it_must():
-    """In hover 0.04 kg too little gives g dm / m of acceleration: half of that in a second."""
-    log = fly(EffectSetting("mass", {"dm": 0.04}), trajectory="hover")
-    expected = 0.5 * VEHICLE.gravity * 0.04 / VEHICLE.mass
-    assert rollout_error(log, VEHICLE, SEGMENTS) == pytest.approx(expected, rel=0.05)
-
-
 def test_only_whole_predictions_inside_a_segment_count(clean):
     push = replace(
         clean,

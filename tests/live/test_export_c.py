@@ -33,7 +33,7 @@ from windwrench.live.export_c.precision import FUNCTIONS
 from windwrench.runtime.errors import InputError
 
 LARGEST = 0.01  # of a standard deviation
-QUICK, SLOW = 2_000, 20_000  # steps of each of five flights
+QUICK = 2_000  # steps of each of five flights
 POLICY = ROOT / "training" / "policies" / "sac-0.npz"
 
 
@@ -79,20 +79,6 @@ def test_in_double_c_and_python_are_the_same_numbers(estimator, tmp_path):
     assert worst["status"] == 0.0
     assert worst["restarts"] > 5
     assert max(worst[part] for part in (*PARTS, "std")) < 1e-6
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("estimator", "name"), COMBINATIONS)
-def test_c_and_python_agree_along_long_flights(estimator, name, tmp_path):
-    needs("gcc")
-    exported = export_c(vehicle_of(name), estimator)
-    c = CompiledFilter(exported, tmp_path)
-    flown = flight(name, SLOW, seed=1)
-    worst = compare(c, exported.filter, flown, 4)
-    assert worst["status"] == 0.0
-    # now and then a NIS comes so near to a bound that the two decide differently, and agree again
-    # later: the page counts how often
-    assert worst["over"] < 0.03
 
 
 @pytest.mark.parametrize("estimator", ["constant-gain", "ekf"])
@@ -156,11 +142,13 @@ def test_c_and_python_agree_with_an_imu(estimator, tmp_path):
     assert e.imu_refused == python.imu_refused > 0
 
 
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
 @pytest.mark.parametrize("estimator", ESTIMATORS)
-def test_compilers_find_nothing_to_say(estimator, compiler, tmp_path):
-    """With everything in it: effects, an offset centre of mass, a policy."""
-    needs(compiler)
+def test_compilers_find_nothing_to_say(estimator, tmp_path):
+    """With everything in it: effects, an offset centre of mass, a policy. What gcc sees only as it
+    optimises is an error wherever ``CompiledFilter`` compiles.
+    """
+    needs("gcc")
+    compilers = [name for name in ("gcc", "clang") if not missing(name)]
     model = load_vehicle("ardrone2")
     effects = ("rotor_drag", "motor_lag", "ground_effect", "com_offset", "attitude_gain")
     model = model.with_effects(*(parse_setting(e, model) for e in effects))
@@ -175,9 +163,8 @@ def test_compilers_find_nothing_to_say(estimator, compiler, tmp_path):
         )
     ):
         folder = write(exported, tmp_path / str(number))
-        # clang finds what it says of before it optimises
-        how = ("-O1", "-c") if compiler == "gcc" and number < 2 else ("-fsyntax-only",)
-        run(compiler, *STRICT, *how, "windwrench_filter.c", "main.c", cwd=folder)
+        for compiler in compilers:
+            run(compiler, *STRICT, "-fsyntax-only", "windwrench_filter.c", "main.c", cwd=folder)
 
 
 def test_only_the_allowed_functions_of_libm_are_called(tmp_path):
@@ -198,7 +185,7 @@ def test_only_the_allowed_functions_of_libm_are_called(tmp_path):
 @pytest.mark.parametrize(
     ("estimator", "steps"),
     [
-        *(("constant-gain", 5_000), ("ekf", 10_000), ("ukf", 5_000)),
+        *(("constant-gain", 5_000), ("ekf", 5_000), ("ukf", 3_000)),
         *(pytest.param(e, 1_000_000, marks=pytest.mark.slow) for e in ESTIMATORS),
     ],
 )
@@ -319,7 +306,7 @@ def test_on_a_cortex_m4_it_says_the_same_within_its_limits(tmp_path):
         ("ukf", 16_384, 168_000),
     ):
         exported = export_c(vehicle_of(name), estimator)
-        board = firmware.fly(exported, flown, tmp_path / estimator, "-Os")
+        board = firmware.fly(exported, flown, tmp_path / estimator)
         assert abs(board.loop - 2_000) < 20
         assert board.code <= 40_960
         assert board.ram <= ram

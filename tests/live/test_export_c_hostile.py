@@ -14,17 +14,22 @@ SEEDS, MANY = (0, 1, 104), range(2, 86)  # 104: on 17 m away; 1,044 sequences in
 LARGEST = {"single": 0.05, "double": 1e-6}
 
 
-@pytest.mark.parametrize("seeds", [SEEDS, pytest.param(MANY, marks=pytest.mark.slow)], ids=len)
-@pytest.mark.parametrize("precision", LARGEST)
+COMBINATIONS = [
+    ("constant-gain", None, False, "double"),
+    ("constant-gain", 0.9999, False, "single"),
+    ("ekf", None, False, "single"),
+    ("ekf", 0.9999, True, "double"),
+    ("ukf", None, True, "single"),
+    ("ukf", 0.9999, False, "double"),
+]
+OTHERS = [(*given, *(LARGEST.keys() - {precision})) for *given, precision in COMBINATIONS]
+
+
 @pytest.mark.parametrize(
-    ("estimator", "gate", "imu"),
+    ("estimator", "gate", "imu", "precision", "seeds"),
     [
-        ("constant-gain", None, False),
-        ("constant-gain", 0.9999, False),
-        ("ekf", None, False),
-        ("ekf", 0.9999, True),
-        ("ukf", None, True),
-        ("ukf", 0.9999, False),
+        *((*given, SEEDS) for given in COMBINATIONS),
+        *(pytest.param(*given, MANY, marks=pytest.mark.slow) for given in (*COMBINATIONS, *OTHERS)),
     ],
 )
 def test_c_and_python_agree_along_hostile_sequences(

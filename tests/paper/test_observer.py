@@ -64,31 +64,6 @@ def test_steady_state_is_exact_after_a_rise_of_a_second():
         assert rise == pytest.approx(1.0, abs=0.02)
 
 
-def test_the_error_decays_exponentially_at_the_gain():
-    observer = NonlinearObserver(
-        VEHICLE, ObserverTuning(force_gain=(1.0, 2.0, 4.0), position_cutoff_hz=1000.0)
-    )
-    forces, _, _ = loaded_hover(observer, 400, np.array([0, 0, 0.5]), np.zeros(3))
-    t = PERIOD * np.arange(1, 401)
-    assert np.allclose(forces[:, 2], 0.5 * (1.0 - np.exp(-4.0 * t)), atol=2e-3)
-
-
-@pytest.mark.parametrize("cutoff", [0.5, 10.0, 2e4])
-def test_any_cutoff_is_stable_and_unbiased_in_motion(cutoff):
-    tuning = ObserverTuning(position_cutoff_hz=cutoff, attitude_cutoff_hz=cutoff)
-    observer = NonlinearObserver(VEHICLE, tuning)
-    observer.reset([0, 0, 1], [1, 0, 0, 0], None, [1.0, -0.5, 0.2], [0, 0, 2.0])
-    hover = np.full(4, VEHICLE.hover_rate)
-    for k in range(1, 2001):
-        t = k * PERIOD
-        e = observer.step(hover, [t, -0.5 * t, 1 + 0.2 * t], [np.cos(t), 0, 0, np.sin(t)])
-    assert np.allclose(e.velocity, [1.0, -0.5, 0.2], atol=1e-8)
-    assert np.allclose(e.angular_velocity, [0, 0, 2.0], atol=1e-3)
-    assert np.allclose(e.position, [t, -0.5 * t, 1 + 0.2 * t], atol=1e-7)
-    assert np.allclose(e.force, 0, atol=1e-8)
-    assert np.allclose(e.torque, 0, atol=1e-6)
-
-
 def test_a_yawing_flight_is_no_wrench():
     flight = yawing_flight(VEHICLE, 2501, sigma_position=0.0, sigma_attitude=0.0, substeps=6)
     clean = fly(NonlinearObserver(VEHICLE), flight)[1200:]

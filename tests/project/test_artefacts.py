@@ -9,7 +9,6 @@ from tests.support.paths import ROOT
 
 MOST = 5_400_000  # bytes, of all that git keeps of docs/ beside its films
 MOST_OF_FILMS = 3_000_000  # bytes, of these: a reader of README waits for them
-MOST_OF_A_FILE = 50_000  # bytes, of what should have been compressed
 PICTURES = {".png", ".gif", ".jpg", ".webp", ".mp4", ".svg"}
 PAGES_OF_COMMANDS = (  # a line that says how the page was made, once or once a section
     "reproduction.md",
@@ -49,15 +48,6 @@ def test_docs_are_small(tracked):
         assert sum(sizes.values()) <= most, [f"{p.name}: {sizes[p]}" for p in largest]
 
 
-def test_large_text_is_compressed(tracked):
-    found = [
-        path.relative_to(ROOT).as_posix()
-        for path in tracked
-        if path.suffix in (".svg", ".csv", ".jsonl") and path.stat().st_size > MOST_OF_A_FILE
-    ]
-    assert not found
-
-
 def test_a_figure_is_kept_once(tracked):
     pictures = [path for path in tracked if path.suffix in PICTURES]
     kept = [path.with_suffix("").as_posix() for path in pictures]
@@ -65,12 +55,6 @@ def test_a_figure_is_kept_once(tracked):
     contents = [path.read_bytes() for path in pictures]
     assert len(contents) == len(set(contents))
     assert {path.suffix for path in pictures} <= {".png", ".gif"}
-
-
-def test_data_is_compact(tracked):
-    for path in tracked:
-        if path.suffix == ".json":
-            assert not re.search(rb"\n\s|[,:\]}]\n.", path.read_bytes()), path
 
 
 def test_every_picture_and_data_file_is_used(tracked):

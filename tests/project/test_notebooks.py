@@ -60,6 +60,7 @@ def test_the_papers_law_stays_in_the_jet_and_hovering_does_not(run):
     assert rmse["admittance"] < 0.3 * rmse["hover"]
 
 
+@pytest.mark.slow  # a diagnosis names a drag in tests/identification, the other notebooks run here
 def test_the_diagnosis_of_a_log_names_what_was_added(run):
     names = run("your_log")
     found = names["found"]

@@ -2,15 +2,13 @@
 refused in clear words.
 """
 
-import json
 import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from windwrench.cli import app
-from windwrench.controllers.own_file import is_file_name, load_controller
+from windwrench.controllers.own_file import is_file_name
 from windwrench.dynamics import InputError, effects, load_vehicle
 from windwrench.dynamics.effects import compile_effects, parse_setting
 from windwrench.evaluation.tasks import make_pilot
@@ -74,53 +72,6 @@ def test_a_subclass_is_one_too(laws):
         "        super().__init__(40.0)\n"
     )
     assert make_pilot(str(laws)).gain == 40.0
-
-
-def test_workers_fly_it(laws, tmp_path):
-    app(
-        [
-            "benchmark",
-            "--controllers",
-            f"{laws}:Left",
-            "--scenarios",
-            "static",
-            "--episodes",
-            "6",
-            "--jobs",
-            "2",
-            "--quiet",
-            "--out",
-            str(tmp_path / "out"),
-        ],
-        standalone_mode=False,
-    )
-    rows = json.loads((tmp_path / "out" / "leaderboard.json").read_text())
-    (row,) = rows
-    assert row["controller"] == f"{laws}:Left"
-    assert row["lost_fraction"] == 1.0  # it flies off to the left
-
-
-@pytest.mark.parametrize(
-    ("text", "name", "words"),
-    [
-        (LAWS, "laws.py:Lef", "unknown controller 'Lef'.*Did you mean 'Left'"),
-        (
-            LAWS + LAWS.replace("Left", "Right"),
-            "laws.py",
-            r"holds Left, Right; expected one of them",
-        ),
-        (
-            LAWS + "class Plain:\n    pass\n",
-            "laws.py:Plain",
-            "Plain is no controller; expected a P",
-        ),
-        (LAWS.replace("speed=0.25", "speed"), "laws.py", "cannot be made without arguments"),
-    ],
-)
-def test_what_is_no_controller_is_named(text, name, words, tmp_path):
-    (tmp_path / "laws.py").write_text(text)
-    with pytest.raises(InputError, match=words):
-        load_controller(str(tmp_path / name))
 
 
 def test_a_folder_s_files_join_the_library(folder):

@@ -7,8 +7,7 @@ from windwrench.dynamics import load_vehicle
 from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.speed.contenders import HEADER, Contender, cells, measure
 from windwrench.speed.filters import PERIOD, PeerFilter, filters, flight, start
-from windwrench.speed.flights import flights
-from windwrench.speed.programs import decisions, logs, starts
+from windwrench.speed.programs import decisions, starts
 
 
 def test_medians_and_ratios_are_taken_round_by_round():
@@ -44,12 +43,4 @@ def test_filterpy_agrees_with_the_filter_that_it_is_timed_beside():
 @pytest.mark.parametrize("group", [filters, decisions, starts])
 def test_every_contender_runs(group):
     for figure in measure(group(), rounds=1):
-        assert figure.value[0] > 0, figure.contender.name
-
-
-@pytest.mark.slow
-def test_flights_and_logs_are_timed(tmp_path):
-    # crazyflow compiles for half a minute
-    found = [c for c in flights(8) if "crazyflow" not in c.name] + logs(tmp_path)
-    for figure in measure(found, rounds=1):
         assert figure.value[0] > 0, figure.contender.name

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from tests.support.paths import ROOT
-from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import check_setting, get, names
-from windwrench.envs.plant import is_a_body
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass
@@ -18,15 +17,6 @@ from windwrench.studies.trials.practice_flights import (
     SIZES,
     draw_effect,
     fly_practice,
-    of_mass,
-    practise,
-)
-from windwrench.studies.trials.rotorpy_flights import (
-    aero_settings,
-    available,
-    hummingbird_aero,
-    hummingbird_vehicle,
-    rotorpy_flight,
 )
 
 VEHICLE = load_vehicle("ardrone2")
@@ -36,10 +26,6 @@ CUTOFF, EDGE = 4.0, 200  # Hz, samples
 DISTURBANCES = sorted({**OUTSIDERS, **HELD_BACK})
 # sizes of each; ``python -m tests.studies.test_practice_flights`` writes them anew
 GOLDEN = ROOT / "tests" / "golden" / "disturbances.json"
-
-needs_rotorpy = pytest.mark.skipif(
-    not available(), reason="RotorPy is not installed (pip install rotorpy)"
-)
 
 
 def left_over(log, vehicle):
@@ -93,21 +79,6 @@ def test_the_same_seed_gives_the_same_log_and_another_one_another():
         assert not np.array_equal(getattr(logs[0], field), getattr(logs[2], field))
 
 
-def test_noise_and_turbulence_are_as_asked():
-    noisy, calm = (
-        fly_practice(VEHICLE, (), "hover", 6.0, 0, sensor=s, turbulence=u)
-        for s, u in ((2.0, 3.0), (0.5, 0.0))
-    )
-
-    def sigma(log):
-        return np.diff(log.position, axis=0).std() / np.sqrt(2)
-
-    assert sigma(noisy) == pytest.approx(2.0 * VEHICLE.mocap.sigma_pos_m, rel=0.1)
-    assert sigma(calm) == pytest.approx(0.5 * VEHICLE.mocap.sigma_pos_m, rel=0.1)
-    assert np.abs(calm.force).max() == 0.0
-    assert 0.5 < noisy.force.std() / (3 * 0.015 * WEIGHT / 4.5126) < 1.5
-
-
 @pytest.mark.parametrize("size", SIZES)
 def test_drawn_effects_are_in_range_and_grow_with_the_size(size):
     for name in names():
@@ -118,87 +89,6 @@ def test_drawn_effects_are_in_range_and_grow_with_the_size(size):
             drawn = max(abs(value) for value in setting.coefficients.values())
             assert 0.8 * SIZES[size] <= drawn / typical * 1.0000001
             assert drawn / typical <= 1.2500001 * SIZES[size]
-
-
-def test_every_effect_and_every_disturbance_is_flown():
-    every = [("effect", name) for name in names()] + [("outsider", name) for name in OUTSIDERS]
-    flown = [
-        practise(VEHICLE, kind, (name,), "small", seed=i, seconds=0.2)
-        for i, (kind, name) in enumerate(every)
-    ]
-    assert {f.truth[0] for f in flown if f.truth} == set(names())
-    assert {f.outsider for f in flown if f.outsider} == set(OUTSIDERS)
-    assert len({f.name for f in flown}) == len(flown)
-    assert len({f.log.position.tobytes() for f in flown}) == len(flown)
-
-
-@needs_rotorpy
-def test_rotorpy_s_hummingbird_is_told_in_our_conventions():
-    vehicle, preset = hummingbird_vehicle(eight_bit=True), load_vehicle("hummingbird")
-    np.testing.assert_allclose(vehicle.mixing, preset.mixing, rtol=1e-4)
-    np.testing.assert_allclose(vehicle.inertia, preset.inertia)
-    np.testing.assert_array_equal(vehicle.spin, preset.spin)
-    assert vehicle.mass == preset.mass
-    assert vehicle.omega_lsb == pytest.approx(1500.0 / 255)
-    assert vehicle.effects == ()
-    for setting in aero_settings():
-        check_setting(setting)
-    assert {"rotor_drag", "inflow_thrust", "translational_lift", "body_drag"} == set(
-        hummingbird_aero()
-    )
-
-
-@needs_rotorpy
-def test_the_library_s_effects_explain_rotorpy_s_flight():
-    vehicle, flight = hummingbird_vehicle(), rotorpy_flight("fast", 5.0, noise=0.0)
-    r, truth = left_over(flight, vehicle)
-    for axis in range(3):
-        assert np.corrcoef(r[:, axis], truth[:, axis])[0, 1] > 0.999
-    whole, _ = left_over(flight, vehicle.with_effects(*aero_settings()))
-    assert whole[:, :3].std(axis=0).max() < 0.01
-    assert whole[:, 3:].std(axis=0).max() < 2e-3
-    # each of them is needed
-    for left_out in range(4):
-        rest = [s for i, s in enumerate(aero_settings()) if i != left_out]
-        without, _ = left_over(flight, vehicle.with_effects(*rest))
-        assert without[:, :3].std(axis=0).max() > 0.02
-
-
-def test_without_rotorpy_the_message_says_what_to_install(monkeypatch):
-    from windwrench.studies.trials import rotorpy_flights
-
-    monkeypatch.setattr(rotorpy_flights, "available", lambda: False)
-    rotorpy_flights._parameters.cache_clear()
-    with pytest.raises(InputError, match="pip install rotorpy"):
-        rotorpy_flight("hover", 1.0)
-
-
-@pytest.mark.parametrize("mass", [0.1, 2.0])
-def test_a_vehicle_of_another_mass_hovers_with_rotor_tips_as_fast(mass):
-    like = load_vehicle("ardrone2")
-    vehicle = of_mass(like, mass)
-    tips = [v.hover_rate * v.rotor_radius for v in (like, vehicle)]
-    assert tips[1] == pytest.approx(tips[0])
-    # the density is the same, and so is the shape
-    assert vehicle.mass / vehicle.arm_l**3 == pytest.approx(like.mass / like.arm_l**3)
-    assert is_a_body(vehicle.inertia)
-    log = fly_practice(vehicle, seconds=4.0)
-    assert np.linalg.norm(log.force[:, :2], axis=1).max() < vehicle.weight / 10.0
-
-
-def test_a_loop_that_reads_a_gyro_sees_less_noise_than_its_log_holds():
-    vehicle = load_vehicle("ardrone2")
-    logs = [
-        fly_practice(vehicle, trajectory="hover", seconds=20.0, turbulence=3.0, seen=seen)
-        for seen in (1.0, 0.1)
-    ]
-    for log in logs:
-        jumps = np.diff(log.position, n=4, axis=0)
-        sigma = jumps.std() / np.sqrt(70.0)  # fourth differences of white noise
-        assert sigma == pytest.approx(vehicle.mocap.sigma_pos_m, rel=0.1)
-    # it holds its place better in the same gusts
-    away = [log.position[200:].std(axis=0).max() for log in logs]
-    assert away[1] < away[0]
 
 
 if __name__ == "__main__":

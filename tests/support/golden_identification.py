@@ -4,6 +4,7 @@ writes it anew after a change that is meant.
 
 import json
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -25,6 +26,8 @@ from windwrench.identification.vehicle_fit.identify import identify
 from windwrench.identification.vehicle_fit.report import identified_data
 
 GOLDEN = ROOT / "tests" / "golden" / "identification.json"
+CRAZYFLIE = load_vehicle("crazyflie")
+LAG = (EffectSetting("motor_lag", {"tau": 0.06}), EffectSetting("body_drag", {"dx": 0.02}))
 
 
 def failing_flight():
@@ -38,22 +41,31 @@ def failing_flight():
     return replace(log, accelerometer=force, gyro=rate)
 
 
-def made():
-    """Return all that is kept, as plain data."""
-    (one, speeds), (other, _) = inertial_flights(range(2))
-    crazyflie = load_vehicle("crazyflie")
-    lag = (EffectSetting("motor_lag", {"tau": 0.06}), EffectSetting("body_drag", {"dx": 0.02}))
-    columns = [record_flight(crazyflie, lag, name, 12.0, 1) for name in ("excite", "yaw")]
-    posed = [
+@cache
+def posed():
+    """Two flights of a Crazyflie with a lag and a drag that nobody declared."""
+    columns = [record_flight(CRAZYFLIE, LAG, name, 12.0, 1) for name in ("excite", "yaw")]
+    return [
         FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], name="posed")
         for c in columns
     ]
+
+
+@cache
+def vehicles():
+    """Vehicles identified from each kind of log."""
+    (one, speeds), (other, _) = inertial_flights(range(2))
     arm = parse_geometry(str(ARM))
-    vehicles = {
+    return {
         "imu and commands": identify([one, other], MASS, arm),
         "imu, commands and speeds": identify([replace(one, rotor_speeds=speeds)], MASS, arm),
-        "pose without an arm": identify(posed, crazyflie.mass, parse_geometry(None)),
+        "pose without an arm": identify(posed(), CRAZYFLIE.mass, parse_geometry(None)),
     }
+
+
+def made():
+    """Return all that is kept, as plain data."""
+    one = inertial_flights([0])[0][0]
     rng = np.random.default_rng(4)
     changes = {
         str(moved): compare(drawn(rng, 2, moved), drawn(rng, 3))
@@ -64,18 +76,18 @@ def made():
         "rotor": find_fault(channels_of_log(failing_flight())),
     }
     blocks = [(2.0, 6.0), (7.0, 11.0)]
-    models = {"plain": crazyflie, "with its effects": crazyflie.with_effects(*lag)}
+    models = {"plain": CRAZYFLIE, "with its effects": CRAZYFLIE.with_effects(*LAG)}
     return {
         "prediction": {
             name: [
                 f(log, model, blocks)
-                for log in posed
+                for log in posed()
                 for f in (rollout_error, nis_without_wrench_state)
             ]
             for name, model in models.items()
         },
-        "identified": {name: identified_data(v) for name, v in vehicles.items()},
-        "exports": {n: {k: f(v) for k, f in EXPORTS.items()} for n, v in vehicles.items()},
+        "identified": {name: identified_data(v) for name, v in vehicles().items()},
+        "exports": {n: {k: f(v) for k, f in EXPORTS.items()} for n, v in vehicles().items()},
         "changes": {name: change_data(change) for name, change in changes.items()},
         "faults": {name: fault_data(fault) for name, fault in faults.items()},
     }

@@ -1,6 +1,5 @@
 """Effects of a user's own, and the library under other names."""
 
-import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -38,15 +37,6 @@ EFFECT = Effect(
     # more
 )
 '''
-
-
-def copied(name: str, new: str, folder: Path) -> Path:
-    """Write the kit's own file of an effect as a user would have written it, under a new name."""
-    source = (Path(effects.__file__).parent / f"{name}.py").read_text(encoding="utf-8")
-    source = re.sub(r"from \.(\w+) import", r"from windwrench.dynamics.effects.\1 import", source)
-    path = folder / f"{new}.py"
-    path.write_text(source.replace(f'name="{name}"', f'name="{new}"'), encoding="utf-8")
-    return path
 
 
 def forget() -> None:

@@ -49,12 +49,10 @@ _SPEED_NAMES = {"rpm": "rpm{i}", "eRPM": "eRPM[{n}]"}
 
 @dataclass(frozen=True, eq=False)
 class Written:
-    """A table that was written: the flight, what its columns mean, and how it was laid out."""
+    """A table that was written: the flight, what its columns mean, and its text."""
 
     log: FlightLog
     log_map: LogMap
-    separator: str
-    decimal: str
     text: str
 
 
@@ -117,7 +115,7 @@ def random_table(log: FlightLog, rng: np.random.Generator, imu_only: float = 0.1
         separator = ";"
     decimal = pick((".", ",")) if separator != "," else "."
     text = _text(columns, separator, decimal, int(rng.integers(0, 4)))
-    return Written(log, LogMap(name="truth", **parts), separator, decimal, text)
+    return Written(log, LogMap(name="truth", **parts), text)
 
 
 def _distract(
@@ -242,51 +240,32 @@ def save(written: Written, path: Path) -> Path:
 
 def fields_of(m: LogMap) -> dict[Field, Any]:
     """Return what a map's fields mean, each once, however they are written."""
-    out: dict[Field, Any] = {
-        ("time", "column"): m.time.column,
-        ("time", "unit"): m.time.unit,
-    }
+    out: dict[Field, Any] = {("time", "column"): m.time.column, ("time", "unit"): m.time.unit}
     if m.position is not None:
-        out |= {
-            ("world", ""): m.world,
-            ("body", ""): m.body,
-            ("position", "columns"): m.position.columns,
-            ("position", "unit"): m.position.unit,
-        }
+        out |= {("world", ""): m.world, ("body", ""): m.body}
+    for section, *names in (
+        ("position", "columns", "unit"),
+        ("rotors", "unit", "pole_pairs"),
+        ("commands", "unit", "range"),
+        ("accelerometer", "columns", "unit"),
+        ("gyro", "columns", "unit"),
+    ):
+        part = getattr(m, section)
+        if part is None:
+            continue
+        out |= {(section, name): getattr(part, name) for name in names}
+        if isinstance(part, Rotors | Commands):
+            out[section, "columns"] = tuple(sorted(part.columns))
+            out[section, "order"] = tuple(part.columns[i - 1] for i in part.order)
+        if isinstance(part, Sensor):
+            out[section, "body"] = part.body or m.body
     if (a := m.attitude) is not None:
         out["attitude", "sense"] = a.sense
         if a.euler:
-            out |= {
-                ("attitude", "columns"): a.columns,
-                ("attitude", "euler"): a.euler,
-                ("attitude", "unit"): a.unit,
-                ("attitude", "signs"): a.signs or (1, 1, 1),
-            }
+            out |= {("attitude", name): getattr(a, name) for name in ("columns", "euler", "unit")}
+            out["attitude", "signs"] = a.signs or (1, 1, 1)
         else:
             out["attitude", "order"] = tuple(a.columns[a.order.index(x)] for x in "wxyz")
-    for name in ("rotors", "commands"):
-        part = getattr(m, name)
-        if part is not None:
-            out |= {
-                (name, "columns"): tuple(sorted(part.columns)),
-                (name, "unit"): part.unit,
-                (name, "order"): tuple(part.columns[i - 1] for i in part.order),
-            }
-            if isinstance(part, Rotors):
-                out[name, "pole_pairs"] = part.pole_pairs
-            if isinstance(part, Commands):
-                out[name, "range"] = part.range
-    for name in ("accelerometer", "gyro"):
-        part = getattr(m, name)
-        if part is not None:
-            out |= {
-                (name, "columns"): part.columns,
-                (name, "unit"): part.unit,
-                (name, "body"): part.body or m.body,
-            }
     if m.battery is not None:
-        out |= {
-            ("battery", "column"): m.battery.columns,
-            ("battery", "unit"): m.battery.unit,
-        }
+        out |= {("battery", "column"): m.battery.columns, ("battery", "unit"): m.battery.unit}
     return out

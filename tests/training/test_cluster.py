@@ -79,6 +79,7 @@ def cluster():
     ray.shutdown()
 
 
+@pytest.mark.slow  # a task that is done again, and a run that goes on where it stopped, are quick
 def test_runs_on_a_cluster_are_the_local_ones_though_a_worker_is_killed(cluster, tmp_path):
     pytest.importorskip(
         "stable_baselines3",

@@ -229,6 +229,7 @@ def test_keys_zoom_and_switches_in_a_browser(tmp_path, width, dark):
 
 
 @needs_browser
+@pytest.mark.slow  # of a minute it is quick
 def test_cursors_over_a_long_flight_say_one_time(tmp_path):
     trace = made_trace(400.0)  # of which each channel keeps other samples
     act = ACT.split('  await key("time-Fx", "Escape"')[0] + "  return out;"

@@ -29,42 +29,34 @@ class Measured:
     """What a filter needs on the microcontroller, and what it estimated there."""
 
     code: int  # bytes, of the filter's object: instructions and tables
-    tables: int  # bytes, of the tables alone
     ram: int  # bytes, of one ww_filter
     stack: int  # bytes, at most, of a call
     predict: Array  # (n,) instructions of each ww_predict
     correct: Array  # (n,) of each ww_correct_pose
-    imu: Array  # (n,) of each ww_correct_imu
     status: Array  # (n,)
     estimates: Array  # (n, 19)
     loop: int  # instructions that the timer saw in the loop of 2,000
-    policy: int = 0  # instructions of the longest ww_policy, where there is one
 
 
-def object_size(exported: Exported, folder: Path, optimise: str = "-O2") -> tuple[int, int]:
-    """Return the bytes of the filter's object on a Cortex-M4F, and those of its tables alone.
+def object_size(exported: Exported, folder: Path) -> int:
+    """Return the bytes of the filter's object on a Cortex-M4F.
 
     Raises:
         RuntimeError: it does not compile.
     """
     write(exported, folder)
-    options = ("-std=c99", optimise, "-fno-math-errno", "-Wall", "-Wextra", "-Werror", *_CPU)
+    options = ("-std=c99", "-Os", "-fno-math-errno", "-Wall", "-Wextra", "-Werror", *_CPU)
     run(TOOLS[0], *options, "-c", "windwrench_filter.c", "-o", "filter.o", cwd=folder)
-    said = run(TOOLS[1], "filter.o", cwd=folder)
-    sections = run(TOOLS[1], "-A", "filter.o", cwd=folder)
-    tables = sum(int(size) for size in re.findall(r"^\.rodata\S*\s+(\d+)", sections, re.M))
-    return int(said.splitlines()[1].split()[0]), tables
+    return int(run(TOOLS[1], "filter.o", cwd=folder).splitlines()[1].split()[0])
 
 
-def fly(
-    exported: Exported, flight: Mapping[str, Array], folder: Path, optimise: str = "-O2"
-) -> Measured:
+def fly(exported: Exported, flight: Mapping[str, Array], folder: Path) -> Measured:
     """Fly a filter along a flight on the board, at most some thousand steps.
 
     Raises:
         RuntimeError: a tool fails, or the program on the board does.
     """
-    sizes = object_size(exported, folder, optimise)
+    code = object_size(exported, folder)
     columns = [np.atleast_2d(flight[name].T).T for name in _COLUMNS if name in flight]
     rows = np.concatenate(columns, axis=1)
     unmeasured = "12345.678"  # a number that no flight has, where nothing was measured
@@ -77,7 +69,7 @@ def fly(
     )
     for name in ("bench.c", "mps2_an386.ld"):
         (folder / name).write_text((_FOLDER / name).read_text(encoding="utf-8"), encoding="utf-8")
-    options = ("-std=c99", optimise, "-fno-math-errno", *_CPU, "-nostartfiles", "-I.")
+    options = ("-std=c99", "-Os", "-fno-math-errno", *_CPU, "-nostartfiles", "-I.")
     run(
         *(TOOLS[0], *options, "bench.c", "filter.o", "-T", "mps2_an386.ld"),
         *("-o", "bench.elf", "-lm", "-lc", "-lgcc"),
@@ -90,10 +82,10 @@ def fly(
         *("-kernel", "bench.elf"),
         cwd=folder,
     )
-    return _read(said, *sizes)
+    return _read(said, code)
 
 
-def _read(said: str, code: int, tables: int) -> Measured:
+def _read(said: str, code: int) -> Measured:
     words = {name: int(value, 16) for name, value in re.findall(r"^(\w+) (\w{8}) $", said, re.M)}
     rows = [
         [int(word, 16) for word in line.split()[1:]]
@@ -105,14 +97,11 @@ def _read(said: str, code: int, tables: int) -> Measured:
     numbers = np.array(rows, dtype=np.uint32)
     return Measured(
         code,
-        tables,
         words["size"],
         words["stack"],
         numbers[:, 0].astype(float),
         numbers[:, 1].astype(float),
-        numbers[:, 2].astype(float),
         numbers[:, 3].astype(float),
         numbers[:, 4:].copy().view(np.float32).astype(float),
         round(words["loop"] * 5 / 8),
-        words.get("policy", 0),
     )

@@ -25,7 +25,7 @@ def hostile(vehicle: Vehicle, seed: int) -> dict[str, Array]:
     first = 100
     while first < STEPS:
         last = min(first + int(rng.integers(1, 120)), STEPS)
-        _befall(str(rng.choice(KINDS)), slice(first, last), position, quaternion, speeds, rng)
+        befall(str(rng.choice(KINDS)), slice(first, last), position, quaternion, speeds, rng)
         first = last + int(rng.integers(20, 200))
     quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
     quaternion *= rng.choice([-1.0, 1.0], (STEPS, 1))
@@ -40,8 +40,10 @@ def hostile(vehicle: Vehicle, seed: int) -> dict[str, Array]:
     return {name: values.astype(np.float32).astype(np.float64) for name, values in flown.items()}
 
 
-def _befall(kind: str, when: slice, x: Array, q: Array, W: Array, rng: np.random.Generator) -> None:
-    """Let something happen to positions (n, 3), quaternions (n, 4) or rotor speeds (n, 4)."""
+def befall(kind: str, when: slice, x: Array, q: Array, W: Array, rng: np.random.Generator) -> Array:
+    """Let something happen to positions (n, 3), quaternions (n, 4) or rotor speeds (n, 4); return
+    how far positions jump (3,), where they do.
+    """
     count = when.stop - when.start
     away = rng.standard_normal(3)
     away *= 10.0 ** rng.uniform(-2.0, 1.5) / np.linalg.norm(away)
@@ -64,3 +66,4 @@ def _befall(kind: str, when: slice, x: Array, q: Array, W: Array, rng: np.random
             values[when][rng.random((count, values.shape[1])) < 0.2] = np.nan
     elif kind in ("rotors", "off"):
         W[when] *= 0.0 if kind == "off" else rng.uniform(0.0, 1.5, (count, 4))
+    return away
