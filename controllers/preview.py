@@ -115,14 +115,18 @@ class _PreviewLaw:
     def _states(
         self, info: Mapping[str, Any], place: Wide, speed: Wide, pushed: Wide
     ) -> list[Wide]:
-        """Return the state of each axis; ``place``, ``speed`` and ``pushed`` (3,) are off, relative
-        to, and the acceleration of what is flown to.
+        """Return the state (..., n) of each axis; ``place``, ``speed`` and ``pushed`` (..., 3) are
+        off, relative to, and the acceleration of what is flown to.
         """
-        tilt = info["up"] / info["up"][2] - pushed / self.vehicle.gravity
+        tilt = info["up"] / info["up"][..., 2:] - pushed / self.vehicle.gravity
         turning, turned = tilting(info["rate"]), tilting(info["angular_acceleration"])
-        middle = [[tilt[i], turning[i], turned[i]] for i in (0, 1)]
-        middle.append([info["lift"] - pushed[2]])
-        return [np.array([place[i], speed[i], *middle[i], info["integral"][i]]) for i in (0, 1, 2)]
+        middle = [[tilt[..., i], turning[i], turned[i]] for i in (0, 1)]
+        middle.append([info["lift"] - pushed[..., 2]])
+        sums = info["integral"]
+        return [
+            np.stack([place[..., i], speed[..., i], *middle[i], sums[..., i]], axis=-1)
+            for i in (0, 1, 2)
+        ]
 
 
 @lru_cache(maxsize=16)
@@ -166,11 +170,14 @@ class WindOracle(_PreviewLaw):
         """Return the models with an acceleration beside the flight loop's own as input."""
         return [axis.held(WIND_PERIOD) for axis in axis_models(vehicle)]
 
-    def _look(self, o: Wide, info: Mapping[str, Any]) -> tuple[list[Wide], list[Wide]]:
+    def states(self, o: Wide, info: Mapping[str, Any]) -> list[Wide]:
+        """Return the state (..., n) of each axis for observations (..., 27) and what is true."""
         place = info["position"] - info["reference"]
-        speed = info["velocity"] - o[REFERENCE_VELOCITY]
-        states = self._states(info, place, speed, o[REFERENCE_ACCELERATION])
-        return states, pushing(
+        speed = info["velocity"] - o[..., REFERENCE_VELOCITY]
+        return self._states(info, place, speed, o[..., REFERENCE_ACCELERATION])
+
+    def _look(self, o: Wide, info: Mapping[str, Any]) -> tuple[list[Wide], list[Wide]]:
+        return self.states(o, info), pushing(
             info["wrench_ahead"] + lasting(info["disturbance"], self.foresight, WIND_PERIOD)
         )
 

@@ -237,10 +237,12 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
     @property
     def _states(self) -> Array:
         """Estimated states (num_envs, 20)."""
-        states: Array = np.moveaxis(self._motion.state, 1, 2).reshape(
-            -1, self._motion.state.shape[1]
-        )
-        return states[: self.num_envs]
+        return self._rows(self._motion.state)
+
+    def _rows(self, values: Array) -> Array:
+        """Return values (rows, size, lanes) of the vehicles as (num_envs, size)."""
+        rows: Array = np.moveaxis(values, 1, 2).reshape(-1, values.shape[1])
+        return rows[: self.num_envs]
 
     def _look(self, which: Flags) -> None:
         """Write frames and values of some environments, as their task has them."""

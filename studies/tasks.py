@@ -13,6 +13,7 @@ def page() -> dict[str, Any]:
     return {
         "tasks": tasks,
         "hover": _by_name(tasks["WindHover"]),
+        "trajectory": _by_name(tasks["WindTrajectory"]),
         "fan": _by_name(tasks["FanTracking2D"]),
     }
 

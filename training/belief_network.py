@@ -15,6 +15,7 @@ Array = NDArray[np.float32]
 CELLS: dict[str, Any] = {"lstm": torch.nn.LSTM, "gru": torch.nn.GRU}
 _SURE, _UNSURE = -4.0, 1.5  # bounds of what it may say of a logarithmic standard deviation
 _MIRRORED = 0.5  # share of the episodes
+_SMALLEST = 1.4e-3  # of what is seen, in its scales, that counts
 _STEEPEST = 1.0  # norm to which a gradient is cut
 
 
@@ -52,6 +53,7 @@ class BeliefNetwork(torch.nn.Module):
     ) -> None:
         super().__init__()
         self.taught, self._name = taught, cell
+        self._white: tuple[torch.Tensor, torch.Tensor] | None = None
         make_cell = CELLS.get(cell)
         self.cell = None if make_cell is None else make_cell(quantities, state)
         if cell == "lstm":  # it begins by keeping what it has, or it never learns to keep it long
@@ -66,6 +68,9 @@ class BeliefNetwork(torch.nn.Module):
         """Return means and logarithmic deviations (decisions, episodes, taught) and the cell's
         state for frames (decisions, episodes, quantities).
         """
+        if self._white is not None:
+            turn, mean = self._white
+            frames = (frames - mean) @ turn
         remembered = frames
         if self.cell is not None:
             remembered, state = self.cell(frames, state)
@@ -73,13 +78,33 @@ class BeliefNetwork(torch.nn.Module):
         deviations = said[..., self.taught :].clamp(_SURE, _UNSURE)
         return said[..., : self.taught], deviations, state
 
+    def whiten(self, seen: Array) -> None:
+        """Let the cell see frames whose quantities are not correlated and of size 1, as they are in
+        ``seen`` (decisions, episodes, quantities): a small difference of two of them counts as much
+        as their sum. The policy has it in the weights of its cell.
+        """
+        flat = seen.reshape(-1, seen.shape[-1]).astype(np.float64)
+        sizes, axes = np.linalg.eigh(np.cov(flat.T))
+        turn = (axes / np.sqrt(sizes + _SMALLEST**2)) @ axes.T
+        self._white = (
+            torch.from_numpy(np.float32(turn)),
+            torch.from_numpy(np.float32(flat.mean(axis=0))),
+        )
+
     def policy_weights(self, shares: Array) -> Weights:
         """Return the weights of the policy that commands ``shares`` (axes, taught) of the means."""
         weights = dense_weights(self.dense)
         last = layers_of(weights) - 1
         for name in (f"weight{last}", f"bias{last}"):
             weights[name] = shares @ weights[name][: self.taught]
-        return weights if self.cell is None else cell_weights(self._name, self.cell) | weights
+        if self.cell is None:
+            return weights
+        weights |= cell_weights(self._name, self.cell)
+        if self._white is not None:
+            turn, mean = (x.numpy() for x in self._white)
+            seen = weights[f"{self._name}_input"] = weights[f"{self._name}_input"] @ turn
+            weights[f"{self._name}_input_bias"] -= seen @ mean
+        return weights
 
 
 def fit(

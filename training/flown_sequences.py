@@ -31,8 +31,8 @@ class FanLesson:
     def __init__(self, config: Config) -> None:
         self._config, self._features = config, features_of(config)
 
-    def begin(self, count: int) -> None:
-        """Start ``count`` episodes."""
+    def begin(self, envs: Any, leads: bool) -> None:
+        """Start an episode in each of ``envs``; ``leads``: the teacher flies."""
         self._history: History | None = None
         self._known: list[Array] = []
 
@@ -126,7 +126,7 @@ class Flights:
         seen, kept = [], [flying]
         seeds = [training_seed(self._seed, 0, self.episodes + i) for i in range(n)]
         observation, infos = env.reset(seed=seeds)
-        lesson.begin(n)
+        lesson.begin(env, network is None)
         for k in range(lesson.decisions):
             frames, command = lesson.look(observation, infos)
             seen.append(frames)

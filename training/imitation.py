@@ -39,6 +39,7 @@ def rounds(
     config: Config,
     seed: int,
     mirrored: Array | None,
+    whitened: bool = False,
 ) -> Iterator[bool]:
     """Fly and fit round after round; yield after each whether the round was the last.
 
@@ -49,12 +50,16 @@ def rounds(
         config: ``rounds``, ``epochs``, ``last_epochs``, ``batch_size`` and ``learning_rate``.
         seed: of the order of the episodes.
         mirrored: as of ``belief_network.fit``.
+        whitened: whether the network sees frames as ``BeliefNetwork.whiten`` has them, by the
+            first round.
     """
     order, rate = torch.Generator().manual_seed(seed), config["learning_rate"]
     for number in range(config["rounds"]):
         flights.fly(None if number == 0 else network, shares)
         last = number == config["rounds"] - 1
         flown = flights.sequences()
+        if whitened and number == 0:
+            network.whiten(flown.seen)
         fit(
             network,
             flown if network.cell else flown.single_decisions(),

@@ -1,14 +1,16 @@
-"""Policies of the tasks beside ``FanTracking``: a GRU that is taught by a law that knows, and SAC.
+"""Policies of the tasks beside ``FanTracking``: a GRU that is taught by who knows, and SAC.
 
 ``python -m windwrench.training.task_policies --task WindHover --kind gru --seed 0 --out FOLDER``.
 
-``gru`` is imitation with a memory (``imitation``): the task's oracle says of every decision what it
-would do; in ``FanTracking2D`` the simulator says where the fan is and how it moves. ``sac`` is that
-of stable-baselines3 on the task's version 1.
+``gru`` is imitation with a memory (``imitation``): in the wind it is taught what would have been
+best in view of all that came (``hindsight``), in a mix of scenarios or in one of them; in
+``FanTracking2D`` the simulator says where the fan is and how it moves. ``sac`` is that of
+stable-baselines3 on the task's version 1. Beside the wind all learn on ``base``.
 """
 
 import argparse
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,14 +27,20 @@ from ..evaluation.tasks import TASKS
 from .belief_network import BeliefNetwork
 from .configuration import load_config
 from .flown_sequences import Flights
+from .hindsight import WindLesson, mix_of
 from .imitation import rounds as taught_in_rounds
 from .learners import make_learner, weights_of
 from .run import origin, validate
 
 Array = NDArray[np.float32]
 
-_STATE, _NET, _ACTIVATION = 48, [32], "tanh"  # of the GRU and the layer after it
-_FIT = {"batch_size": 16, "learning_rate": 3e-3}  # episodes
+# of FanTracking2D and of the wind: sizes of the GRU and of the layer after it, rounds of DAgger,
+# episodes of a batch, and the learning rate
+_FIT: dict[bool, dict[str, Any]] = {
+    True: {"state": 48, "net": [32], "batch_size": 16, "learning_rate": 3e-3},
+    False: {"state": 64, "net": [64], "batch_size": 32, "learning_rate": 5e-3},
+}
+_ACTIVATION = "tanh"
 # of the error added to half of the flights: a share of the largest action, and s that it lasts
 _WANDER, _WANDER_TIME = 0.3, 0.5
 _SAC = (
@@ -48,93 +56,98 @@ _SAC = (
 _TURNED = np.array([1, -1, -1, 1, -1, -1, -1, -1, -1, -1], dtype=np.float32)
 _GAINS = (1.2, 2.0, 3.0)  # 1/s, on what it says of the fan's offset; one is chosen
 VALIDATION = 10  # episodes
-SCENARIO = "base"
+BASE = "base"
 
 
-class TaskLesson:
-    """A task: scaled observations, and the oracle's action; in FanTracking2D the fan's offset from
-    the vehicle (m) and its velocity (m/s), both in the plane of the commands.
+def _card(task: str, kind: str, scenario: str, seed: int, steps: int) -> dict[str, Any]:
+    """Return the card of a policy."""
+    env = TASKS[task].environment
+    told = {"task": task, "scale": [float(f"{x:.6g}") for x in env.scales]}
+    activation = _ACTIVATION if kind == "gru" else "relu"
+    return origin(kind, scenario, seed, steps, activation) | told | {"largest": env.largest_action}
+
+
+class FanPlaneLesson:
+    """FanTracking2D: scaled observations; the fan's offset from the vehicle (m) and its velocity
+    (m/s), both in the plane of the commands. The oracle flies the first round.
     """
 
-    def __init__(self, task: str) -> None:
-        kind = TASKS[task].environment
-        self.of_fan, self._task = task == "FanTracking2D", task
-        self.decisions, self.period = kind.decisions(), TICK * kind.decision_ticks
-        self.largest, self.scale = kind.largest_action, np.array(kind.scales, dtype=np.float32)
+    _kind = TASKS["FanTracking2D"].environment
+    decisions, period = _kind.decisions(), TICK * _kind.decision_ticks
+    largest, scale = _kind.largest_action, np.array(_kind.scales, dtype=np.float32)
 
-    def card(self, kind: str, seed: int, steps: int, activation: str) -> dict[str, Any]:
-        """Return the card of a policy."""
-        scale = [float(f"{x:.6g}") for x in self.scale]
-        told = {"task": self._task, "scale": scale, "largest": self.largest}
-        return origin(kind, SCENARIO, seed, steps, activation) | told
+    def environments(self, scenarios: dict[str, int]) -> list[SyncVectorEnv]:
+        """Return so many environments of each scenario, with what their oracle must see."""
 
-    def begin(self, count: int) -> None:
-        """Start ``count`` episodes."""
-        self._oracles = [make_controller("oracle", self._task) for _ in range(count)]
+        def make(scenario: str) -> Any:
+            env = self._kind(scenario)
+            env.foresight = make_controller("oracle", env.name).foresight
+            return env
+
+        return [
+            SyncVectorEnv([partial(make, name)] * count, autoreset_mode=AutoresetMode.NEXT_STEP)
+            for name, count in scenarios.items()
+        ]
+
+    def begin(self, envs: Any, leads: bool) -> None:
+        """Start an episode in each of ``envs``."""
+        self._oracles = [make_controller("oracle", self._kind.name) for _ in range(envs.num_envs)]
         self._truth: list[Any] = []
 
     def look(self, observations: Array, infos: dict[str, Any]) -> tuple[Array, Any]:
-        """Return scaled observations (n, quantities) and the oracle's actions (n, axes)."""
+        """Return scaled observations (n, quantities) and the oracle's actions (n, 2)."""
         wanted = np.array(
             [
                 oracle(observations[i], {name: values[i] for name, values in infos.items()})
                 for i, oracle in enumerate(self._oracles)
             ]
         )
-        if self.of_fan:
-            offset, velocity = infos["fan"] - infos["position"], infos["fan_velocity"]
-            self._truth.append(np.concatenate([offset[:, :2], velocity[:, :2]], axis=1))
-        else:
-            self._truth.append(wanted)
+        offset, velocity = infos["fan"] - infos["position"], infos["fan_velocity"]
+        self._truth.append(np.concatenate([offset[:, :2], velocity[:, :2]], axis=1))
         return observations / self.scale, wanted
 
     def taught(self, kept: NDArray[np.bool_]) -> tuple[Any, NDArray[np.bool_]]:
-        """Return what is taught (decisions, n, 4 or 3), and what counts (decisions, n)."""
+        """Return what is taught (decisions, n, 4), and what counts (decisions, n)."""
         return np.array(self._truth[:-1]), kept[:-1]
 
-    def shares(self, gain: float) -> Array:
-        """Return what is commanded (axes, 4 or 3) of each quantity that is taught."""
-        if not self.of_fan:
-            return np.eye(3, dtype=np.float32)
-        return np.array([[gain, 0.0, 1.0, 0.0], [0.0, gain, 0.0, 1.0]], dtype=np.float32)
+
+def _shares(of_fan: bool, gain: float) -> Array:
+    """Return what is commanded (axes, 4 or 3) of each quantity that is taught."""
+    if not of_fan:
+        return np.eye(3, dtype=np.float32)
+    return np.array([[gain, 0.0, 1.0, 0.0], [0.0, gain, 0.0, 1.0]], dtype=np.float32)
 
 
-def _environment(task: str) -> Any:
-    """Return the task's environment, with what its oracle must see."""
-    env = TASKS[task].environment(SCENARIO)
-    env.foresight = make_controller("oracle", task).foresight
-    return env
-
-
-def teach(task: str, seed: int, rounds: int, episodes: int, epochs: int) -> TaskPolicy:
+def teach(
+    task: str, scenario: str, seed: int, rounds: int, episodes: int, epochs: int
+) -> TaskPolicy:
     """Return a GRU that was taught in rounds of DAgger of so many episodes each."""
-    lesson = TaskLesson(task)
+    of_fan = task == "FanTracking2D"
+    lesson = FanPlaneLesson() if of_fan else WindLesson(task)
     config = {
-        **_FIT,
+        **_FIT[of_fan],
         "rounds": rounds,
         "epochs": epochs,
         "last_epochs": 3 * epochs,
         "wander": {"size": _WANDER * lesson.largest, "time": _WANDER_TIME},
     }
     torch.manual_seed(seed)
-    network = BeliefNetwork(
-        len(lesson.scale), 4 if lesson.of_fan else 3, "gru", _STATE, _NET, _ACTIVATION
-    )
-    envs = SyncVectorEnv(
-        [lambda: _environment(task)] * episodes, autoreset_mode=AutoresetMode.NEXT_STEP
-    )
-    flights = Flights([envs], lesson, config, seed)
-    mirrored = _TURNED if lesson.of_fan else None
-    for last in taught_in_rounds(
-        network, flights, lesson.shares(_GAINS[1]), config, seed, mirrored
-    ):
+    shape = "gru", config["state"], config["net"], _ACTIVATION
+    network = BeliefNetwork(len(lesson.scale), 4 if of_fan else 3, *shape)
+    envs = lesson.environments(mix_of(scenario, episodes))
+    flights = Flights(envs, lesson, config, seed)
+    mirrored = _TURNED if of_fan else None
+    shares = _shares(of_fan, _GAINS[1])
+    for last in taught_in_rounds(network, flights, shares, config, seed, mirrored, not of_fan):
         print(f"{flights.episodes} episodes{', the last' if last else ''}", flush=True)
-    card = lesson.card("gru", seed, flights.episodes * lesson.decisions, _ACTIVATION)
+    card = _card(task, "gru", scenario, seed, flights.episodes * lesson.decisions)
+    if not of_fan:
+        return TaskPolicy(card, network.policy_weights(shares))
     tried = [
-        TaskPolicy({**card, "gain": gain}, network.policy_weights(lesson.shares(gain)))
-        for gain in (_GAINS if lesson.of_fan else _GAINS[:1])
+        TaskPolicy({**card, "gain": gain}, network.policy_weights(_shares(of_fan, gain)))
+        for gain in _GAINS
     ]
-    env = _environment(task)
+    env = TASKS[task].environment(BASE)
     return min(tried, key=lambda each: validate(each, env, VALIDATION, task)[0])
 
 
@@ -144,13 +157,12 @@ def sac(task: str, seed: int, steps: int) -> TaskPolicy:
     from stable_baselines3.common.vec_env import DummyVecEnv
 
     name = f"windwrench/{task}-v1"
-    env = DummyVecEnv([lambda: Monitor(gym.make(name, scenario=SCENARIO))])
+    env = DummyVecEnv([lambda: Monitor(gym.make(name, scenario=BASE))])
     entropy = f"learner.target_entropy={-float(env.action_space.shape[0])}"
     config = load_config("sac", [*_SAC, entropy, f"steps={steps}"])
     learner = make_learner(config, env, seed)
     learner.learn(steps)
-    card = TaskLesson(task).card("sac", seed, steps, "relu")
-    return TaskPolicy(card, weights_of(learner, "sac"))
+    return TaskPolicy(_card(task, "sac", BASE, seed, steps), weights_of(learner, "sac"))
 
 
 def main() -> None:
@@ -160,8 +172,9 @@ def main() -> None:
     parser.add_argument("--kind", choices=["gru", "sac"], default="gru")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--rounds", type=int, default=4, help="of DAgger")
-    parser.add_argument("--episodes", type=int, default=16, help="of each round")
-    parser.add_argument("--epochs", type=int, default=12, help="of each round; the last, thrice")
+    parser.add_argument("--scenario", default="wide", help="of the wind, or a mix of them: wide")
+    parser.add_argument("--episodes", type=int, default=128, help="of each round")
+    parser.add_argument("--epochs", type=int, default=6, help="of each round; the last, thrice")
     parser.add_argument("--steps", type=int, default=20_000, help="decisions of SAC")
     parser.add_argument("--out", type=Path, default=Path("training/policies/tasks"))
     given = parser.parse_args()
@@ -170,10 +183,12 @@ def main() -> None:
     if given.kind == "sac":
         policy = sac(given.task, given.seed, given.steps)
     else:
-        policy = teach(given.task, given.seed, given.rounds, given.episodes, given.epochs)
+        scenario = BASE if given.task == "FanTracking2D" else given.scenario
+        lesson = given.rounds, given.episodes, given.epochs
+        policy = teach(given.task, scenario, given.seed, *lesson)
     given.out.mkdir(parents=True, exist_ok=True)
     path = given.out / f"{given.task}-{given.kind}-{given.seed}.npz"
-    env = TASKS[given.task].environment(SCENARIO)
+    env = TASKS[given.task].environment(BASE)
     rmse, lost = validate(policy, env, VALIDATION, given.task)
     policy.card |= {
         "validation": {"episodes": VALIDATION, "rmse_m": round(rmse, 5), "lost": lost},

@@ -79,6 +79,29 @@ class TaskLanes(TaskVectorEnv):
         for i, winds in enumerate(self._blowing):
             self._calls[i, : len(winds.calls)] = winds.calls
 
+    def truth(self) -> dict[str, Array]:
+        """Return the true motion and the integral of the flight loop as ``Task`` tells an oracle of
+        them, a row an environment.
+        """
+        from scipy.spatial.transform import Rotation
+
+        loops, vehicle = self._flying.loops, self.envs[0].vehicle
+        pose, velocity, speeds, integral = (
+            self._rows(values)
+            for values in (*self._motion[:2], loops["plant"]["speeds"], loops["flight"]["sum"])
+        )
+        rotation = Rotation.from_quat(pose[:, 3:], scalar_first=True)
+        thrust, *torques = vehicle.mixing @ speeds.T**2
+        up = rotation.apply([0.0, 0.0, 1.0])
+        return {
+            "velocity": velocity[:, :3],
+            "rate": rotation.apply(velocity[:, 3:]),
+            "angular_acceleration": rotation.apply(np.linalg.solve(vehicle.inertia, torques).T),
+            "up": up,
+            "lift": thrust * up[:, 2] / vehicle.mass - vehicle.gravity,
+            "integral": integral,
+        }
+
     def __getstate__(self) -> dict[str, Any]:
         state = super().__getstate__()
         for name in ("_like", "_motion", "_settling", "_works"):

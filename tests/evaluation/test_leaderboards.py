@@ -146,7 +146,7 @@ def test_policies_of_a_kind_stand_together_and_their_losses_show(tmp_path):
     def flown(level, lost=0):
         return [episode(k, level * rng.uniform(0.9, 1.1), k < lost) for k in range(episodes)]
 
-    policies = [f"sac-{k}" for k in range(3)]
+    policies = [f"gru-{k}" for k in range(3)]
     results = {
         (name, "base"): flown(level)
         for name, level in {"hover": 0.2, "pid": 0.1, "pid-force": 0.08, "oracle": 0.07}.items()
@@ -156,20 +156,20 @@ def test_policies_of_a_kind_stand_together_and_their_losses_show(tmp_path):
         for name, level, lost in zip(policies, (0.05, 0.06, 0.07), (0, 3, 0), strict=True)
     }
     rows = leaderboard(results, ["pid", "pid-force", *policies], 0, "WindHover")
-    sac = next(row for row in rows if row.controller == "sac")
+    gru = next(row for row in rows if row.controller == "gru")
     singles = [row for row in rows if row.controller in policies]
-    assert (sac.policies, sac.best_law) == (3, "pid-force")
-    assert sac.rmse_m == pytest.approx(np.mean([row.rmse_m for row in singles]))
-    assert (sac.lost_fraction, sac.most_lost_fraction) == (pytest.approx(3 / 36), 3 / 12)
-    low, high = sac.rmse_ci95_m
+    assert (gru.policies, gru.best_law) == (3, "pid-force")
+    assert gru.rmse_m == pytest.approx(np.mean([row.rmse_m for row in singles]))
+    assert (gru.lost_fraction, gru.most_lost_fraction) == (pytest.approx(3 / 36), 3 / 12)
+    low, high = gru.rmse_ci95_m
     assert all(high - low > np.ptp(row.rmse_ci95_m) for row in singles)  # other seeds, too
-    assert sac.p_over_best < 0.05
-    assert all(row.p_over_best is None for row in rows if row is not sac)
-    assert {row.controller for row in shown(rows)} == {"sac", "pid", "pid-force"}
+    assert gru.p_over_best < 0.05
+    assert all(row.p_over_best is None for row in rows if row is not gru)
+    assert {row.controller for row in shown(rows)} == {"gru", "pid", "pid-force"}
     assert "8.3 % (most 25.0 %)" in markdown(rows)
     told = summary(rows)
-    assert "Lost: `sac` 8.3 % (most 25.0 %); `pid-force`, `pid` none." in told
-    assert re.search(r"`pid-force`: clearly worse none; clearly better `sac` -\d+ %", told)
+    assert "Lost: `gru` 8.3 % (most 25.0 %); `pid-force`, `pid` none." in told
+    assert re.search(r"`pid-force`: clearly worse none; clearly better `gru` -\d+ %", told)
     nothing = [replace(row, lost_fraction=0.0, most_lost_fraction=0.0) for row in rows]
     assert "Lost: nothing." in summary(nothing)
     draw_leaderboard(rows, results, tmp_path / "a.png")

@@ -5,22 +5,90 @@ import pytest
 
 pytest.importorskip("torch", reason="torch is not installed: pip install 'windwrench[rl]'")
 
+import torch
+
+from windwrench.controllers.preview import WindOracle, preview
+from windwrench.controllers.trained_policy import TaskPolicy
+from windwrench.envs.lanes.vector import TaskLanes
 from windwrench.evaluation.tasks import TASKS
+from windwrench.training.belief_network import BeliefNetwork
+from windwrench.training.hindsight import AHEAD, WindLesson, mix_of
 from windwrench.training.run import validate
-from windwrench.training.task_policies import sac, teach
+from windwrench.training.task_policies import _card, sac, teach
 
-pytestmark = pytest.mark.slow
+HOVER = TASKS["WindHover"].environment
 
 
-def test_a_taught_network_is_the_same_again():
-    one, other = (teach("WindHover", 0, rounds=2, episodes=2, epochs=2) for _ in range(2))
+def test_lanes_tell_the_truth_of_the_single_environment():
+    lanes, single = TaskLanes(3, task=HOVER), HOVER()
+    single.foresight = 1
+    lanes.reset(seed=[4, 5, 6])
+    single.reset(seed=5)
+    for action in ([1.0, -2.0, 0.5], [-1.0, 0.0, 2.0]):
+        lanes.step(np.tile(action, (3, 1)))
+        *_, info = single.step(np.array(action))
+    for name, values in lanes.truth().items():
+        np.testing.assert_allclose(values[1], info[name], rtol=1e-6, atol=1e-9)
+
+
+def test_hindsight_knows_what_came_beside_the_model():
+    """Of a flight of the linear model itself with any commands and disturbances."""
+    oracle, rng, count = WindOracle(), np.random.default_rng(0), 30
+    lesson = WindLesson("WindHover")
+    lesson.largest = np.inf
+    commands = rng.standard_normal((count + 1, 2, 3))
+    states, wanted = [], []
+    for i, (A, B, _) in enumerate(oracle.steps(oracle.vehicle)):
+        gain, ahead = preview(A, B, np.eye(len(A)), oracle.effort, AHEAD)
+        x, came = [rng.standard_normal((2, len(A)))], rng.standard_normal((count, 2, len(A)))
+        for k in range(count):
+            x.append(x[k] @ A.T + commands[k + 1, :, i : i + 1] * B[:, 0] + came[k])
+        states.append(x)
+        wanted.append(-(x[3] @ gain + np.einsum("kni,ki->n", came[3 : 3 + AHEAD], ahead)))
+    lesson._states, lesson._commands = list(zip(*states, strict=True)), list(commands)
+    best, counts = lesson.taught(np.ones((count + 1, 2), dtype=np.bool_))
+    np.testing.assert_allclose(best[3], np.transpose(wanted))
+    assert counts.sum(axis=0).tolist() == [count - AHEAD + 1] * 2
+
+
+def test_a_policy_sees_what_its_network_saw_whitened():
+    torch.manual_seed(0)
+    network, rng = BeliefNetwork(27, 3, "gru", 8, [5], "tanh"), np.random.default_rng(0)
+    mixed = np.diag(np.full(27, 0.01)) + 0.1 * rng.standard_normal((1, 27))
+    seen = (rng.standard_normal((40, 6, 27)) @ mixed + 1.0).astype(np.float32)
+    network.whiten(seen)
+    turn, mean = (x.numpy() for x in network._white)
+    white = (seen.reshape(-1, 27) - mean) @ turn
+    np.testing.assert_allclose(np.cov(white.T), np.eye(27), atol=0.1)
+    with torch.no_grad():
+        said = network(torch.from_numpy(seen))[0].numpy()
+    policy = TaskPolicy(
+        _card("WindHover", "gru", "wide", 0, 0), network.policy_weights(np.eye(3, dtype=np.float32))
+    )
+    flown = [policy(frame * np.float32(HOVER.scales)) for frame in seen[:, 2]]
+    np.testing.assert_allclose(flown, said[:, 2], atol=1e-4)
+
+
+def test_a_mix_has_all_of_its_scenarios():
+    assert mix_of("wide", 16) == {"base": 4} | dict.fromkeys(
+        ("turbulent", "noisy", "varied", "gusts", "wash", "fan-wall"), 2
+    )
+    assert mix_of("calm", 5) == {"calm": 5}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("task", ["WindHover", "FanTracking2D"])
+def test_a_taught_network_is_the_same_again(task):
+    scenario = "wide" if task == "WindHover" else "base"
+    one, other = (teach(task, scenario, 0, rounds=2, episodes=8, epochs=1) for _ in range(2))
     for name, array in one.weights.items():
         np.testing.assert_array_equal(array, other.weights[name])
-    assert one.card["steps"] == 2000
+    assert one.card["steps"] == 4000
 
 
+@pytest.mark.slow
 def test_sac_trains_in_the_wind():
     pytest.importorskip("stable_baselines3", reason="stable_baselines3 is not installed")
     policy = sac("WindHover", 0, 1100)
     assert policy.card["squash"]
-    assert np.isfinite(validate(policy, TASKS["WindHover"].environment("base"), 2, "WindHover")[0])
+    assert np.isfinite(validate(policy, HOVER("base"), 2, "WindHover")[0])
