@@ -59,7 +59,7 @@ def rank_by_rows(
         fitted[key] = likelihood.fitted(setting)
         found = set(fitted[key]) - given
         if found & likelihood.idle(fitted[key]) or not all(
-            is_possible(flights, fitted[key], {}, e) for e in found
+            is_possible(flights, fitted[key], {}, e, plausible=True) for e in found
         ):
             idle.add(key)
             return

@@ -67,10 +67,10 @@ class _Candidate:
 
 
 def is_possible(
-    flights: Flights, setting: Setting, std: Mapping[Column, float], effect: str
+    flights: Flights, setting: Setting, std: Mapping[Column, float], effect: str, plausible: bool
 ) -> bool:
-    """Return whether a vehicle can have an effect's coefficients at a setting, and whether they are
-    physics of this effect.
+    """Return whether a vehicle can have an effect's coefficients at a setting; ``plausible``: and
+    whether they are physics of this effect.
 
     An effect that stands for another one is often fitted at a bound: a dry friction, named a drag,
     needs a quadratic part below zero. A true coefficient of zero is at a bound too, but its best
@@ -79,7 +79,7 @@ def is_possible(
     words, vehicle, own = get(effect), flights.vehicle, setting[effect]
     if words.possible is not None and not words.possible(own, vehicle):
         return False
-    if words.implausible is None:
+    if not plausible or words.implausible is None:
         return True
     named = {*(e for e in setting if e), *(e.name for e in vehicle.effects)} - {effect}
     return not words.implausible(
@@ -170,7 +170,7 @@ class Posterior:
         return own <= key and len(own) == most
 
     def _variants(self, base: Base) -> list[Variant]:
-        out = []
+        out, known = [], self.given is not None
         for effect in self.library:
             stated = self.flights.stated(effect)
             for _, every in variants_of(self.flights, effect, base.effects, base.starts):
@@ -178,9 +178,10 @@ class Posterior:
                 columns = tuple(
                     c
                     for c in every
-                    if c[1].removeprefix(WHOLE_PREFIX) not in stated and c in base.columns
+                    if c[1].removeprefix(WHOLE_PREFIX) not in stated
+                    and (c in base.columns or not known)
                 )
-                if columns:
+                if columns and all(c in base.columns for c in columns):
                     out.append((effect, columns))
         return out
 
@@ -239,10 +240,11 @@ class Posterior:
 
     def _possible(self, base: Base, some: Sequence[Variant], evidence: SetEvidence) -> bool:
         """Return whether a vehicle can have the coefficients of a set at its mode."""
+        plausible = self.given is not None
         asked = [
             (e, columns)
             for e, columns in some
-            if get(e).possible or get(e).implausible
+            if get(e).possible or (plausible and get(e).implausible)
             if not columns[0][1].startswith(START_PREFIX)
         ]
         if not asked:
@@ -250,7 +252,7 @@ class Posterior:
         setting, std = self._at_mode(base, some, evidence)
         for effect, _ in asked:
             own = {(effect, name): x for name, x in std[effect].items()}
-            if not is_possible(self.flights, setting, own, effect):
+            if not is_possible(self.flights, setting, own, effect, plausible):
                 return False
         return True
 
