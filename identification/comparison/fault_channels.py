@@ -17,6 +17,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
+from ..logs.flight_phases import carrying, usual_thrust
 from ..logs.readers import px4_ulog, reader_by_content
 from ..logs.reading import read_log
 from ..logs.streams import Stream, readable
@@ -28,9 +29,6 @@ Mask = NDArray[np.bool_]
 _CHANNELS = ("gyro", "accelerometer", "commands")  # of a PX4 log that are needed
 STEP = 0.02  # s, of the grid: a rotor takes about that long to follow
 FINE = 0.004  # s, on which commands are filtered by the rotors' lag
-# of the largest command, above which the rotors are not idle; and of the median of what is: above
-# that they carry the vehicle. After a fault commands may stay at their limit for long.
-IDLE, FLYING = 0.15, 0.5
 SETTLED = 1.5  # s after the rotors first carry the vehicle: it has left the ground
 LEAST_SECONDS = 3.0  # in flight: less says nothing of what is usual
 LONGEST_GAP = 0.1  # s without a sample, across which nothing is interpolated
@@ -181,7 +179,8 @@ def sample(channels: Channels) -> Samples:
     gyro = resampled(edges, c.gyro.t, c.gyro.values)
     force = _means(c.accelerometer.t, c.accelerometer.values, t)
     stop, why = _end(c)
-    keep = (np.interp(t, c.command.t, c.command.values.sum(axis=1)) > _least(c)) & (t < stop)
+    total = c.command.values.sum(axis=1)
+    keep = (np.interp(t, c.command.t, total) > 0.5 * usual_thrust(total)) & (t < stop)
     for at in times[:2]:
         after = np.clip(np.searchsorted(at, t), 1, len(at) - 1)
         keep &= at[after] - at[after - 1] < LONGEST_GAP
@@ -205,13 +204,6 @@ def sample(channels: Channels) -> Samples:
         c,
         why,
     )
-
-
-def _least(c: Channels) -> float:
-    """Return the total command above which the rotors carry the vehicle."""
-    total = c.command.values.sum(axis=1)
-    busy = total[total > IDLE * total.max()]
-    return FLYING * float(np.median(busy)) if len(busy) else np.inf
 
 
 def _between(c: Channels, t: Array) -> Array:
@@ -253,8 +245,8 @@ def _end(c: Channels) -> tuple[float, str]:
             found.append((float(c.gyro.t[first]), "the gyro was at its limit"))
     hit = np.linalg.norm(c.accelerometer.values, axis=1) > IMPACT
     # take-off may be hard: an impact counts once the rotors carry the vehicle
-    flying = c.command.t[c.command.values.sum(axis=1) > _least(c)]
-    hit &= c.accelerometer.t > flying[0] + SETTLED if len(flying) else False
+    aloft = c.command.t[carrying(c.command.values.sum(axis=1))]
+    hit &= c.accelerometer.t > aloft[0] + SETTLED if len(aloft) else False
     if hit.any():
         found.append((float(c.accelerometer.t[np.argmax(hit)]) - STEP, "the vehicle hit something"))
     return min(found)

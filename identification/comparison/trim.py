@@ -160,21 +160,15 @@ def carrying(t: Array, total: Array) -> NDArray[np.bool_]:
         t: (N,) s.
         total: (N,) thrust of all rotors, in any unit.
     """
-    high = float(np.quantile(total, 0.9))
-    steady = np.zeros(len(t), dtype=np.bool_)
-    if high <= 0.0:
-        return steady
-    smooth = _smooth(total, t)
-    for first, end in runs_of(smooth > 0.5 * high):  # a single low sample is no landing
+    steady, smooth = np.zeros(len(t), dtype=np.bool_), _smooth(total, t)
+    for first, end in runs_of(flying(smooth)):  # a single low sample is no landing
         # a log may begin and end in flight
         start = t[first] + (EDGE if first > 0 else 0.0)
         stop = t[end - 1] - (EDGE if end < len(t) else 0.0)
         steady |= (t >= start) & (t <= stop)
-    if not steady.any():
-        return steady
-    middle = float(np.median(total[steady]))
-    close: NDArray[np.bool_] = steady & (np.abs(smooth / middle - 1.0) < NEAR)
-    return close
+    if steady.any():
+        steady &= np.abs(smooth / np.median(total[steady]) - 1.0) < NEAR
+    return steady
 
 
 def _scaled_speeds(thrust: Array, vehicle: Vehicle) -> Array:

@@ -27,15 +27,6 @@ class AxisSettings:
     first_time: float = 0.4  # s, correlation time at which a search begins
     # s, correlation times: gusts last 0.1 to 2 s; what lasts longer is no disturbance
     times: tuple[float, float] = (0.03, 2.0)
-    ridge: float = 1e-9  # relative, of gains that do the same
-    # logarithms of variances and of the correlation time, by which the search's first points differ
-    # where nothing is known, and where a noise of the same flight is
-    first_step: float = 2.0
-    next_step: float = 0.7
-    # the same, and log-likelihood, by which the search's points differ at its end. A white noise
-    # that is far below the rest has no likeliest value
-    last_step: float = 0.3
-    least_gain: float = 0.2
 
 
 AXIS = AxisSettings()
@@ -178,7 +169,8 @@ def likeliest_noise(
         total = np.zeros((len(jump_state) + 1,) * 2)
         for y, a, v, x in zip(measured, drive, rate, jumps, strict=True):
             _products(y, a, v, x, jump_state, keep, period, gain, skip, total)
-        normal = total[:-1, :-1] + AXIS.ridge * np.diag(np.diagonal(total)[:-1] + 1e-300)
+        # against gains that do the same
+        normal = total[:-1, :-1] + 1e-9 * np.diag(np.diagonal(total)[:-1] + 1e-300)
         gains: Array = np.asarray(np.linalg.solve(normal, total[:-1, -1]))
         return float(total[-1, -1] - total[-1, :-1] @ gains), gains
 
@@ -203,10 +195,11 @@ def likeliest_noise(
         method="Nelder-Mead",
         options={
             "initial_simplex": begun
-            + (AXIS.next_step if time else AXIS.first_step)
+            + (0.7 if time else 2.0)
             * np.vstack([np.zeros(3), np.diag(np.where(begun >= high, -1.0, 1.0))]),
-            "xatol": AXIS.last_step,
-            "fatol": AXIS.least_gain,
+            # a white noise that is far below the rest has no likeliest value
+            "xatol": 0.3,
+            "fatol": 0.2,  # nats
             "maxfev": 160,
         },
     )

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
 from .regression import Flights, Setting
-from .sensor_bias import biases
 
 Array = NDArray[np.float64]
 
@@ -52,7 +51,8 @@ def balance(flights: Flights, setting: Setting) -> Balance:
     """Return the residual with a setting of effects. What of it is a sensor's bias is no error of
     the model, and counts before as well.
     """
-    before = flights.residual(biases(setting))
+    sensors = {k: x for k, x in setting.get("", {}).items() if ("", k) in flights.biases}
+    before = flights.residual({"": sensors} if sensors else {})
     after = flights.residual(setting)
     held_out = ~flights.fit_rows
     floor = _rms(flights.visible_noise)

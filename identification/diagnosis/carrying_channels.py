@@ -6,7 +6,8 @@ that of torques; what the model reads shows where its wrench changes with an inp
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,22 +21,9 @@ from .regression import Flights, Setting, without
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class ChannelSettings:
-    """From when on a channel carries an effect, and by how much inputs are changed to see it."""
-
-    least_share: float = 0.05  # of the effect's deviance, in the forces or in the torques
-    least_change: float = 0.01  # of the effect's wrench, as an input changes
-    speed: float = 1.05  # factor on rotor speeds
-    voltage: float = 0.97  # factor
-    position: float = 0.1  # m
-    velocity: float = 0.5  # m/s
-    angle: float = 0.1  # rad
-    rate: float = 0.3  # rad/s
-    most_samples: int = 2000  # of the first piece: enough to see a change
-
-
-CHANNELS = ChannelSettings()
+# shares from which a channel carries an effect: of its deviance, in the forces or in the torques,
+# and of its wrench, as an input changes
+LEAST_SHARE, LEAST_CHANGE = 0.05, 0.01
 ORDER = (
     "position",
     "attitude",
@@ -61,9 +49,9 @@ def _traces(flights: Flights, setting: Setting, effect: str) -> Iterator[str]:
     noise = np.mean(np.square(flights.sensor_noise), axis=0) + 1e-30
     power = np.mean(np.square(part), axis=0) / noise
     whole = max(float(power.sum()), 1e-30)
-    if power[:3].sum() / whole > CHANNELS.least_share:
+    if power[:3].sum() / whole > LEAST_SHARE:
         yield "accelerometer" if flights.inertial else "position"
-    if power[3:].sum() / whole > CHANNELS.least_share and not flights.commanded:
+    if power[3:].sum() / whole > LEAST_SHARE and not flights.commanded:
         yield "gyro" if flights.inertial else "attitude"
 
 
@@ -72,34 +60,34 @@ def _read(flights: Flights, setting: Setting, effect: str) -> Iterator[str]:
     if get(effect).kind == "sensing":
         yield from ("position", "attitude")
         return
-    s = flights.pieces(setting)[0].signals.at(slice(CHANNELS.most_samples))
+    s = flights.pieces(setting)[0].signals.at(slice(2000))  # enough to see a change
     own = _wrench(flights, setting, effect, s)
-    size = float(np.sqrt(np.mean(np.square(own), axis=0)).sum())
     placed = any(np.isfinite(log.position).any() for log in flights.logs)
-    names = {
-        "rotor speeds": "motor commands" if flights.commanded else "rotor speeds",
-        "position": "position" if placed else "accelerometer",
-        "velocity": "position" if placed else "accelerometer",
-        "attitude": "gyro" if flights.inertial else "attitude",
-        "angular velocity": "gyro" if flights.inertial else "attitude",
+    place = "position" if placed else "accelerometer"
+    turn = "gyro" if flights.inertial else "attitude"
+    # inputs, changed by some per cent, or by as much as they vary in a calm flight (SI units)
+    changed: dict[str, tuple[str, Array]] = {
+        "rotor_speeds": (
+            "motor commands" if flights.commanded else "rotor speeds",
+            1.05 * s.rotor_speeds,
+        ),
+        "position": (place, s.position + 0.1),
+        "velocity": (place, s.velocity + 0.5),
+        "rotation": (turn, s.rotation @ Rotation.from_rotvec([0.1, -0.1, 0.1]).as_matrix()),
+        "angular_velocity": (turn, s.angular_velocity + 0.3),
     }
-    for name, changed in _changed(s):
-        moved = _wrench(flights, setting, effect, changed) - own
-        change = float(np.sqrt(np.mean(np.square(moved), axis=0)).sum())
-        if change > CHANNELS.least_change * max(size, 1e-12):
-            yield names.get(name, name)
-
-
-def _changed(s: Signals) -> Iterator[tuple[str, Signals]]:
-    """Yield signals with one input changed, and the input's name."""
-    yield "rotor speeds", replace(s, rotor_speeds=CHANNELS.speed * s.rotor_speeds)
     if s.voltage is not None:
-        yield "battery voltage", replace(s, voltage=CHANNELS.voltage * s.voltage)
-    yield "position", replace(s, position=s.position + CHANNELS.position)
-    yield "velocity", replace(s, velocity=s.velocity + CHANNELS.velocity)
-    turn = Rotation.from_rotvec([CHANNELS.angle, -CHANNELS.angle, CHANNELS.angle]).as_matrix()
-    yield "attitude", replace(s, rotation=s.rotation @ turn)
-    yield "angular velocity", replace(s, angular_velocity=s.angular_velocity + CHANNELS.rate)
+        changed["voltage"] = "battery voltage", 0.97 * s.voltage
+    for name, (channel, values) in changed.items():
+        moved: dict[str, Any] = {name: values}
+        off = _wrench(flights, setting, effect, replace(s, **moved)) - own
+        if _size(off) > LEAST_CHANGE * max(_size(own), 1e-12):
+            yield channel
+
+
+def _size(wrench: Array) -> float:
+    """Return the sum of a wrench's RMS (n, 6) over its axes."""
+    return float(np.sqrt(np.mean(np.square(wrench), axis=0)).sum())
 
 
 def _wrench(flights: Flights, setting: Setting, effect: str, s: Signals) -> Array:

@@ -41,12 +41,13 @@ class Poses:
 class State:
     """A piece of flight (n samples)."""
 
+    t: Array  # (n,) s
     position: Array  # (n, 3) m, world
     rotation: Array  # (n, 3, 3) body to world
     velocity: Array  # (n, 3) m/s, world
     angular_velocity: Array  # (n, 3) rad/s, body
     acceleration: Array  # (n, 3) m/s2, world; of a track (n, 6), and rad/s2, body
-    rotors: Array  # (n, 4) thrust (N) and torques (Nm) of the rotors
+    rotors: Array  # (n, 4) what the rotors' thrust and torques accelerate: m/s2, rad/s2, body
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +184,7 @@ def run(poses: Poses, vehicle: Vehicle, noise: tuple[AxisNoise, ...], known: Arr
     load_model(models[0], vehicle)
     n = len(poses.t)
     shapes = ((3,), (3, 3), (3,), (3,), (6,), (4,), (6,), (7,), (6,))
-    out = Track(*(np.empty((n, *shape)) for shape in shapes))
+    out = Track(poses.t, *(np.empty((n, *shape)) for shape in shapes))
     _run(
         models,
         poses.period,
@@ -205,6 +206,7 @@ def run(poses: Poses, vehicle: Vehicle, noise: tuple[AxisNoise, ...], known: Arr
         out.predicted,
         out.innovations,
     )
+    np.divide(out.rotors, [vehicle.mass, *np.diagonal(vehicle.inertia)], out=out.rotors)
     return out
 
 

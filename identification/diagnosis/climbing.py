@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,16 +15,9 @@ from .regression import Column, Flights, coefficient
 Height = tuple[float, Callable[[], Setting]]
 
 
-@dataclass(frozen=True)
-class ClimbSettings:
-    """When a search for a mode ends."""
-
-    rounds: int = 8
-    shares: tuple[float, ...] = (1.0, 0.5, 0.2, 0.05)  # of a step, tried in turn
-    least_gain: float = 0.3  # nats; a step that gains less is the last
-
-
-CLIMB = ClimbSettings()
+ROUNDS = 8
+SHARES = (1.0, 0.5, 0.2, 0.05)  # of a step, tried in turn
+LEAST_GAIN = 0.3  # nats; a step that gains less is the last
 
 
 def mode(start: Setting, at: Callable[[Setting], Height]) -> Setting:
@@ -33,9 +25,9 @@ def mode(start: Setting, at: Callable[[Setting], Height]) -> Setting:
     error where no vehicle is like that.
     """
     here, (value, target) = start, height(start, at)
-    for _ in range(CLIMB.rounds):
+    for _ in range(ROUNDS):
         there = target()
-        for share in CLIMB.shares:
+        for share in SHARES:
             trial = {
                 e: {n: own.get(n, 0.0) + share * (x - own.get(n, 0.0)) for n, x in there[e].items()}
                 for e, own in here.items()
@@ -46,7 +38,7 @@ def mode(start: Setting, at: Callable[[Setting], Height]) -> Setting:
         else:
             break
         gained, here, value, target = value - after, trial, after, onwards
-        if gained < CLIMB.least_gain:
+        if gained < LEAST_GAIN:
             break
     return here
 

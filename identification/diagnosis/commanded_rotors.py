@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...dynamics.effects import Role, playing
 from ...dynamics.vehicle import Vehicle
 from ..logs.flight_log import FlightLog, with_rows
-from ..logs.flight_phases import FLIGHT, flight_phases
+from ..logs.flight_phases import FLIGHT, flight_phases, usual_thrust
 from ..motion.signals import Signals
 from ..motion.smoothing import CUTOFFS, low_pass
 
@@ -27,8 +27,8 @@ class CommandedSettings:
     """What a regression allows for where rotor speeds are worked out from commands."""
 
     period: float = 0.02  # s, of the samples that are used
-    # of the median thrust in flight, from which rotors carry the vehicle, and s that taking off and
-    # landing last beyond: where no height shows them
+    # of the usual thrust, from which rotors carry the vehicle, and s that taking off and landing
+    # last beyond: where no height shows them
     carrying_share: float = 0.7
     take_off: float = 1.0
     # relative standard deviation of the thrust that a command makes where nobody stated the motor
@@ -64,8 +64,7 @@ def in_flight_by_thrust(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     thrust = np.square(log.rotor_speeds) @ vehicle.k
     if len(thrust) * log.period > 1.0 / CUTOFFS.flying_hz:
         thrust = low_pass(thrust, CUTOFFS.flying_hz, log.period)
-    level = np.median(thrust[thrust > 0.5 * np.quantile(thrust, 0.9)])
-    carried = np.flatnonzero(thrust > COMMANDED.carrying_share * level)
+    carried = np.flatnonzero(thrust > COMMANDED.carrying_share * usual_thrust(thrust))
     if not carried.size:
         return log
     first, last = carried[0], carried[-1]

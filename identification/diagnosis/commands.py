@@ -5,12 +5,11 @@ calibrations, which any such vehicle has, and the delay that its turns show.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...dynamics.effects import get, playing
+from ...dynamics.effects import Role, get, playing
 from ..findings import NamedEffect
 from .commanded_rotors import THRUST_FACTORS, thrust_is_assumed
 from .regression import CENTRAL, Flights
-from .row_nuisances import calibrations
-from .turning_delay import rotor_delay, same_delays, turning_delay
+from .turning_delay import turning_delay
 
 
 @dataclass(frozen=True)
@@ -36,34 +35,45 @@ class Given:
 def what_commands_show(flights: Flights, library: Sequence[str]) -> Given:
     """Return what is known of flights before effects of a library are asked about; nothing where
     rotor speeds were measured.
+
+    How much thrust a command makes and when, how it bends, and how it goes with voltage and time
+    are fitted in every set, and are no discovery. Of thrust and mass a flight shows the ratio: one
+    of them is enough.
     """
     library = list(library)
     if not flights.commanded:
         return Given(library, {}, {})
-    effect, late = rotor_delay(library), None
-    same = same_delays(effect, library) if effect else []
+    late = None
     seen = [p.signals for p in flights.pieces({}) if flights.fit_rows[flights.log == p.log].any()]
-    if effect:
+    delays = playing(Role.DELAY, among=library)
+    delay = next((effect for effect in delays if get(effect).kind == "rotor input"), None)
+    if delay:
+        # a lag delays slow changes as much, and a log whose clock is off looks like one whose
+        # commands are late
+        same = [x for x in playing(Role.LAG, Role.DELAY, among=library) if x != delay]
         library = [e for e in library if e not in same]
-        if delay := turning_delay(seen, flights.vehicle):
-            library.remove(effect)
-            c = get(effect).coefficients[0]
+        if shown := turning_delay(seen, flights.vehicle):
+            library.remove(delay)
+            c = get(delay).coefficients[0]
             late = NamedEffect(
-                name=effect,
-                coefficients={c.name: delay.seconds},
-                std={c.name: delay.std},
+                name=delay,
+                coefficients={c.name: shown.seconds},
+                std={c.name: shown.std},
                 units={c.name: c.unit},
                 tentative=False,
                 indistinguishable_from=tuple(same),
-                evidence={"log_bayes_factor": 0.5 * delay.log_likelihood_ratio},
+                evidence={"log_bayes_factor": 0.5 * shown.log_likelihood_ratio},
                 channels=("attitude", "motor commands"),
             )
+    thrust = playing(Role.THRUST, among=library) or playing(Role.MASS, among=library)
+    roles = (Role.THRUST_CURVE, Role.THRUST_OVER_VOLTAGE, Role.THRUST_OVER_TIME)
+    calibrations = [*thrust, *playing(*roles, among=library)]
     first = {
         e: {c.name: 0.0 for c in get(e).coefficients if c.name != CENTRAL}
         | dict(flights.coefficients({}, e))
-        for e in calibrations(library)
+        for e in (*calibrations, *(e for e in library if e == delay))
     }
-    if playing(*THRUST_FACTORS, among=first):  # thrust over mass is known, and neither alone
+    if thrust:  # thrust over mass is known, and neither alone
         library = [e for e in library if e in first or get(e).role not in THRUST_FACTORS]
     assumed = thrust_is_assumed(flights.logs, flights.vehicle)
     fixed = {late.name: dict(late.coefficients)} if late else {}

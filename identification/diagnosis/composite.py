@@ -6,7 +6,6 @@ and a scale of thrust any two that change alike are the third, the other way rou
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +18,9 @@ Array = NDArray[np.float64]
 Setting = Mapping[str, Mapping[str, float]]
 
 
-@dataclass(frozen=True)
-class CompositeSettings:
-    """From when on two changes are alike."""
-
-    most_apart: float = 2.5  # standard deviations, of any component
-    share: float = 0.1  # of the changes, to which effect models are alike
-
-
-COMPOSITE = CompositeSettings()
+# from when on two changes are alike: standard deviations, of any component, that they may be apart,
+# and the share of the changes to which effect models are alike
+MOST_APART, SHARE = 2.5, 0.1
 ROLES = (Role.MASS, Role.THRUST, Role.INERTIA)
 
 
@@ -45,9 +38,9 @@ def composites(vehicle: Vehicle, setting: Setting, std: Setting) -> tuple[str, .
         for a, b in itertools.product(*pair):
             (x, dx), (y, dy) = (_relative(vehicle, e, setting[e], std[e]) for e in (a, b))
             off = np.subtract.outer(x, y)
-            alike = COMPOSITE.share * np.maximum.outer(np.abs(x), np.abs(y))
+            alike = SHARE * np.maximum.outer(np.abs(x), np.abs(y))
             size = np.sqrt(np.add.outer(dx**2, dy**2) + alike**2)
-            if np.all(np.abs(off) < COMPOSITE.most_apart * size):
+            if np.all(np.abs(off) < MOST_APART * size):
                 other = " or ".join(playing(third))
                 found.append(f"{a} and {b} change alike: {other} may be the one cause")
     return tuple(found)

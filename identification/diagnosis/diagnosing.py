@@ -22,8 +22,7 @@ from ..motion.noise_spectrum import filtering_notes, pose_was_filtered
 from ..motion.smoothing import CUTOFFS
 from ..prediction import nis_without_wrench_state, rollout_error
 from ..wrench_series import pose_notes
-from .explanatory_variables import explanatory_variables
-from .fit_range import range_notes
+from .explanatory_variables import explanatory_variables, range_notes
 from .regression import Flights, lost_behind_a_filter
 from .settings import DIAGNOSIS, DiagnosisSettings
 from .verdict import Judged

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from scipy.signal import bilinear, lfilter
 
 from .causal_filter import State
+from .priors import UNKNOWN
+from .regression import Column, Flights
 
 Array = NDArray[np.float64]
 
@@ -40,6 +42,7 @@ class DiscrepancySettings:
 
 
 DISCREPANCY = DiscrepancySettings()
+CHANGING = f"{UNKNOWN}changing coefficient: "
 
 
 def _joined(tracks: Sequence[State]) -> tuple[Array, dict[str, Array]]:
@@ -57,22 +60,17 @@ def _scaled(x: Array) -> Array:
     return x / size if size > 1e-9 else np.zeros_like(x)
 
 
-def discrepancy_columns(
-    tracks: Sequence[State], times: list[Array], weight: float, arm: float, inertias: Array
-) -> dict[tuple[str, str], list[Array]]:
-    """Return accelerations (n, 6) of each piece by group and name, each of a standard deviation of
-    the weight, or of the weight times the arm.
+def discrepancy_columns(tracks: Sequence[State], flights: Flights) -> dict[Column, list[Array]]:
+    """Return accelerations (n, 6) of each piece by column, each of a standard deviation of the
+    weight, or of the weight times the arm.
 
     Args:
         tracks: the pieces.
-        times: (n,) s of each.
-        weight: N.
-        arm: m.
-        inertias: (6,) mass (kg) three times, and moments of inertia (kg m2).
+        flights: of the vehicle.
     """
     ends, joined = _joined(tracks)
     rotation, velocity, position = joined["rotation"], joined["velocity"], joined["position"]
-    rate, rotors, t = joined["angular_velocity"], joined["rotors"], np.concatenate(times)
+    rate, rotors, t = joined["angular_velocity"], joined["rotors"], joined["t"]
     body = np.einsum("nij,ni->nj", rotation, velocity)
     above = position[:, 2] - position[:, 2].min()
     shapes: list[tuple[str, str, Array, tuple[int, ...]]] = []  # group, name, of which channels
@@ -103,18 +101,20 @@ def discrepancy_columns(
     shapes += [("place", name, x, every) for name, x in places]
     along = np.pi * (t - t[0]) / max(float(t[-1] - t[0]), 1e-9)
     shapes += [("time", f"time {i}", np.cos(i * along), every) for i in (1, 2, 3)]
-    size = np.repeat([weight, weight * DISCREPANCY.torque_arm * arm], 3) / inertias
-    out: dict[tuple[str, str], list[Array]] = {}
+    vehicle = flights.vehicle
+    arm = DISCREPANCY.torque_arm * vehicle.arm_l
+    size = vehicle.weight * np.repeat([1.0, arm], 3) / flights.inertias
+    out: dict[Column, list[Array]] = {}
 
     def add(group: str, name: str, column: Array) -> None:
-        out[group, name] = np.split(column, ends)
+        out["", f"{UNKNOWN}{group}: {name}"] = np.split(column, ends)
 
     for group, name, x, channels in shapes:
         z = _scaled(x)
         for channel in channels if z.any() else ():
             column = np.zeros((len(z), 6))
             if channel < 3:
-                column[:, :3] = (weight / inertias[0]) * z[:, None] * rotation[:, :, channel]
+                column[:, :3] = size[0] * z[:, None] * rotation[:, :, channel]
             else:
                 column[:, channel] = size[channel] * z
             add(group, f"{name} in {channel}", column)
@@ -123,11 +123,11 @@ def discrepancy_columns(
         column[:, channel] = size[channel]
         add("constant", f"a constant in {channel}", column)
     period = float(np.median(np.diff(t)))
-    acceleration, turning = joined["acceleration"], rotors[:, 1:] / inertias[3:]
+    acceleration, turning = joined["acceleration"], rotors[:, 1:]
     for hertz in DISCREPANCY.load_hz:
         column = np.zeros((len(t), 6))
         column[:, :2] = _resonance(acceleration[:, :2], hertz, period, ends)
-        column *= weight / inertias[0] / max(float(column[:, :2].std()), 1e-9)
+        column *= size[0] / max(float(column[:, :2].std()), 1e-9)
         add("resonance", f"a load that swings at {hertz:g} Hz in 0", column)
     for hertz, i in itertools.product(DISCREPANCY.mount_hz, range(3)):
         column = np.zeros((len(t), 6))
@@ -151,7 +151,7 @@ def _resonance(drive: Array, hertz: float, period: float, ends: Array) -> Array:
     return np.concatenate([lfilter(*shape, x, axis=0) for x in np.split(drive, ends)])
 
 
-def variables(tracks: Sequence[State], times: list[Array]) -> dict[str, list[Array]]:
+def variables(tracks: Sequence[State]) -> dict[str, list[Array]]:
     """Return what a coefficient may change with: variables (n,) of each piece by name, of mean zero
     and standard deviation one over all.
     """
@@ -168,7 +168,7 @@ def variables(tracks: Sequence[State], times: list[Array]) -> dict[str, list[Arr
         "position y": position[:, 1],
         "heading's sine": np.sin(heading),
         "heading's cosine": np.cos(heading),
-        "time": np.concatenate(times),
+        "time": joined["t"],
         "thrust": rotors[:, 0],
         "yaw rate": joined["angular_velocity"][:, 2],
     }
@@ -178,18 +178,16 @@ def variables(tracks: Sequence[State], times: list[Array]) -> dict[str, list[Arr
 
 def changing_columns(
     parts: Mapping[str, list[Array]], found: Mapping[str, list[Array]]
-) -> dict[tuple[str, str], list[Array]]:
-    """Return columns of coefficients that change with a variable, by group and name.
+) -> dict[Column, list[Array]]:
+    """Return columns of coefficients that change with a variable.
 
     Args:
         parts: what each effect of a set adds (n, ...) to each piece.
         found: ``variables``.
     """
-    out = {}
-    for (effect, part), (name, z) in itertools.product(parts.items(), found.items()):
-        column = [
-            DISCREPANCY.share_of_effect * x * y.reshape(-1, *[1] * (x.ndim - 1))
-            for x, y in zip(part, z, strict=True)
+    return {
+        ("", f"{CHANGING}{effect} with {name}"): [
+            DISCREPANCY.share_of_effect * x * y[:, None] for x, y in zip(part, z, strict=True)
         ]
-        out["changing coefficient", f"{effect} with {name}"] = column
-    return out
+        for (effect, part), (name, z) in itertools.product(parts.items(), found.items())
+    }

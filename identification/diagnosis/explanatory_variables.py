@@ -1,4 +1,6 @@
-"""What a force or a torque may depend on: variables of a flight at the rows of its residual."""
+"""What a force or a torque may depend on: variables of a flight at the rows of its residual, and
+whether flights that a fit did not see lie within the range of those that it saw.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,9 +9,11 @@ from ..motion.smoothing import CUTOFFS, low_pass
 from .regression import Flights, Setting
 
 Array = NDArray[np.float64]
-
-
 Variable = tuple[str, Array]  # in words, (rows,)
+
+# quantile of the fitted rows up to which the fit knows a quantity, and the share of other rows
+# beyond it from which these are said to lie outside
+KNOWN, OUTSIDE = 0.995, 0.05
 
 
 def explanatory_variables(flights: Flights, setting: Setting) -> list[Variable]:
@@ -50,3 +54,29 @@ def explanatory_variables(flights: Flights, setting: Setting) -> list[Variable]:
         (name, np.concatenate([p[i][1] for p in parts])) for i, (name, _) in enumerate(parts[0])
     ]
     return [(name, x) for name, x in joined if x.std() > 1e-9]
+
+
+def range_notes(flights: Flights) -> list[str]:
+    """Return a sentence for each quantity in which held-out flight leaves the range of the fit.
+
+    A coefficient that was fitted at 6 m/s says what happens at 14 m/s only if the effect's form
+    holds that far, which the fit cannot know.
+    """
+    seen, out = flights.fit_rows, []
+    thrust, weight = flights.vehicle.rotor_wrench, flights.vehicle.weight
+    pieces = [p.signals.at(p.rows) for p in flights.pieces({})]
+    for name, unit, parts in (
+        ("the speed", "m/s", [np.linalg.norm(s.velocity, axis=1) for s in pieces]),
+        ("the turn rate", "rad/s", [np.linalg.norm(s.angular_velocity, axis=1) for s in pieces]),
+        ("the thrust", "weights", [thrust(s.rotor_speeds)[:, 0] / weight for s in pieces]),
+    ):
+        values = np.concatenate(parts)
+        most = float(np.quantile(values[seen], KNOWN))
+        beyond = values[~seen] > most
+        if beyond.mean() > OUTSIDE:
+            out.append(
+                f"outside the range of the fit: {name} of {beyond.mean():.0%} of the held-out "
+                f"flight is above {most:.3g} {unit}, up to {values[~seen].max():.3g} {unit}. The "
+                "errors there are those of an extrapolation"
+            )
+    return out

@@ -27,6 +27,14 @@ from ..motion.smoothing import continuous, turn_between, turned
 from .axis_filter import AXIS, AxisNoise, likeliest_noise, steady_noise
 from .causal_filter import Poses, Track, run, sensitivities
 from .discrepancy import changing_columns, discrepancy_columns, variables
+from .log_offsets import (
+    ATTITUDE_TIME_OFFSET,
+    LAG_ASYMMETRY,
+    ROTOR_TIME_OFFSET,
+    TIMINGS,
+    with_time_offsets,
+    with_uneven_lag,
+)
 from .priors import (
     BETWEEN,
     GAIN,
@@ -44,22 +52,14 @@ from .regression import (
     CENTRAL,
     REGRESSION,
     START_PREFIX,
+    STEP,
     Column,
     Flights,
-    coefficient,
     is_delay,
     typical_size,
     without,
 )
 from .rotor_innovations import DRIVEN, rotor_innovations
-from .time_offsets import (
-    ATTITUDE_TIME_OFFSET,
-    LAG_ASYMMETRY,
-    ROTOR_TIME_OFFSET,
-    TIMINGS,
-    with_time_offsets,
-    with_uneven_lag,
-)
 
 Array = NDArray[np.float64]
 
@@ -72,8 +72,6 @@ SIDEWAYS = 0.01
 class LikelihoodSettings:
     """What the likelihood allows for beside effects."""
 
-    step: float = 0.1  # typical sizes, over which derivatives are taken
-    step_of_time: float = 0.001  # s, the same for the rotors' time offset
     noise_rounds: int = 2  # of the noise and of the flight as it is seen with it
     first_disturbance: float = 0.3  # m/s2 and rad/s2, at which the search for the noise begins
 
@@ -116,8 +114,7 @@ class Likelihood:
             self.pieces = [piece for _, piece in found]
             self._fit = [_in_fit(flights, i, piece.t) for i, piece in found]
         self.period = self.pieces[0].period
-        inertia = flights.vehicle.inertia
-        self.inertias = np.array([flights.vehicle.mass] * 3 + np.diagonal(inertia).tolist())
+        self.inertias = flights.inertias
         lengths = [len(piece.t) for piece in self.pieces]
         if near is not None and [len(piece.t) for piece in near.pieces] != lengths:
             near = None
@@ -153,8 +150,7 @@ class Likelihood:
         ]
 
     def _rotor_innovations(self) -> list[Array]:
-        pairs = list(zip(self.pieces, self.tracks, strict=True))
-        return rotor_innovations(pairs, self.inertias[2:])
+        return rotor_innovations(list(zip(self.pieces, self.tracks, strict=True)))
 
     # Noise
 
@@ -285,10 +281,7 @@ class Likelihood:
         if name.startswith(WHOLE_PREFIX):
             own[CENTRAL] = 1.0
         name = name.removeprefix(WHOLE_PREFIX)
-        value, c = own.get(name, 0.0), coefficient((effect, name))
-        delta = LIKELIHOOD.step * typical_size((effect, name), self.flights.vehicle)
-        if not c.minimum <= value + delta <= c.maximum:
-            delta = -delta
+        value, delta = self.flights.step(self.setting, (effect, name))
         try:
             return self._change({**self.setting, effect: {**own, name: value + delta}}, delta)
         except (InputError, np.linalg.LinAlgError):
@@ -299,7 +292,7 @@ class Likelihood:
         filter predicts: so the pose's own noise is no part of it.
         """
         effect, name = column
-        delta = LIKELIHOOD.step * typical_size(column, self.flights.vehicle)
+        delta = STEP * typical_size(column, self.flights.vehicle)
         bare = replace(self.flights.vehicle, effects=())
         vehicle = replace(bare, effects=self.flights.amended({effect: {name: delta}}).effects[-1:])
         out = []
@@ -325,20 +318,12 @@ class Likelihood:
         """
         acting, moved = self._acting, self._posed
         if playing(Role.LAG, among=self.setting) and LAG_ASYMMETRY not in acting:
-            delta = LIKELIHOOD.step * TIMINGS[LAG_ASYMMETRY].size
+            delta = STEP * TIMINGS[LAG_ASYMMETRY].size
             acting[LAG_ASYMMETRY] = self._change(
                 self.setting, delta, lambda s: with_uneven_lag(s, self.vehicle, delta)
             )
         if unknown and not any(name.startswith(UNKNOWN) for _, name in acting):
-            found = discrepancy_columns(
-                self.tracks,
-                [p.t for p in self.pieces],
-                self.flights.vehicle.weight,
-                self.flights.vehicle.arm_l,
-                self.inertias,
-            )
-            for (group, name), column in found.items():
-                acting["", f"{UNKNOWN}{group}: {name}"] = column
+            acting |= discrepancy_columns(self.tracks, self.flights)
             self._add_changing_coefficients()
         for c, start in starts.items():
             if c not in acting:
@@ -375,14 +360,13 @@ class Likelihood:
                 ]
             else:
                 parts[effect] = self._change(without(self.setting, effect), -1.0)
-        found = variables(self.tracks, [p.t for p in self.pieces])
-        for columns, of in ((self._acting, parts), (self._posed, poses)):
-            for (group, name), column in changing_columns(of, found).items():
-                columns["", f"{UNKNOWN}{group}: {name}"] = column
+        found = variables(self.tracks)
+        self._acting |= changing_columns(parts, found)
+        self._posed |= changing_columns(poses, found)
 
     def _add_what_any_flight_may_have(self) -> None:
         """Add the columns of time offsets, of rotors between samples and of the model's error."""
-        acting, delta = self._acting, LIKELIHOOD.step_of_time
+        acting, delta = self._acting, 0.001  # s
         offset = {ROTOR_TIME_OFFSET[1]: delta}
         acting[ROTOR_TIME_OFFSET] = self._change(
             self.setting, delta, lambda s: with_time_offsets(s, offset)
@@ -425,8 +409,7 @@ class Likelihood:
                 x[:, 1] += coefficients.get(c, 0.0) * column[i]
             for c, column in self._posed.items():
                 x[:, 0] += coefficients.get(c, 0.0) * column[i]
-            specific = track.rotors[:, :1] / self.vehicle.mass
-            x[:, 1, :3] += specific * (
+            x[:, 1, :3] += track.rotors[:, :1] * (
                 x[:, 0, 4:5] * track.rotation[:, :, 0] - x[:, 0, 3:4] * track.rotation[:, :, 1]
             )
             explained.append(x)
@@ -449,11 +432,10 @@ class Likelihood:
 
     def _add_model_errors(self) -> None:
         for track, answer in zip(self.tracks, self.answers, strict=True):
-            specific = track.rotors[:, 0] / self.vehicle.mass
             for i, axis in enumerate("xyz"):
-                force, torque = np.zeros((len(specific), 6)), np.zeros((len(specific), 6))
-                force[:, :3] = specific[:, None] * track.rotation[:, :, i]
-                torque[:, 3 + i] = track.rotors[:, 1 + i] / self.inertias[3 + i]
+                force, torque = np.zeros((2, len(track.t), 6))
+                force[:, :3] = track.rotors[:, :1] * track.rotation[:, :, i]
+                torque[:, 3 + i] = track.rotors[:, 1 + i]
                 # of rounded rotor speeds the flight loop's answer to the state shows too little,
                 # and what answers the state stands for it
                 expected = torque.copy()
@@ -505,8 +487,7 @@ class Likelihood:
         blocks, samples = [], 0
         for i, track in enumerate(self.tracks):
             state = np.zeros((6, 3, len(names)))
-            specific = track.rotors[:, 0] / self.vehicle.mass
-            pull = specific[:, None, None] * track.rotation[:, :, 1::-1] * [-1.0, 1.0]
+            pull = track.rotors[:, :1, None] * track.rotation[:, :, 1::-1] * [-1.0, 1.0]
             for begin in range(0, len(track.position), length):
                 at = slice(begin, min(begin + length, len(track.position)))
                 rows = at.stop - at.start

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Role
 from .evidence import Index, Marginal, marginal
+from .log_offsets import TIMINGS
 from .regression import (
     CENTRAL,
     START_PREFIX,
@@ -23,7 +24,6 @@ from .regression import (
     typical_size,
     unit_of_change,
 )
-from .time_offsets import timing_of
 
 Array = NDArray[np.float64]
 Setting = dict[str, dict[str, float]]
@@ -137,8 +137,8 @@ def variants_of(
 def prior_size(column: Column, flights: Flights) -> float:
     """Return the standard deviation of a column's coefficient before a flight is seen."""
     effect, name = column
-    if (timing := timing_of(column)) is not None:
-        return timing.size
+    if column in TIMINGS:
+        return TIMINGS[column].size
     if not effect:
         if name == BETWEEN:
             return PRIORS.between_samples
@@ -250,10 +250,8 @@ def in_prior_units(
     low, high = np.array([_bounds(c, flights) for c in names]).T / size
     plain = [i for i, c in enumerate(names) if not c[0] and not c[1].startswith(UNKNOWN)]
     dictionary = [i for i, c in enumerate(names) if not c[0] and c[1].startswith(UNKNOWN)]
-    typical = [
-        typical_size((e, n.removeprefix(WHOLE_PREFIX)), flights.vehicle) if e else 1.0
-        for e, n in names
-    ]
+    bare = [(e, n.removeprefix(WHOLE_PREFIX)) for e, n in names]
+    typical = np.array([typical_size(c, flights.vehicle) for c in bare])
     return Base(
         {c: i for i, c in enumerate(names)},
         size,
@@ -263,7 +261,7 @@ def in_prior_units(
         penalty,
         frozenset(k for k in setting if k),
         np.array(plain, dtype=np.intp),
-        np.array(typical) / size,
+        typical / size,
         np.array(dictionary, dtype=np.intp),
         starts,
     )

@@ -100,9 +100,7 @@ def rank(
     found = Posterior(flights, library, (loud, whole), found.tempering())
     column, size, _ = found.strangest()
     ranking = found.ranking(best.quieter({column: size}, starts))
-    late = {
-        name: x for (_, name), x in found.nuisances().items() if ("", name) in flights.time_offsets
-    }
+    late = {c[1]: x for c, x in found.nuisances().items() if c in flights.offsets}
     return Found(found, ranking, found.best_setting(), best.noise, late)
 
 

@@ -26,7 +26,7 @@ from ..motion.noise_spectrum import pose_was_filtered
 from ..motion.residual import acting_wrench, needed_wrench
 from ..motion.sensing_effects import undo_log_sensing
 from ..motion.sensor_noise import noisy_logs
-from ..motion.signals import Signals, log_signals
+from ..motion.signals import SIGNALS, Signals, log_signals
 from ..motion.smoothing import CUTOFFS, low_pass, resampled
 from .commanded_rotors import (
     COMMANDED,
@@ -35,14 +35,16 @@ from .commanded_rotors import (
     in_flight_by_thrust,
     thrust_is_assumed,
 )
-from .sensor_bias import bias, bias_columns
-from .time_offsets import (
+from .log_offsets import (
     ATTITUDE_TIME_OFFSET,
+    BEHIND_A_FILTER,
     LAG_ASYMMETRY,
     ROTOR_SPREAD,
     ROTOR_TIME_OFFSET,
+    TIMINGS,
     VELOCITY_TIME_OFFSET,
-    timing_of,
+    Offset,
+    bias_column,
     with_time_offsets,
     with_uneven_lag,
 )
@@ -58,7 +60,6 @@ V = TypeVar("V")
 class RegressionSettings:
     """Rows and blocks of the regression, what flights must excite, and how much memory is used."""
 
-    row_rate_hz: float = 25.0  # of the samples that are rows: five times the cut-off
     margin: float = 0.6  # s at either end of a piece, where the filters lack half of what they need
     # share of sensor noise in an effect's column, from which the effect is not identifiable; of one
     # that scales a measurement, it could cancel the measurement's own noise
@@ -67,13 +68,9 @@ class RegressionSettings:
     # rounding steps by which rotor speeds must vary; with less, the rounding is no noise but looks
     # like an effect
     least_steps_of_rotor_speed: float = 1.4
-    accelerometer_gap: float = 0.1  # s, the longest in which an accelerometer is read
     block: float = 3.0  # s of flight held out, or left out in cross-validation, in one piece
     short_block: float = 1.0  # s, the same of commanded flights of fewer than eight blocks
     blocks_per_held_out: int = 4  # one of so many blocks is held out
-    # the golden ratio, by which the place of the held-out block moves: no flight keeps step with it
-    held_out_step: float = 0.5 * (5.0**0.5 - 1.0)
-    most_period_ratio: float = 1.01  # between logs that one filter reads
     memory: int = 2**28  # bytes, of pieces that are kept
 
 
@@ -82,6 +79,9 @@ REGRESSION = RegressionSettings()
 # curve is a guess, and commands do not tell small differences between rotors
 NOT_COMMANDED = (Need.MOMENTS, Need.SINGLE_ROTORS)
 
+# typical sizes, over which derivatives by a coefficient are taken: where it is fitted, and, so that
+# a signal moves in time by a sample and not by a part of one, where the noise in them is looked at
+STEP, LARGE_STEP = 0.1, 0.5
 # Coefficients by effect: what is added to the declared vehicle
 Setting = Mapping[str, Mapping[str, float]]
 # A column: an effect's coefficient
@@ -136,8 +136,8 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
     """Return the typical size of a coefficient for a vehicle of this mass, interpolated between the
     library's two.
     """
-    if (timing := timing_of(column)) is not None:
-        return timing.size
+    if not column[0]:
+        return TIMINGS[column].size if column in TIMINGS else 1.0
     if column[1].startswith(START_PREFIX) or column[1] == CENTRAL:
         return 1.0
     c = coefficient(column)
@@ -202,22 +202,13 @@ class Flights:
         self.filtered = not (self.commanded or self.inertial) and any(
             pose_was_filtered(log) for log in self.logs
         )
-        # which of a log's signals may be apart in time
-        self.time_offsets: tuple[Column, ...] = (
-            *(() if self.commanded else (ROTOR_TIME_OFFSET,)),
-            *((ROTOR_SPREAD,) if self.inertial and not self.commanded else ()),
-            *(() if self.inertial else (ATTITUDE_TIME_OFFSET,)),
-            *(() if self.commanded or self.inertial else (VELOCITY_TIME_OFFSET,)),
-        )
         # poses and rotor speeds as they were measured, for one filter of all logs
-        periods = [log.period for log in self.logs]
-        self.has_raw_poses = not (self.commanded or self.inertial or self.filtered) and (
-            max(periods) <= REGRESSION.most_period_ratio * min(periods)
+        self.has_raw_poses = not (self.commanded or self.inertial or self.filtered) and np.allclose(
+            [log.period for log in self.logs], self.logs[0].period, rtol=0.01
         )
         self.logs = tuple(excerpt(self.logs))
-        self.residual_hz, self._row_rate_hz = CUTOFFS.residual_hz, REGRESSION.row_rate_hz
+        self.residual_hz, self._row_rate_hz = CUTOFFS.residual_hz, 5.0 * CUTOFFS.residual_hz
         self._fit_logs, self._has_test = len(logs), bool(test)
-        self.biases: tuple[Column, ...] = tuple(bias_columns(len(logs)) if self.inertial else ())
         self._drift: np.random.Generator | None = None  # of a copy whose fusion errs otherwise
         self._fused: dict[FlightLog, list[InertialSignals]] = {}
         self._smooth_imu: dict[int, tuple[Array, Array]] = {}
@@ -230,6 +221,9 @@ class Flights:
         self.t: Array  # (rows,) s
         self.period: float  # s, from row to row
         self._lay_rows()
+        # by what the accelerometers from which the motion is read may be off, and all signals
+        self.biases = self._biases()
+        self.offsets = self._timings() | self.biases
         # of a log that is read by its IMU: effects that leave no trace in it at all, and those that
         # would show beside a pose
         self.without_trace: frozenset[str] = frozenset()
@@ -353,7 +347,7 @@ class Flights:
         if is_nonlinear(effect):
             setting = {effect: {c[1]: typical_size(c, self.vehicle) for c in own}}
             return [self.residual({}) - self.residual(setting)]
-        columns = self.columns({}, [c for c in own if c[1] != CENTRAL])
+        columns = self.columns({}, [c for c in own if c[1] != CENTRAL], LARGE_STEP)
         return [typical_size(c, self.vehicle) * x for c, x in columns.items()]
 
     def _in_own_axes(self, x: Array, noisy: "Flights") -> Array:
@@ -390,6 +384,11 @@ class Flights:
         """RMS of the speed, m/s."""
         velocity = np.concatenate([p.signals.velocity[p.rows] for p in self._first])
         return float(np.sqrt(np.mean(np.sum(np.square(velocity), axis=1))))
+
+    @property
+    def inertias(self) -> Array:
+        """Mass (kg), three times, and moments of inertia (kg m2), (6,)."""
+        return np.array([self.vehicle.mass] * 3 + np.diagonal(self.vehicle.inertia).tolist())
 
     @property
     def rotor_speeds_vary(self) -> bool:
@@ -453,13 +452,23 @@ class Flights:
             return self._fused[log]
         return [with_drift(s, self._drift, self.vehicle.gravity) for s in self._fused[log]]
 
-    def bias_std(self, flight: int) -> Array:
-        """Return the standard deviation (3,) m/s2 of what is left of a flight's accelerometer
-        bias.
-        """
-        own = [p.signals for p in self._first if p.log == flight]
-        left = [s.bias_std for s in own if isinstance(s, InertialSignals)]
-        return np.asarray(np.max(left, axis=0))
+    def _timings(self) -> dict[Column, Offset]:
+        """Return by what signals may be apart in time: none where commands stand for rotors."""
+        if self.commanded:
+            return {}
+        others = (ROTOR_SPREAD,) if self.inertial else (ATTITUDE_TIME_OFFSET, VELOCITY_TIME_OFFSET)
+        rotors = BEHIND_A_FILTER if self.filtered else TIMINGS[ROTOR_TIME_OFFSET]
+        return {ROTOR_TIME_OFFSET: rotors, **{c: TIMINGS[c] for c in others}}
+
+    def _biases(self) -> dict[Column, Offset]:
+        """Return what is left of the biases of accelerometers from which the motion is read."""
+        out: dict[Column, Offset] = {}
+        for piece in self._first:
+            if isinstance(s := piece.signals, InertialSignals) and piece.log < self._fit_logs:
+                for axis, std in enumerate(s.bias_std.tolist()):
+                    c = bias_column(piece.log, axis)
+                    out[c] = Offset(max(std, out[c].size if c in out else 0.0))
+        return out
 
     def amended(self, setting: Setting) -> Vehicle:
         """Return the vehicle with these effects; one that it declares already is replaced."""
@@ -540,7 +549,8 @@ class Flights:
             s = with_time_offsets(piece.signals, offsets)
             s = with_uneven_lag(s, vehicle, offsets.get(LAG_ASYMMETRY[1], 0.0))
             model, _ = acting_wrench(s, vehicle, self.vehicle)
-            if self.inertial and (off := bias(setting, piece.log)).any():
+            off = np.array([offsets.get(bias_column(piece.log, i)[1], 0.0) for i in range(3)])
+            if off.any():
                 model[:, :3] += self.vehicle.mass * np.einsum("nij,j->ni", s.rotation, off)
             if self.commanded:
                 model[:, 3:] = 0.0
@@ -581,36 +591,39 @@ class Flights:
         )
         return _kept(self._columns, key, dict, 12)
 
-    def _slope(self, setting: Setting, column: Column, base: Array, delta: float) -> Array:
-        """Return what a unit of a coefficient adds (rows, 6), by a difference of ``delta`` from the
-        residual at a setting.
+    def step(self, setting: Setting, column: Column, size: float = STEP) -> tuple[float, float]:
+        """Return a coefficient's value at a setting, and a step from there within its limits, of so
+        many typical sizes, over which a derivative is taken.
+        """
+        value = self.coefficients(setting, column[0]).get(column[1], 0.0)
+        delta = size * typical_size(column, self.vehicle)
+        if column[0]:
+            c = coefficient(column)
+            delta = -delta if c.typical[0] < 0.0 else delta
+            delta = delta if c.minimum <= value + delta <= c.maximum else -delta
+        return value, delta
+
+    def _slope(self, setting: Setting, column: Column, base: Array, step: float) -> Array:
+        """Return what a unit of a coefficient adds (rows, 6), by a difference from the residual at
+        a setting.
         """
         effect, name = column
         own = self.coefficients(setting, effect)
-        value = own.get(name, 0.0)
+        value, delta = self.step(setting, column, step)
 
         def at(moved: float) -> Array:
             return self.residual({**setting, effect: {**own, name: moved}})
 
-        if effect:
-            c = coefficient(column)
-            if c.typical[0] < 0:
-                delta = -delta
-            # moving signals in time moves their noise as well: the difference is taken to both
-            # sides, as a step to one side would seem to reduce the noise
-            if (
-                moves_time(effect)
-                and abs(value) > abs(delta)
-                and c.minimum <= value - delta
-                and value + delta <= c.maximum
-            ):
+        # moving signals in time moves their noise as well, and a step to one side would seem to
+        # reduce it: the difference is taken to both sides
+        if effect and moves_time(effect) and abs(value) > abs(delta):
+            c, far = coefficient(column), abs(delta)
+            if c.minimum <= value - far and value + far <= c.maximum:
                 return (at(value - delta) - at(value + delta)) / (2.0 * delta)
-            if not c.minimum <= value + delta <= c.maximum:
-                delta = -delta
         return (base - at(value + delta)) / delta
 
     def columns(
-        self, setting: Setting, wanted: Iterable[Column], step: float = 0.5
+        self, setting: Setting, wanted: Iterable[Column], step: float = STEP
     ) -> dict[Column, Array]:
         """Return what each unit of a coefficient adds to the residual that the model leaves, (rows,
         6) each.
@@ -625,8 +638,7 @@ class Flights:
             effect = column[0]
             known = kept if effect and effect not in setting else {}
             if column not in known:
-                delta = step * typical_size(column, self.vehicle)
-                known[column] = self._slope(setting, column, base, delta)
+                known[column] = self._slope(setting, column, base, step)
             out[column] = known[column]
         return out
 
@@ -647,7 +659,7 @@ def _reads_throughout(log: FlightLog) -> bool:
         return False
     times = log.t[np.isfinite(log.accelerometer).all(axis=1)]
     ends = np.concatenate([log.t[:1], times, log.t[-1:]])
-    return len(times) > 0 and float(np.diff(ends).max()) < REGRESSION.accelerometer_gap
+    return len(times) > 0 and float(np.diff(ends).max()) < SIGNALS.gap
 
 
 def _smooth_accelerometer(log: FlightLog) -> tuple[Array, Array]:
@@ -672,9 +684,10 @@ def _most_noise_share(effect: str) -> float:
 
 def held_out(number: Index) -> Index:
     """Return which block of its four is held out, of each block: the last of the first, then as
-    evenly as can be.
+    evenly as can be: by the golden ratio, with which no flight keeps step.
     """
-    turn = (0.75 + REGRESSION.held_out_step * (number // REGRESSION.blocks_per_held_out)) % 1.0
+    golden = 0.5 * (5.0**0.5 - 1.0)
+    turn = (0.75 + golden * (number // REGRESSION.blocks_per_held_out)) % 1.0
     return np.asarray(REGRESSION.blocks_per_held_out * turn, dtype=np.int64)
 
 

@@ -9,8 +9,6 @@ is known by what of the rotors was predictable alone. (Joint input-output identi
 System Identification, 2nd edition, 1999, section 13.5.)
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,38 +17,28 @@ from .causal_filter import Poses, Track
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class FeedbackSettings:
-    """The model by which the rotors answer the past."""
-
-    # samples of the rotors' past: a loop's own filter remembers what it saw. Of 23 flights whose
-    # loops saw more than their logs, 7 got a wrong probable set with 4, and 4 with 20
-    lags: int = 20
-    # relative, of each regressor's own variance: against columns that are alike
-    ridge: float = 1e-6
-
-
-FEEDBACK = FeedbackSettings()
+# samples of the rotors' past by which they answer it: a loop's own filter remembers what it saw. Of
+# 23 flights whose loops saw more than their logs, 7 got a wrong probable set with 4, and 4 with 20
+LAGS = 20
 # the axis of the pose that each of thrust and torques drives
 DRIVEN = (2, 3, 4, 5)
 
 
-def rotor_innovations(pieces: list[tuple[Poses, Track]], inertias: Array) -> list[Array]:
+def rotor_innovations(pieces: list[tuple[Poses, Track]]) -> list[Array]:
     """Return the rotors' innovations (n, 4) of each piece, as accelerations: along body z (m/s2)
     and about the body's axes (rad/s2). The first samples, of which too little is past, have none.
 
     Args:
         pieces: as they were measured, and as the filter sees them.
-        inertias: (4,) mass (kg) and moments of inertia (kg m2).
     """
     sides = []
     for poses, track in pieces:
-        now = _accelerations(poses, track, inertias)
-        sides.append((_known_before(track, now), now[FEEDBACK.lags :]))
+        now = _accelerations(poses, track)
+        sides.append((_known_before(track, now), now[LAGS:]))
     out = []
     for (poses, _), (_, y), predicted in zip(pieces, sides, _predicted(sides), strict=True):
         found = np.zeros((len(poses.t), 4))
-        found[FEEDBACK.lags :] = y - predicted
+        found[LAGS:] = y - predicted
         out.append(found)
     return out
 
@@ -63,30 +51,29 @@ def _predicted(sides: list[tuple[Array, Array]]) -> list[Array]:
     mean, size = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-12)
     z = np.column_stack([(x - mean) / size, np.ones(len(x))])
     normal = z.T @ z
-    normal += FEEDBACK.ridge * np.diag(np.diagonal(normal))
+    normal += 1e-6 * np.diag(np.diagonal(normal))  # against columns that are alike
     predicted = z @ np.linalg.solve(normal, z.T @ y)
     return np.split(predicted, np.cumsum([len(part) for part, _ in sides])[:-1])
 
 
-def _accelerations(poses: Poses, track: Track, inertias: Array) -> Array:
+def _accelerations(poses: Poses, track: Track) -> Array:
     """Return what the rotors do at the samples (n, 4), as accelerations."""
-    # the track has the rotors between samples; their wrench is linear in the squares of the speeds
-    wrench = np.linalg.lstsq(
+    # the track has the rotors between samples; what they do is linear in the squares of the speeds
+    effectiveness = np.linalg.lstsq(
         np.square(0.5 * (poses.rotor_speeds[:-1] + poses.rotor_speeds[1:])),
         track.rotors[:-1],
         rcond=None,
     )[0]
-    return np.asarray(np.square(poses.rotor_speeds) @ wrench / inertias)
+    return np.asarray(np.square(poses.rotor_speeds) @ effectiveness)
 
 
 def _known_before(track: Track, rotors: Array) -> Array:
-    """Return what is known before a sample's rotors (n - lags, c): their past, ``rotors`` (n, 4),
+    """Return what is known before a sample's rotors (n - LAGS, c): their past, ``rotors`` (n, 4),
     and the filter's state. Nothing is known in a piece that is shorter than the lags.
     """
-    lags = FEEDBACK.lags
-    count = max(len(rotors) - lags, 0)
-    known = [rotors[i : i + count] for i in reversed(range(lags))]
-    before = slice(lags - 1, lags - 1 + count)
+    count = max(len(rotors) - LAGS, 0)
+    known = [rotors[i : i + count] for i in reversed(range(LAGS))]
+    before = slice(LAGS - 1, LAGS - 1 + count)
     body = np.einsum("nij,ni->nj", track.rotation[before], track.velocity[before])
     known += [
         track.rotation[before][:, 2, :2],
@@ -96,6 +83,6 @@ def _known_before(track: Track, rotors: Array) -> Array:
         track.acceleration[before] - track.model[before],
         track.innovations[before],
         # the loop may have read this sample's pose before the rotors were logged
-        track.innovations[lags:],
+        track.innovations[LAGS:],
     ]
     return np.column_stack(known)

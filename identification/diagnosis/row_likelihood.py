@@ -2,7 +2,6 @@
 settings.
 """
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
@@ -14,10 +13,9 @@ from ..motion.smoothing import low_pass
 from .causal_filter import State
 from .climbing import Height, height, linearised, mode
 from .discrepancy import changing_columns, discrepancy_columns, variables
-from .evidence import tempering
+from .log_offsets import LAG_ASYMMETRY
 from .priors import (
     NUISANCE,
-    UNKNOWN,
     Base,
     Setting,
     Starts,
@@ -29,11 +27,8 @@ from .regression import Column, Flights, without
 from .row_noise import ROW_NOISE, RowNoise, fitted_noise, white_noise
 from .row_nuisances import answered, followers, row_nuisances
 from .rows import Rows
-from .sensor_bias import flight_and_axis
-from .time_offsets import LAG_ASYMMETRY, timing_of
 
 Array = NDArray[np.float64]
-IDLE = 1e-6  # of the largest residual, up to which an effect does nothing
 
 
 class RowLikelihood:
@@ -138,15 +133,10 @@ class RowLikelihood:
         return in_prior_units(flights, list(columns), blocks, 0.0, setting, starts)
 
     def _dictionary(self) -> dict[Column, Array]:
-        flights, vehicle = self.rows.flights, self.flights.vehicle
-        pieces = flights.pieces({})
-        seen = self._states()
-        inertias = np.array([vehicle.mass] * 3 + np.diagonal(vehicle.inertia).tolist())
-        found = discrepancy_columns(
-            seen, [p.signals.t for p in pieces], vehicle.weight, vehicle.arm_l, inertias
-        )
+        flights = self.rows.flights
+        pieces, found = flights.pieces({}), discrepancy_columns(self._states(), flights)
         out: dict[Column, Array] = {}
-        for (group, name), parts in found.items():
+        for column, parts in found.items():
             if not self.rows.with_torques and not any(x[:, :3].any() for x in parts):
                 continue
             sampled = np.concatenate(
@@ -155,18 +145,16 @@ class RowLikelihood:
                     for x, p in zip(parts, pieces, strict=True)
                 ]
             )
-            out["", f"{UNKNOWN}{group}: {name}"] = self.rows.from_world(
-                sampled[:, :3], torque=sampled[:, 3:]
-            )
+            out[column] = self.rows.from_world(sampled[:, :3], torque=sampled[:, 3:])
         return out
 
     def _states(self) -> list[State]:
         """Return the flight; the acceleration is the rotors', which knows no disturbance."""
         vehicle, out = self.flights.vehicle, []
         for s in (p.signals for p in self.rows.flights.pieces({})):
-            rotors = vehicle.rotor_wrench(s.rotor_speeds)
-            push = rotors[:, :1] / vehicle.mass * s.rotation[:, :, 2]
-            out.append(State(s.position, s.rotation, s.velocity, s.angular_velocity, push, rotors))
+            rotors = vehicle.rotor_wrench(s.rotor_speeds) / self.flights.inertias[2:]
+            push, rate = rotors[:, :1] * s.rotation[:, :, 2], s.angular_velocity
+            out.append(State(s.t, s.position, s.rotation, s.velocity, rate, push, rotors))
         return out
 
     def _changing(self, setting: Setting) -> dict[Column, Array]:
@@ -174,15 +162,12 @@ class RowLikelihood:
         rows, pieces = self.rows, self.rows.flights.pieces({})
         here = rows.residual(setting)
         parts = {e: [rows.residual(without(setting, e)) - here] for e in setting}
-        found = variables(self._states(), [p.signals.t for p in pieces])
+        found = variables(self._states())
         at_rows = {
             name: [rows.at_rows([z[p.rows] for z, p in zip(x, pieces, strict=True)])]
             for name, x in found.items()
         }
-        return {
-            ("", f"{UNKNOWN}{group}: {name}"): column[0]
-            for (group, name), column in changing_columns(parts, at_rows).items()
-        }
+        return {c: x for c, (x,) in changing_columns(parts, at_rows).items()}
 
     # Fits
 
@@ -240,32 +225,21 @@ class RowLikelihood:
         std = np.sqrt(np.diag(cho_solve(factor, np.eye(len(b)))))
         at = {name: i for i, (_, name) in enumerate(self.nuisances)}
         out = {}
-        for column in (*self.flights.biases, *self.flights.time_offsets):
-            timing = timing_of(column, self.flights.filtered)
-            if timing is None:
-                flight, axis = flight_and_axis(column[1])
-                size, limits = float(self.flights.bias_std(flight)[axis]), (-math.inf, math.inf)
-            else:
-                size, limits = timing.size, timing.range
-            if (i := at.get(NUISANCE + column[1])) is not None:
-                value = float(np.clip(size * modes[i], *limits))
-                out[column[1]] = value, size * float(std[i])
+        for (_, name), offset in self.flights.offsets.items():
+            i = at[NUISANCE + name]
+            value = float(np.clip(offset.size * modes[i], *offset.range))
+            out[name] = value, offset.size * float(std[i])
         return out
 
     def idle(self, setting: Setting) -> set[str]:
         """Return the effects of a setting that do nothing there."""
         here = self.rows.residual(setting)
-        least = IDLE * float(np.abs(here).max())
+        least = 1e-6 * float(np.abs(here).max())
         return {
             effect
             for effect in setting
             if np.abs(self.rows.residual(without(setting, effect)) - here).max() <= least
         }
-
-    def tempered(self, setting: Setting) -> float:
-        """Return the power of the likelihood that its scatter beside a setting allows."""
-        base = self.base(setting, {}, setting)
-        return tempering(base.blocks, np.arange(len(base.columns)))
 
 
 def _named(columns: Mapping[str, Array]) -> dict[Column, Array]:

@@ -8,12 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...dynamics.effects import Role, playing
 from ..motion.smoothing import low_pass
+from .log_offsets import ROTOR_TIME_OFFSET
 from .priors import MODEL_ERROR, PRIORS
 from .rows import Rows
-from .time_offsets import timing_of
-from .turning_delay import rotor_delay
 
 Array = NDArray[np.float64]
 
@@ -44,9 +42,9 @@ def row_nuisances(rows: Rows) -> dict[str, Array]:
             of = _Flown(rows, i, here)
             out |= _of_sensors(of)
             out |= _of_commands(of) if rows.flights.commanded else _of_rotors(of)
-    if not rows.flights.commanded:
-        out |= _of_timing(rows)
-    return out
+    offsets = rows.flights.offsets
+    found = rows.columns({}, offsets)
+    return out | {c[1]: offsets[c].size * x for c, x in found.items()}
 
 
 class _Flown:
@@ -55,26 +53,14 @@ class _Flown:
     Attributes:
         here: (samples,) 1 in this flight, 0 in others.
         thrust: (samples,) specific, m/s2.
-        slope: (samples,) its derivative, m/s3.
         turning: (samples, 3) angular acceleration by the rotors, rad/s2.
-        rotation: (samples, 3, 3) body to world.
+        none: (samples, 3) zero.
     """
 
     def __init__(self, rows: Rows, number: int, here: Array) -> None:
         self.rows, self.number, self.here = rows, number, here
-        flights = rows.flights
-        vehicle, pieces = flights.vehicle, flights.pieces({})
-        self.rotation = np.concatenate([p.signals.rotation[p.rows] for p in pieces])
-        wrench, slope = [], []
-        for p in pieces:
-            s = p.signals
-            smooth = low_pass(vehicle.rotor_wrench(s.rotor_speeds), flights.residual_hz, s.period)
-            wrench.append(smooth[p.rows])
-            slope.append(np.gradient(smooth[:, 0], s.period)[p.rows])
-        both = np.concatenate(wrench) * here[:, None]
-        self.thrust = both[:, 0] / vehicle.mass
-        self.turning = both[:, 1:] / np.diagonal(vehicle.inertia)
-        self.slope = np.concatenate(slope) * here / vehicle.mass
+        rotors = rows.flights.rotor_wrench({}) / rows.flights.inertias[2:] * here[:, None]
+        self.thrust, self.turning = rotors[:, 0], rotors[:, 1:]
         self.none = np.zeros((len(here), 3))
 
     @staticmethod
@@ -98,11 +84,12 @@ def _of_commands(of: _Flown) -> dict[str, Array]:
     bend = of.thrust * (1.5 * w * w - 0.5)
     out[f"bend {i}"] = use.drift * rows.from_body(of.along(2, bend))
     if rows.fixed:
-        out[f"delay {i}"] = use.delay * rows.from_body(of.along(2, -of.slope))
+        late = rows.columns({}, [ROTOR_TIME_OFFSET])[ROTOR_TIME_OFFSET]
+        out[f"delay {i}"] = use.delay * rows.at_rows([of.here])[:, None] * late
     level = flights.vehicle.gravity * of.here[:, None]
     for axis, name in enumerate("xy"):
         if not flights.inertial:
-            tilted = use.tilt * level * of.rotation[:, axis, :]
+            tilted = use.tilt * level * rows.rotation[:, axis, :]
             out[f"frame tilt {name} {i}"] = rows.from_body(tilted, of.none)
         aside = use.tilt * of.along(axis, of.thrust)
         out[f"thrust axis {name} {i}"] = rows.from_body(aside)
@@ -155,8 +142,7 @@ class Follower:
 def followers(rows: Rows) -> list[Follower]:
     """Return the signals of measured rotors and of the motion that follow disturbances."""
     flights = rows.flights
-    inertias = np.array([flights.vehicle.mass, *np.diagonal(flights.vehicle.inertia)])
-    wrench = flights.rotor_wrench({}) / inertias
+    wrench = flights.rotor_wrench({}) / flights.inertias[2:]
     rates = np.concatenate(
         [
             low_pass(p.signals.angular_velocity, flights.residual_hz, p.signals.period)[p.rows]
@@ -195,7 +181,7 @@ def answered(rows: Rows, signals: Sequence[Follower], disturbance: Array) -> dic
 
 
 def _of_sensors(of: _Flown) -> dict[str, Array]:
-    rows, flights, use, i = of.rows, of.rows.flights, NUISANCES, of.number
+    rows, use, i = of.rows, NUISANCES, of.number
     out = {}
     if rows.has_accelerometer:
         for axis, name in enumerate("xyz"):
@@ -203,31 +189,4 @@ def _of_sensors(of: _Flown) -> dict[str, Array]:
             out[f"accelerometer bias {name} {i}"] = rows.from_body(of.none, bias)
         scaled = use.accelerometer_scale * of.along(2, of.thrust)
         out[f"accelerometer scale {i}"] = rows.from_body(of.none, scaled)
-    elif flights.inertial:
-        for axis, name in enumerate("xyz"):
-            bias = flights.bias_std(i)[axis] * of.along(axis, of.here)
-            out[f"accelerometer bias {name} {i}"] = rows.from_body(bias)
     return out
-
-
-def _of_timing(rows: Rows) -> dict[str, Array]:
-    """Return what signals that are apart in time do, to first order."""
-    out = {}
-    for column, x in rows.columns({}, rows.flights.time_offsets).items():
-        timing = timing_of(column, rows.flights.filtered)
-        assert timing is not None
-        out[column[1]] = timing.size * x
-    return out
-
-
-def calibrations(library: Sequence[str]) -> list[str]:
-    """Return the effects of a library that any vehicle has whose rotors are known by commands: how
-    much thrust a command makes and when, how it bends, and how it goes with voltage and time.
-
-    They are fitted in every set, and are no discovery. Of thrust and mass a flight shows the ratio:
-    one of them is enough.
-    """
-    roles = (Role.THRUST_CURVE, Role.THRUST_OVER_VOLTAGE, Role.THRUST_OVER_TIME)
-    thrust = playing(Role.THRUST, among=library) or playing(Role.MASS, among=library)
-    delay = rotor_delay(library)
-    return [*thrust, *playing(*roles, among=library), *([delay] if delay else [])]

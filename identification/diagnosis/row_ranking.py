@@ -10,7 +10,6 @@ it, until none does that was not fitted.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 from .evidence import set_evidence
 from .priors import Base, Setting
@@ -20,15 +19,7 @@ from .row_likelihood import RowLikelihood
 from .sets import Posterior, is_possible
 from .settings import DIAGNOSIS
 
-
-@dataclass(frozen=True)
-class RowRankingSettings:
-    """Which starts are fitted."""
-
-    most_starts: int = 2  # of an effect with nonlinear coefficients, the likeliest, that are fitted
-
-
-ROW_RANKING = RowRankingSettings()
+MOST_STARTS = 2  # of an effect with nonlinear coefficients, the likeliest, that are fitted
 
 
 def rank_by_rows(
@@ -82,14 +73,16 @@ def rank_by_rows(
         own = [{**first, effect: dict(x)} for c, x in starts.items() if c[0] == effect]
         own.sort(key=likelihood.objective)
         if own:
-            near = map(likelihood.fitted, own[: ROW_RANKING.most_starts])
+            near = map(likelihood.fitted, own[:MOST_STARTS])
             add(min(near, key=likelihood.objective))
+
+    def posterior() -> Posterior:
+        return Posterior(flights, library, list(bases.values()), likelihood.power, given, idle)
 
     def likeliest() -> Setting:
         """Return the likeliest set's fit, once no set is likelier that was not fitted."""
         while True:
-            found = Posterior(flights, library, list(bases.values()), likelihood.power, given, idle)
-            setting = found.best_setting(len(library))
+            setting = posterior().best_setting(len(library))
             if (key := frozenset(setting)) in bases:
                 return fitted[key]
             report(f"trying {', '.join(e for e in setting if e not in given) or 'no effect'}")
@@ -108,13 +101,14 @@ def rank_by_rows(
             for setting in new:
                 add(setting)
 
-    likelihood.power = likelihood.tempered(confirmed())
+    confirmed()
+    likelihood.power = posterior().tempering()
     best = confirmed()
     key = frozenset(best)
     others = {c: x for c, x in lags.items() if c[0] not in key}
     bases.pop(key)
     bases[key] = likelihood.base(best, others, unknown=True)
-    found = Posterior(flights, library, list(bases.values()), likelihood.power, given, idle)
+    found = posterior()
     hidden = sorted(flights.needs_pose - flights.without_trace - set(best))
     behind = _behind(likelihood, best, [e for e in hidden if not flights.is_nonlinear(e)])
     return Found(found, found.ranking(), best, sensors=likelihood.sensors(best), behind=behind)

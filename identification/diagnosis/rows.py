@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...dynamics.effects import get
 from ..motion.smoothing import low_pass
-from .regression import Column, Flights, Setting, coefficient, typical_size
+from .regression import Column, Flights, Setting
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -24,7 +24,7 @@ Index = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class RowSettings:
-    """The rows, and the steps by which columns are differences."""
+    """The rows."""
 
     cutoff_hz: float = 3.5  # where rotors are known by commands
     # where the pose was filtered: well below any filter
@@ -32,7 +32,6 @@ class RowSettings:
     inertial_cutoff_hz: float = 5.0  # where the motion is read from an IMU
     rows_per_cutoff: float = 25.0 / 10.5  # rows in a period of the cut-off
     block: float = 4.0  # s, of the sums by which the likelihood's scatter is judged
-    step: float = 0.1  # typical sizes
 
 
 ROWS = RowSettings()
@@ -59,6 +58,7 @@ class Rows:
         t: (n,) s.
         channels: 3, 6 or 9.
         with_torques: whether torques are among them.
+        rotation: (samples, 3, 3) body to world, at the samples of ``flights``.
     """
 
     def __init__(self, flights: Flights, fixed: Setting) -> None:
@@ -84,8 +84,8 @@ class Rows:
         self.block = np.cumsum(new) - 1
         self.has_accelerometer = flights.felt({}) is not None
         self.channels = 3 * (1 + self.has_accelerometer + self.with_torques)
-        self._inertia = np.diagonal(flights.vehicle.inertia)
-        self._rotation = self._axes({})
+        self._inertia = flights.inertias[3:]
+        self.rotation = self._axes({})
 
     def _axes(self, setting: Setting) -> Array:
         pieces = self.flights.pieces(setting)
@@ -103,7 +103,7 @@ class Rows:
             torque: the angular acceleration (samples, 3, ...) rad/s2, body axes; default: none.
         """
         both = [pose, pose if accelerometer is None else accelerometer]
-        return self._thinned([self._in_body(x, self._rotation) for x in both], torque)
+        return self._thinned([self._in_body(x, self.rotation) for x in both], torque)
 
     def from_body(
         self, pose: Array, accelerometer: Array | None = None, torque: Array | None = None
@@ -155,28 +155,15 @@ class Rows:
         if not wanted:
             return {}
         mass, setting = self.flights.vehicle.mass, {**self.fixed, **setting}
-        found = self.flights.columns(setting, wanted, ROWS.step)
+        found = self.flights.columns(setting, wanted)
         pose = np.stack([found[c][:, :3] / mass for c in wanted], axis=2)
         torque = np.stack([found[c][:, 3:] / self._inertia for c in wanted], axis=2)
-        both = pose.copy()
-        for i, (effect, name) in enumerate(wanted):
-            if self.has_accelerometer and effect and get(effect).kind == "sensing":
-                both[:, :, i] += self._felt_slope(setting, (effect, name)) / mass
-        rows = self.from_world(pose, both, torque)
-        return {c: rows[:, :, i] for i, c in enumerate(wanted)}
-
-    def _felt_slope(self, setting: Setting, column: Column) -> Array:
-        """Return how a unit of a sensing effect changes what the accelerometer has beyond the pose
-        (samples, 3), N.
-        """
-        effect, name = column
-        own = self.flights.coefficients(setting, effect)
-        value, c = own.get(name, 0.0), coefficient(column)
-        delta = ROWS.step * typical_size(column, self.flights.vehicle)
-        if value + delta > c.maximum:
-            delta = -delta
-        moved = self.flights.felt({**setting, effect: {**own, name: value + delta}})
-        here = self.flights.felt(setting)
-        assert moved is not None
-        assert here is not None
-        return (here - moved) / delta
+        rows = self.from_world(pose, torque=torque)
+        out = {c: rows[:, :, i] for i, c in enumerate(wanted)}
+        for effect, name in wanted if self.has_accelerometer else ():
+            if effect and get(effect).kind == "sensing":  # what is felt is not what the pose shows
+                own = self.flights.coefficients(setting, effect)
+                value, delta = self.flights.step(setting, (effect, name))
+                moved = self.residual({**setting, effect: {**own, name: value + delta}})
+                out[effect, name] = (self.residual(setting) - moved) / delta
+        return out

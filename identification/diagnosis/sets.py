@@ -11,7 +11,7 @@ from scipy.special import logsumexp
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Found
 from ..findings import RankedSet, Ranking
-from .discrepancy import DISCREPANCY
+from .discrepancy import CHANGING, DISCREPANCY
 from .evidence import (
     Index,
     Marginal,
@@ -22,7 +22,6 @@ from .evidence import (
 )
 from .priors import (
     PRIORS,
-    UNKNOWN,
     WHOLE_PREFIX,
     Base,
     Setting,
@@ -54,7 +53,6 @@ class SetSettings:
 
 
 SETS = SetSettings()
-CHANGING = f"{UNKNOWN}changing coefficient: "
 
 
 @dataclass(frozen=True, eq=False)

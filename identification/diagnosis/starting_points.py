@@ -29,10 +29,6 @@ class StartingSettings:
     most_tried: int = 12  # all of them, if there are no more
     kept_of_more: int = 4  # of more, those that resemble the residual most
     sample_step: int = 20  # every so many samples are enough to see the resemblance
-    # of one sample, repeated, and s between them: for a minute, and in step with no whole Hz
-    steady_samples: int = 200
-    steady_period: float = 0.317
-    least_size: float = 1e-12  # of a channel of the residual, against a division by zero
 
 
 STARTING = StartingSettings()
@@ -101,7 +97,7 @@ def _likeness(
     every = np.concatenate(rows)
     seen = flights.fit_rows[every]
     target = residual[every][seen]
-    scale = 1.0 / np.maximum(np.sqrt(np.mean(np.square(target), axis=0)), STARTING.least_size)
+    scale = 1.0 / np.maximum(np.sqrt(np.mean(np.square(target), axis=0)), 1e-12)
     base = [residual_wrench(s, bare) for s in looked_at]
     out = []
     for start in starts:
@@ -122,8 +118,8 @@ def _is_steady(signals: Signals, vehicle: Vehicle) -> bool:
     """Return whether a vehicle's effects do the same as long as nothing else changes: they have no
     state of their own and go by no clock, so not every sample need be looked at.
     """
-    still = signals.at(np.zeros(STARTING.steady_samples, dtype=np.int64))
-    same = replace(still, period=STARTING.steady_period)
+    # one sample, repeated for a minute, in step with no whole Hz
+    same = replace(signals.at(np.zeros(200, dtype=np.int64)), period=0.317)
     found = residual_wrench(same, vehicle)
     return bool(np.all(found == found[0]))
 

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.signal import csd, welch
 
-from ...dynamics.effects import Role, get, playing
 from ...dynamics.vehicle import Vehicle
 from ..motion.signals import Signals
 
@@ -75,19 +74,6 @@ class _Spectra:
             gain = max(float(np.sum(along / noise) / np.sum(power / noise)), 0.0)
         noise = self.turning - 2.0 * gain * along + gain**2 * power
         return 2.0 * self.count * float(np.sum(np.log(noise / self.turning)))
-
-
-def rotor_delay(library: Sequence[str]) -> str:
-    """Return the effect of a library that delays the rotors; empty where it has none."""
-    delays = playing(Role.DELAY, among=library)
-    return next((effect for effect in delays if get(effect).kind == "rotor input"), "")
-
-
-def same_delays(effect: str, library: Sequence[str]) -> list[str]:
-    """Return the effects of a library that show the same delay: a lag delays slow changes as much,
-    and a log whose clock is off looks like one whose commands are late.
-    """
-    return [x for x in playing(Role.LAG, Role.DELAY, among=library) if x != effect]
 
 
 def turning_delay(pieces: Sequence[Signals], vehicle: Vehicle) -> Delay | None:

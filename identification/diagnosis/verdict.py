@@ -31,6 +31,7 @@ from .carrying_channels import carrying_channels
 from .commanded_rotors import COMMANDED, THRUST_FACTORS, assumed_thrust_doubts
 from .commands import what_commands_show
 from .composite import composites
+from .log_offsets import ROTOR_TIME_OFFSET
 from .priors import NUISANCE
 from .ranking import rank
 from .regression import (
@@ -45,7 +46,6 @@ from .regression import (
 )
 from .row_ranking import rank_by_rows
 from .settings import DiagnosisSettings
-from .time_offsets import ROTOR_TIME_OFFSET
 from .transient_disturbances import transient_disturbances
 from .unknown import Signs, unknown
 from .worth import worth
@@ -170,11 +170,10 @@ class Judged:
         return frozenset(e for e, x in shown.items() if x < self._rule.least_shown)
 
     def _gusts(self) -> tuple[Disturbance, ...]:
-        vehicle = self._flights.vehicle
-        inertias = [vehicle.mass] * 3 + np.diagonal(vehicle.inertia).tolist()
+        sizes = self._flights.inertias.tolist()
         return tuple(
-            Disturbance(channel, inertia * noise.disturbance, noise.time)
-            for channel, inertia, noise in zip(CHANNELS, inertias, self._found.noise, strict=False)
+            Disturbance(channel, size * noise.disturbance, noise.time)
+            for channel, size, noise in zip(CHANNELS, sizes, self._found.noise, strict=False)
         )
 
     def _differs(self, effect: str) -> float:

@@ -1,7 +1,6 @@
 """How much an effect does, beside what a model with it leaves unexplained."""
 
 from collections.abc import Collection
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +15,8 @@ from .rows import Rows
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class WorthSettings:
-    """What counts as an effect's own, and as left."""
-
-    most_in_std: float = 3.0  # of a prior, that others may differ in an effect's place
-    noise_known: float = 0.2  # share of the sensors' noise, to which it is known
-
-
-WORTH = WorthSettings()
+MOST_IN_STD = 3.0  # of a prior, that others may differ in an effect's place
+NOISE_KNOWN = 0.2  # share of the sensors' noise, to which it is known
 
 
 def worth(
@@ -45,7 +37,7 @@ def worth(
     rows = Rows(flights, fixed)
     fit, left = rows.fit, rows.residual(setting)
     power, noise = (np.mean(np.square(x[fit]), axis=0) for x in (left, rows.noise()))
-    size = np.sqrt(np.maximum(power - noise, WORTH.noise_known**2 * noise)) + 1e-12
+    size = np.sqrt(np.maximum(power - noise, NOISE_KNOWN**2 * noise)) + 1e-12
     nuisances = list(row_nuisances(rows).values())
     columns = rows.columns(setting, flights.columns_of(setting))
     out = {}
@@ -63,7 +55,7 @@ def worth(
         ]
         X = np.stack([*nuisances, *own], axis=2)[fit] / size[:, None]
         y = part[fit] / size
-        most = WORTH.most_in_std
-        done = lsq_linear(X.reshape(-1, X.shape[2]), y.ravel(), (-most, most)).x
+        bounds = -MOST_IN_STD, MOST_IN_STD
+        done = lsq_linear(X.reshape(-1, X.shape[2]), y.ravel(), bounds).x
         out[effect] = float(np.sqrt(np.mean(np.square(y - X @ done), axis=0)).max())
     return out

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.support.flown import VEHICLE, recorded
+from windwrench.identification.diagnosis.log_offsets import LAG_ASYMMETRY
 from windwrench.identification.diagnosis.ranking import rank
 from windwrench.identification.diagnosis.regression import Flights
-from windwrench.identification.diagnosis.time_offsets import LAG_ASYMMETRY
 from windwrench.identification.motion.smoothing import low_pass
 
 TAU, APART = 0.03, 0.008  # s: 22 ms up, 38 ms down

@@ -1,7 +1,12 @@
-"""How the signals of a log may be apart in time, and rotor speeds less smooth or less even than
-what the rotors do: nuisances that are fitted beside effects.
+"""By what the signals of a log may be off: apart in time, with rotor speeds less smooth or less
+even than what the rotors do, and with a bias of the accelerometer. All are fitted beside effects.
+
+A fusion takes out what it knows of an accelerometer's bias; what is left is three numbers a flight.
+So a steady force along the body is told from a bias only where attitude, thrust or the force itself
+changes.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -30,35 +35,29 @@ LAG_ASYMMETRY = ("", "lag_asymmetry")
 
 
 @dataclass(frozen=True)
-class Timing:
-    """Typical size and range of a nuisance, in its unit."""
+class Offset:
+    """Typical size and range, in its unit."""
 
     size: float
-    range: tuple[float, float]
+    range: tuple[float, float] = (-math.inf, math.inf)
 
 
-_OFFSET = Timing(0.0025, (-0.006, 0.006))
+_SECONDS = Offset(0.0025, (-0.006, 0.006))
 TIMINGS = {
-    ROTOR_TIME_OFFSET: _OFFSET,
-    ATTITUDE_TIME_OFFSET: _OFFSET,
-    VELOCITY_TIME_OFFSET: _OFFSET,
-    ROTOR_SPREAD: Timing(2.5e-5, (0.0, 1.6e-3)),  # 5 ms, and at most 40
-    LAG_ASYMMETRY: Timing(0.005, (-0.02, 0.02)),  # rotors are driven up, and drag slows them down
+    ROTOR_TIME_OFFSET: _SECONDS,
+    ATTITUDE_TIME_OFFSET: _SECONDS,
+    VELOCITY_TIME_OFFSET: _SECONDS,
+    ROTOR_SPREAD: Offset(2.5e-5, (0.0, 1.6e-3)),  # 5 ms, and at most 40
+    LAG_ASYMMETRY: Offset(0.005, (-0.02, 0.02)),  # rotors are driven up, and drag slows them down
 }
 # where the pose was filtered before the log was written: a causal low-pass of 5 Hz is 45 ms late,
 # an estimator some more
-_BEHIND_A_FILTER = Timing(0.02, (-0.1, 0.1))
+BEHIND_A_FILTER = Offset(0.02, (-0.1, 0.1))
 
 
-def timing_of(column: tuple[str, str], filtered: bool = False) -> Timing | None:
-    """Return size and range of a nuisance of this module; None of any other column.
-
-    Args:
-        column: without an effect, and the nuisance's name.
-        filtered: whether the pose was filtered, and may be late.
-    """
-    late = filtered and column == ROTOR_TIME_OFFSET
-    return _BEHIND_A_FILTER if late else TIMINGS.get(column)
+def bias_column(log: int, axis: int) -> tuple[str, str]:
+    """Return the column of a bias (m/s2) along an axis of the body."""
+    return "", f"accelerometer bias {'xyz'[axis]} {log}"
 
 
 def with_uneven_lag(signals: Signals, vehicle: Vehicle, asymmetry: float) -> Signals:
