@@ -126,7 +126,7 @@ def make_controller(name: str, task: str = STANDARD_TASK) -> Any:
 @cache
 def shipped_policies(task: str = STANDARD_TASK) -> dict[str, Path]:
     """Return the file of each policy of a task that this installation has, sorted by name. A wheel
-    has one seed of each of ``FanTracking`` alone, a checkout all.
+    has one seed of each kind, a checkout all.
     """
     folder = Path(str(resources.files(__package__))).parent / "training" / "policies"
     start = "" if task == STANDARD_TASK else f"{task}-"

@@ -14,7 +14,7 @@ from tests.support.paths import ROOT
 from windwrench.cli import app
 
 CHECKOUT_ONLY = ("studies", "tests")
-MOST_BYTES = 1_800_000  # of the wheel
+MOST_BYTES = 2_000_000  # of the wheel
 
 
 def done(*words, **options):
@@ -95,6 +95,7 @@ def test_the_wheel_holds_code_and_data_and_nothing_else(installed):
         "dynamics/effects/rotor_drag.py",
         "identification/logs/readers/px4_ulog.py",
         "identification/logs/maps/nanobench.yaml",
+        "training/policies/tasks/WindHover-gru-0.npz",
     ):
         assert (package / name).is_file(), name
     assert not (package / "tests").exists()
