@@ -3,7 +3,7 @@
 from .fan_laws import Admittance, AdmittancePID, Hover, Lead, Ratio
 from .preview import Oracle
 from .registry import CONTROLLERS, LAWS, Controller, make_controller
-from .tracker import InformedTracker, Limit, Tracker
+from .tracker import InformedTracker, Limit, Tracker, TrackerLQG
 
 __all__ = [
     "CONTROLLERS",
@@ -18,6 +18,7 @@ __all__ = [
     "Oracle",
     "Ratio",
     "Tracker",
+    "TrackerLQG",
     "make_controller",
 ]
 

@@ -18,7 +18,7 @@ from ..runtime.errors import unknown_name
 from .fan_laws import Admittance, AdmittancePID, Hover, Lead, Ratio
 from .lqg import LQG
 from .preview import Oracle, WindOracle
-from .tracker import InformedTracker, Limit, Tracker
+from .tracker import InformedTracker, Limit, Tracker, TrackerLQG
 from .wind_laws import INDI, PID, FlightLoopAlone, L1Adaptive, PIDWithForce, PIDWithWrench
 
 STANDARD_TASK = "FanTracking"
@@ -79,7 +79,14 @@ LAWS: Laws = {
     "tracker": Tracker,
     "tracker-informed": InformedTracker,
 }
-CONTROLLERS: Laws = {"hover": Hover, **LAWS, "limit": Limit, "oracle": Oracle, **_tuned()}
+CONTROLLERS: Laws = {
+    "hover": Hover,
+    **LAWS,
+    "tracker-lqg": TrackerLQG,
+    "limit": Limit,
+    "oracle": Oracle,
+    **_tuned(),
+}
 _WIND: Laws = {
     "hover": FlightLoopAlone,
     "pid": PID,

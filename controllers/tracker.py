@@ -255,29 +255,16 @@ class InformedTracker(_Belief):
 
 
 @dataclass(eq=False, kw_only=True)
-class Limit(InformedTracker):
-    """What the best controller could reach from these measurements: the informed tracker with the
-    true parameters of everything that is drawn at random, gusts included, many particles, and the
-    oracle's regulator, which looks ahead along the expected path.
+class _Regulated(_Belief):
+    """A belief that commands by the oracle's regulator, which looks ahead along the expected path.
 
     Of its own motion it observes place and speed; tilt, its rates and the set point follow from its
-    commands and the estimated wrench by the model of the flight loop. On the leaderboard's base and
-    fast the regulator is worth 9 and 6 % (mean RMSE .0896 to .0818 and .1113 to .1043 m). It is not
-    robust: under an undeclared latency of 30 ms it is worse than the trackers (.270 m).
-
-    No entry, but the end of the scale for those that see the wrench alone. What an episode of the
-    scenario ``varied`` draws anew, and effects that nobody declared, it does not know either.
+    commands and the estimated wrench by the model of the flight loop.
     """
 
-    ahead: float = 0.12
-    spread: float = 0.15
-    particles: int = 2000
-    leave: float = 0.0
+    gain: float = 0.0  # the regulator has its own
+    damping: float = 0.0
     effort: float = 3e-4  # as of ``Oracle``
-
-    def brief(self, briefing: Briefing) -> None:
-        """Take all that is known."""
-        self._briefing = briefing
 
     def reset(self) -> None:
         """Forget the last episode."""
@@ -287,13 +274,16 @@ class Limit(InformedTracker):
         # its expected state a decision later; places from where it was at first
         self._moved = np.zeros(len(self._model[0]))
 
+    @abstractmethod
+    def _ahead(self, seconds: float) -> Array:
+        """Return where the fan is expected to be after some time, (n,) m, a place a particle."""
+
     def _command(self, observation: NDArray[np.floating[Any]], shares: Array) -> float:
         A, B, D = self._model
         sensing = self._sensing
-        time = (sensing.count - 1) * DECISION_PERIOD
         # every second decision, and evenly between
         knots = np.arange(0, _LOOK + 1, 2)
-        expected = [float(shares @ self._place_at(time + k * DECISION_PERIOD)) for k in knots]
+        expected = [float(shares @ self._ahead(k * DECISION_PERIOD)) for k in knots]
         path = np.interp(np.arange(_LOOK + 1), knots, expected)
         state = self._moved.copy()
         state[[PLACE, SPEED]] = sensing.own, sensing.velocity
@@ -306,6 +296,47 @@ class Limit(InformedTracker):
         command = min(max(command, -MAX_COMMAND), MAX_COMMAND)
         self._moved = A @ state + B[:, 0] * command + D[:, :2] @ felt[0]
         return command
+
+
+@dataclass(eq=False, kw_only=True)
+class TrackerLQG(_Regulated, Tracker):
+    """The tracker that knows nothing of how the fan moves, with the oracle's regulator.
+
+    A fan that changes its velocity at once stops, turns round or moves anyhow, so its expected
+    velocity decays.
+    """
+
+    def _ahead(self, seconds: float) -> Array:
+        rate = self.jumps * (1.0 + TURN)  # what stops or is anyhow loses its velocity, a turn two
+        kept = -float(np.expm1(-rate * seconds)) / rate  # s of its velocity
+        return np.asarray(self._place + self._velocity * kept)
+
+
+@dataclass(eq=False, kw_only=True)
+class Limit(_Regulated, InformedTracker):
+    """What the best controller could reach from these measurements: the informed tracker with the
+    true parameters of everything that is drawn at random, gusts included, many particles, and the
+    oracle's regulator.
+
+    On the leaderboard's base and fast the regulator is worth 9 and 6 % (mean RMSE .0896 to .0818
+    and .1113 to .1043 m). It is not robust: under an undeclared latency of 30 ms it is worse than
+    the trackers (.270 m).
+
+    No entry, but the end of the scale for those that see the wrench alone. What an episode of the
+    scenario ``varied`` draws anew, and effects that nobody declared, it does not know either.
+    """
+
+    ahead: float = 0.12
+    spread: float = 0.15
+    particles: int = 2000
+    leave: float = 0.0
+
+    def brief(self, briefing: Briefing) -> None:
+        """Take all that is known."""
+        self._briefing = briefing
+
+    def _ahead(self, seconds: float) -> Array:
+        return self._place_at((self._sensing.count - 1) * DECISION_PERIOD + seconds)
 
 
 def nominal(briefing: Briefing) -> Briefing:

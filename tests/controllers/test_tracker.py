@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support.synthetic_wrench import TICKS, observations
-from windwrench.controllers import InformedTracker, Limit, Tracker
+from windwrench.controllers import InformedTracker, Limit, Tracker, TrackerLQG
 from windwrench.controllers.briefing import Briefing, Motions
 from windwrench.controllers.jet_map import COUNT, FIRST, STEP, jet_map
 from windwrench.envs.fan_tracking import FanTrackingEnv
@@ -14,7 +14,7 @@ from windwrench.envs.scenarios import SCENARIOS
 from windwrench.evaluation.episodes import fly_episode
 
 BRIEFING = Briefing()
-TRACKERS = [Tracker, InformedTracker]
+TRACKERS = [Tracker, InformedTracker, TrackerLQG]
 
 
 def test_the_map_is_what_the_environment_s_jet_does_to_the_vehicle():
@@ -98,6 +98,18 @@ def test_the_limit_looks_ahead():
         for pilot in (Limit(particles=500), Behind(particles=500, gain=1.6, damping=0.3))
     )
     assert ahead.mean() < 0.95 * behind.mean()
+
+
+def test_the_expected_path_is_the_mean_of_all_paths():
+    tracker = TrackerLQG(particles=20_000, acceleration=0.0, jumps=0.6)
+    tracker._place[:], tracker._velocity[:] = 0.1, 0.3
+    expected = [tracker._ahead(0.08 * k).mean() for k in range(1, 25)]
+    flown = []
+    for _ in expected:
+        tracker._move()
+        flown.append(tracker._place.mean())
+    assert flown[-1] < 0.1 + 0.9 * 24 * 0.08 * 0.3  # some turned round
+    np.testing.assert_allclose(flown, expected, atol=0.006)
 
 
 def test_a_fan_that_leaves_the_family_is_found_again():
