@@ -148,15 +148,17 @@ class Disturbance:
         channel: one of CHANNELS.
         rms: N, or Nm.
         time: s, correlation time.
+        unanswered: N, or Nm, what of it the rotors do not answer before the pose shows it.
     """
 
     channel: str
     rms: float
     time: float
+    unanswered: float = 0.0
 
-    def below(self, frequency: float) -> float:
-        """Return the RMS (N, or Nm) of what is slower than a frequency (Hz)."""
-        return self.rms * math.sqrt(
+    def unanswered_below(self, frequency: float) -> float:
+        """Return the RMS (N, or Nm) of what is unanswered and slower than a frequency (Hz)."""
+        return self.unanswered * math.sqrt(
             2.0 / math.pi * math.atan(2.0 * math.pi * frequency * self.time)
         )
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.effects import Role, get, playing
@@ -247,6 +248,17 @@ class Likelihood:
                     at = jump_state[say] == state
                     x[:, axis, state] = jump[:, at] @ gains[at]
         return tuple(out), known
+
+    def answered(self) -> list[float]:
+        """Return of each axis the standard deviation of the disturbance that the rotors show: a
+        flight loop that reads a gyro answers most of a gust's torque before the pose shows it.
+        """
+        out = []
+        for axis, own in enumerate(self.noise):
+            keep = math.exp(-self.period / own.time)
+            shown = [lfilter([1.0], [1.0, -keep], known[:, axis, 2]) for known in self.known]
+            out.append(float(np.concatenate(shown).std()))
+        return out
 
     # Columns
 

@@ -45,6 +45,7 @@ class Found:
     setting: Setting  # coefficients of the likeliest set
     # of each channel, where the likelihood has a noise of the motion; none for a force balance
     noise: tuple[AxisNoise, ...] = ()
+    answered: Sequence[float] = ()  # of each channel's disturbance, what the rotors show
     # biases and time offsets of the sensors, with their standard deviations
     sensors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     # of each effect of the set, those that the logs do not show and that do as well in its place
@@ -101,7 +102,8 @@ def rank(
     column, size, _ = found.strangest()
     ranking = found.ranking(best.quieter({column: size}, starts))
     late = {c[1]: x for c, x in found.nuisances().items() if c in flights.offsets}
-    return Found(found, ranking, found.best_setting(), best.noise, late)
+    noise = (best.noise, best.answered())
+    return Found(found, ranking, found.best_setting(), *noise, late)
 
 
 def _whole_library(base: Base) -> dict[Column, float]:

@@ -170,10 +170,17 @@ class Judged:
         return frozenset(e for e, x in shown.items() if x < self._rule.least_shown)
 
     def _gusts(self) -> tuple[Disturbance, ...]:
-        sizes = self._flights.inertias.tolist()
+        sizes, found = self._flights.inertias.tolist(), self._found
         return tuple(
-            Disturbance(channel, size * noise.disturbance, noise.time)
-            for channel, size, noise in zip(CHANNELS, sizes, self._found.noise, strict=False)
+            Disturbance(
+                channel,
+                size * math.hypot(noise.disturbance, answered),
+                noise.time,
+                size * noise.disturbance,
+            )
+            for channel, size, noise, answered in zip(
+                CHANNELS, sizes, found.noise, found.answered, strict=False
+            )
         )
 
     def _differs(self, effect: str) -> float:
@@ -342,8 +349,8 @@ class Judged:
 
 
 def beyond_calm(disturbances: Sequence[Disturbance], vehicle: Vehicle) -> float:
-    """Return the logarithm of the largest disturbance of the six channels over what counts for
-    none; ``-inf`` where none was fitted.
+    """Return the logarithm of the largest unanswered disturbance of the six channels over what
+    counts for none; ``-inf`` where none was fitted.
     """
-    slow = [x.below(CUTOFFS.calm_hz) for x in disturbances]
+    slow = [x.unanswered_below(CUTOFFS.calm_hz) for x in disturbances]
     return float(np.log(np.max(slow / calm(vehicle)))) if slow else -np.inf
