@@ -27,7 +27,6 @@ from .c_values import (
     operator_of,
 )
 from .expressions import TYPES, Expressions, Known
-from .source_tree import is_read, python_of, results_of, tree_of
 
 _MATHS = {
     "sqrt": "sqrtf",
@@ -44,6 +43,32 @@ _PASSED_ON = ("any_of", "all_of")  # of one lane
 _PUT = re.compile(r"(?P<indent> *)(?:const \w+ )?(?P<name>\w+)(?:\[\])? [-+*/]?= (?P<value>.*);")
 _CALL = re.compile(rf"(?!(?:{'|'.join((*_MATHS.values(), *_FUNCTIONS.values()))})\()\w+\(.*\)")
 _OF_ANNOTATION = {"float": "float", "int": "int", "bool": "truth"}
+
+
+def python_of(function: Any) -> Any:
+    """Return the Python function of a compiled one."""
+    return getattr(function, "py_func", None) or getattr(function, "__wrapped__", function)
+
+
+def tree_of(function: Callable[..., Any]) -> ast.FunctionDef:
+    """Return the syntax tree of a function."""
+    return cast(ast.FunctionDef, ast.parse(textwrap.dedent(inspect.getsource(function))).body[0])
+
+
+def results_of(tree: ast.FunctionDef) -> int:
+    """Return how many numbers a function returns at once; 0: one, or none."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Return(value=ast.Tuple(elts=elements)):
+                return len(elements)
+    return 0
+
+
+def is_read(targets: list[ast.expr], values: list[ast.expr]) -> bool:
+    """Return whether values may read what is assigned to the targets before them."""
+    read = {node.id for value in values for node in ast.walk(value) if isinstance(node, ast.Name)}
+    stored = {node.id for one in targets for node in ast.walk(one) if isinstance(node, ast.Name)}
+    return bool(read & stored)
 
 
 @dataclass
