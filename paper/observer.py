@@ -25,7 +25,7 @@ straight line between samples, u as constant over a step): any cutoff at any per
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
@@ -38,8 +38,8 @@ from ..estimator.estimate import COASTING, NIS, TRACKING, Array, WrenchEstimate
 from ..estimator.filter_record import drive
 from ..estimator.sample import Sample, check_sample, undo_sensing
 from ..estimator.ukf import WrenchUKF
+from ..runtime.arguments import check_positive
 from ..runtime.compiled import Record, compiled
-from ..runtime.errors import InputError
 
 _DAMPING = math.sqrt(0.5)  # Butterworth
 _FORGOTTEN = 4.0  # delays of a filter after which exp(-4) of its past is left
@@ -101,15 +101,7 @@ class ObserverTuning:
     attitude_cutoff_hz: float = 5.0
 
     def __post_init__(self) -> None:
-        for f in fields(self):
-            value = getattr(self, f.name)
-            shapes = ((), (3,)) if f.name.endswith("gain") else ((),)
-            array = np.asarray(value, dtype=np.float64)
-            if array.shape not in shapes or not np.all(np.isfinite(array) & (array > 0)):
-                expected = ", a number or three" if len(shapes) > 1 else ""
-                raise InputError(
-                    f"ObserverTuning: {f.name} must be positive and finite{expected}, got {value!r}"
-                )
+        check_positive(self, ("force_gain", "torque_gain"))
 
 
 class NonlinearObserver:
