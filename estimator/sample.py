@@ -23,18 +23,15 @@ class Sample:
     """A buffer (11,) of rotor speeds, position and quaternion that compiled code reads.
 
     Args:
-        z: the buffer, contiguous; default: one of its own.
+        z: the buffer, contiguous.
     """
 
     __slots__ = ("_position", "_quaternion", "_speeds", "z")
 
-    def __init__(self, z: Array | None = None) -> None:
-        self.z = np.zeros(11) if z is None else z
+    def __init__(self, z: Array) -> None:
+        self.z = z
         view = memoryview(self.z)  # type: ignore[arg-type]
         self._speeds, self._position, self._quaternion = view[0:4], view[4:7], view[7:11]
-
-    def __reduce__(self) -> tuple[type[Sample], tuple[Array]]:
-        return Sample, (self.z,)
 
     def read(
         self, rotor_speeds: ArrayLike, position: ArrayLike | None, quaternion: ArrayLike | None
