@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from datetime import date
 from itertools import islice
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -273,9 +273,10 @@ def _lines(path: Path) -> Iterator[str]:
     size, number, most = 0, 0, LIMITS.table_rows + _LINES
     try:
         with open_regular(path, WHAT) as file:
-            packed, source = _Packed(file, path), file
+            packed: Any = _Packed(file, path)
+            source = file
             if path.name.lower().endswith(".gz"):
-                source = io.BufferedReader(gzip.GzipFile(fileobj=packed), _BUFFER)  # type: ignore[arg-type]
+                source = io.BufferedReader(gzip.GzipFile(fileobj=packed), _BUFFER)
             text = io.TextIOWrapper(source, "utf-8-sig", _LATIN)
             while line := text.readline(LIMITS.table_line + 1):
                 size, number = size + len(line), number + 1
