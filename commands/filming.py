@@ -63,8 +63,9 @@ def films(
     every: int = 1,
     fps: float = FPS,
     still: str = "scene.png",
-) -> Iterator[Callable[[Callable[[], Any], Callable[[], Caption]], None]]:
-    """Give what films a decision: it takes what draws, and what tells the caption after that.
+) -> Iterator[tuple[Callable[[Callable[[], Any], Callable[[], Caption]], None], list[Path]]]:
+    """Give what films a decision, and the paths of what is filmed: the former takes what draws, and
+    what tells the caption after that.
 
     Args:
         folder: for the films ``name.gif`` and ``name.mp4``, and the last picture.
@@ -80,11 +81,10 @@ def films(
     fps /= every
     last: list[Any] = []
     count = 0
+    paths = [folder / f"{name}.{kind}" for kind in kinds]
+    scene = folder / f"{name}.{still}"
     with ExitStack() as stack:
-        made = [
-            stack.enter_context(Film(folder / f"{name}.{kind}", *SIZE, fps, seconds))
-            for kind in kinds
-        ]
+        made = [stack.enter_context(Film(path, *SIZE, fps, seconds)) for path in paths]
 
         def add(draw: Callable[[], Any], caption: Callable[[], Caption]) -> None:
             nonlocal count
@@ -96,12 +96,6 @@ def films(
                 for film in wanted:
                     film.add(picture)
 
-        yield add
+        yield add, [*paths, scene] if paths else []
     if last:
-        save_picture(last[0], folder / f"{name}.{still}")
-
-
-def written(folder: Path, name: str, kinds: list[str], still: str = "scene.png") -> list[Path]:
-    """Return the paths of what was filmed."""
-    made = [folder / f"{name}.{kind}" for kind in kinds]
-    return [*made, folder / f"{name}.{still}"] if kinds else made
+        save_picture(last[0], scene)

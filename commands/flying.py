@@ -42,7 +42,7 @@ def fly(
     from ..evaluation.episodes import fly_episode, time_series
     from ..evaluation.pictures import draw_episode
     from ..evaluation.tasks import make_pilot, short_names, task_of
-    from .filming import SIZE, Tally, caption_of, films, written
+    from .filming import SIZE, Tally, caption_of, films
 
     kinds = film_kinds(view, video, gif)
     effects = [parse_setting(e) for e in effect or []]
@@ -66,7 +66,7 @@ def fly(
     tally = Tally()
     with (
         working("flying", known.decisions) as progress,
-        films(folder, "fly", kinds, film_seconds, every, rate) as film,
+        films(folder, "fly", kinds, film_seconds, every, rate) as (film, filmed),
     ):
 
         def each(info: dict[str, Any]) -> None:
@@ -77,7 +77,7 @@ def fly(
 
         episode = fly_episode(env, make_pilot(controller, task), seed, each, known.decisions)
     env.close()
-    paths = [folder / "fly.png", *written(folder, "fly", kinds)]
+    paths = [folder / "fly.png", *filmed]
     draw_episode(episode, title, paths[0])
     if csv:
         from ..identification.logs.tables import write_csv

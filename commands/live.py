@@ -151,12 +151,15 @@ def _say(session: "Session") -> None:
 
 def _summary(session: "Session") -> dict[str, Any]:
     """Say what came and what became of it; return it."""
+    import numpy as np
+
     from ..live.terminal_page import counts_words, tuning_words
 
     _say(session)
     tallies, restarts = session.tallies, session.filter.restarts
     median, most = tallies.latency.median_and_most
-    mean, deviation = tallies.wrench.mean, tallies.wrench.deviation
+    mean, square = tallies.wrench / max(session.estimates, 1)
+    deviation = np.sqrt(np.maximum(square - mean**2, 0.0))
     result: dict[str, Any] = {
         "source": session.source.name,
         "vehicle": session.source.vehicle.name,

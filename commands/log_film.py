@@ -88,7 +88,7 @@ def draw_film(
     from ..envs.drawing import Viewer
     from ..envs.replay import arrow_scales, drawn_arm, pictures
     from ..envs.video import FPS
-    from .filming import SIZE, films, written
+    from .filming import SIZE, films
 
     part = whole.part(rows)
     arm = drawn_arm(part, model)
@@ -122,7 +122,7 @@ def draw_film(
     try:
         with (
             working("drawing") as progress,
-            films(folder, "film", list(kinds), seconds + 1.0, still="png") as film,
+            films(folder, "film", list(kinds), seconds + 1.0, still="png") as (film, filmed),
         ):
             frames: Any = pictures(part, model, viewer, FPS)
             for count, (k, picture) in enumerate(frames):
@@ -133,4 +133,4 @@ def draw_film(
                 progress(min(1.0, (count + 1) / total))
     finally:
         viewer.close()
-    return written(folder, "film", list(kinds), "png")
+    return filmed

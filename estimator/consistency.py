@@ -22,7 +22,6 @@ from .estimate import Array, WrenchEstimate
 from .filter_record import N
 
 MEASURED = 6  # numbers in a pose
-_MOST = 1024  # poses of a second; more make a shorter one, of the same distribution
 
 
 def state_error(estimate: WrenchEstimate, truth: Array) -> Array:
@@ -63,43 +62,41 @@ class Consistency:
     """What the innovations of a flight say of its filter's tuning, in memory that does not grow.
 
     Attributes:
+        poses: how many were added.
         seconds: that have a pose.
     """
 
     def __init__(self) -> None:
-        self._sums = np.zeros(2)  # of NIS and of NIS over a second, of the seconds before
-        self._before = self.seconds = self._count = 0  # poses before this second, and in it
-        self._kept, self._end = np.zeros((_MOST, MEASURED)), -math.inf
+        self.poses = self.seconds = 0
+        self._nis = self._nis_over_seconds = 0.0  # sums; the latter's of the seconds before
+        self._end = -math.inf  # s, of this second
+        self._total, self._count = np.zeros(MEASURED), 0  # of this second's innovations
 
     def add(self, t: float, white: Array) -> None:
         """Take in the whitened innovation (6,) of a pose at ``t``, s."""
-        if not self._end - 1.0 <= t < self._end or self._count == _MOST:
-            self._sums += self._this_second
-            self._before, self._count, self._end = self.poses, 0, t + 1.0
+        if not self._end - 1.0 <= t < self._end:
+            self._nis_over_seconds += self._nis_over_this_second
+            self._total, self._count, self._end = np.zeros(MEASURED), 0, t + 1.0
             self.seconds += 1
-        self._kept[self._count] = white
+        self._nis += float(white @ white)
+        self._total += white
         self._count += 1
+        self.poses += 1
 
     @property
-    def _this_second(self) -> tuple[float, float]:
-        kept = self._kept[: self._count]
-        total = kept.sum(axis=0)
-        return float(np.vdot(kept, kept)), float(total @ total) / max(self._count, 1)
-
-    @property
-    def poses(self) -> int:
-        """How many were added."""
-        return self._before + self._count
+    def _nis_over_this_second(self) -> float:
+        return float(self._total @ self._total) / max(self._count, 1)
 
     @property
     def nis(self) -> float:
         """Mean NIS of a pose; 6 is expected, NaN where there is none."""
-        return float(self._sums[0] + self._this_second[0]) / (self.poses or math.nan)
+        return self._nis / (self.poses or math.nan)
 
     @property
     def nis_over_second(self) -> float:
         """Mean NIS over a second, likewise."""
-        return float(self._sums[1] + self._this_second[1]) / (self.seconds or math.nan)
+        total = self._nis_over_seconds + self._nis_over_this_second
+        return total / (self.seconds or math.nan)
 
     @property
     def too_slow(self) -> bool:

@@ -15,14 +15,14 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..runtime.arguments import real_numbers
 from ..runtime.errors import InputError
-from .estimate import Array, WrenchEstimate
+from .estimate import WrenchEstimate
 from .ukf import WrenchUKF
 
 _DIGITS = 9  # of a time stamp in s: what is nearer to one another than a clock can tell is one time
@@ -37,9 +37,9 @@ class _Event:
 
     t: float  # s
     # rotor speeds and voltage of the time since the event before
-    inputs: tuple[Array, float | None] | None
+    inputs: tuple[ArrayLike, float | None] | None
     # the filter's method, and its arguments
-    measured: tuple[str, tuple[Array | None, Array | None]] | None
+    measured: tuple[str, tuple[ArrayLike | None, ArrayLike | None]] | None
     before: Snapshot | None = None  # the filter's memory before this event
 
 
@@ -136,7 +136,8 @@ class TimedFilter:
                 f"predict: rotor speeds up to {t:.6f} s, but the filter is at {now:.6f} s already; "
                 "rotor speeds must come in order"
             )
-        estimate = self._append(_Event(t, (_numbers(rotor_speeds), voltage), None), now)
+        # a copy: a caller may use its array again before it is replayed
+        estimate = self._append(_Event(t, (copy(rotor_speeds), voltage), None), now)
         self._forget(t - self.horizon)
         return estimate
 
@@ -174,8 +175,7 @@ class TimedFilter:
         if t < max(now - self.horizon, self._start):
             self.too_late += 1
             return None
-        one, other = (None if value is None else _numbers(value) for value in (first, second))
-        measured = method, (one, other)
+        measured = method, (copy(first), copy(second))
         where = bisect_right(self._events, t, key=lambda event: event.t)
         if where == len(self._events):
             self.fused = self._append(_Event(t, None, measured), now)
@@ -272,15 +272,3 @@ def _seconds(method: str, t: float) -> float:
     if not math.isfinite(seconds):
         raise InputError(f"{method}: t must be a finite time in s, got {t!r}")
     return round(seconds, _DIGITS)
-
-
-def _numbers(values: ArrayLike) -> Array:
-    """Return a copy: a caller may use its array again before it is replayed.
-
-    Raises:
-        InputError: they are no numbers.
-    """
-    numbers = real_numbers(values)
-    if numbers is None:
-        raise InputError(f"TimedFilter: expected an array of numbers, got {values!r}")
-    return numbers

@@ -50,15 +50,15 @@ C: so phases are numbers, and conditions have an answer for each lane (``runtime
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 
 from ..dynamics.rotation import attitude_error
 from ..dynamics.vehicle import Vehicle
+from ..runtime.arguments import check_positive
 from ..runtime.compiled import Record, compiled
-from ..runtime.errors import InputError
 from ..runtime.vector_lanes import any_of, choose, opposite
 from .error_state import LARGEST_MRP_VARIANCE, bound_variance
 from .estimate import COASTING, NIS, REJECTED, RESTARTED, TRACKING, Array
@@ -143,12 +143,7 @@ class Recovery:
     response: float = 0.05
 
     def __post_init__(self) -> None:
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if not isinstance(value, int | float) or not (math.isfinite(value) and value > 0):
-                raise InputError(
-                    f"Recovery: {f.name} must be a positive finite number, got {value!r}"
-                )
+        check_positive(self)
 
 
 def load_recovery(record: np.void, vehicle: Vehicle, gate: float | None, given: Recovery) -> None:

@@ -54,16 +54,12 @@ def _rise(dt: float, inertia: float, white: float, walk: float, noise: float) ->
     P = solve_discrete_are(A.T, C.T, Q, np.eye(1))
     gain = P[:, 0] / (P[0, 0] + 1.0)
     error = np.array([0.0, 0.0, 1.0])  # a step of one: truth minus estimate
-    previous, start = 0.0, 0.0
-    for k in range(1, _LONGEST):
+    response = [0.0]
+    while response[-1] < 0.9:
+        if len(response) > _LONGEST:
+            return float("inf")
         error = A @ error
-        error = error - gain * error[0]
-        now = 1.0 - float(error[2])
-        for level in (0.1, 0.9):
-            if previous < level <= now:
-                when = k - (now - level) / (now - previous)
-                if level == 0.9:
-                    return (when - start) * dt
-                start = when
-        previous = now
-    return float("inf")
+        error -= gain * error[0]
+        response.append(1.0 - float(error[2]))
+    start, end = np.interp((0.1, 0.9), response, np.arange(len(response)))
+    return float(end - start) * dt

@@ -23,18 +23,15 @@ class Sample:
     """A buffer (11,) of rotor speeds, position and quaternion that compiled code reads.
 
     Args:
-        z: the buffer, contiguous; default: one of its own.
+        z: the buffer, contiguous.
     """
 
     __slots__ = ("_position", "_quaternion", "_speeds", "z")
 
-    def __init__(self, z: Array | None = None) -> None:
-        self.z = np.zeros(11) if z is None else z
+    def __init__(self, z: Array) -> None:
+        self.z = z
         view = memoryview(self.z)  # type: ignore[arg-type]
         self._speeds, self._position, self._quaternion = view[0:4], view[4:7], view[7:11]
-
-    def __reduce__(self) -> tuple[type[Sample], tuple[Array]]:
-        return Sample, (self.z,)
 
     def read(
         self, rotor_speeds: ArrayLike, position: ArrayLike | None, quaternion: ArrayLike | None
@@ -47,7 +44,7 @@ class Sample:
             InputError: a shape or a type is wrong, or a rotor speed is negative.
         """
         if MaskedArray in (type(rotor_speeds), type(position), type(quaternion)):
-            return self._convert(rotor_speeds, position, quaternion)
+            return convert(self.z, rotor_speeds, position, quaternion)
         try:
             # a memory view takes in arrays of doubles of its own shape, in half the time that NumPy
             # would need
@@ -68,30 +65,7 @@ class Sample:
         # a list, another shape, memory out of order, another type of number: each a different error
         # of a memory view
         except (TypeError, ValueError, BufferError, NotImplementedError):
-            return self._convert(rotor_speeds, position, quaternion)
-
-    def _convert(
-        self, rotor_speeds: ArrayLike, position: ArrayLike | None, quaternion: ArrayLike | None
-    ) -> int:
-        """Do the same with anything that NumPy can make numbers of."""
-        parts = 0
-        for value, where, part, expected in (
-            (rotor_speeds, self.z[0:4], 0, "rotor_speeds (4,) of rad/s"),
-            (position, self.z[4:7], POSITION, "position (3,) in m or None"),
-            (quaternion, self.z[7:11], ATTITUDE, "quaternion (4,) or None"),
-        ):
-            if value is None and part:
-                continue
-            array = real_numbers(value)
-            if array is None or array.shape != where.shape:
-                raise InputError(f"step: expected {expected}, got {described(value)}")
-            where[:] = array
-            parts += part
-        if np.any(self.z[0:4] < 0.0):
-            error = negative_speeds("step", self.z[0:4])
-            self.z[0:4] = math.nan  # not known: the last ones hold for what comes next
-            raise error
-        return parts
+            return convert(self.z, rotor_speeds, position, quaternion)
 
     def bad_quaternion(self) -> InputError:
         """Return the error for a quaternion that is no rotation."""
@@ -100,12 +74,36 @@ class Sample:
         )
 
 
-def negative_speeds(where: str, rotor_speeds: Array) -> InputError:
-    """Return the error for rotor speeds (..., 4) of which one is negative."""
-    return InputError(
-        f"{where}: rotor_speeds must not be negative, got {np.nanmin(rotor_speeds):g} rad/s; the "
-        "vehicle's spin says in which direction a rotor turns"
-    )
+def convert(
+    z: Array, rotor_speeds: ArrayLike, position: ArrayLike | None, quaternion: ArrayLike | None
+) -> int:
+    """Take anything that NumPy can make numbers of into samples (..., 11): rotor speeds (..., 4)
+    and what there is of poses, (..., 3) and (..., 4); return its parts.
+
+    Raises:
+        InputError: a shape or a type is wrong, or a rotor speed is negative.
+    """
+    parts = 0
+    for name, value, where, part, unit in (
+        ("rotor_speeds", rotor_speeds, z[..., 0:4], 0, "of rad/s"),
+        ("position", position, z[..., 4:7], POSITION, "in m or None"),
+        ("quaternion", quaternion, z[..., 7:11], ATTITUDE, "or None"),
+    ):
+        if value is None and part:
+            where[...] = math.nan
+            continue
+        array = real_numbers(value)
+        if array is None or array.shape != where.shape:
+            raise InputError(f"step: expected {name} {where.shape} {unit}, got {described(value)}")
+        if not part and np.any(array < 0.0):
+            where[...] = math.nan  # not known: the last ones hold for what comes next
+            raise InputError(
+                f"step: rotor_speeds must not be negative, got {np.nanmin(array):g} rad/s; the "
+                "vehicle's spin says in which direction a rotor turns"
+            )
+        where[...] = array
+        parts += part
+    return parts
 
 
 @compiled

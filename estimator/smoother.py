@@ -7,7 +7,6 @@ block, and the block is run again, to the same bits, on the way back.
 
 from __future__ import annotations
 
-import math
 import struct
 
 import numpy as np
@@ -60,15 +59,9 @@ def _forward_with_links(
 
 @compiled
 def _write(x: Array, P: Array, model: Array, numbers: Array, std: Array, k: int) -> None:
-    for i in range(STATE_SIZE):
-        numbers[k, i] = x[i]
-    numbers[k, MODEL] = model
-    for i in range(N):
-        std[k, i] = math.sqrt(P[i, i])
+    numbers[k, :STATE_SIZE], numbers[k, MODEL], std[k] = x, model, np.sqrt(np.diag(P))
     if numbers.shape[1] == ESTIMATE_SIZE:
-        for i in range(N):
-            for j in range(N):
-                numbers[k, WITHOUT_COVARIANCE + N * i + j] = P[i, j]
+        numbers[k, WITHOUT_COVARIANCE:] = P.flatten()
 
 
 @compiled

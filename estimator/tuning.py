@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..dynamics.vehicle import Vehicle
-from ..runtime.arguments import real_numbers
-from ..runtime.errors import InputError
+from ..runtime.arguments import check_positive
 
 Array = NDArray[np.float64]
 
@@ -69,18 +68,7 @@ class UKFTuning:
     accelerometer_bias_bound: ArrayLike = 0.8
 
     def __post_init__(self) -> None:
-        for f in fields(self):
-            value = getattr(self, f.name)
-            array = real_numbers(value)
-            if array is None:
-                raise InputError(f"UKFTuning: {f.name} must be a number or three, got {value!r}")
-            if array.shape not in ((), (3,)) or not np.all(np.isfinite(array) & (array > 0)):
-                raise InputError(
-                    f"UKFTuning: {f.name} must be positive and finite, a number or three, got "
-                    f"{value!r}"
-                )
-        if np.ndim(self.kappa) != 0:
-            raise InputError(f"UKFTuning: kappa must be one number, got {self.kappa!r}")
+        check_positive(self, vars(self).keys() - {"kappa"})
 
     @classmethod
     def for_vehicle(

@@ -20,7 +20,7 @@ from ..runtime.errors import InputError
 from .estimate import RESTARTS, STATE_SIZE, STATUS, WITHOUT_COVARIANCE, Array, WrenchEstimate
 from .filter_record import NUMBERS, N
 from .recovery import Recovery
-from .sample import negative_speeds
+from .sample import convert
 from .tuning import UKFTuning
 from .ukf import WrenchUKF, step
 from .ukf_lanes import Blocks
@@ -209,25 +209,8 @@ class WrenchUKFBatch:
             InputError: a shape or type is wrong, a rotor speed is negative, or the length of a
                 quaternion is not 1; the filters stay as they were.
         """
-        z, parts = self._z, 0
-        for name, value, where, part in (
-            ("rotor_speeds", rotor_speeds, slice(0, 4), 0),
-            ("position", position, slice(4, 7), 1),
-            ("quaternion", quaternion, slice(7, 11), 2),
-        ):
-            if value is None:
-                z[:, where] = math.nan
-                continue
-            array = real_numbers(value)
-            if array is None or array.shape != (self.count, where.stop - where.start):
-                raise InputError(
-                    f"step: {name} must be ({self.count}, {where.stop - where.start}), got "
-                    f"{described(value)}"
-                )
-            if not part and np.any(array < 0.0):
-                raise negative_speeds("step", array)
-            z[:, where] = array
-            parts += part
+        z = self._z
+        parts = convert(z, rotor_speeds, position, quaternion)
         bad = _first_bad_quaternion(z)
         if bad >= 0:
             raise InputError(

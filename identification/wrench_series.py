@@ -41,6 +41,13 @@ T = TypeVar("T")
 # probability beyond which a pose is asked whether it jumped: one good pose in 10,000 is, at 200 Hz
 # every 50 s, and it is refused only if it also lies away from the pose before
 GATE = 0.9999
+# of wrench.csv, here and of a stream
+COLUMNS = (
+    "t",
+    *(f"{kind}{axis}" for kind in ("f", "t", "std_f", "std_t") for axis in "xyz"),
+    "nis",
+    "status",
+)
 _REPORTED = 10_000  # rows between two reports of progress
 
 
@@ -331,15 +338,9 @@ def write_wrench(series: WrenchSeries, path: Path) -> None:
     Raises:
         InputError: the file cannot be written.
     """
-    columns = {"t": series.t}
-    for name, wrench in (
-        *(("f", series.force), ("t", series.torque)),
-        *(("std_f", series.std_force), ("std_t", series.std_torque)),
-    ):
-        columns |= {f"{name}{axis}": wrench[:, i] for i, axis in enumerate("xyz")}
-    columns["nis"] = series.nis
-    columns["status"] = series.numbers[:, STATUS]
-    write_csv(columns, path)
+    wrench = series.force, series.torque, series.std_force, series.std_torque
+    values = np.column_stack([series.t, *wrench, series.nis, series.numbers[:, STATUS]])
+    write_csv(dict(zip(COLUMNS, values.T, strict=True)), path)
 
 
 def truth_rmse(series: WrenchSeries, log: FlightLog) -> tuple[Array, Array] | None:

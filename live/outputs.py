@@ -2,16 +2,9 @@
 
 from typing import Any, TextIO
 
+from ..identification.wrench_series import COLUMNS
 from .filtering import Output
 from .outlets import Sink
-
-COLUMNS = (
-    "t",
-    *(f"{kind}{axis}" for kind in ("f", "t") for axis in "xyz"),
-    *(f"std_{kind}{axis}" for kind in ("f", "t") for axis in "xyz"),
-    "nis",
-    "status",
-)
 
 
 def _values(output: Output) -> list[float]:

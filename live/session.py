@@ -183,7 +183,7 @@ class Session:
         self.output = output
         with self.tallies.spared("not sent", f"the answer to {self.source.name}"):
             self.source.send(output)
-        self.tallies.wrench.add(output.wrench)
+        self.tallies.wrench += output.wrench, output.wrench**2
         if self.telling is not None:
             self.telling.put(output)
         if not self._recent or output.t - self._recent[-1].t >= 1.0 / _VIEWED - 1e-6:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..estimator.consistency import Consistency
 from ..runtime.errors import InputError
-from .messages import Array, Malformed
+from .messages import Malformed
 
 _BINS_PER_OCTAVE = 16
 _WINDOW = 5_000_000_000  # ns, over which a rate is told
@@ -66,30 +66,6 @@ class Rate:
         return 1e9 * len(recent) / max(lasted, 1_000_000_000)
 
 
-class Means:
-    """The mean wrench of a stream, and how much it varies."""
-
-    def __init__(self) -> None:
-        self._count = 0
-        self._sums, self._squares = np.zeros(6), np.zeros(6)
-
-    def add(self, wrench: Array) -> None:
-        """Take in one of force, N, and torque, Nm, (6,)."""
-        self._count += 1
-        self._sums += wrench
-        self._squares += wrench * wrench
-
-    @property
-    def mean(self) -> Array:
-        """Mean (6,)."""
-        return self._sums / max(self._count, 1)
-
-    @property
-    def deviation(self) -> Array:
-        """Standard deviation (6,)."""
-        return np.sqrt(np.maximum(self._squares / max(self._count, 1) - self.mean**2, 0.0))
-
-
 class Tallies:
     """Counts of what came, and of what became of it.
 
@@ -111,7 +87,7 @@ class Tallies:
         self.rates: defaultdict[str, Rate] = defaultdict(Rate)
         self.latency = Durations()
         self.processor = Durations()
-        self.wrench = Means()
+        self.wrench = np.zeros((2, 6))  # sums of force, N, and torque, Nm, and of their squares
         self.consistency = Consistency()
 
     @property

@@ -15,7 +15,6 @@ import math
 import socket
 import threading
 from collections import deque
-from contextlib import suppress
 from importlib import resources
 from typing import Any
 
@@ -57,7 +56,6 @@ class WebView:
         self._open: set[asyncio.Task[None]] = set()  # connections
         try:
             self._socket = socket.create_server(("127.0.0.1", port))
-            self._socket.setblocking(False)
         except (OSError, OverflowError) as error:
             raise InputError(
                 f"--port {port}: no page can be served there: {getattr(error, 'strerror', error)}; "
@@ -80,34 +78,25 @@ class WebView:
             asyncio.run(self._serve())
 
     async def _serve(self) -> None:
-        loop = asyncio.get_running_loop()
         self._look()
-        loop.add_reader(self._socket, self._accept)
+        server = await asyncio.start_server(self._connected, sock=self._socket, limit=_HEAD)
         while not self._over.is_set():
             await asyncio.sleep(_EVERY)
             self._look()
-        loop.remove_reader(self._socket)
+        server.close()
         if self._open:
             await asyncio.wait(self._open, timeout=10 * _EVERY)  # until browsers know
 
-    def _accept(self) -> None:
-        """Take a connection, or turn it away."""
-        with suppress(OSError):
-            connection = self._socket.accept()[0]
-            connection.setblocking(False)
-            if len(self._open) < _MOST:
-                task = asyncio.get_running_loop().create_task(self._connected(connection))
-                self._open.add(task)
-                task.add_done_callback(self._open.discard)
-                return
-            self._session.tallies.counts["turned away"] += 1
-            with connection:
-                connection.send(_head("503 Service Unavailable"))
-
-    async def _connected(self, connection: socket.socket) -> None:
-        """Answer one request."""
-        reader, writer = await asyncio.open_connection(sock=connection, limit=_HEAD)
+    async def _connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Answer one request, or turn its connection away."""
         try:
+            if len(self._open) >= _MOST:
+                self._session.tallies.counts["turned away"] += 1
+                writer.write(_head("503 Service Unavailable"))
+                return
+            task: Any = asyncio.current_task()
+            self._open.add(task)
+            task.add_done_callback(self._open.discard)
             writer.transport.set_write_buffer_limits(0)  # drained is sent
             request = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _TIMEOUT)
             status, path = _asked(request)

@@ -104,6 +104,7 @@ def run(seeds: int, progress: Progress, seconds: float = _COUNTED) -> Result:
     }
     comparison, remarks = compared(
         "fig3",
+        globals(),
         clusters=figures["clusters"],
         alone=alone,
         calm=1e3 * spread["without actuator noise"],

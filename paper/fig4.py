@@ -32,11 +32,11 @@ Array = NDArray[np.float64]
 HANG = 7.0  # s
 _END = 20.0  # s
 _EVERY = 2  # ticks
-_TRANSIENT = 5.0  # s after the mass is hung on, in which the lateral force is watched
+TRANSIENT = 5.0  # s after the mass is hung on, in which the lateral force is watched
 NOISES = ((0.001, 0.005), (0.01, 0.05))  # m, rad: motion capture, and a vision system
 SWEEP = (0.25, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0)  # s, tuned rise times
 _SHOWN = (0.5, 1.0, 2.0)  # s, drawn over time and held against the requirement
-_RISE, _RISE_BOUND, _LATERAL_BOUND = 1.0, 0.2, 0.1  # s, s, N
+RISE, RISE_BOUND, LATERAL_BOUND = 1.0, 0.2, 0.1  # s, s, N
 _SPAN = (5.5, 14.0)  # s, drawn
 
 
@@ -69,27 +69,25 @@ def run(seeds: int, progress: Progress, sweep: Sequence[float] = SWEEP) -> Resul
     rows = [step.merits for step in steps]
     figures = {
         "rise_within_bounds": all(
-            abs(row[name] - _RISE) <= _RISE_BOUND
+            abs(row[name] - RISE) <= RISE_BOUND
             for row in rows
-            if row["actuator_noise"] and row["tuned_rise_s"] == _RISE
+            if row["actuator_noise"] and row["tuned_rise_s"] == RISE
             for name in ("force_rise_s", "torque_rise_s")
         ),
-        "lateral_within_bounds": all(row["lateral_N"] <= _LATERAL_BOUND for row in rows),
+        "lateral_within_bounds": all(row["lateral_N"] <= LATERAL_BOUND for row in rows),
         "sweep": rows,
     }
     data = table([_columns(step) for step in steps if step.actuator and step.tuned in _SHOWN])
     quiet = {
         row["position_noise_m"]: row
         for row in rows
-        if not row["actuator_noise"] and row["tuned_rise_s"] == _RISE
+        if not row["actuator_noise"] and row["tuned_rise_s"] == RISE
     }
     comparison, remarks = compared(
         "fig4",
+        globals(),
         rows=rows,
         thread=THREAD,
-        transient=_TRANSIENT,
-        rise=_RISE,
-        bound=_LATERAL_BOUND,
         clean=quiet.get(NOISES[0][0]),
         noisy=quiet.get(NOISES[1][0]),
     )
@@ -128,7 +126,7 @@ def fly_step(
     response, response_torque = force - bare_force, torque - bare_torque
     pull: Array = np.array([f.pull for f in hung]).mean(axis=0)
     true = np.stack([pull[:, 2], pull[:, 4], _size(pull)], axis=1)
-    settled, transient = time >= 3.0, (time >= HANG) & (time < HANG + _TRANSIENT)
+    settled, transient = time >= 3.0, (time >= HANG) & (time < HANG + TRANSIENT)
     force_rise, force_rise_error = _with_error(lambda x: rise_time(time, x), response[..., 2])
     torque_rise, torque_rise_error = _with_error(
         lambda x: rise_time(time, x), response_torque[..., 1]
@@ -232,7 +230,7 @@ def draw(steps: Sequence[Step]) -> Figure:
         ("force z (N)", "pitch torque (mNm)", "lateral force of the mass (N)")
     ):
         grid[row, 0].set_ylabel(name)
-    grid[2, 0].set_ylim(0, 1.2 * _LATERAL_BOUND)
+    grid[2, 0].set_ylim(0, 1.2 * LATERAL_BOUND)
     _draw_choice(grid[:, 2], steps)
     figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=4)
     return figure
@@ -260,8 +258,8 @@ def _draw_response(axes: Any, row: int, shown: Sequence[Step]) -> None:
         axes.text(0.97, (0.9, 0.06)[row], told, ha="right", transform=axes.transAxes)
         axes.tick_params(labelbottom=False)
         return
-    axes.axhline(_LATERAL_BOUND, color="black", lw=0.8, ls="--")
-    axes.annotate("allowed", (_SPAN[0], _LATERAL_BOUND), (3, 3), textcoords="offset points")
+    axes.axhline(LATERAL_BOUND, color="black", lw=0.8, ls="--")
+    axes.annotate("allowed", (_SPAN[0], LATERAL_BOUND), (3, 3), textcoords="offset points")
     axes.set_xlabel("time (s)")
 
 
@@ -313,6 +311,6 @@ def _draw_choice(column: Sequence[Any], steps: Sequence[Step]) -> None:
         axes.set_yscale("log")
         only_ticks(axes.yaxis, ticks)
     column[0].set_title("noise against rise time")
-    column[2].axhline(_LATERAL_BOUND, color="black", lw=0.8, ls="--")
-    column[2].set_ylim(0, 1.9 * _LATERAL_BOUND)  # room for the names above the bound
+    column[2].axhline(LATERAL_BOUND, color="black", lw=0.8, ls="--")
+    column[2].set_ylim(0, 1.9 * LATERAL_BOUND)  # room for the names above the bound
     column[2].legend(loc="upper left")

@@ -231,9 +231,8 @@ def _told(scores: Scores, ratios: Ratios, seeds: int) -> tuple[list[Comparison],
 
     return compared(
         "fig5",
+        globals(),
         seeds=seeds,
-        noises=list(NOISES),
-        plants=list(PLANTS),
         words=words,
         nis=nis,
         span=span,

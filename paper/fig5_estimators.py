@@ -33,7 +33,7 @@ UKF_TUNED = ("motor_torque_noise", "torque_walk", "thrust_noise", "force_walk")
 ERRORS = ("force_transient", "force_steady", "torque_transient", "torque_steady")
 
 
-def runner(estimator: WrenchUKF | NonlinearObserver) -> Runner:
+def runner(estimator: WrenchUKF) -> Runner:
     """Return the run of an estimator over a flight."""
 
     def run(samples: Array) -> Array:

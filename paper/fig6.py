@@ -52,23 +52,21 @@ class Hovers:
     traces: Array  # (n, 2, 2, ticks) estimate and truth, of f_x and tau_z
 
 
-def fly_points(points: Array, seed: int, seconds: float = HOVER, fan: Fan | None = None) -> Hovers:
+def fly_points(points: Array, seed: int) -> Hovers:
     """Hover at ``points`` (n, 2) m in the plane of the fan's axis, one after the other in a single
     flight.
 
     Raises:
-        InputError: a point farther than 2 m from the last, or hovers shorter than a tick.
+        InputError: a point farther than 2 m from the last.
     """
     legs = np.diff(points, axis=0, prepend=points[:1])
-    if float(np.max(np.linalg.norm(legs, axis=1))) > 2.0 or seconds < TICK:
-        raise InputError(
-            "fig6: points must lie within 2 m of one another, and hovers last at least a tick"
-        )
-    fan = fan or Fan()
+    if float(np.max(np.linalg.norm(legs, axis=1))) > 2.0:
+        raise InputError("fig6: points must lie within 2 m of one another")
+    fan = Fan()
     loop = ClosedLoop(load_vehicle("ardrone2"), fan=fan)
     rng = np.random.default_rng([6, seed])
     loop.reset(rng, np.array([*points[0], fan.height]), math.pi)
-    ticks, n = round(seconds / TICK), len(points)
+    ticks, n = round(HOVER / TICK), len(points)
     jet = loop.record[0]["plant"]["jet"]
     kept = np.empty((n, ticks, 21))
     for k in range(n):
@@ -177,29 +175,24 @@ def run(seeds: int, progress: Progress) -> Result:
         np.array([p.truth for p in profiles]),
     )
     traces = np.array([m.traces[inside] for m in maps])  # (seeds, n, 2, 2, ticks)
-    axis = int(np.argmin(np.abs(PROFILE_Y)))
+    middle = int(np.argmin(np.abs(PROFILE_Y)))
     at, size = peak(PROFILE_Y, profile[:, :, 5].mean(axis=0))
     calm_size, calm_at = strongest_torque(fan, vehicle, PROFILE_X)
     peaks = {r: strongest_torque(Fan(radius=r), vehicle, PROFILE_X)[1] for r in RADII}
     torque_map = as_map(points, estimate[:, :, 5].mean(axis=0))
-    error = (estimate - truth)[:, inside]
-    figures: dict[str, Any] = {
-        "seeds": seeds,
-        "points_in_jet": int(inside.sum()),
-        "correlation_force_x": _correlation(estimate[:, inside, 0], truth[:, inside, 0]),
-        "correlation_torque_z": _correlation(estimate[:, inside, 5], truth[:, inside, 5]),
-        "correlation_force_x_with_jet_alone": _correlation(
-            estimate[:, inside, 0], jet[:, inside, 0]
-        ),
-        "correlation_torque_z_with_jet_alone": _correlation(
-            estimate[:, inside, 5], jet[:, inside, 5]
-        ),
-        "correlation_force_x_200hz": _correlation(traces[:, :, 0, 0], traces[:, :, 0, 1]),
-        "correlation_torque_z_200hz": _correlation(traces[:, :, 1, 0], traces[:, :, 1, 1]),
-        "error_rms_force_x_N": _rms(error[:, :, 0]),
-        "error_rms_torque_z_Nm": _rms(error[:, :, 5]),
-        "error_rms_force_x_to_mean_jet_N": _rms(estimate[:, inside, 0] - calm_map[inside, 0]),
-        "error_rms_torque_z_to_mean_jet_Nm": _rms(estimate[:, inside, 5] - calm_map[inside, 5]),
+    figures: dict[str, Any] = {"seeds": seeds, "points_in_jet": int(inside.sum())}
+    for trace, (axis, name, unit) in enumerate(((0, "force_x", "N"), (5, "torque_z", "Nm"))):
+        felt = estimate[:, inside, axis]
+        figures |= {
+            f"correlation_{name}": _correlation(felt, truth[:, inside, axis]),
+            f"correlation_{name}_with_jet_alone": _correlation(felt, jet[:, inside, axis]),
+            f"correlation_{name}_200hz": _correlation(
+                traces[:, :, trace, 0], traces[:, :, trace, 1]
+            ),
+            f"error_rms_{name}_{unit}": _rms(felt - truth[:, inside, axis]),
+            f"error_rms_{name}_to_mean_jet_{unit}": _rms(felt - calm_map[inside, axis]),
+        }
+    figures |= {
         "torque_z_antisymmetry": odd_share(torque_map),
         "force_x_symmetry": 1.0 - odd_share(as_map(points, estimate[:, :, 0].mean(axis=0))),
         "profile_torque_peak_offset_m": at,
@@ -208,8 +201,8 @@ def run(seeds: int, progress: Progress) -> Result:
         "true_jet_torque_peak_Nm": calm_size,
         "true_jet_torque_peak_offset_m_by_fan_radius": {f"{r:g}": at for r, at in peaks.items()},
         "map_largest_torque_Nm": float(np.abs(torque_map).max()),
-        "profile_force_x_on_axis_N": float(profile[:, axis, 0].mean()),
-        "true_force_x_on_axis_N": float(profile_truth[:, axis, 0].mean()),
+        "profile_force_x_on_axis_N": float(profile[:, middle, 0].mean()),
+        "true_force_x_on_axis_N": float(profile_truth[:, middle, 0].mean()),
         "hover_offset_rms_m": _rms(
             np.concatenate([np.linalg.norm(m.position[:, :2] - m.points, axis=1) for m in maps])
         ),
@@ -227,15 +220,7 @@ def run(seeds: int, progress: Progress) -> Result:
         correlations=(figures["correlation_force_x"], figures["correlation_torque_z"]),
     )
     comparison, remarks = compared(
-        "fig6",
-        f=figures,
-        radius=fan.radius,
-        peaks=peaks,
-        hover=HOVER,
-        points=len(points),
-        transit=TRANSIT,
-        settle=SETTLE,
-        jet_force=JET_FORCE,
+        "fig6", globals(), f=figures, radius=fan.radius, peaks=peaks, points=len(points)
     )
     return Result(
         figures, _columns(maps, profiles, calm_map, calm_line), picture, comparison, remarks

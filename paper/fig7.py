@@ -317,11 +317,8 @@ def run(seeds: int, progress: Progress) -> Result:
     }
     comparison, remarks = compared(
         "fig7",
-        seeds=seeds,
-        largest=largest,
-        at=at,
-        captures=capture_rows,
-        tracks=track_rows,
+        globals(),
+        f=figures,
         fastest=fastest,
         alone={noise: (float(np.mean(found)), *interval(found)) for noise, found in alone.items()},
         best=[
@@ -333,19 +330,9 @@ def run(seeds: int, progress: Progress) -> Result:
         calm=[f.calm / f.bound for f in fastest],
         sudden=[f.sudden / f.bound for f in fastest],
         span=lambda shares: f"{min(shares):.0%} to {max(shares):.0%}",
-        step=(BRACKET[1] - BRACKET[0]) / 2**HALVINGS,
-        distance=DISTANCE,
-        command=MAX_COMMAND,
         caught=float(np.mean([row["captured"] or 0.0 for row in capture_rows])),
-        captured=CAPTURED,
         # the middle gain stands for the paper's controller
         middle=SHOWN_GAINS[len(SHOWN_GAINS) // 2],
-        offset=HELD_OFFSET,
-        share=HELD_SHARE,
-        start=START,
-        repeats=REPEATS,
-        rise_times=RISE_TIMES,
-        noise_gain=NOISE_GAIN,
     )
     picture = draw_tracking(captures, tracks, fastest, largest, at, HELD_OFFSET)
     return Result(figures, _traces(captures, tracks), picture, comparison, remarks)

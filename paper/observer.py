@@ -25,7 +25,7 @@ straight line between samples, u as constant over a step): any cutoff at any per
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
@@ -36,8 +36,9 @@ from ..dynamics.rotation import normalise, quaternion_to_matrix, turn_body
 from ..dynamics.vehicle import Vehicle
 from ..estimator.estimate import COASTING, NIS, TRACKING, Array, WrenchEstimate
 from ..estimator.filter_record import drive
-from ..estimator.sample import Sample, check_sample, undo_sensing
+from ..estimator.sample import check_sample, undo_sensing
 from ..estimator.ukf import WrenchUKF
+from ..runtime.arguments import check_positive
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
 
@@ -101,20 +102,12 @@ class ObserverTuning:
     attitude_cutoff_hz: float = 5.0
 
     def __post_init__(self) -> None:
-        for f in fields(self):
-            value = getattr(self, f.name)
-            shapes = ((), (3,)) if f.name.endswith("gain") else ((),)
-            array = np.asarray(value, dtype=np.float64)
-            if array.shape not in shapes or not np.all(np.isfinite(array) & (array > 0)):
-                expected = ", a number or three" if len(shapes) > 1 else ""
-                raise InputError(
-                    f"ObserverTuning: {f.name} must be positive and finite{expected}, got {value!r}"
-                )
+        check_positive(self, ("force_gain", "torque_gain"))
 
 
-class NonlinearObserver:
-    """Force and torque observer with the ``reset`` and ``step`` of ``WrenchUKF``; it has neither
-    NIS nor covariance, and no gate.
+class NonlinearObserver(WrenchUKF):
+    """Force and torque observer: a ``WrenchUKF`` whose state an observer moves. It has neither NIS
+    nor covariance, and no gate; it takes whole steps alone, and no inertial measurements.
 
     Pose and twist are those of the low-pass filters, moved ahead by the filters' delay with the
     model. Through gaps in the measurements the model carries on with the last wrench.
@@ -128,59 +121,45 @@ class NonlinearObserver:
         InputError: the period is out of range.
     """
 
+    _no_imu = "an observer takes no inertial measurements"
+
     def __init__(
         self, vehicle: Vehicle, tuning: ObserverTuning | None = None, period: float = 0.005
     ) -> None:
-        self.vehicle = vehicle
-        self.tuning = ObserverTuning() if tuning is None else tuning
-        # lends its checks, its model of the vehicle and its state vector
-        self._filter = WrenchUKF(vehicle, None, period)
-        self.period = self._filter.period
-        self._record = np.zeros(1, dtype=OBSERVER)
-        o = self._record[0]
-        _low_pass(o["translation"], self.tuning.position_cutoff_hz, period)
-        _low_pass(o["rotation"], self.tuning.attitude_cutoff_hz, period)
-        o["force_decay"] = np.exp(-period * np.asarray(self.tuning.force_gain))
-        o["torque_decay"] = np.exp(-period * np.asarray(self.tuning.torque_gain))
-        self._sample = Sample()
+        self.gains = ObserverTuning() if tuning is None else tuning
+        super().__init__(vehicle, None, period)
+
+    def _prepare(self) -> None:
+        """Start at rest at the origin."""
+        self._observer = np.zeros(1, dtype=OBSERVER)
+        o, gains = self._observer[0], self.gains
+        _low_pass(o["translation"], gains.position_cutoff_hz, self.period)
+        _low_pass(o["rotation"], gains.attitude_cutoff_hz, self.period)
+        o["force_decay"] = np.exp(-self.period * np.asarray(gains.force_gain))
+        o["torque_decay"] = np.exp(-self.period * np.asarray(gains.torque_gain))
         self.reset((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 
-    def reset(
-        self,
-        position: ArrayLike,
-        quaternion: ArrayLike,
-        covariance: ArrayLike | None = None,
-        velocity: ArrayLike = (0.0, 0.0, 0.0),
-        angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
-    ) -> None:
-        """Start at a pose, in equilibrium and without an external wrench.
+    def _begin(self) -> None:
+        """Start in equilibrium; the covariance that ``reset`` was given is not used."""
+        self.record["P"] = math.nan
+        _start(self.record, self._observer)
 
-        Arguments and errors as of ``WrenchUKF.reset``; a ``covariance`` is not used.
-        """
-        self._filter.reset(position, quaternion, None, velocity, angular_velocity)
-        self._filter.record["P"] = math.nan
-        _start(self._filter.record, self._record)
-
-    @property
-    def estimate(self) -> WrenchEstimate:
-        """What the observer believes now."""
-        return self._filter.estimate
-
-    def step(
-        self,
-        rotor_speeds: ArrayLike,
-        position: ArrayLike | None = None,
-        quaternion: ArrayLike | None = None,
-        voltage: float | None = None,
-    ) -> WrenchEstimate:
-        """Go one period on with the rotor speeds of that period and the pose at its end; arguments
-        and errors as of ``WrenchUKF.step``.
-        """
-        parts = self._sample.read(rotor_speeds, position, quaternion)
-        volts = self.vehicle.voltage_ref if voltage is None else voltage
-        if _step(self._filter.record, self._record, self._sample.z, parts, self.period, volts) < 0:
+    def _run(self, parts: int, dt: float, voltage: float | None) -> WrenchEstimate:
+        if dt != self.period:
+            raise InputError(f"NonlinearObserver: expected a step of {self.period:g} s, got {dt:g}")
+        volts = self._voltage if voltage is None else voltage
+        if _step(self.record, self._observer, self._sample.z, parts, dt, volts) < 0:
             raise self._sample.bad_quaternion()
         return self.estimate
+
+    @property
+    def step_address(self) -> int:
+        """An observer has none.
+
+        Raises:
+            InputError: always.
+        """
+        raise InputError("step_address: an observer steps in Python only")
 
 
 def _low_pass(record: Record, cutoff_hz: float, period: float) -> None:

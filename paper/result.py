@@ -54,13 +54,17 @@ def template(name: str) -> Template:
     return page_template(__package__, f"templates/{name}.md.j2", html=False)
 
 
-def compared(name: str, /, **values: Any) -> tuple[list[Comparison], list[str]]:
-    """Return the table and the remarks of a figure's template, filled with values.
+def compared(
+    name: str, module: Mapping[str, Any], /, **values: Any
+) -> tuple[list[Comparison], list[str]]:
+    """Return the table and the remarks of a figure's template, filled with the constants of the
+    figure's module, by their names, and with values.
 
     A line ``| quantity | the paper | this kit |`` is a row of the table. Empty lines separate
     the remarks.
     """
-    lines = template(name).render(values).splitlines()
+    constants = {word: value for word, value in module.items() if word.isupper()}
+    lines = template(name).render(constants | values).splitlines()
     rows = [Comparison(*line.strip("| ").split(" | ")) for line in lines if line.startswith("|")]
     text = "\n".join(line for line in lines if not line.startswith("|"))
     return rows, [" ".join(part.split()) for part in text.split("\n\n") if part.strip()]

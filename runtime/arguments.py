@@ -1,9 +1,12 @@
 """Arguments of functions that should be numbers: as arrays, and in words where they are not."""
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .errors import InputError
 
 
 def real_numbers(value: object) -> NDArray[np.float64] | None:
@@ -20,6 +23,25 @@ def real_numbers(value: object) -> NDArray[np.float64] | None:
         return np.asarray(np.ma.filled(numbers, np.nan) if masked else numbers)
     except (TypeError, ValueError):
         return None
+
+
+def check_positive(settings: Any, three: Collection[str] = ()) -> None:
+    """Check that all fields of a data class are positive finite numbers; those named in ``three``
+    may be three of x, y and z.
+
+    Raises:
+        InputError: one is not.
+    """
+    for name, value in vars(settings).items():
+        array, several = real_numbers(value), name in three
+        shapes = ((), (3,)) if several else ((),)
+        if (
+            array is None
+            or array.shape not in shapes
+            or not np.all(np.isfinite(array) & (array > 0))
+        ):
+            what = f"positive and finite, a number{' or three' if several else ''}"
+            raise InputError(f"{type(settings).__name__}: {name} must be {what}, got {value!r}")
 
 
 def described(value: object) -> str:

@@ -22,8 +22,6 @@ class FileLimits:
         table_rows: rows of a table or messages of a topic: more than an hour at 1 kHz.
         table_numbers: rows times columns that are read; each number takes 8 bytes, and a flight
             log is copied about twice.
-        gzip_members: packed parts of one ``.gz`` file; those of parallel packers hold 64 kB or
-            more.
         parquet_footer: items of a list, or bytes of a text, in what describes a Parquet file.
         yaml_text: bytes of a YAML file, the settings of a vehicle or of a training.
         yaml_values: values in it, with every alias written out.
@@ -48,7 +46,6 @@ class FileLimits:
     table_line: int = 1_000_000
     table_rows: int = 4_000_000
     table_numbers: int = 2**25
-    gzip_members: int = 100_000
     parquet_footer: int = 2**20
     yaml_text: int = 200_000
     yaml_values: int = 20_000

@@ -58,9 +58,7 @@ def open_regular(path: Path, what: str) -> BinaryIO:
     check_regular(path, what)  # opening a device may already do something
     try:
         # of a pipe that took its place meanwhile, nobody waits for the writer
-        descriptor = os.open(
-            path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-        )
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read as {what}: {_reason(error)}") from error
     file = os.fdopen(descriptor, "rb")

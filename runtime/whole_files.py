@@ -67,21 +67,18 @@ def _make_folder(folder: Path) -> None:
 
 
 def _keep(path: Path) -> None:
-    """Have the disk keep a file or the names in a folder, where the platform can do that.
+    """Have the disk keep a file or the names in a folder, where it can do that.
 
     Raises:
         OSError: the disk cannot keep the file.
     """
-    is_folder = path.is_dir()
-    if is_folder and os.name == "nt":  # folders cannot be opened there
-        return
     # the descriptor needs no right to write for what others have written
-    descriptor = os.open(path, os.O_RDWR if os.name == "nt" else os.O_RDONLY)
+    descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     except OSError as error:
         # file systems that know no fsync, of a folder above all
-        if not is_folder and error.errno not in (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS):
+        if not path.is_dir() and error.errno not in (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS):
             raise
     finally:
         os.close(descriptor)
@@ -97,8 +94,6 @@ def _sweep(path: Path) -> None:
 
 
 def _lives(pid: int) -> bool:
-    if os.name == "nt":  # where asking would end the process
-        return True
     try:
         os.kill(pid, 0)
     except (ProcessLookupError, OverflowError):

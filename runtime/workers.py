@@ -295,9 +295,6 @@ def shared_dict(values: Mapping[str, Any]) -> Iterator["DictProxy[str, Any]"]:
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
     """Hold interrupts back; processes that start in the block never see one."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
     from multiprocessing import resource_tracker
 
     resource_tracker.ensure_running()  # its own start would let interrupts through again

@@ -9,6 +9,7 @@ counted, and the columns asked for are turned into numbers a block of lines at a
 
 import codecs
 import csv
+import gzip
 import io
 import math
 import re
@@ -19,13 +20,12 @@ from dataclasses import dataclass, replace
 from datetime import date
 from itertools import islice
 from pathlib import Path
-from typing import BinaryIO, cast
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS, check_count
-from ...runtime.gunzipping import Gunzip
 from ...runtime.regular_files import open_regular
 from .column_names import is_unit
 from .table import WHAT, Array, Table
@@ -36,6 +36,7 @@ MISSING_WORDS = frozenset({"na", "n/a", "null", "none", "nil", "-", "--", "?"})
 _SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "white space"}
 _LATIN = "windwrench-latin-1"  # name of an error handler
 _BUFFER = 2**18  # bytes unpacked at a time
+_UNUSED = 2**21  # packed bytes, of which a line may come yet
 _DAY_0 = date(1970, 1, 1).toordinal()
 _BLOCK = 20_000  # lines turned into numbers at a time
 _LOOKED_AT = 2**18  # characters in which the layout is found
@@ -237,6 +238,31 @@ def _latin(error: UnicodeError) -> tuple[str, int]:
 codecs.register_error(_LATIN, _latin)
 
 
+class _Packed:
+    """The bytes of a gzip file, of which no more are read than characters came of them: a million
+    empty parts would take as long as a table.
+    """
+
+    def __init__(self, file: BinaryIO, path: Path) -> None:
+        self._file, self._path, self._size = file, path, 0
+        self.unpacked = 0  # characters that came
+
+    def read(self, size: int) -> bytes:
+        """Return the next bytes.
+
+        Raises:
+            InputError: they are more than they unpack to.
+        """
+        piece = self._file.read(size)
+        self._size += len(piece)
+        if self._size > self.unpacked + _UNUSED:
+            raise InputError(
+                f"{self._path}: {self._size} packed bytes unpack to {self.unpacked}; expected a "
+                "packed table"
+            )
+        return piece
+
+
 def _lines(path: Path) -> Iterator[str]:
     """Yield a text's lines, unpacked, without their ends.
 
@@ -244,14 +270,17 @@ def _lines(path: Path) -> Iterator[str]:
         InputError: unreadable, no text, or more than ``FileLimits`` allows; everything is counted
             as it comes.
     """
-    file: BinaryIO = open_regular(path, WHAT)
-    if path.name.lower().endswith(".gz"):
-        file = cast(BinaryIO, io.BufferedReader(Gunzip(file, path, LIMITS.table_text), _BUFFER))
     size, number, most = 0, 0, LIMITS.table_rows + _LINES
     try:
-        with io.TextIOWrapper(file, "utf-8-sig", _LATIN) as text:
+        with open_regular(path, WHAT) as file:
+            packed: Any = _Packed(file, path)
+            source = file
+            if path.name.lower().endswith(".gz"):
+                source = io.BufferedReader(gzip.GzipFile(fileobj=packed), _BUFFER)
+            text = io.TextIOWrapper(source, "utf-8-sig", _LATIN)
             while line := text.readline(LIMITS.table_line + 1):
                 size, number = size + len(line), number + 1
+                packed.unpacked = size
                 if "\0" in line:
                     raise InputError(f"{path}: not a text file (it holds zero bytes); expected CSV")
                 # asked before it is said: a table may have millions of lines
@@ -261,7 +290,9 @@ def _lines(path: Path) -> Iterator[str]:
                     check_count(path, number - _LINES, LIMITS.table_rows, "rows")
                 yield line.rstrip("\n")
     except (OSError, EOFError, zlib.error) as error:
-        raise InputError(f"{path}: cannot be read as {WHAT}: {error}") from error
+        cut = "the packed data ends before its end is marked"
+        why = cut if isinstance(error, EOFError) else error
+        raise InputError(f"{path}: cannot be read as {WHAT}: {why}") from error
 
 
 def _layout(path: Path, head: list[str]) -> tuple[TextLayout, int]:

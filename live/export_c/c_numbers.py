@@ -1,11 +1,13 @@
 """Numbers as C writes them."""
 
+import textwrap
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...runtime.errors import InputError
 
-_WIDTH = 100  # columns
+_WIDTH = 101  # columns, with a comma
 
 
 def literal(value: float, what: str = "a number") -> str:
@@ -27,21 +29,12 @@ def table(values: ArrayLike, what: str = "a number") -> str:
     """Return an array as the initialiser of a C array."""
     array = np.asarray(values, dtype=np.float64)
     if array.ndim == 1:
-        return _wrapped([literal(x, what) for x in array])
+        numbers = ", ".join(literal(x, what) for x in array)
+        lines = textwrap.wrap(numbers, _WIDTH, break_long_words=False, break_on_hyphens=False)
+        return "{" + "\n     ".join(lines) + "}"
     return "{\n    " + ",\n    ".join(table(row, what) for row in array) + "}"
 
 
 def shape(values: ArrayLike) -> str:
     """Return the sizes of an array as a C declaration has them."""
     return "".join(f"[{n}]" for n in np.shape(values))
-
-
-def _wrapped(words: list[str]) -> str:
-    lines, line = [], ""
-    for word in words:
-        if line and len(line) + len(word) + 2 > _WIDTH:
-            lines.append(line)
-            line = ""
-        line = f"{line}, {word}" if line else word
-    lines.append(line)
-    return "{" + ",\n     ".join(lines) + "}"

@@ -56,6 +56,7 @@ _TITLES = {
 _KNOWN = {
     "N": N,
     "NOISE": NOISE,
+    "AGREEING": AGREEING,
     "PI": math.pi,
     "LARGEST_MRP_VARIANCE": LARGEST_MRP_VARIANCE,
     "LONGEST_GAP": _LONGEST_GAP,
@@ -127,7 +128,6 @@ def export_c(
         policy = tracker_policy(vehicle, tuning, period)
     f = made.record[0]
     kept = hover.kept(f)
-    offset = bool(np.any(f["body"]["com"] != 0.0))
     context: dict[str, Any] = {
         "version": __version__,
         "command": _one_line(command),
@@ -135,13 +135,7 @@ def export_c(
         "estimator": estimator,
         "precision": precision,
         "imu": estimator != "constant-gain",
-        "gated": gate is not None,
-        "gate": 0.0 if gate is None else gate,
-        "patience": f"{made.recovery.patience:g}",
-        "give_up": f"{made.recovery.give_up:g}",
         "rate": rate,
-        "period": literal(period),
-        "mass": literal(float(f["body"]["mass"])),
         "f": f,
         "filter": made,
         "known": _KNOWN,
@@ -150,11 +144,7 @@ def export_c(
         "wrench_coefficients": f["wrench_coefficients"][: len(wrench), :PARAMETERS],
         "converged": [f["converged"][i, j] for i, j in kept],
         "first_variance": np.diag(default_covariance(vehicle, tuning)),
-        "hover_speed": literal(float(f["last_speeds"][0])),
-        "agreeing": AGREEING,
-        "offset": offset,
-        "pairs": 12 if wrench else 6,
-        "bent": 12 if wrench else 6 if offset else 3,
+        "offset": bool(np.any(f["body"]["com"] != 0.0)),
         "wrench": wrench,
         "rotor_effects": rotor_effects,
         "sensing": sensing,

@@ -49,11 +49,9 @@ class Expressions(ABC):
 
     library: Known
     globals: Mapping[str, Any]  # of the function's file
-    suffix: str  # of the names of variables, of a function that is put where it is called
 
     def __init__(self) -> None:
         self.names: dict[str, Value] = {}
-        self.used: set[str] = set()
         self.lines: list[str] = []
 
     @abstractmethod
@@ -80,10 +78,7 @@ class Expressions(ABC):
                 record = self.evaluated(of)
                 if not isinstance(record, Fields):
                     raise UntranslatableError(f"has an attribute {name}")
-                found = self.library.field_of((*record.path, name))
-                self.used |= {"f"} if "f->" in getattr(found, "text", "") else set()
-                self.used |= {"P"} if getattr(found, "root", "") == "P" else set()
-                return found
+                return self.library.field_of((*record.path, name))
             case ast.Subscript(value=of, slice=place):
                 return self.element(of, place)
             case ast.Tuple(elts=elements):
@@ -137,7 +132,6 @@ class Expressions(ABC):
             return array[int(cast(float, self.number(place).known))]
         if not isinstance(array, Array):
             raise UntranslatableError("takes a part of a number")
-        self.used.add(array.root)
         match place:
             case ast.Slice(lower=lower, step=None):
                 first = self.number(lower).text if lower is not None else "0"
@@ -156,8 +150,6 @@ class Expressions(ABC):
     def name_of(self, name: str) -> Value:
         """Return what a name is: a parameter, a variable, or a constant of the file."""
         if name in self.names:
-            if not (self.suffix or isinstance(self.names[name], Fields)):
-                self.used.add(name)
             return self.names[name]
         value = self.library.numbers.get(name, self.globals.get(name))
         if isinstance(value, int) and getattr(base, name, None) == value:

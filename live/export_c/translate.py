@@ -10,6 +10,7 @@ has the chosen branch only. Everything else is refused.
 
 import ast
 import inspect
+import re
 import textwrap
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -26,7 +27,6 @@ from .c_values import (
     operator_of,
 )
 from .expressions import TYPES, Expressions, Known
-from .source_tree import decided, is_read, python_of, results_of, tree_of
 
 _MATHS = {
     "sqrt": "sqrtf",
@@ -39,7 +39,36 @@ _MATHS = {
 }
 _FUNCTIONS = {"abs": "fabsf", "min": "smaller", "max": "larger"}
 _PASSED_ON = ("any_of", "all_of")  # of one lane
+# a line that gives a variable a value
+_PUT = re.compile(r"(?P<indent> *)(?:const \w+ )?(?P<name>\w+)(?:\[\])? [-+*/]?= (?P<value>.*);")
+_CALL = re.compile(rf"(?!(?:{'|'.join((*_MATHS.values(), *_FUNCTIONS.values()))})\()\w+\(.*\)")
 _OF_ANNOTATION = {"float": "float", "int": "int", "bool": "truth"}
+
+
+def python_of(function: Any) -> Any:
+    """Return the Python function of a compiled one."""
+    return getattr(function, "py_func", None) or getattr(function, "__wrapped__", function)
+
+
+def tree_of(function: Callable[..., Any]) -> ast.FunctionDef:
+    """Return the syntax tree of a function."""
+    return cast(ast.FunctionDef, ast.parse(textwrap.dedent(inspect.getsource(function))).body[0])
+
+
+def results_of(tree: ast.FunctionDef) -> int:
+    """Return how many numbers a function returns at once; 0: one, or none."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Return(value=ast.Tuple(elts=elements)):
+                return len(elements)
+    return 0
+
+
+def is_read(targets: list[ast.expr], values: list[ast.expr]) -> bool:
+    """Return whether values may read what is assigned to the targets before them."""
+    read = {node.id for value in values for node in ast.walk(value) if isinstance(node, ast.Name)}
+    stored = {node.id for one in targets for node in ast.walk(one) if isinstance(node, ast.Name)}
+    return bool(read & stored)
 
 
 @dataclass
@@ -95,6 +124,7 @@ class Function(Expressions):
         self.bound = bound or (None,) * len(self.arguments)
         self.locals: dict[str, str] = {}  # of C, and their types
         self.written: set[str] = set()  # arrays; "f": a field
+        self.used: set[str] = set()  # words of the C
         self.suffix = suffix
         self.returned: Value | None = None
         self.results, self.out = results_of(self.tree), "float"
@@ -107,23 +137,8 @@ class Function(Expressions):
             if isinstance(bound, Array) and bound.root:  # a matrix of this size
                 bound = replace(bound, text=c_name(name), root=name)
             self.names[name] = bound or self.parameter(argument)
-        self.tree = decided(self.tree, self.known)
-        self.lines = self.block(self.tree.body)
-
-    def known(self, test: ast.expr) -> float | None:
-        """Return the value of a condition on an export's constants alone, or None."""
-        for node in ast.walk(test):
-            match node:
-                case ast.Call():
-                    return None
-                case ast.Name(id=name):
-                    given = self.names.get(name, self.globals.get(name))
-                    if not isinstance(given, Fields | int | float):
-                        return None
-        used = set(self.used)
-        value = self.number(test).known
-        self.used = used
-        return value
+        self.lines = _without_unread(self.block(self.tree.body))
+        self.used = _words(*self.lines)
 
     def parameter(self, argument: ast.arg) -> Value:
         """Return what a parameter is, by its annotation."""
@@ -154,15 +169,15 @@ class Function(Expressions):
                 parameters.append(f"{const}float *{value.text}")
             elif isinstance(value, Number):
                 parameters.append(f"{TYPES[value.kind]} {value.text}")
-            if name not in self.used:
-                unused.append(f"    (void){'f' if name == 'f' else c_name(name)};")
+            if c_name(name) not in self.used:
+                unused.append(f"    (void){c_name(name)};")
         if self.results:
             parameters.append(f"{self.out} *out")
         result = "int" if self.result in ("truth", "int") else self.result or "void"
         head = [
             f"    {kind} {', '.join(f'{name} = {zero}' for name in names)};"
             for kind, zero in (("float", "0.0f"), ("int", "0"))
-            if (names := [name for name, its in self.locals.items() if its == kind])
+            if (names := [n for n, its in self.locals.items() if its == kind and n in self.used])
         ]
         about = (ast.get_docstring(self.tree) or self.name).split("\n\n")[0].replace("``", "`")
         comment = textwrap.fill(f"/* {self.file.split('.', 1)[-1]}: {about} */", 100)
@@ -204,9 +219,13 @@ class Function(Expressions):
                 self.indented(f"for (int {i} = {first}; {i} < {end}; {i}++) {{", body)
                 self.lines.append("}")
             case ast.If(test=test, body=body, orelse=orelse):
-                condition = self.number(test).text  # its own parentheses do
-                condition = condition if condition[0] == "(" else f"({condition})"
-                self.indented(f"if {condition} {{", body)
+                condition = self.number(test)
+                if condition.known is not None:
+                    for one in body if condition.known else orelse:
+                        self.statement(one)
+                    return
+                text = condition.text  # its own parentheses do
+                self.indented(f"if {text if text[0] == '(' else f'({text})'} {{", body)
                 if orelse:
                     self.indented("} else {", orelse)
                 self.lines.append("}")
@@ -343,7 +362,7 @@ class Function(Expressions):
         self.library.counter += 1
         part = Function(function, self.library, suffix=f"_{self.library.counter}")
         part.lines, part.locals = self.lines, self.locals
-        part.written, part.used = self.written, self.used
+        part.written = self.written
         stored = {
             n.id
             for n in ast.walk(part.tree)
@@ -355,7 +374,6 @@ class Function(Expressions):
                 part.put(ast.Name(argument.arg, ast.Store()), value)
             else:
                 part.names[argument.arg] = value
-        part.tree = decided(part.tree, part.known)
         for statement in part.tree.body:
             part.statement(statement)
         if part.returned is None:
@@ -384,7 +402,6 @@ class Function(Expressions):
         for i, argument in enumerate(node.args):
             value = self.evaluated(argument)
             if isinstance(value, Array):
-                self.used.add(value.root)
                 if made and made.arguments[i].arg in made.written:
                     self.written.add(value.root)
                 if value.root:
@@ -393,11 +410,34 @@ class Function(Expressions):
                 wanted = made.names[made.arguments[i].arg] if made else value
                 texts.append(self.converted(value, cast(Number, wanted).kind))
             elif isinstance(value, Fields) and not value.path:
-                self.used |= {"f"} | ({"P"} & made.used if made else set())
                 self.written |= {"f"} & (made.written if made else {"f"})
                 texts += ["f", "P"] if made and "P" in made.used else ["f"]
         name = made.name if made else node.func.id.lstrip("_")
         return f"{name}({', '.join([*texts, *([out] if out else [])])})"
+
+
+def _words(*lines: str) -> set[str]:
+    return set(re.findall(r"\w+", " ".join(lines)))
+
+
+def _without_unread(lines: list[str]) -> list[str]:
+    """Return lines of C without those that give a value to a variable that no line reads; a call of
+    theirs, which may write elsewhere, stays.
+    """
+    while True:
+        put = [_PUT.fullmatch(line) for line in lines]
+        read = _words(
+            *(one["value"] if one else line for one, line in zip(put, lines, strict=True))
+        )
+        kept = []
+        for one, line in zip(put, lines, strict=True):
+            if one is None or one["name"] in read:
+                kept.append(line)
+            elif _CALL.fullmatch(one["value"]):
+                kept.append(f"{one['indent']}{one['value']};")
+        if kept == lines:
+            return lines
+        lines = kept
 
 
 def _bound(value: Value) -> Value | None:

@@ -7,14 +7,12 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 from urllib.parse import parse_qsl, urlsplit
 
-import numpy as np
-
 from ...dynamics.vehicle import Vehicle
 from ...identification.logs.log_map import LogMap
 from ...runtime.errors import InputError
 from ...runtime.extras import need
 from ..filtering import Output
-from ..messages import Array, Malformed, Sample
+from ..messages import Malformed, Sample
 from ..tallies import Tallies
 
 # s for which a file waits for those who take its estimates: someone leafs through them, or a disk
@@ -161,22 +159,6 @@ def unwrapped(count: int, last: int, wraps: int) -> int:
     after ``wraps``.
     """
     return last + (count - last + wraps // 2) % wraps - wraps // 2
-
-
-def command_of(raw: Array, vehicle: Vehicle, counts: tuple[float, float] | None) -> Array:
-    """Return motor commands (4,), 0 to 1 within the range that the vehicle's motor curve states.
-
-    Args:
-        raw: (4,) as they come.
-        vehicle: that flies.
-        counts: what stands for 0 and 1 where the curve is one of shares and ``raw`` holds none;
-            None: ``raw`` holds shares.
-    """
-    curve = vehicle.motor_curve
-    low, high = (0.0, 1.0) if curve is None else curve.command
-    if counts is not None and high <= LARGEST_SHARE:
-        low, high = counts
-    return np.clip((raw - low) / (high - low), 0.0, 1.0)
 
 
 @dataclass(frozen=True)

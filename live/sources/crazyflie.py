@@ -12,7 +12,6 @@ that stops the motors.
 
 import importlib
 import logging
-import math
 import queue
 import threading
 import time
@@ -21,14 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from ...identification.logs.rotor_orders import ORDERS
+from ...identification.logs.log_map import load_map
 from ...runtime.errors import InputError
+from ..field_map import FieldMap
 from ..messages import Malformed, Sample
-from .base import Source, command_of, unwrapped
+from .base import LARGEST_SHARE, Source, unwrapped
 
 _FULL = 65_535.0  # PWM
-_G = 9.80665  # m/s2, of accelerometer readings in g
-_RPM = math.pi / 30.0  # rad/s
 _WRAP = 2**24  # ms, of a log's time stamps
 _POSE = (
     ("stateEstimate.x", "float"),
@@ -63,6 +61,7 @@ class CrazyflieLog(Source):
         self._over = threading.Event()
         self._cf: Any = None
         self._stamps: dict[str, int] = {}  # ms, the newest of each block
+        self._map = FieldMap(load_map("cflib"), self.vehicle, text)
 
     def open(self) -> None:
         """Connect and start the log.
@@ -121,14 +120,14 @@ class CrazyflieLog(Source):
         self._over.set()
 
     def _stamp(self, kind: str, milliseconds: int) -> int:
-        """Return a block's time in ns: its stamp begins at 0 again after 4.7 h."""
+        """Return a block's time in ms: its stamp begins at 0 again after 4.7 h."""
         last = self._stamps.get(kind, milliseconds)
         now = unwrapped(milliseconds, last, _WRAP)
         missed = round((now - last) / self._period) - 1
         if missed > 0:
             self.tallies.counts["lost"] += missed
         self._stamps[kind] = max(now, last)
-        return 1_000_000 * now
+        return now
 
     def _take(self, stamp: int, data: dict[str, Any], block: Any) -> None:
         """Take a block of the log, in cflib's thread."""
@@ -140,37 +139,17 @@ class CrazyflieLog(Source):
     def decode(self, message: Any, arrival: int) -> Sample | None:
         """Return what a block holds."""
         kind, stamp, data = message
-        found = self._row(data) if kind == "row" else self._imu_of(data)
-        return Sample(kind, self._stamp(kind, stamp), arrival, kind == "row", **found)
-
-    def _row(self, data: dict[str, Any]) -> dict[str, Any]:
-        """Return the quantities of a row."""
-        x, y, z, w = self._decompress(data["stateEstimateZ.quat"])
-        quaternion = np.array([w, x, y, z], dtype=np.float64)
-        length = float(np.linalg.norm(quaternion))
-        position = np.array([data[name] for name, _ in _POSE[:3]], dtype=np.float64)
-        if not (0.9 < length < 1.1 and np.isfinite(position).all()):
+        if kind == "row":
+            turn = self._decompress(data["stateEstimateZ.quat"])  # scalar last
+            data |= {f"stateEstimate.q{x}": float(q) for x, q in zip("xyzw", turn, strict=True)}
+        found = self._map.sample(kind, {"timestamp": self._stamp(kind, stamp), **data}, arrival)
+        if (kind == "row") != found.has_pose:
             raise Malformed("no pose")
-        volts = float(data["pm.vbat"])
-        group = "rpm" if "rpm.m1" in data else "motor"
-        motors = np.array([data[f"{group}.m{i}"] for i in ORDERS["crazyflie"]], dtype=np.float64)
-        return {
-            "position": position,
-            "quaternion": quaternion / length,
-            "voltage": volts if math.isfinite(volts) and volts > 0.0 else None,
-            **(
-                {"rotor_speeds": motors * _RPM}
-                if group == "rpm"
-                else {"command": command_of(motors, self.vehicle, (0.0, _FULL))}
-            ),
-        }
-
-    def _imu_of(self, data: dict[str, Any]) -> dict[str, Any]:
-        """Return gyro and accelerometer."""
-        values = np.array([data[name] for name, _ in _IMU], dtype=np.float64)
-        if not np.isfinite(values).all():
-            raise Malformed("a number that is not finite")
-        return {"gyro": np.radians(values[:3]), "accelerometer": _G * values[3:]}
+        curve = self.vehicle.motor_curve
+        if found.command is not None and curve is not None and curve.command[1] > LARGEST_SHARE:
+            low, high = curve.command  # PWM of its own
+            found.command = np.clip((_FULL * found.command - low) / (high - low), 0.0, 1.0)
+        return found
 
     def read(self, timeout: float) -> list[tuple[Any, int]] | None:
         """Return the blocks that have come."""

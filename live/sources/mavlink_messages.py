@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from ...dynamics.vehicle import Vehicle
 from ...identification.logs.rotor_orders import ORDERS
 from ..messages import Array, Malformed, Sample
-from .base import LARGEST_SHARE, command_of, unwrapped
+from .base import LARGEST_SHARE, unwrapped
 
 HALF_TURN = np.array([1.0, -1.0, -1.0])  # of a vector
 _ORDER = [motor - 1 for motor in ORDERS["px4-x"]]
@@ -151,9 +151,11 @@ class MessageReader:
         return self._command(sample, (m.servo1_raw, m.servo2_raw, m.servo3_raw, m.servo4_raw))
 
     def _command(self, sample: Sample, values: Any) -> bool:
-        raw = _motors(values)
-        counts = _PULSES if float(np.max(raw)) > LARGEST_SHARE else None
-        sample.command = command_of(raw, self._vehicle, counts)
+        raw, curve = _motors(values), self._vehicle.motor_curve
+        low, high = (0.0, 1.0) if curve is None else curve.command
+        if high <= LARGEST_SHARE < float(np.max(raw)):
+            low, high = _PULSES
+        sample.command = np.clip((raw - low) / (high - low), 0.0, 1.0)
         return True
 
     def _battery(self, m: Any, sample: Sample) -> bool:

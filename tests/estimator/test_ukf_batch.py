@@ -146,8 +146,8 @@ SPEEDS, POSITION, QUATERNION = (
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ((SPEEDS[:1], POSITION, QUATERNION), r"rotor_speeds must be \(2, 4\)"),
-        ((SPEEDS, POSITION[:, :2], QUATERNION), r"position must be \(2, 3\)"),
+        ((SPEEDS[:1], POSITION, QUATERNION), r"rotor_speeds \(2, 4\) of rad/s"),
+        ((SPEEDS, POSITION[:, :2], QUATERNION), r"position \(2, 3\)"),
         ((SPEEDS, POSITION, QUATERNION * [[1.0], [2.0]]), r"length 1, got 2 \(filter 1\)"),
         ((SPEEDS, POSITION, QUATERNION, [1.0, 2.0, 3.0]), "voltage"),
     ],
