@@ -8,7 +8,7 @@ import pytest
 
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import MotorCurve, Vehicle
-from windwrench.dynamics.vehicle_file import dump_vehicle, parse_vehicle
+from windwrench.identification.diagnosis.commanded_rotors import thrust_is_assumed
 from windwrench.identification.logs.commanded_speeds import with_commanded_speeds
 from windwrench.identification.logs.flight_log import FlightLog, write_log
 from windwrench.identification.logs.reading import read_log
@@ -40,24 +40,15 @@ def inertial_log(**fields: object) -> FlightLog:
     return FlightLog(**{**given, **fields})  # type: ignore[arg-type]
 
 
-def test_a_log_of_commands_and_imu_reads_back(tmp_path: Path) -> None:
-    """No pose and no rotor speeds: what is not there is not in the file, and is NaN when read."""
-    path = tmp_path / "imu.csv"
-    write_log(inertial_log(), path)
-    log = read_log(path)
-    assert not log.has_pose
-    assert not log.has_rotor_speeds
-    assert log.command is not None
-    np.testing.assert_array_equal(log.command, inertial_log().command)
-    assert np.isnan(log.position).all()
-
-
 def test_a_motor_curve_turns_commands_into_rotor_speeds(tmp_path: Path) -> None:
     """At 3.8 V of 4 V and an exponent of 2, thrust is 0.9025 of the curve's."""
     path, vehicle = tmp_path / "imu.csv", curved()
     write_log(inertial_log(), path)
+    assert not read_log(path).has_rotor_speeds
     log = read_log(path, vehicle=vehicle)
     assert log.commanded
+    assert not thrust_is_assumed([log], vehicle)
+    assert any("motor curve" in note for note in log.notes)
     u = np.array([0.5, 0.6, 0.7, 0.8])
     thrust = (0.02 * u + 0.10 * u**2) * (3.8 / 4.0) ** 2
     np.testing.assert_allclose(vehicle.k * log.rotor_speeds[0] ** 2, thrust, rtol=1e-12)
@@ -70,19 +61,6 @@ def test_commands_without_a_curve_are_refused_where_thrust_is_needed() -> None:
     )
     with pytest.raises(InputError, match="motor_curve"):
         screen_log(log, load_vehicle("crazyflie"))
-
-
-def test_a_command_beyond_its_range_is_refused(tmp_path: Path) -> None:
-    """A command of 1.5 is no command of 0 to 1."""
-    path = tmp_path / "imu.csv"
-    write_log(inertial_log(command=np.full((200, 4), 1.5)), path)
-    with pytest.raises(InputError, match=r"cmd1.*from 0 to 1"):
-        read_log(path)
-
-
-def test_a_motor_curve_is_written_and_read_back() -> None:
-    """The YAML of a vehicle holds its motor curve."""
-    assert parse_vehicle(dump_vehicle(curved())).motor_curve == curved().motor_curve
 
 
 def test_the_scale_of_commands_counts_the_dips_between_high_thrusts() -> None:

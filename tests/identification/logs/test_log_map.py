@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from tests.support.random_tables import flight, random_table, save
 from windwrench.dynamics import load_vehicle
-from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.diagnosis.commanded_rotors import thrust_is_assumed
 from windwrench.identification.logs.flight_log import FlightLog, with_rows, write_log
 from windwrench.identification.logs.log_map import load_map, map_names, parse_map
@@ -232,17 +231,6 @@ def test_a_time_that_goes_back_costs_its_row_and_many_are_refused(tmp_path: Path
         map_table(open_table(table(tmp_path / "a.csv", {"t": t})), parse_map(GOOD, "m"))
 
 
-def test_a_table_of_two_boots_is_read_by_the_piece(tmp_path: Path) -> None:
-    t = [f"{0.1 * k:.2f}" for k in [*range(60), *range(40)]]
-    opened = open_table(table(tmp_path / "a.csv", {"t": t}, 100))
-    log = map_table(opened, parse_map(GOOD, "m"))
-    assert len(log.t) == 60
-    assert any("2 pieces of 5.9, 3.9 s; the longest, piece 1, was read" in x for x in log.notes)
-    assert len(map_table(opened, parse_map(GOOD, "m"), piece=2).t) == 40
-    with pytest.raises(InputError, match="piece 3: it has 2; expected 1 to 2"):
-        map_table(opened, parse_map(GOOD, "m"), piece=3)
-
-
 COMMANDED = {
     **{k: v for k, v in GOOD.items() if k != "rotors"},
     "commands": {"columns": ["m1", "m2", "m3", "m4"], "unit": "us", "order": "px4-x"},
@@ -259,36 +247,12 @@ def test_commands_without_a_curve_say_what_is_assumed(
     vehicle = load_vehicle("crazyflie")
     turn = {"qx": np.sin(tilt / 2), "qw": np.cos(tilt / 2)}
     path = table(tmp_path / "a.csv", {**turn, **dict.fromkeys(("m1", "m2", "m3", "m4"), 1600)})
-    log = read_log(path, vehicle=vehicle, map=_saved(tmp_path, COMMANDED))
+    (tmp_path / "map.yaml").write_text(yaml.safe_dump(COMMANDED))
+    log = read_log(path, vehicle=vehicle, map=tmp_path / "map.yaml")
     assert log.commanded
     assert thrust_is_assumed([log], vehicle)
     np.testing.assert_allclose(log.rotor_speeds, np.sqrt(needed) * vehicle.hover_rate)
     assert any("cannot be found from this log" in note for note in log.notes)
-
-
-def test_a_stated_curve_turns_commands_into_speeds(tmp_path: Path) -> None:
-    curve = MotorCurve(thrust=(0.0, 0.02, 0.10), command=(1000.0, 2000.0))
-    vehicle = replace(load_vehicle("crazyflie"), motor_curve=curve)
-    given = {**COMMANDED, "commands": {**COMMANDED["commands"], "unit": "counts"}}
-    path = table(tmp_path / "a.csv", dict.fromkeys(("m1", "m2", "m3", "m4"), 1600))
-    log = read_log(path, vehicle=vehicle, map=_saved(tmp_path, given))
-    assert log.commanded
-    assert not thrust_is_assumed([log], vehicle)
-    np.testing.assert_allclose(vehicle.k * log.rotor_speeds[0] ** 2, 0.012 + 0.036)
-    assert any("motor curve" in note for note in log.notes)
-    with pytest.raises(InputError, match="unit counts without a range"):
-        read_log(path, map=tmp_path / "map.yaml")
-
-
-def test_commands_of_another_range_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="expected motor commands from 1000 to 2000"):
-        map_table(open_table(table(tmp_path / "a.csv", {})), parse_map(COMMANDED, "m"))
-
-
-def _saved(folder: Path, given: dict[str, object]) -> Path:
-    path = folder / "map.yaml"
-    path.write_text(yaml.safe_dump(given))
-    return path
 
 
 def test_the_kits_own_columns_are_read_in_any_layout(tmp_path: Path, flown: FlightLog) -> None:

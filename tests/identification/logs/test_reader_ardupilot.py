@@ -174,10 +174,6 @@ def test_frame_types_number_their_motors(read, kind, order):
             "no motors that turn; expected ESC .* or RCOU .*, found XKF1, XKQ",
         ),
         ((parm(), rcou(T)), "no pose, and no accelerometer and no gyro; expected SIM2 or"),
-        (
-            (parm(FRAME_CLASS=2.0), rcou(T)),
-            "FRAME_CLASS = 2 says a hexarotor with 6 rotors; expected a",
-        ),
         ((parm(FRAME_TYPE=0.0), rcou(T)), "FRAME_TYPE is 0, a plus, whose rotors do not stand as"),
         (
             (parm(MOT_PWM_MIN=1900.0), *POSE, rcou(T)),
