@@ -6,7 +6,6 @@ import gymnasium as gym
 import mujoco
 import numpy as np
 import pytest
-from gymnasium.vector import AutoresetMode
 
 from tests.support.vector_flights import TASKS, fly, make
 from windwrench.dynamics import InputError
@@ -137,23 +136,11 @@ def test_side_by_side_is_single_bit_for_bit_and_lanes_to_rounding(task, scenario
     np.testing.assert_allclose(in_lanes[1], told, atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("task", "plant", "mode"),
-    [
-        ("WindHover", "mujoco", AutoresetMode.NEXT_STEP),
-        ("FanTracking2D", "lanes", AutoresetMode.SAME_STEP),
-        ("WindTrajectory", "lanes", AutoresetMode.NEXT_STEP),
-    ],
-)
-def test_episodes_follow_one_another_in_both_modes_and_copies_go_on(task, plant, mode):
-    envs = make(3, plant, task, autoreset_mode=mode)
+@pytest.mark.parametrize(("task", "plant"), [("WindHover", "mujoco"), ("WindTrajectory", "lanes")])
+def test_a_copy_of_many_goes_on_as_they_do(task, plant):
+    envs = make(3, plant, task, max_episode_steps=3)  # and begins the same episodes
     envs.reset(seed=2)
-    still = np.zeros(envs.action_space.shape, dtype=np.float32)
-    ended = 0
-    while not ended:
-        _, _, lost, out, infos = envs.step(still)
-        ended = int(np.sum(lost | out))
-    assert ("final_obs" in infos) == (mode == AutoresetMode.SAME_STEP)
     other = copy.deepcopy(envs)
-    for _ in range(2):
+    still = np.zeros(envs.action_space.shape, dtype=np.float32)
+    for _ in range(5):
         np.testing.assert_array_equal(envs.step(still)[0], other.step(still)[0])

@@ -4,11 +4,8 @@ the log that was not spoiled; never another one without a word.
 """
 
 import warnings
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,9 +14,7 @@ from numpy.typing import NDArray
 from tests.support.data_paths import DATA, EXCERPTS
 from windwrench.dynamics import InputError
 from windwrench.identification.logs import reading
-from windwrench.identification.logs.channels import Samples
-from windwrench.identification.logs.flight_log import FlightLog
-from windwrench.identification.logs.log_map import OWN_MAP, UNITS, LogMap, load_map
+from windwrench.identification.logs.log_map import OWN_MAP, UNITS, load_map
 from windwrench.identification.logs.readers import (
     TABLES,
     ardupilot_bin,
@@ -28,7 +23,6 @@ from windwrench.identification.logs.readers import (
     px4_ulog,
     reader_by_columns,
 )
-from windwrench.identification.logs.table import Table
 from windwrench.identification.logs.tables import open_table
 
 Array = NDArray[np.float64]
@@ -57,12 +51,12 @@ KINDS = {  # and words that name it
 }
 
 
-def named(log_map: LogMap, *sections: str) -> set[str]:
+def named(log_map, *sections):
     """Return the columns of some sections of a map."""
     return {name for part in sections for way in log_map.ways(part) for name in way.named}
 
 
-def spoiled(kind: str, name: str, t: Array, x: Array, log_map: LogMap) -> Array:
+def spoiled(kind, name, t, x, log_map):
     """Return a column (N,), of times (N,) in s."""
     if kind == "slow" and name in named(log_map, "rotors", "commands", "wrench"):
         held = np.searchsorted(t, t[0] + np.floor((t - t[0]) * SLOW_HZ) / SLOW_HZ)
@@ -72,10 +66,10 @@ def spoiled(kind: str, name: str, t: Array, x: Array, log_map: LogMap) -> Array:
     return x
 
 
-def spoiled_recording(kind: str, whole: Callable[..., Any]) -> Callable[..., Any]:
+def spoiled_recording(kind, whole):
     """Return ``recording_of`` of what is spoiled."""
 
-    def of(path: Path, recorded: Sequence[Samples], log_map: LogMap, *others: Any) -> Any:
+    def of(path, recorded, log_map, *others):
         out = []
         for s in recorded:
             columns = {name: spoiled(kind, name, s.t, x, log_map) for name, x in s.columns.items()}
@@ -88,10 +82,10 @@ def spoiled_recording(kind: str, whole: Callable[..., Any]) -> Callable[..., Any
     return of
 
 
-def spoiled_table(kind: str) -> Callable[[Path], Table]:
+def spoiled_table(kind):
     """Return ``open_table`` of what is spoiled."""
 
-    def opened(path: Path) -> Table:
+    def opened(path):
         table = open_table(path)
         reader = reader_by_columns(path, table.header)
         log_map = load_map(OWN_MAP if reader is None else TABLES[reader.name])
@@ -100,14 +94,14 @@ def spoiled_table(kind: str) -> Callable[[Path], Table]:
         t = (raw - raw[0]) * UNITS["time"][clock.unit]
         motors = sorted(named(log_map, "rotors", "commands") & set(table.header))
         noise = np.random.default_rng(0).standard_normal((table.rows, 2))
-        more: dict[str, Array] = {}
+        more = {}
         if kind == "six rotors" and motors and motors[0].count("1") == 1:
             turning = table.read(motors[:1])[motors[0]]
             names = (motors[0].replace("1", number) for number in "56")
             more = dict(zip(names, (turning[:, None] * (1.0 + 0.01 * noise)).T, strict=True))
         header = (*table.header, *more)
 
-        def fill(_: Table, where: Sequence[int], columns: Array) -> None:
+        def fill(_, where, columns):
             for i, out in zip(where, columns, strict=True):
                 name = header[i]
                 x = more[name] if name in more else table.read([name])[name]
@@ -120,18 +114,18 @@ def spoiled_table(kind: str) -> Callable[[Path], Table]:
     return opened
 
 
-def read(path: Path) -> FlightLog:
+def read(path):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         return reading.read_log(path)
 
 
 @cache
-def unspoiled(path: Path) -> FlightLog:
+def unspoiled(path):
     return read(path)
 
 
-def is_same(here: FlightLog, there: FlightLog) -> bool:
+def is_same(here, there):
     """Return whether a log says what the other says, at the times of both."""
     _, i, j = np.intersect1d(np.round(here.t, 6), np.round(there.t, 6), return_indices=True)
     if len(i) < 0.98 * len(there.t):
@@ -149,9 +143,7 @@ def is_same(here: FlightLog, there: FlightLog) -> bool:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("path", FIXTURES, ids=lambda path: path.name)
-def test_no_kind_of_fault_passes_without_a_word(
-    path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_kind_of_fault_passes_without_a_word(path, kind, monkeypatch):
     if not path.exists():
         pytest.skip(f"{path} is not there")
     expected = unspoiled(path)

@@ -194,7 +194,7 @@ def test_pymavlink_reads_the_same_numbers():
     wanted = ("IMU", "ATT", "XKF1", "XKQ", "RCOU", "BAT", "POS")
     ours, _ = read_dataflash(path, wanted)
     reader = dfreader.DFReader_binary(str(path))
-    theirs: dict[str, list[object]] = {name: [] for name in wanted}
+    theirs = {name: [] for name in wanted}
     while (message := reader.recv_msg()) is not None:
         if message.get_type() in wanted:
             theirs[message.get_type()].append(message)
