@@ -245,6 +245,11 @@ def test_commands_without_a_curve_say_what_is_assumed(tmp_path, tilt, needed):
     assert any("cannot be found from this log" in note for note in log.notes)
 
 
+def test_commands_of_another_range_are_refused(tmp_path):
+    with pytest.raises(InputError, match="expected motor commands from 1000 to 2000: state the"):
+        map_table(open_table(table(tmp_path / "a.csv", {})), parse_map(COMMANDED, "m"))
+
+
 def test_the_kits_own_columns_are_read_in_any_layout(tmp_path, flown):
     """Semicolons, decimal commas and a comment, without a map."""
     write_log(flown, tmp_path / "own.csv")
