@@ -22,7 +22,7 @@ from windwrench.runtime.vector_lanes import WIDTH
 )
 def test_the_bits_depend_on_neither_number_nor_threads(given, threads):
     given = {"scenario": "varied", "max_episode_steps": 7, **given}
-    many, decisions = 2 * WIDTH + 1 if "plant" in given else 5, 16
+    many, decisions = 2 * WIDTH + 1 if "plant" in given else 5, 9
     alone = fly(make(many, **given), decisions)
     for other in (make(2, **given), make(many, threads=threads, **given)):
         count = other.num_envs

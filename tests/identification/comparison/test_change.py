@@ -46,11 +46,11 @@ def drawn(rng, count, moved=(0.0, 0.0, 0.0, 0.0), sessions=1):
 
 
 def test_flights_without_a_change_are_never_given_a_sure_one():
-    """Of 150 pairs of sets at most one in fifty, and most are said to be unchanged."""
+    """Of 60 pairs of sets at most one, and most are said to be unchanged."""
     rng = np.random.default_rng(1)
-    found = [compare(drawn(rng, 1), drawn(rng, 2)) for _ in range(150)]
-    assert sum(c.sure and c.place != NOWHERE for c in found) <= 3
-    assert sum(c.place == NOWHERE for c in found) > 140
+    found = [compare(drawn(rng, 1), drawn(rng, 2)) for _ in range(60)]
+    assert sum(c.sure and c.place != NOWHERE for c in found) <= 1
+    assert sum(c.place == NOWHERE for c in found) > 55
     assert all(sum(c.places.values()) == pytest.approx(1.0) for c in found)
 
 
@@ -104,7 +104,7 @@ def test_a_weak_rotor_and_a_weight_are_named_at_their_place(rotor):
     weight = 0.1 * np.array([left, front, 0, 1])
     places = []
     for moved in (weak, weight):
-        for _ in range(15):
+        for _ in range(8):
             places.append(compare(drawn(rng, 3, moved), drawn(rng, 3)))
     assert np.mean([c.place == ROTORS[rotor] for c in places]) > 0.8
     assert not any(c.sure and c.place != ROTORS[rotor] for c in places)
