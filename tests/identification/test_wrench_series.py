@@ -26,13 +26,9 @@ from windwrench.identification.wrench_series import (
 )
 from windwrench.identification.wrench_track import write_mcap
 
+VEHICLE = load_vehicle("ardrone2")
 WRENCH = [f"{kind}{axis}" for kind in "ft" for axis in "xyz"]
 HEADER = ["t", *WRENCH, *(f"std_{name}" for name in WRENCH), "nis", "status"]
-
-
-@pytest.fixture(scope="module")
-def vehicle():
-    return load_vehicle("ardrone2")
 
 
 def held_flight(vehicle, t, lift=0.3, lost=None, seed=0):
@@ -63,9 +59,9 @@ def finite(series):
     return np.isfinite(series.state[:, :19]).all() and np.isfinite(series.std).all()
 
 
-def test_a_constant_force_is_found(vehicle):
-    log = held_flight(vehicle, 0.005 * np.arange(2000))
-    series = estimate_log(log, vehicle)
+def test_a_constant_force_is_found():
+    log = held_flight(VEHICLE, 0.005 * np.arange(2000))
+    series = estimate_log(log, VEHICLE)
     assert finite(series)
     np.testing.assert_allclose(series.force[1000:].mean(axis=0), [0, 0, 0.3], atol=0.02)
     np.testing.assert_allclose(series.torque[1000:].mean(axis=0), 0.0, atol=2e-3)
@@ -91,10 +87,10 @@ def test_uneven_times_and_lost_poses_give_a_finite_wrench(seed, jitter, share):
     )
 
 
-def test_a_gap_widens_the_band_and_is_bridged(vehicle):
+def test_a_gap_widens_the_band_and_is_bridged():
     t = 0.005 * np.arange(2000)
     t[1000:] += 1.0
-    series = estimate_log(held_flight(vehicle, t), vehicle)
+    series = estimate_log(held_flight(VEHICLE, t), VEHICLE)
     assert np.all(series.std[1000, 15:] > 1.05 * series.std[999, 15:])
     # at its default noise the filter has lost the attitude in a second
     assert (series.restarts[-1], series.status[1000]) == (1, "restarted")
@@ -105,56 +101,56 @@ def test_a_gap_widens_the_band_and_is_bridged(vehicle):
 
 
 @pytest.mark.parametrize("smooth", [False, True])
-def test_wild_poses_are_refused_and_said(vehicle, smooth):
-    log = held_flight(vehicle, 0.005 * np.arange(1200))
+def test_wild_poses_are_refused_and_said(smooth):
+    log = held_flight(VEHICLE, 0.005 * np.arange(1200))
     position = log.position.copy()
     position[500:1100:100] += [0.1, -0.1, 0.1]
     spoiled = replace(log, position=position)
-    series = estimate_log(spoiled, vehicle, smooth=smooth)
+    series = estimate_log(spoiled, VEHICLE, smooth=smooth)
     assert "6 of 1200 poses jump from those before and were refused" in series.notes[-1]
     assert counts(series)["rejected"] == 6
-    clean = estimate_log(log, vehicle, smooth=smooth)
+    clean = estimate_log(log, VEHICLE, smooth=smooth)
     assert np.max(np.abs(series.force - clean.force)) < 0.03
     # no gate: each of them, and each way back, is a jump for good
-    trusting = estimate_log(spoiled, vehicle, gate=None)
+    trusting = estimate_log(spoiled, VEHICLE, gate=None)
     assert trusting.restarts[-1] >= 6
 
 
-def test_smoothing_is_the_filters_nis_with_a_narrower_band(vehicle):
+def test_smoothing_is_the_filters_nis_with_a_narrower_band():
     lost = slice(400, 440)
-    log = held_flight(vehicle, 0.005 * np.arange(1200), lost=lost)
-    filtered, smoothed = estimate_log(log, vehicle), estimate_log(log, vehicle, smooth=True)
+    log = held_flight(VEHICLE, 0.005 * np.arange(1200), lost=lost)
+    filtered, smoothed = estimate_log(log, VEHICLE), estimate_log(log, VEHICLE, smooth=True)
     assert np.allclose(filtered.nis, smoothed.nis, equal_nan=True)
     assert np.allclose(filtered.force[-1], smoothed.force[-1])
     inner = slice(100, -100)
     assert (smoothed.std[inner, 12:] < 0.9 * filtered.std[inner, 12:]).all()  # of noise
     # nothing crosses a new start
     t = np.concatenate([0.005 * np.arange(600), 20.0 + 0.005 * np.arange(600)])
-    apart = held_flight(vehicle, t, lost=slice(590, 610))
-    found = estimate_log(apart, vehicle, smooth=True)
+    apart = held_flight(VEHICLE, t, lost=slice(590, 610))
+    found = estimate_log(apart, VEHICLE, smooth=True)
     first = {
         name: getattr(apart, name)[:590] for name in ("t", "position", "quaternion", "rotor_speeds")
     }
-    alone = estimate_log(FlightLog(**first), vehicle, smooth=True)
+    alone = estimate_log(FlightLog(**first), VEHICLE, smooth=True)
     assert np.allclose(found.force[:590], alone.force, rtol=0, atol=1e-6)
     assert np.allclose(found.std_force[:590], alone.std_force, rtol=1e-6)
 
 
-def test_rows_before_the_first_pose_have_a_wrench(vehicle):
-    series = estimate_log(held_flight(vehicle, 0.005 * np.arange(100), lost=slice(0, 30)), vehicle)
+def test_rows_before_the_first_pose_have_a_wrench():
+    series = estimate_log(held_flight(VEHICLE, 0.005 * np.arange(100), lost=slice(0, 30)), VEHICLE)
     assert finite(series)
     np.testing.assert_array_equal(series.force[:31], 0.0)
     np.testing.assert_array_equal(series.std_force[:30], np.tile(series.std_force[30], (30, 1)))
 
 
-def test_a_log_without_a_pose_is_refused(vehicle):
+def test_a_log_without_a_pose_is_refused():
     with pytest.raises(InputError, match=r"held.csv: no row has a pose; expected at least one"):
-        estimate_log(held_flight(vehicle, 0.005 * np.arange(10), lost=slice(0, 10)), vehicle)
+        estimate_log(held_flight(VEHICLE, 0.005 * np.arange(10), lost=slice(0, 10)), VEHICLE)
 
 
-def test_wrench_csv(vehicle, tmp_path):
-    log = held_flight(vehicle, 0.005 * np.arange(50), lost=slice(10, 20))
-    series = estimate_log(log, vehicle)
+def test_wrench_csv(tmp_path):
+    log = held_flight(VEHICLE, 0.005 * np.arange(50), lost=slice(10, 20))
+    series = estimate_log(log, VEHICLE)
     path = tmp_path / "new" / "folder" / "wrench.csv"
     write_wrench(series, path)
     assert [p.name for p in path.parent.iterdir()] == ["wrench.csv"]
@@ -174,9 +170,9 @@ def test_wrench_csv(vehicle, tmp_path):
         write_wrench(series, tmp_path / "file" / "wrench.csv")
 
 
-def test_a_track_of_the_wrench_is_a_bag_that_ros_s_reader_opens(vehicle, tmp_path):
-    log = held_flight(vehicle, 0.005 * np.arange(50))
-    series = estimate_log(log, vehicle)
+def test_a_track_of_the_wrench_is_a_bag_that_ros_s_reader_opens(tmp_path):
+    log = held_flight(VEHICLE, 0.005 * np.arange(50))
+    series = estimate_log(log, VEHICLE)
     path = tmp_path / "new" / "wrench.mcap"
     write_mcap(series, path)
     assert [p.name for p in path.parent.iterdir()] == ["wrench.mcap"]
@@ -208,21 +204,21 @@ def hop(vehicle, top, bounce):
 
 
 @pytest.mark.parametrize(("top", "bounce"), [(1.0, 0.0), (1.0, 0.1), (3.0, 0.2), (0.3, 0.0)])
-def test_phases_of_a_hop(vehicle, top, bounce):
-    t, height, speeds, edges = hop(vehicle, top, bounce)
-    phases = flight_phases(t, height, speeds, vehicle)
+def test_phases_of_a_hop(top, bounce):
+    t, height, speeds, edges = hop(VEHICLE, top, bounce)
+    phases = flight_phases(t, height, speeds, VEHICLE)
     assert [phase.name for phase in phases] == [GROUND, TAKE_OFF, FLIGHT, LANDING, GROUND]
     np.testing.assert_allclose([phase.end for phase in phases[:4]], edges, atol=0.3)
     assert phases[0].start == t[0]
     assert phases[-1].end == t[-1]
 
 
-def test_a_log_that_was_filtered_before_it_was_written_has_no_tuning_to_fit(vehicle):
+def test_a_log_that_was_filtered_before_it_was_written_has_no_tuning_to_fit():
     """A hover whose pose has no noise: neither pose noise nor walk is found."""
     t = 0.005 * np.arange(800)
-    log = held_flight(vehicle, t, lift=0.0)
+    log = held_flight(VEHICLE, t, lift=0.0)
     position = log.position[0] + 1e-7 * np.sin(t)[:, None]  # or each pose repeats the last one
     quaternion = np.tile(log.quaternion[0], (len(t), 1))
     with pytest.raises(InputError, match="filtered before it was written") as caught:
-        tune_to_log(replace(log, position=position, quaternion=quaternion), vehicle)
+        tune_to_log(replace(log, position=position, quaternion=quaternion), VEHICLE)
     assert "\n" not in str(caught.value)

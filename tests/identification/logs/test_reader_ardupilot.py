@@ -29,6 +29,7 @@ from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.logs.readers.dataflash import read_dataflash
 from windwrench.identification.logs.reading import read_log
 
+VEHICLE = load_vehicle("ardrone2")
 T = 5.0 + 0.02 * np.arange(300)
 SLOW = T[::5]
 FAST = 5.0 + 0.0025 * np.arange(2400)
@@ -58,14 +59,9 @@ def read(tmp_path):
     return of_messages
 
 
-@pytest.fixture(scope="module")
-def vehicle():
-    return load_vehicle("ardrone2")
-
-
-def test_frames_motors_and_commands(read, vehicle):
+def test_frames_motors_and_commands(read):
     battery = "BAT", "QBf", {"TimeUS": micro(SLOW), "Inst": 0 * SLOW, "Volt": 16.0 - 0.1 * SLOW}
-    log = read(parm(), *POSE, imu(T), rcou(T), battery, vehicle=vehicle)
+    log = read(parm(), *POSE, imu(T), rcou(T), battery, vehicle=VEHICLE)
     assert "reader ardupilot_bin" in log.source
     assert_motion(log, T, 1e-5)
     assert_inertial(log, T, 1e-4)
@@ -74,9 +70,9 @@ def test_frames_motors_and_commands(read, vehicle):
     # ArduPilot's own curve, scaled to the accelerometer's specific force
     a = (COMMAND - 0.1) / 0.8
     shape = 0.5 * a + 0.5 * a * a
-    thrust = vehicle.k * log.rotor_speeds**2
+    thrust = VEHICLE.k * log.rotor_speeds**2
     np.testing.assert_allclose(thrust[9] / thrust[9].sum(), shape / shape.sum(), rtol=1e-6)
-    needed = np.median(vehicle.mass * inertial(T)[1][:, 2])
+    needed = np.median(VEHICLE.mass * inertial(T)[1][:, 2])
     np.testing.assert_allclose(thrust[9].sum(), needed, rtol=1e-3)
     assert log.commanded
     assert any("e = 0.5 (MOT_THST_EXPO)" in note for note in log.notes)

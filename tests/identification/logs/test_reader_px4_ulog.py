@@ -24,16 +24,13 @@ from tests.support.ulog_writer import (
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.logs.reading import read_log
 
+VEHICLE = load_vehicle("ardrone2")
+
 pytest.importorskip("pyulog", reason="pyulog is not installed: pip install 'windwrench[logs]'")
 
 
 T = 0.01 * np.arange(200)
 WIDE = np.arange(-0.5, T[-1] + 0.5, 0.004)
-
-
-@pytest.fixture(scope="module")
-def vehicle():
-    return load_vehicle("ardrone2")
 
 
 def onboard(t):
@@ -55,8 +52,8 @@ def onboard(t):
 
 
 @pytest.fixture
-def read(tmp_path, vehicle):
-    def of_topics(topics, parameters=None, vehicle=vehicle):
+def read(tmp_path):
+    def of_topics(topics, parameters=None, vehicle=VEHICLE):
         path = tmp_path / "flight.ulg"
         path.write_bytes(ulog_bytes(topics, parameters))
         return read_log(path, None, vehicle)
@@ -161,11 +158,11 @@ def assert_scaled(log, vehicle):
     assert log.commanded
 
 
-def test_relative_thrust_is_scaled_to_the_weight(read, vehicle):
+def test_relative_thrust_is_scaled_to_the_weight(read):
     values = np.full((len(WIDE), 12), np.nan)
     values[20:, :4] = THEIRS  # disarmed before
     topics = MOCAP | {"esc_status": esc(WIDE, 0 * PX4)} | {"actuator_motors": control(WIDE, values)}
-    assert_scaled(read(topics, {"THR_MDL_FAC": 0.3}), vehicle)
+    assert_scaled(read(topics, {"THR_MDL_FAC": 0.3}), VEHICLE)
     alone = read(topics, vehicle=None)  # without a vehicle commands stay what they are
     assert not alone.has_rotor_speeds
     np.testing.assert_allclose(alone.command[100], SHARES, rtol=1e-6)
@@ -204,7 +201,7 @@ def test_a_slow_pose_stands_in_rows_of_the_inertial_sensors(read, pose):
 
 
 @pytest.mark.parametrize("pulses", [True, False])
-def test_outputs_go_through_the_thrust_curve(read, vehicle, pulses):
+def test_outputs_go_through_the_thrust_curve(read, pulses):
     factor = 0.6
     x = (-(1 - factor) + np.sqrt((1 - factor) ** 2 + 4 * factor * THEIRS)) / (2 * factor)
     output = np.zeros((len(WIDE), 16))
@@ -224,7 +221,7 @@ def test_outputs_go_through_the_thrust_curve(read, vehicle, pulses):
         "vehicle_land_detected": landed,
     }
     log = read(MOCAP | topics, parameters)
-    assert_scaled(log, vehicle)
+    assert_scaled(log, VEHICLE)
     assert any("f = 0.6" in note and "outputs 3, 4, 5, 6" in note for note in log.notes)
 
 
