@@ -24,7 +24,6 @@ from tests.support.flown import recorded
 from tests.support.golden_identification import GOLDEN, made, vehicles
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle_file import dump_vehicle, parse_vehicle
-from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.logs.screening import screen_log
 from windwrench.identification.vehicle_fit.channels import MotionPiece, Sources
 from windwrench.identification.vehicle_fit.columns import Drive
@@ -92,7 +91,6 @@ def test_a_vehicle_of_rounded_speeds_reads_the_log_that_it_comes_from(crazyflie)
     assert not any("reads" in note for note in screen_log(log, again)[1])
     force = estimate_log(log, again).force
     assert np.abs(np.mean(force[len(force) // 2 :], axis=0)).max() < 0.02 * again.weight
-    assert diagnose([log], again).declared.omega_lsb == again.omega_lsb
 
 
 def test_a_hover_does_not_show_what_it_does_not_excite(crazyflie):
