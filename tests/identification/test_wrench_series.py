@@ -31,13 +31,13 @@ WRENCH = [f"{kind}{axis}" for kind in "ft" for axis in "xyz"]
 HEADER = ["t", *WRENCH, *(f"std_{name}" for name in WRENCH), "nis", "status"]
 
 
-def held_flight(vehicle, t, lift=0.3, lost=None, seed=0):
+def held_flight(t, lift=0.3, lost=None):
     """A vehicle at rest in the air while something carries ``lift`` N of its weight."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     count = len(t)
-    speed = vehicle.hover_rate * np.sqrt(1 - lift / vehicle.weight)
-    position = np.array([0.5, -0.5, 1.0]) + vehicle.mocap.sigma_pos_m * rng.normal(size=(count, 3))
-    turn = 0.5 * vehicle.mocap.sigma_att_rad * rng.normal(size=(count, 3))
+    speed = VEHICLE.hover_rate * np.sqrt(1 - lift / VEHICLE.weight)
+    position = np.array([0.5, -0.5, 1.0]) + VEHICLE.mocap.sigma_pos_m * rng.normal(size=(count, 3))
+    turn = 0.5 * VEHICLE.mocap.sigma_att_rad * rng.normal(size=(count, 3))
     quaternion = np.column_stack([np.sqrt(1 - np.sum(turn**2, axis=1)), turn])
     valid = np.ones(count, dtype=bool)
     if lost is not None:
@@ -60,7 +60,7 @@ def finite(series):
 
 
 def test_a_constant_force_is_found():
-    log = held_flight(VEHICLE, 0.005 * np.arange(2000))
+    log = held_flight(0.005 * np.arange(2000))
     series = estimate_log(log, VEHICLE)
     assert finite(series)
     np.testing.assert_allclose(series.force[1000:].mean(axis=0), [0, 0, 0.3], atol=0.02)
@@ -75,12 +75,11 @@ def test_a_constant_force_is_found():
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), jitter=st.floats(0.0, 0.9), share=st.floats(0.0, 0.9))
 def test_uneven_times_and_lost_poses_give_a_finite_wrench(seed, jitter, share):
-    vehicle = load_vehicle("ardrone2")
     rng = np.random.default_rng(seed)
     t = np.cumsum(0.01 * (1 + jitter * rng.uniform(-1, 1, 300)))
     lost = rng.random(300) < share
     lost[rng.integers(300)] = False
-    series = estimate_log(held_flight(vehicle, t, lost=lost), vehicle)
+    series = estimate_log(held_flight(t, lost=lost), VEHICLE)
     assert finite(series)
     np.testing.assert_array_equal(
         np.isfinite(series.nis), ~lost & (np.arange(300) > np.argmin(lost))
@@ -90,7 +89,7 @@ def test_uneven_times_and_lost_poses_give_a_finite_wrench(seed, jitter, share):
 def test_a_gap_widens_the_band_and_is_bridged():
     t = 0.005 * np.arange(2000)
     t[1000:] += 1.0
-    series = estimate_log(held_flight(VEHICLE, t), VEHICLE)
+    series = estimate_log(held_flight(t), VEHICLE)
     assert np.all(series.std[1000, 15:] > 1.05 * series.std[999, 15:])
     # at its default noise the filter has lost the attitude in a second
     assert (series.restarts[-1], series.status[1000]) == (1, "restarted")
@@ -102,7 +101,7 @@ def test_a_gap_widens_the_band_and_is_bridged():
 
 @pytest.mark.parametrize("smooth", [False, True])
 def test_wild_poses_are_refused_and_said(smooth):
-    log = held_flight(VEHICLE, 0.005 * np.arange(1200))
+    log = held_flight(0.005 * np.arange(1200))
     position = log.position.copy()
     position[500:1100:100] += [0.1, -0.1, 0.1]
     spoiled = replace(log, position=position)
@@ -118,7 +117,7 @@ def test_wild_poses_are_refused_and_said(smooth):
 
 def test_smoothing_is_the_filters_nis_with_a_narrower_band():
     lost = slice(400, 440)
-    log = held_flight(VEHICLE, 0.005 * np.arange(1200), lost=lost)
+    log = held_flight(0.005 * np.arange(1200), lost=lost)
     filtered, smoothed = estimate_log(log, VEHICLE), estimate_log(log, VEHICLE, smooth=True)
     assert np.allclose(filtered.nis, smoothed.nis, equal_nan=True)
     assert np.allclose(filtered.force[-1], smoothed.force[-1])
@@ -126,7 +125,7 @@ def test_smoothing_is_the_filters_nis_with_a_narrower_band():
     assert (smoothed.std[inner, 12:] < 0.9 * filtered.std[inner, 12:]).all()  # of noise
     # nothing crosses a new start
     t = np.concatenate([0.005 * np.arange(600), 20.0 + 0.005 * np.arange(600)])
-    apart = held_flight(VEHICLE, t, lost=slice(590, 610))
+    apart = held_flight(t, lost=slice(590, 610))
     found = estimate_log(apart, VEHICLE, smooth=True)
     first = {
         name: getattr(apart, name)[:590] for name in ("t", "position", "quaternion", "rotor_speeds")
@@ -137,7 +136,7 @@ def test_smoothing_is_the_filters_nis_with_a_narrower_band():
 
 
 def test_rows_before_the_first_pose_have_a_wrench():
-    series = estimate_log(held_flight(VEHICLE, 0.005 * np.arange(100), lost=slice(0, 30)), VEHICLE)
+    series = estimate_log(held_flight(0.005 * np.arange(100), lost=slice(0, 30)), VEHICLE)
     assert finite(series)
     np.testing.assert_array_equal(series.force[:31], 0.0)
     np.testing.assert_array_equal(series.std_force[:30], np.tile(series.std_force[30], (30, 1)))
@@ -145,11 +144,11 @@ def test_rows_before_the_first_pose_have_a_wrench():
 
 def test_a_log_without_a_pose_is_refused():
     with pytest.raises(InputError, match=r"held.csv: no row has a pose; expected at least one"):
-        estimate_log(held_flight(VEHICLE, 0.005 * np.arange(10), lost=slice(0, 10)), VEHICLE)
+        estimate_log(held_flight(0.005 * np.arange(10), lost=slice(0, 10)), VEHICLE)
 
 
 def test_wrench_csv(tmp_path):
-    log = held_flight(VEHICLE, 0.005 * np.arange(50), lost=slice(10, 20))
+    log = held_flight(0.005 * np.arange(50), lost=slice(10, 20))
     series = estimate_log(log, VEHICLE)
     path = tmp_path / "new" / "folder" / "wrench.csv"
     write_wrench(series, path)
@@ -171,7 +170,7 @@ def test_wrench_csv(tmp_path):
 
 
 def test_a_track_of_the_wrench_is_a_bag_that_ros_s_reader_opens(tmp_path):
-    log = held_flight(VEHICLE, 0.005 * np.arange(50))
+    log = held_flight(0.005 * np.arange(50))
     series = estimate_log(log, VEHICLE)
     path = tmp_path / "new" / "wrench.mcap"
     write_mcap(series, path)
@@ -192,7 +191,7 @@ def test_a_track_of_the_wrench_is_a_bag_that_ros_s_reader_opens(tmp_path):
 # phases
 
 
-def hop(vehicle, top, bounce):
+def hop(top, bounce):
     t, edges = (
         np.arange(0.0, 11.0, 0.01),
         np.array([2.0, 3.0, 8.0, 9.0]),
@@ -200,12 +199,12 @@ def hop(vehicle, top, bounce):
     height = 0.06 + np.interp(t, edges, [0.0, top, top, 0.0])
     height += bounce * np.exp(-(((t - edges[3] - 0.2) / 0.05) ** 2))
     turning = (t > 1.5) & (t < edges[3] + 0.4)
-    return t, height, np.where(turning[:, None], vehicle.hover_rate, 0.0) * np.ones(4), edges
+    return t, height, np.where(turning[:, None], VEHICLE.hover_rate, 0.0) * np.ones(4), edges
 
 
 @pytest.mark.parametrize(("top", "bounce"), [(1.0, 0.0), (1.0, 0.1), (3.0, 0.2), (0.3, 0.0)])
 def test_phases_of_a_hop(top, bounce):
-    t, height, speeds, edges = hop(VEHICLE, top, bounce)
+    t, height, speeds, edges = hop(top, bounce)
     phases = flight_phases(t, height, speeds, VEHICLE)
     assert [phase.name for phase in phases] == [GROUND, TAKE_OFF, FLIGHT, LANDING, GROUND]
     np.testing.assert_allclose([phase.end for phase in phases[:4]], edges, atol=0.3)
@@ -216,7 +215,7 @@ def test_phases_of_a_hop(top, bounce):
 def test_a_log_that_was_filtered_before_it_was_written_has_no_tuning_to_fit():
     """A hover whose pose has no noise: neither pose noise nor walk is found."""
     t = 0.005 * np.arange(800)
-    log = held_flight(VEHICLE, t, lift=0.0)
+    log = held_flight(t, lift=0.0)
     position = log.position[0] + 1e-7 * np.sin(t)[:, None]  # or each pose repeats the last one
     quaternion = np.tile(log.quaternion[0], (len(t), 1))
     with pytest.raises(InputError, match="filtered before it was written") as caught:

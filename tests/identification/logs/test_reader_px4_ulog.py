@@ -95,14 +95,6 @@ def test_inertial_sensors_come_in_the_kits_axes(read):
     assert read(FLIGHT).gyro is None
 
 
-def test_level_and_facing_north_is_the_unit_quaternion(read):
-    ones = np.ones((len(T), 1))
-    still = odometry(T) | {"float q": ones * [1.0, 0, 0, 0], "float position": ones * [1.0, 2, -3]}
-    log = read(FLIGHT | {"vehicle_mocap_odometry": still})
-    np.testing.assert_allclose(log.quaternion[0], [1, 0, 0, 0], atol=1e-12)
-    np.testing.assert_allclose(log.position[0], [1, -2, 3], atol=1e-12)
-
-
 TRUTH = {
     f"{topic}_groundtruth": {k: v for k, v in fields.items() if "valid" not in k}
     for topic, fields in onboard(T).items()
