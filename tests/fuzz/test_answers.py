@@ -33,30 +33,21 @@ def unspoiled(circle):
     return estimate_log(circle, VEHICLE)
 
 
-def changed(field, change):
-    """Return what changes a copy of a channel of a log."""
+def put(field, rows, columns, value):
+    """Return what gives some rows and columns of a log's channel what a function says of it."""
 
     def spoil(log):
         values = getattr(log, field).copy()
-        change(values)
+        values[rows, columns] = value(values)
         return replace(log, **{field: values})
 
     return spoil
 
 
-def put(rows, columns, value):
-    """Return what gives some columns of a channel, from or in some rows, what a function says."""
-
-    def change(values):
-        values[rows, columns] = value(values)
-
-    return change
-
-
-def outliers(columns):
+def scattered(positions):
     rng = np.random.default_rng(0)
-    hit = rng.random(len(columns)) < 0.01
-    columns[hit] += rng.standard_normal((int(hit.sum()), 3))
+    hit = rng.random((len(positions), 1)) < 0.01
+    return positions + hit * rng.standard_normal(positions.shape)
 
 
 def rows_lost(log, counted):
@@ -66,19 +57,14 @@ def rows_lost(log, counted):
 
 
 ALL, LATER = slice(None), slice(1200, None)
+SPEEDS, PLACE = "rotor_speeds", "position"
 FAULTS = {
-    "rotors swapped": (
-        changed("rotor_speeds", put(ALL, [0, 2], lambda x: x[:, [2, 0]])),
-        ROTORS,
-    ),
-    "a rotor's column twice": (changed("rotor_speeds", put(ALL, 1, lambda x: x[:, 3])), ROTORS),
-    "a rotor's speed stands still": (
-        changed("rotor_speeds", put(LATER, 1, lambda x: x[1200, 1])),
-        ROTORS,
-    ),
-    "a rotor's speed is zero": (changed("rotor_speeds", put(LATER, 1, lambda x: 0.0)), ROTORS),
+    "rotors swapped": (put(SPEEDS, ALL, [0, 2], lambda x: x[:, [2, 0]]), ROTORS),
+    "a rotor's column twice": (put(SPEEDS, ALL, 1, lambda x: x[:, 3]), ROTORS),
+    "a rotor's speed stands still": (put(SPEEDS, LATER, 1, lambda x: x[1200, 1]), ROTORS),
+    "a rotor's speed is zero": (put(SPEEDS, LATER, 1, lambda x: 0.0), ROTORS),
     "the attitude stands still": (
-        changed("quaternion", put(LATER, ALL, lambda x: x[1200])),
+        put("quaternion", LATER, ALL, lambda x: x[1200]),
         ("the attitude stands still",),
     ),
     "a second of rows is lost": (
@@ -86,14 +72,9 @@ FAULTS = {
         ("gap", *POSE),
     ),
     "every other row is lost": (lambda log: with_rows(log, np.arange(len(log.t)) % 2 == 0), ()),
-    "an axis stands still": (changed("position", put(LATER, 1, lambda x: x[1200, 1])), POSE),
-    "outliers of the position": (changed("position", outliers), POSE),
-    "a jump for good": (
-        changed(
-            "position", put(slice(2000, None), ALL, lambda x: np.add(x[2000:], [0.3, -0.4, 0.0]))
-        ),
-        POSE,
-    ),
+    "an axis stands still": (put(PLACE, LATER, 1, lambda x: x[1200, 1]), POSE),
+    "outliers of the position": (put(PLACE, ALL, ALL, scattered), POSE),
+    "a jump for good": (put(PLACE, LATER, ALL, lambda x: np.add(x[1200:], [0.3, -0.4, 0])), POSE),
     "rows lost": (lambda log: rows_lost(log, False), ("gap", "lost", "rows", *POSE)),
     "rows lost, times counted": (lambda log: rows_lost(log, True), ("clock", "moves", *POSE)),
 }

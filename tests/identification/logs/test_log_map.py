@@ -77,7 +77,6 @@ def test_each_map_that_ships_is_a_map(name):
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        ({"time": {"unit": "s"}}, "map: time must have one column of the table, or rate_hz"),
         ({"attitude": {"columns": ["a", "b", "c"]}}, "attitude must have a list of 4 columns"),
         ({"rotors": {**GOOD["rotors"], "order": [1, 2, 3, 3]}}, "rotors: order: .*numbers of the"),
         ({"rotors": {**GOOD["rotors"], "unit": "eRPM"}}, "eRPM without pole_pairs"),

@@ -233,7 +233,6 @@ LONG = odometry(T) | {"float q": 2 * odometry(T)["float q"]}
 @pytest.mark.parametrize(
     ("topics", "parameters", "expected"),
     [
-        ({}, {}, "no motors that turn; expected esc_status .* found nothing"),
         ({"esc_status": esc(WIDE)}, {}, "no pose, and no accel.* vehicle_local_position, with"),
         (MOCAP, {}, "no motors that turn; expected esc_status .* found vehicle_mocap_odometry"),
         (FLIGHT, {"CA_ROTOR_COUNT": 4, "CA_ROTOR0_PX": 0.1}, "expected one in each quadrant"),
