@@ -82,16 +82,7 @@ def _times():
     return _PERIOD * np.arange(_COUNT, dtype=np.float64)
 
 
-@cache
-def _vehicle(name):
-    return load_vehicle(name)
-
-
-def _written(write, name):
-    """Return the bytes of the file that ``write`` writes."""
-    with tempfile.TemporaryDirectory() as folder:
-        write(Path(folder) / name)
-        return (Path(folder) / name).read_bytes()
+_vehicle = cache(load_vehicle)
 
 
 @cache
@@ -110,7 +101,9 @@ def _own_log(name):
         np.zeros((_COUNT, 3)),
         np.zeros((_COUNT, 3)),
     )
-    return _written(lambda path: write_log(log, path), name)
+    with tempfile.TemporaryDirectory() as folder:
+        write_log(log, Path(folder) / name)
+        return (Path(folder) / name).read_bytes()
 
 
 def _table(log_map):
@@ -244,12 +237,8 @@ def _use_policy(path):
     assert command.shape == (1,)
 
 
-def _preset():
-    return (ROOT / "dynamics" / "vehicles" / "ardrone2.yaml").read_bytes()
-
-
-def _effects_of_vehicle():
-    text = _preset().decode() + "effects:\n"
+def _vehicle_with_effects():
+    text = (ROOT / "dynamics" / "vehicles" / "ardrone2.yaml").read_text() + "effects:\n"
     for name in ("rotor_drag", "mass", "slung_payload", "battery_sag", "latency"):
         setting = parse_setting(name, _vehicle("ardrone2"))
         given = ", ".join(f"{k}: {v:g}" for k, v in setting.coefficients.items())
@@ -270,45 +259,25 @@ def _ulog():
     return ulog_bytes(topics, {"THR_MDL_FAC": 0.3, "CA_ROTOR_COUNT": 4})
 
 
-def _dataflash_messages():
+def _messages():
     t = 10.0 + _times()
     volts = {"TimeUS": micro(t), "Inst": 0.0 * t, "Volt": 0.0 * t + 11.1}
     return [parm(), xkf1(t), xkq(t), imu(t), rcou(t), ("BAT", "QBf", volts)]
 
 
-@cache
-def _dataflash():
-    return dataflash(_dataflash_messages())
-
-
-@cache
 def _dataflash_text():
-    return dataflash_text(_dataflash_messages()).encode()
+    return dataflash_text(_messages()).encode()
 
 
-@cache
-def _blackbox():
-    return blackbox(blackbox_rows(_COUNT))
-
-
-def _sd_card_variables():
+def _events():
+    """Return times (s) and variables of a Crazyflie's SD-card log."""
     columns = hover_columns("cflib", _COUNT, _PERIOD)
     del columns["timestamp"]  # each event has its own
-    return {
+    return 30.0 + _times(), {
         f"{name}({'H' if name.startswith('motor.') else 'f'})": np.broadcast_to(values, _COUNT)
         for name, values in columns.items()
         if not name.startswith("rpm.")
     }
-
-
-@cache
-def _sd_card():
-    return sd_card({"fixedFrequency": (30.0 + _times(), _sd_card_variables())})
-
-
-@cache
-def _old_sd_card():
-    return sd_card_before_2021(30.0 + _times(), _sd_card_variables())
 
 
 def _zipped(spoiled):
@@ -366,6 +335,7 @@ def _form_of_log(
 def forms():
     """Return every form of input by its name."""
     log, flown = _form_of_log, ("record", "--seconds", "1", "--out", "out", "--vehicle")
+    sd = "crazyflie_sd", "crazyflie"
     own, packed = partial(_own_log, "log.csv"), (_zipped(spoiled_table), spoiled_bytes)
     scored = ("benchmark", "--episodes", "1", "--out", "out", "--controllers")
     found = [
@@ -376,13 +346,12 @@ def forms():
             for name, log_map in TABLES.items()
         ),
         log("betaflight_csv", "log.csv", _betaflight_table, _CELLS),
-        log("ardupilot_bin", "log.BIN", _dataflash, _BYTES, "ardupilot_bin"),
+        log("ardupilot_bin", "log.BIN", lambda: dataflash(_messages()), _BYTES, "ardupilot_bin"),
         log("ardupilot_bin, text", "flight.log", _dataflash_text, _WORDS, "ardupilot_bin"),
-        log("betaflight", "log.bbl", _blackbox, _BYTES, "betaflight"),
-        log("crazyflie_sd", "log00", _sd_card, _BYTES, "crazyflie_sd", "crazyflie"),
-        log("crazyflie_sd, old", "log01", _old_sd_card, _BYTES, "crazyflie_sd", "crazyflie"),
-        Form("vehicle", "v.yaml", _preset, _WORDS, _use_vehicle, flown),
-        Form("vehicle with effects", "v.yaml", _effects_of_vehicle, _WORDS, _use_vehicle, flown),
+        log("betaflight", "log.bbl", lambda: blackbox(blackbox_rows(_COUNT)), _BYTES, "betaflight"),
+        log("crazyflie_sd", "log00", lambda: sd_card({"fixedFrequency": _events()}), _BYTES, *sd),
+        log("crazyflie_sd, old", "log01", lambda: sd_card_before_2021(*_events()), _BYTES, *sd),
+        Form("vehicle with effects", "v.yaml", _vehicle_with_effects, _WORDS, _use_vehicle, flown),
         Form(
             *("log map", "map.yaml", lambda: _MAP, _WORDS, _use_map),
             ("check", "log.csv", "--out", "out", "--map"),
