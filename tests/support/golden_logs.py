@@ -94,10 +94,8 @@ def recorded(case):
         form = forms()[rest]
         with tempfile.TemporaryDirectory() as folder:
             path = lay_out(form, form.good(), Path(folder) / "log")
-            vehicle = load_vehicle(
-                "crazyflie" if rest.startswith(("crazy", "nano")) else "ardrone2"
-            )
-            return _recorded(path, way, vehicle, FORM_MAPS.get(rest), Path(folder))
+            flown = "crazyflie" if rest.startswith(("crazy", "nano")) else "ardrone2"
+            return _recorded(path, way, load_vehicle(flown), FORM_MAPS.get(rest), Path(folder))
     path = path_of(name)
     return _recorded(path, way, vehicle_of(path), MAPS.get(path.parent.name), path.parent)
 

@@ -57,10 +57,8 @@ def flown(index):
 
 def files():
     """Return the measured files by their names."""
-    names = [
-        case.rpartition(" ")[0] for case in golden_logs.cases() if not case.startswith("form/")
-    ]
-    return {name: path_of(name) for name in names}
+    names = (case.rpartition(" ")[0] for case in golden_logs.cases())
+    return {name: path_of(name) for name in names if not name.startswith("form/")}
 
 
 def cases():
