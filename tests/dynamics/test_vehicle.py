@@ -15,6 +15,7 @@ from windwrench.dynamics import (
     load_vehicle,
     preset_names,
 )
+from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.dynamics.vehicle_file import parse_vehicle, save_vehicle
 
 GOOD = {
@@ -76,11 +77,17 @@ def test_a_saved_vehicle_is_the_vehicle_again(tmp_path):
         "gravity": 9.8,
         "rotor_radius": 0.11,
         "mocap": {"rate_hz": 100.0, "sigma_pos_m": 0.002},
+        "motor_curve": {
+            "thrust": [0.0, 0.02, 0.1],
+            "voltage_exponent": 2.0,
+            "command": [0.0, 65535.0],
+        },
         "effects": [{"name": "rotor_drag", "coefficients": {"kdx": 1.0e-4, "kdy": 2.0e-4}}],
     }
     vehicle = parse_vehicle(yaml.safe_dump(given))
+    assert vehicle.motor_curve == MotorCurve((0.0, 0.02, 0.1), 2.0, (0.0, 65535.0))
     for name, value in given.items():
-        if name not in ("effects", "mocap"):
+        if name not in ("effects", "mocap", "motor_curve"):
             np.testing.assert_array_equal(getattr(vehicle, name), value)
     assert vehicle.effects == (EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 2e-4}),)
     # numbers of numpy's own, and one of more digits than YAML's writer gives by itself

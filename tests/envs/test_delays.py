@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.support.vector_flights import TASKS, make
+from tests.support.vector_flights import TASKS, fly, make
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.envs import SCENARIOS
 from windwrench.envs.closed_loop import ClosedLoop
@@ -19,7 +19,7 @@ LATE = PlantSettings(
 )
 
 
-def fly(settings, ticks, **given):
+def ticking(settings, ticks, **given):
     """Yield a loop after each tick, with where it was before."""
     rng = np.random.default_rng(3)
     loop = ClosedLoop(VEHICLE, settings=settings, **given)
@@ -35,10 +35,10 @@ def fly(settings, ticks, **given):
 def test_rotors_follow_what_was_commanded_so_many_ticks_ago(ticks):
     flown = [
         (loop.command.copy(), loop.unrounded.copy())
-        for loop, _ in fly(replace(QUIET, actuator_delay=0.005 * ticks), 40)
+        for loop, _ in ticking(replace(QUIET, actuator_delay=0.005 * ticks), 40)
     ]
     commands, speeds = (np.array(part) for part in zip(*flown, strict=True))
-    largest = fly(QUIET, 1).__next__()[0].record[0]["plant"]["omega_max"]
+    largest = next(ticking(QUIET, 1))[0].record[0]["plant"]["omega_max"]
     np.testing.assert_array_equal(speeds[ticks:], np.clip(commands, 0, largest)[: 40 - ticks])
 
 
@@ -46,7 +46,7 @@ def test_rotors_follow_what_was_commanded_so_many_ticks_ago(ticks):
 def test_a_pose_is_that_of_so_many_ticks_ago(ticks):
     flown = [
         (before, loop.sample[4:7].copy())
-        for loop, before in fly(replace(QUIET, pose_delay=0.005 * ticks), 60)
+        for loop, before in ticking(replace(QUIET, pose_delay=0.005 * ticks), 60)
     ]
     places, measured = (np.array(part) for part in zip(*flown, strict=True))
     np.testing.assert_array_equal(measured[ticks:], places[: 60 - ticks])
@@ -54,7 +54,7 @@ def test_a_pose_is_that_of_so_many_ticks_ago(ticks):
 
 def test_an_accelerometer_tells_what_it_felt_so_many_ticks_ago():
     felt, told = [], []
-    for loop, _ in fly(replace(QUIET, imu_delay=0.015), 40, accelerometer=(0.0, 0.0)):
+    for loop, _ in ticking(replace(QUIET, imu_delay=0.015), 40, accelerometer=(0.0, 0.0)):
         record = loop.record[0]
         felt.append(record["plant"]["rotation"].T @ loop.world.xfrc[:3] / VEHICLE.mass)
         told.append(record["flight"]["rotation"].T @ loop.specific)
@@ -64,7 +64,7 @@ def test_an_accelerometer_tells_what_it_felt_so_many_ticks_ago():
 
 def test_lost_poses_have_the_stated_share_and_come_in_runs_of_the_stated_length():
     settings = PlantSettings(dropout=0.2, dropout_burst=0.03)
-    lost = ~np.array([loop.seen for loop, _ in fly(settings, 20_000)])
+    lost = ~np.array([loop.seen for loop, _ in ticking(settings, 20_000)])
     runs = np.count_nonzero(lost[1:] & ~lost[:-1])
     assert lost.mean() == pytest.approx(0.2, abs=0.03)
     assert 0.005 * lost.sum() / runs == pytest.approx(0.03, rel=0.1)
@@ -83,10 +83,7 @@ def test_lanes_are_late_as_mujoco_is_with_delays_stated_and_drawn(task):
         ("at once", {}),
     ):
         for plant in ("mujoco", "lanes"):
-            envs = make(3, plant, task, **given)
-            envs.reset(seed=7)
-            pushed = np.full(envs.action_space.shape, 0.3, dtype=np.float32)
-            flown[how, plant] = np.array([envs.step(pushed)[0] for _ in range(6)])
+            flown[how, plant] = fly(make(3, plant, task, **given), 6, seed=7)
         np.testing.assert_allclose(flown[how, "lanes"], flown[how, "mujoco"], atol=2e-5)
     assert np.abs(flown["as stated", "lanes"] - flown["at once", "lanes"]).max() > 1e-3
 

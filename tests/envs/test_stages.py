@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from tests.support.vector_flights import TASKS, fly_alone, make
+from tests.support.vector_flights import fly as flown
 from windwrench.dynamics import InputError
 from windwrench.envs import FanTrackingEnv, Stage
 from windwrench.envs.closed_loop import STAGES
@@ -28,15 +29,10 @@ def test_so_it_flies_in_a_vector_of_environments():
         loop.applied[2] = -0.2
 
     given = {"stages": [Stage("push", push, before="actuate")]}
-    envs = make(2, **given)
-    envs.reset(seed=[3, 4])
-    env = gym.make("windwrench/FanTracking-v0", **given)
-    env.reset(seed=3)
-    for _ in range(4):
-        frames, _, _, _, infos = envs.step(np.full((2, 1), 0.2, np.float32))
-        frame, _, _, _, info = env.step(np.full(1, 0.2, np.float32))
-        np.testing.assert_array_equal(frames[0], frame)
-        np.testing.assert_array_equal(infos["force"][0], info["force"])
+    alone = [lambda: gym.make("windwrench/FanTracking-v0", **given)] * 2
+    many = flown(make(2, **given), 4)
+    np.testing.assert_array_equal(many, flown(gym.vector.SyncVectorEnv(alone), 4))
+    assert not np.array_equal(many, flown(make(2), 4))
 
 
 def test_a_sensor_an_actuator_and_a_wind_of_one_s_own_change_the_flight():

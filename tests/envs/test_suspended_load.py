@@ -12,7 +12,7 @@ STILL = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0, sensor_nois
 LOAD = SuspendedLoad(anchor=(0.1, -0.05, -0.02), length=0.2)
 
 
-def _hung(load: SuspendedLoad, seconds: float) -> ClosedLoop:
+def _hung(load, seconds):
     loop = ClosedLoop(VEHICLE, settings=STILL, load=load)
     loop.reset(np.random.default_rng(0), np.array([0.0, 0.0, 1.5]))
     loop.hang_load()

@@ -79,7 +79,6 @@ def test_a_bad_action_and_unknown_options_are_named(name, action):
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"scenario": "bsae"}, "Did you mean 'base'"),
         ({"estimator": "constant"}, "Did you mean 'constant-gain'"),
         ({"normalize": 2}, "normalize must be True or False"),
         ({"vehicle": "crazyfly"}, "Did you mean 'crazyflie'"),

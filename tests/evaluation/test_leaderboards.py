@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from tests.support.alike import assert_alike
+from tests.support.alike import assert_alike, strict_json
 from tests.support.parameters import mostly_slow
 from tests.support.paths import ROOT
 from windwrench.evaluation.benchmark import count_flights, fly_all
@@ -108,11 +108,7 @@ def test_the_file_has_the_documented_keys_and_pages_have_losses(task, tmp_path, 
     _, results, rows = flown(task)
     path = write_leaderboard(rows, tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["leaderboard.json"]
-
-    def refuse(word):
-        raise AssertionError(f"{word} is no JSON")
-
-    written = json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
+    written = strict_json(path)
     assert all(list(row)[: len(KEYS)] == KEYS for row in written)
     assert (written[0]["wins_over_admittance"] is None) == (task == "WindHover")
     draw_leaderboard(rows, results, tmp_path / "a.png")

@@ -13,15 +13,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from pyarrow import parquet
 
-from tests.fuzz.spoiling import Draw, places, spoiled_bytes, spoiled_table, spoiled_text
+from tests.fuzz.spoiling import places, spoiled_bytes, spoiled_table, spoiled_text
 from tests.support.blackbox_writer import blackbox
 from tests.support.blackbox_writer import flight as blackbox_rows
 from tests.support.converted_flights import write_bag
@@ -42,7 +40,6 @@ from tests.support.ulog_writer import battery, control, esc, odometry, sensor_co
 from windwrench.controllers.features import Features
 from windwrench.controllers.trained_policy import load_policy, save_policy
 from windwrench.dynamics.effects import parse_setting
-from windwrench.dynamics.vehicle import Vehicle
 from windwrench.dynamics.vehicle_file import dump_vehicle, load_vehicle, parse_vehicle
 from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.identification.logs.flight_log import FlightLog, write_log
@@ -53,7 +50,6 @@ from windwrench.identification.logs.reading import finished, read_log
 from windwrench.identification.logs.tables import open_table
 from windwrench.identification.wrench_series import estimate_log
 
-Array = NDArray[np.float64]
 Way = Callable[[bytes], st.SearchStrategy[bytes]]
 
 _COUNT = 60  # samples of a good log
@@ -74,7 +70,7 @@ class Form:
     beside: Callable[[], Mapping[str, bytes]] = dict  # files that must lie beside it
 
     @property
-    def spoiled(self) -> st.SearchStrategy[bytes]:
+    def spoiled(self):
         """A strategy for inputs that are the good one, spoiled in one of the ways or by bytes after
         it.
         """
@@ -82,24 +78,15 @@ class Form:
         return once | once.flatmap(spoiled_bytes)
 
 
-def _times() -> Array:
+def _times():
     return _PERIOD * np.arange(_COUNT, dtype=np.float64)
 
 
-@cache
-def _vehicle(name: str) -> Vehicle:
-    return load_vehicle(name)
-
-
-def _written(write: Callable[[Path], object], name: str) -> bytes:
-    """Return the bytes of the file that ``write`` writes."""
-    with tempfile.TemporaryDirectory() as folder:
-        write(Path(folder) / name)
-        return (Path(folder) / name).read_bytes()
+_vehicle = cache(load_vehicle)
 
 
 @cache
-def _own_log(name: str) -> bytes:
+def _own_log(name):
     """Return a hover with a slow turn, in the kit's own form."""
     t = _times()
     vehicle = _vehicle("ardrone2")
@@ -114,17 +101,19 @@ def _own_log(name: str) -> bytes:
         np.zeros((_COUNT, 3)),
         np.zeros((_COUNT, 3)),
     )
-    return _written(lambda path: write_log(log, path), name)
+    with tempfile.TemporaryDirectory() as folder:
+        write_log(log, Path(folder) / name)
+        return (Path(folder) / name).read_bytes()
 
 
-def _table(log_map: str) -> bytes:
+def _table(log_map):
     """Return a table that a reader knows by the columns of its map."""
     return table_text(hover_columns(log_map, _COUNT, _PERIOD))
 
 
-def _betaflight_table() -> bytes:
+def _betaflight_table():
     """Return a table as blackbox_decode writes it."""
-    columns: dict[str, Array | float] = {
+    columns = {
         "loopIteration": np.arange(_COUNT, dtype=np.float64),
         "time (us)": 1e6 * _times(),
         **{f"{name}[{i}]": 0.0 for name in ("gyroADC", "accSmooth") for i in range(3)},
@@ -137,7 +126,7 @@ def _betaflight_table() -> bytes:
 
 
 @cache
-def _bag(kind: str) -> dict[str, bytes]:
+def _bag(kind):
     """Return the files of a bag with a pose and rotor speeds: one of ROS 1, or a folder's of ROS 2,
     by the ending of the file that holds the messages."""
     count = len(_times())
@@ -159,7 +148,7 @@ TOPIC_MAP = (
 )
 
 
-def _log(path: Path, reader: str | None = None, vehicle: str = "ardrone2") -> None:
+def _log(path, reader=None, vehicle="ardrone2"):
     """Read a log, and estimate the wrench on it where it is short."""
     log = read_log(path, reader, _vehicle(vehicle))
     if len(log.t) <= _LONGEST and log.has_pose and log.has_rotor_speeds:
@@ -177,19 +166,19 @@ _MAP = (
 )
 
 
-def _use_map(path: Path) -> None:
+def _use_map(path):
     """Read a good table by a map."""
     read_log(path.parent / "log.csv", vehicle=_vehicle("ardrone2"), map=path)
 
 
-def _foreign_table() -> bytes:
+def _foreign_table():
     text = _own_log("log.csv").decode()
     head, _, rest = text.partition("\n")
     head = head.replace("omega", "rpm").replace("px", "x").replace("py", "y").replace("pz", "z")
     return f"{head}\n{rest}".encode()
 
 
-def _use_foreign(path: Path) -> None:
+def _use_foreign(path):
     """Guess a map for a table, and read it by that."""
     table = open_table(path)
     guess = guess_map(table, _vehicle("ardrone2"))
@@ -197,11 +186,11 @@ def _use_foreign(path: Path) -> None:
         finished(map_table(table, guess.log_map), _vehicle("ardrone2"))
 
 
-def _folder_bag(path: Path) -> None:
+def _folder_bag(path):
     _log(path.parent, "rosbag:" + str(path.parent / "map.yaml"))
 
 
-def _use_vehicle(path: Path) -> None:
+def _use_vehicle(path):
     """Load a vehicle, write it and read it back, and let a filter know it."""
     vehicle = load_vehicle(path)
     again = parse_vehicle(dump_vehicle(vehicle))
@@ -212,7 +201,7 @@ def _use_vehicle(path: Path) -> None:
 
 
 @cache
-def _policy() -> dict[str, bytes]:
+def _policy():
     """Return the files of a policy with one hidden layer."""
     features = Features(("torque_z", "force_x"), 2)
     weights = {
@@ -236,7 +225,7 @@ def _policy() -> dict[str, bytes]:
         return {p.name: p.read_bytes() for p in Path(folder).iterdir()}
 
 
-def _use_policy(path: Path) -> None:
+def _use_policy(path):
     """Load a policy and fly a decision; the card is made to vouch for spoiled weights, as an
     attacker's would.
     """
@@ -248,12 +237,8 @@ def _use_policy(path: Path) -> None:
     assert command.shape == (1,)
 
 
-def _preset() -> bytes:
-    return (ROOT / "dynamics" / "vehicles" / "ardrone2.yaml").read_bytes()
-
-
-def _effects_of_vehicle() -> bytes:
-    text = _preset().decode() + "effects:\n"
+def _vehicle_with_effects():
+    text = (ROOT / "dynamics" / "vehicles" / "ardrone2.yaml").read_text() + "effects:\n"
     for name in ("rotor_drag", "mass", "slung_payload", "battery_sag", "latency"):
         setting = parse_setting(name, _vehicle("ardrone2"))
         given = ", ".join(f"{k}: {v:g}" for k, v in setting.coefficients.items())
@@ -262,7 +247,7 @@ def _effects_of_vehicle() -> bytes:
 
 
 @cache
-def _ulog() -> bytes:
+def _ulog():
     t = _times()
     topics = {
         "vehicle_mocap_odometry": odometry(t),
@@ -274,57 +259,37 @@ def _ulog() -> bytes:
     return ulog_bytes(topics, {"THR_MDL_FAC": 0.3, "CA_ROTOR_COUNT": 4})
 
 
-def _dataflash_messages() -> list[Any]:
+def _messages():
     t = 10.0 + _times()
     volts = {"TimeUS": micro(t), "Inst": 0.0 * t, "Volt": 0.0 * t + 11.1}
     return [parm(), xkf1(t), xkq(t), imu(t), rcou(t), ("BAT", "QBf", volts)]
 
 
-@cache
-def _dataflash() -> bytes:
-    return dataflash(_dataflash_messages())
+def _dataflash_text():
+    return dataflash_text(_messages()).encode()
 
 
-@cache
-def _dataflash_text() -> bytes:
-    return dataflash_text(_dataflash_messages()).encode()
-
-
-@cache
-def _blackbox() -> bytes:
-    return blackbox(blackbox_rows(_COUNT))
-
-
-def _sd_card_variables() -> dict[str, Array]:
+def _events():
+    """Return times (s) and variables of a Crazyflie's SD-card log."""
     columns = hover_columns("cflib", _COUNT, _PERIOD)
     del columns["timestamp"]  # each event has its own
-    return {
+    return 30.0 + _times(), {
         f"{name}({'H' if name.startswith('motor.') else 'f'})": np.broadcast_to(values, _COUNT)
         for name, values in columns.items()
         if not name.startswith("rpm.")
     }
 
 
-@cache
-def _sd_card() -> bytes:
-    return sd_card({"fixedFrequency": (30.0 + _times(), _sd_card_variables())})
-
-
-@cache
-def _old_sd_card() -> bytes:
-    return sd_card_before_2021(30.0 + _times(), _sd_card_variables())
-
-
-def _zipped(spoiled: Way) -> Way:
+def _zipped(spoiled):
     """Return a way to spoil what a gzip file holds."""
     return lambda data: spoiled(gzip.decompress(data)).map(lambda text: gzip.compress(text, 1))
 
 
-KINDS: tuple[Any, ...] = ("a", None, True, [1.0], b"\xff", math.nan, math.inf, 1e308, 2**62)
+KINDS = ("a", None, True, [1.0], b"\xff", math.nan, math.inf, 1e308, 2**62)
 
 
 @st.composite
-def _spoiled_parquet(draw: Draw, data: bytes) -> bytes:
+def _spoiled_parquet(draw, data):
     """Take a column of a Parquet file away, give it twice, cut it or change its type."""
     table = parquet.read_table(io.BytesIO(data))
     i = draw(places(table.column_names))
@@ -351,14 +316,14 @@ _BAGS = {"rosbag 1": "bag", "rosbag 2, SQLite": "db3", "rosbag 2, MCAP": "mcap"}
 
 
 def _form_of_log(
-    name: str,
-    file: str,
-    good: Callable[[], bytes],
-    ways: tuple[Way, ...],
-    reader: str | None = None,
-    vehicle: str = "ardrone2",
-    beside: Callable[[], Mapping[str, bytes]] = dict,
-) -> Form:
+    name,
+    file,
+    good,
+    ways,
+    reader=None,
+    vehicle="ardrone2",
+    beside=dict,
+):
     """Return the form of a log that is read, and estimated, by a reader or the file's content."""
     named = () if reader is None else ("--reader", reader)
     command = ("estimate", "--out", "out", "--vehicle", vehicle, *named)
@@ -367,9 +332,10 @@ def _form_of_log(
     )
 
 
-def forms() -> dict[str, Form]:
+def forms():
     """Return every form of input by its name."""
     log, flown = _form_of_log, ("record", "--seconds", "1", "--out", "out", "--vehicle")
+    sd = "crazyflie_sd", "crazyflie"
     own, packed = partial(_own_log, "log.csv"), (_zipped(spoiled_table), spoiled_bytes)
     scored = ("benchmark", "--episodes", "1", "--out", "out", "--controllers")
     found = [
@@ -380,13 +346,12 @@ def forms() -> dict[str, Form]:
             for name, log_map in TABLES.items()
         ),
         log("betaflight_csv", "log.csv", _betaflight_table, _CELLS),
-        log("ardupilot_bin", "log.BIN", _dataflash, _BYTES, "ardupilot_bin"),
+        log("ardupilot_bin", "log.BIN", lambda: dataflash(_messages()), _BYTES, "ardupilot_bin"),
         log("ardupilot_bin, text", "flight.log", _dataflash_text, _WORDS, "ardupilot_bin"),
-        log("betaflight", "log.bbl", _blackbox, _BYTES, "betaflight"),
-        log("crazyflie_sd", "log00", _sd_card, _BYTES, "crazyflie_sd", "crazyflie"),
-        log("crazyflie_sd, old", "log01", _old_sd_card, _BYTES, "crazyflie_sd", "crazyflie"),
-        Form("vehicle", "v.yaml", _preset, _WORDS, _use_vehicle, flown),
-        Form("vehicle with effects", "v.yaml", _effects_of_vehicle, _WORDS, _use_vehicle, flown),
+        log("betaflight", "log.bbl", lambda: blackbox(blackbox_rows(_COUNT)), _BYTES, "betaflight"),
+        log("crazyflie_sd", "log00", lambda: sd_card({"fixedFrequency": _events()}), _BYTES, *sd),
+        log("crazyflie_sd, old", "log01", lambda: sd_card_before_2021(*_events()), _BYTES, *sd),
+        Form("vehicle with effects", "v.yaml", _vehicle_with_effects, _WORDS, _use_vehicle, flown),
         Form(
             *("log map", "map.yaml", lambda: _MAP, _WORDS, _use_map),
             ("check", "log.csv", "--out", "out", "--map"),
@@ -427,7 +392,7 @@ def forms() -> dict[str, Form]:
     return {form.name: form for form in found}
 
 
-def lay_out(form: Form, data: bytes, folder: Path) -> Path:
+def lay_out(form, data, folder):
     """Write a spoiled input and what belongs beside it into an empty folder; return its path."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)

@@ -1,11 +1,8 @@
 """How files are spoiled, as hypothesis strategies: bytes, cells, rows, columns, words and lines."""
 
 import re
-from typing import Any
 
 from hypothesis import strategies as st
-
-Draw = Any  # hypothesis.strategies.DrawFn
 
 NUMBERS = ("nan", "inf", "-inf", "1e999", "-1e308", "1e308", "1e-320", "0", "-0.0", "-1", "1", "2")
 LARGE = ("1e9", "-1e9", "1e18", "18446744073709551616", "9" * 400)
@@ -28,13 +25,13 @@ ABSURD_COUNTS = (0, 1, 10**9, 2**31 - 1, 2**32 - 1, 2**63 - 1, 2**64 - 1)
 tokens = st.sampled_from(TOKENS)
 
 
-def places(things: Any) -> st.SearchStrategy[int]:
+def places(things):
     """Return a strategy for the index of one of some things, 0 where there are none."""
     return st.integers(0, max(len(things) - 1, 0))
 
 
 @st.composite
-def spoiled_bytes(draw: Draw, data: bytes) -> bytes:
+def spoiled_bytes(draw, data):
     """Put other bytes in a stretch's place or before it, or lose all that follows."""
     start = draw(places(data))
     stop = min(start + draw(st.sampled_from((0, 1, 4, 16, 256, 4096))), len(data))
@@ -47,7 +44,7 @@ def spoiled_bytes(draw: Draw, data: bytes) -> bytes:
 
 
 @st.composite
-def spoiled_table(draw: Draw, data: bytes) -> bytes:
+def spoiled_table(draw, data):
     """Spoil cells, a row, a column or the line ends of CSV text."""
     rows = [line.split(",") for line in data.decode("utf-8", "surrogateescape").split("\n")]
     row, other = draw(places(rows)), draw(places(rows))
@@ -77,7 +74,7 @@ def spoiled_table(draw: Draw, data: bytes) -> bytes:
 
 
 @st.composite
-def spoiled_text(draw: Draw, data: bytes) -> bytes:
+def spoiled_text(draw, data):
     """Spoil words, a line or an indent of text: YAML, JSON, a setting of an effect, a name."""
     text = data.decode("utf-8", "surrogateescape")
     lines, how = text.split("\n"), draw(st.sampled_from(("words", "insert", "line", "cut")))

@@ -9,14 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from windwrench.dynamics import InputError, load_vehicle
+from tests.support.flown import VEHICLE, recorded
+from windwrench.dynamics import InputError
 from windwrench.dynamics.effects import parse_setting
-from windwrench.envs.recording import record_flight
-from windwrench.identification.logs.flight_log import FlightLog, with_rows
+from windwrench.identification.logs.flight_log import with_rows
 from windwrench.identification.wrench_series import estimate_log, pose_notes
 
-VEHICLE = load_vehicle("ardrone2")
-SECONDS = 20.0
 SETTLED = 2.0  # s, from the start and from a restart, until estimates are compared
 SAME = 0.03  # of the weight, and of weight times arm, RMS: the same wrench
 ROTORS = ("rotor", "omega", "order", "column")
@@ -26,9 +24,8 @@ POSE = ("pose", "position", "px", "py", "pz", "jump", "leap", "restart")
 @pytest.fixture(scope="module")
 def circle():
     """A circle under a drag that the vehicle does not declare."""
-    effects = (parse_setting("rotor_drag", VEHICLE),)
-    flown = record_flight(VEHICLE, effects, "circle", SECONDS, seed=1)
-    return FlightLog(**flown, name="flight", source="flight.csv")
+    drag = parse_setting("rotor_drag", VEHICLE).coefficients
+    return replace(recorded("circle", rotor_drag=drag), source="flight.csv")
 
 
 @pytest.fixture(scope="module")
@@ -36,72 +33,48 @@ def unspoiled(circle):
     return estimate_log(circle, VEHICLE)
 
 
-def rotors(log, change):
-    speeds = log.rotor_speeds.copy()
-    change(speeds)
-    return replace(log, rotor_speeds=speeds)
+def put(field, rows, columns, value):
+    """Return what gives some rows and columns of a log's channel what a function says of it."""
+
+    def spoil(log):
+        values = getattr(log, field).copy()
+        values[rows, columns] = value(values)
+        return replace(log, **{field: values})
+
+    return spoil
 
 
-def position(log, change):
-    moved = log.position.copy()
-    change(moved)
-    return replace(log, position=moved)
-
-
-def swapped(speeds):
-    speeds[:, [0, 2]] = speeds[:, [2, 0]]
-
-
-def repeated(speeds):
-    speeds[:, 1] = speeds[:, 3]
-
-
-def held(columns):
-    columns[1200:, 1] = columns[1200, 1]
-
-
-def stopped(speeds):
-    speeds[1200:, 1] = 0.0
-
-
-def attitude_held(log):
-    turned = log.quaternion.copy()
-    turned[1200:] = turned[1200]
-    return replace(log, quaternion=turned)
-
-
-def outliers(columns):
+def scattered(positions):
     rng = np.random.default_rng(0)
-    hit = rng.random(len(columns)) < 0.01
-    columns[hit] += rng.standard_normal((int(hit.sum()), 3))
-
-
-def moved_for_good(columns):
-    columns[2000:] += [0.3, -0.4, 0.0]
+    hit = rng.random((len(positions), 1)) < 0.01
+    return positions + hit * rng.standard_normal(positions.shape)
 
 
 def rows_lost(log, counted):
     """The log without a fifth of its rows; ``counted``: its times go on as if none were lost."""
-    kept = np.random.default_rng(0).random(len(log.t)) > 0.2
-    t = log.t[0] + log.period * np.arange(kept.sum()) if counted else log.t[kept]
-    parts = (log.position, log.quaternion, log.rotor_speeds)
-    return FlightLog(t, *(part[kept] for part in parts), name=log.name, source=log.source)
+    kept = with_rows(log, np.random.default_rng(0).random(len(log.t)) > 0.2)
+    return replace(kept, t=log.t[: len(kept.t)]) if counted else kept
 
 
+ALL, LATER = slice(None), slice(1200, None)
+SPEEDS, PLACE = "rotor_speeds", "position"
 FAULTS = {
-    "rotors swapped": (lambda log: rotors(log, swapped), ROTORS),
-    "a rotor's column twice": (lambda log: rotors(log, repeated), ROTORS),
-    "a rotor's speed stands still": (lambda log: rotors(log, held), ROTORS),
-    "a rotor's speed is zero": (lambda log: rotors(log, stopped), ROTORS),
-    "the attitude stands still": (attitude_held, ("the attitude stands still",)),
+    "rotors swapped": (put(SPEEDS, ALL, [0, 2], lambda x: x[:, [2, 0]]), ROTORS),
+    "a rotor's column twice": (put(SPEEDS, ALL, 1, lambda x: x[:, 3]), ROTORS),
+    "a rotor's speed stands still": (put(SPEEDS, LATER, 1, lambda x: x[1200, 1]), ROTORS),
+    "a rotor's speed is zero": (put(SPEEDS, LATER, 1, lambda x: 0.0), ROTORS),
+    "the attitude stands still": (
+        put("quaternion", LATER, ALL, lambda x: x[1200]),
+        ("the attitude stands still",),
+    ),
     "a second of rows is lost": (
         lambda log: with_rows(log, np.abs(log.t - 5.5) > 0.5),
         ("gap", *POSE),
     ),
     "every other row is lost": (lambda log: with_rows(log, np.arange(len(log.t)) % 2 == 0), ()),
-    "an axis stands still": (lambda log: position(log, held), POSE),
-    "outliers of the position": (lambda log: position(log, outliers), POSE),
-    "a jump for good": (lambda log: position(log, moved_for_good), POSE),
+    "an axis stands still": (put(PLACE, LATER, 1, lambda x: x[1200, 1]), POSE),
+    "outliers of the position": (put(PLACE, ALL, ALL, scattered), POSE),
+    "a jump for good": (put(PLACE, LATER, ALL, lambda x: np.add(x[1200:], [0.3, -0.4, 0])), POSE),
     "rows lost": (lambda log: rows_lost(log, False), ("gap", "lost", "rows", *POSE)),
     "rows lost, times counted": (lambda log: rows_lost(log, True), ("clock", "moves", *POSE)),
 }

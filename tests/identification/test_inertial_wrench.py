@@ -1,13 +1,15 @@
 """The wrench from an IMU: against the truth, and its smoother against dense least squares."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from tests.support.flown import without_pose
 from tests.support.imu_flights import imu_flight, pose_removed
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.identification.inertial_wrench import _two_sided
-from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.wrench_series import estimate_log, truth_rmse, tune_to_log
 from windwrench.runtime.errors import InputError
 
@@ -16,12 +18,12 @@ PUSH = EffectSetting("constant_force", {"fx": 0.0, "fy": 0.0, "fz": -0.4})
 
 
 @pytest.fixture(scope="module")
-def flown() -> FlightLog:
+def flown():
     """A flight of 15 s under a steady force."""
     return imu_flight(VEHICLE, (PUSH,), seconds=15.0)
 
 
-def test_an_imu_alone_shows_a_vertical_force(flown: FlightLog) -> None:
+def test_an_imu_alone_shows_a_vertical_force(flown):
     """Within its own deviations, which say that horizontal ones are worse known."""
     series = estimate_log(pose_removed(flown), VEHICLE)
     inner = slice(400, -400)
@@ -32,23 +34,41 @@ def test_an_imu_alone_shows_a_vertical_force(flown: FlightLog) -> None:
     assert any("no pose" in note for note in series.notes)
 
 
-def test_an_imu_beside_the_pose_is_smoothed(flown: FlightLog) -> None:
+def test_an_imu_beside_the_pose_is_smoothed(flown):
     """Nearer to the truth than the filter with the same sensors."""
     smoothed = truth_rmse(estimate_log(flown, VEHICLE, smooth=True), flown)
     filtered = truth_rmse(estimate_log(flown, VEHICLE), flown)
-    assert smoothed is not None
-    assert filtered is not None
     assert (smoothed[0] < filtered[0]).all()
     assert (smoothed[1] < filtered[1]).all()
 
 
-def test_a_tuning_needs_poses(flown: FlightLog) -> None:
+def test_gyro_and_accelerometer_of_a_log_sharpen_its_estimate(flown):
+    """Sensors at 200 Hz beside a pose at 50 Hz, in a log whose other rows have no pose."""
+    log = without_pose(flown, np.arange(len(flown.t)) % 4 > 0)
+    force = log.accelerometer - [0.05, -0.1, 0.08]  # less its bias
+    force[7::10] = np.nan  # not read
+    log = replace(log, accelerometer=force)
+
+    def errors(**less):
+        series = estimate_log(replace(log, **less), VEHICLE)
+        np.testing.assert_array_equal(np.isfinite(series.nis[1:]), log.valid[1:])
+        return [
+            np.linalg.norm((x - y)[400:])
+            for x, y in ((series.force, log.force), (series.torque, log.torque))
+        ]
+
+    force, torque = errors(accelerometer=None, gyro=None)
+    assert errors(gyro=None)[0] < 0.7 * force
+    assert errors(accelerometer=None)[1] < 0.5 * torque
+
+
+def test_a_tuning_needs_poses(flown):
     """One line, and no numbers."""
     with pytest.raises(InputError, match="to fit a tuning to"):
         tune_to_log(pose_removed(flown), VEHICLE)
 
 
-def test_the_force_is_the_posterior_of_a_walk() -> None:
+def test_the_force_is_the_posterior_of_a_walk():
     """Far from the ends, where the start is forgotten, a dense solution says the same."""
     rng = np.random.default_rng(0)
     n, walk, variance = 400, 0.01, 1.0

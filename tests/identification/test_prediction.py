@@ -6,10 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from windwrench.dynamics import EffectSetting, load_vehicle
-from windwrench.dynamics.effects import get
+from tests.support.flown import VEHICLE, recorded, settings, without_pose
+from windwrench.dynamics.effects import parse_setting
 from windwrench.envs.plant import PlantSettings
-from windwrench.envs.recording import record_flight
 from windwrench.identification import predict
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.residual import residual_wrench
@@ -23,31 +22,12 @@ from windwrench.identification.prediction import (
 )
 from windwrench.runtime.errors import InputError
 
-VEHICLE = load_vehicle("ardrone2")
 QUIET = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0)
 SEGMENTS = [(3.0, 11.0), (15.0, 24.0)]
 
 
-def fly(*effects, trajectory="excite", seconds=25.0, settings=QUIET):
-    return FlightLog(
-        **record_flight(VEHICLE, effects, trajectory, seconds, 3, settings), name="flight"
-    )
-
-
-def typical(name):
-    return EffectSetting(name, {c.name: c.typical[0] for c in get(name).coefficients})
-
-
-def without_pose(log, rows):
-    valid = log.valid.copy()
-    valid[rows] = False
-    lost = ~valid[:, None]
-    return replace(
-        log,
-        position=np.where(lost, np.nan, log.position),
-        quaternion=np.where(lost, np.nan, log.quaternion),
-        valid=valid,
-    )
+def fly(trajectory="excite", seconds=25.0, background=QUIET, **effects):
+    return recorded(trajectory, seconds, 3, background, **effects)
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +44,7 @@ def residual_rms(log):
 
 
 @pytest.mark.parametrize(
-    "settings",
+    "effects",
     [
         {"clock_offset": {"dt": 0.03}},
         {
@@ -75,11 +55,10 @@ def residual_rms(log):
         },
     ],
 )
-def test_a_log_without_its_sensing_effects_leaves_the_residual_of_a_clean_flight(clean, settings):
-    effects = [EffectSetting(name, coefficients) for name, coefficients in settings.items()]
-    floor, log = residual_rms(clean), fly(*effects)
+def test_a_log_without_its_sensing_effects_leaves_the_residual_of_a_clean_flight(clean, effects):
+    floor, log = residual_rms(clean), fly(**effects)
     before = residual_rms(log) / floor
-    after = residual_rms(undo_log_sensing(log, VEHICLE.with_effects(*effects))) / floor
+    after = residual_rms(undo_log_sensing(log, VEHICLE.with_effects(*settings(effects)))) / floor
     assert np.max(before) > 2.0
     # a loop that sees late poses flies livelier than the clean flight, which leaves more behind at
     # the plant's time step
@@ -88,9 +67,9 @@ def test_a_log_without_its_sensing_effects_leaves_the_residual_of_a_clean_flight
 
 
 def test_a_delayed_pose_is_not_made_up_after_a_gap():
-    late = VEHICLE.with_effects(EffectSetting("clock_offset", {"dt": -0.03}))
-    log = without_pose(fly(*late.effects, seconds=8.0), slice(800, 900))
-    corrected = undo_log_sensing(log, late)
+    late = {"clock_offset": {"dt": -0.03}}
+    log = without_pose(fly(seconds=8.0, **late), slice(800, 900))
+    corrected = undo_log_sensing(log, VEHICLE.with_effects(*settings(late)))
     np.testing.assert_array_equal(np.flatnonzero(~corrected.valid), [*range(6), *range(800, 906)])
     assert np.isnan(corrected.position[905]).all()
     # the pose of a row is the log's of 6 rows before, and the turn rates are the row's own
@@ -110,8 +89,8 @@ def test_a_delayed_pose_is_not_made_up_after_a_gap():
     ],
 )
 def test_the_missing_effect_brings_prediction_back_to_the_flight(name, trajectory, ratio):
-    effect = typical(name)
-    log = fly(effect, trajectory=trajectory, settings=None)
+    effect = parse_setting(name, VEHICLE)
+    log = fly(trajectory, background=None, **{name: effect.coefficients})
     whole = VEHICLE.with_effects(effect)
     assert rollout_error(log, whole, SEGMENTS) < ratio * rollout_error(log, VEHICLE, SEGMENTS)
     assert nis_without_wrench_state(log, whole, SEGMENTS) < nis_without_wrench_state(
@@ -157,7 +136,7 @@ def test_only_whole_predictions_inside_a_segment_count(clean):
 
 def test_errors_of_predictions_are_those_of_the_motion():
     """In hover 0.04 kg too little is g dm / m of acceleration, and nothing changes."""
-    log = fly(EffectSetting("mass", {"dm": 0.04}), trajectory="hover", seconds=12.0)
+    log = fly("hover", 12.0, mass={"dm": 0.04})
     found = prediction_errors([log, log], VEHICLE, 0.5, [(2.0, 11.0), (2.0, math.inf)])
     fall = VEHICLE.gravity * 0.04 / VEHICLE.mass
     assert found.horizon[[0, -1]] == pytest.approx([0.005, 0.5])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support.data_paths import crazyswarm2_file, data_file
+from tests.support.parameters import mostly_slow
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.commanded_rotors import in_flight
@@ -16,14 +17,11 @@ from windwrench.studies.measured_flights import (
     swing,
 )
 
-
-@pytest.fixture(scope="module")
-def vehicle():
-    return load_vehicle("crazyflie")
+VEHICLE = load_vehicle("crazyflie")
 
 
 @pytest.mark.measured
-@pytest.mark.parametrize("number", ["202", "201", "165"])
+@pytest.mark.parametrize("number", mostly_slow(["202", "201", "165"], lambda n: n != "201"))
 def test_slung_payload(number):
     carrier = payload_vehicle(0.032 if number == "165" else CARRIER)
     log = read_log(crazyswarm2_file(number), "crazyswarm2", carrier)
@@ -44,9 +42,9 @@ def test_slung_payload(number):
 
 
 @pytest.mark.measured
-def test_only_the_time_in_the_air_counts(vehicle):
-    log = read_log(data_file("nanobench/B2_circle_fast_rep3.csv"), "nanobench", vehicle)
-    flight = in_flight(log, vehicle)
+def test_only_the_time_in_the_air_counts():
+    log = read_log(data_file("nanobench/B2_circle_fast_rep3.csv"), "nanobench", VEHICLE)
+    flight = in_flight(log, VEHICLE)
     assert 29 < flight.t[-1] - flight.t[0] < 33
     assert flight.position[:, 2].min() > 0.4
     assert len(flight.voltage) == len(flight.t) == len(flight.valid)

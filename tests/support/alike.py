@@ -1,6 +1,19 @@
-"""Kept numbers and those of now, to what solvers of other processors order otherwise."""
+"""Kept numbers and those of now, to what solvers of other processors order otherwise; and files of
+JSON whose numbers are JSON's.
+"""
+
+import json
 
 import pytest
+
+
+def strict_json(path):
+    """Return what a file of JSON holds, which knows neither NaN nor Infinity."""
+
+    def refuse(word):
+        raise AssertionError(f"{word} is no JSON")
+
+    return json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
 
 
 def assert_alike(now, kept, where="", rel=1e-4, least=1e-9):

@@ -7,8 +7,6 @@ differs, the cells of a row in which a log differs from a hover, and whole files
 import gzip
 import io
 import json
-from collections.abc import Mapping
-from pathlib import Path
 
 from tests.support.paths import ROOT
 
@@ -16,7 +14,7 @@ KEPT = json.loads((ROOT / "tests" / "data" / "bad_inputs.json").read_text(encodi
 COLUMNS = ("t", "px", "py", "pz", "qw", "qx", "qy", "qz", "omega1", "omega2", "omega3", "omega4")
 
 
-def table(changes: Mapping[tuple[int, str], str] = {}, rows: int = 60, left_out: str = "") -> str:
+def table(changes=(), rows=60, left_out=""):
     """Return a hover at 100 Hz as CSV, with some cells changed and one column left out."""
     names = [name for name in COLUMNS if name != left_out]
     hover = dict.fromkeys(COLUMNS, "0") | {"pz": "1", "qw": "1"}
@@ -24,12 +22,12 @@ def table(changes: Mapping[tuple[int, str], str] = {}, rows: int = 60, left_out:
     lines = [",".join(names)]
     for row in range(rows):
         cells = hover | {"t": f"{0.01 * row:.2f}"}
-        cells |= {name: text for (where, name), text in changes.items() if where == row}
+        cells |= {name: text for (where, name), text in dict(changes).items() if where == row}
         lines.append(",".join(cells[name] for name in names))
     return "\n".join(lines) + "\n"
 
 
-def forms(kind: str, letter: str) -> dict[str, str]:
+def forms(kind, letter):
     """Return files of a kind as YAML: the good one with some fields changed, or one left out."""
     good = KEPT[kind]
     changed = {name: good | fields for name, fields in KEPT[f"{kind}s"].items()}
@@ -41,7 +39,7 @@ def forms(kind: str, letter: str) -> dict[str, str]:
     }
 
 
-def logs() -> dict[str, str | bytes]:
+def logs():
     """Return tables, each with one mistake, and logs that end too early."""
     good, packed = table(), io.BytesIO()
     with gzip.GzipFile(fileobj=packed, mode="wb", mtime=0) as file:
@@ -76,7 +74,7 @@ def logs() -> dict[str, str | bytes]:
     }
 
 
-def policies() -> dict[str, str | bytes]:
+def policies():
     """Return policies whose weights or cards do not fit."""
     folder = ROOT / "training" / "policies"
     weights = (folder / "sac-0.npz").read_bytes()
@@ -96,7 +94,7 @@ def policies() -> dict[str, str | bytes]:
     )
 
 
-def write_bad_inputs(folder: Path) -> None:
+def write_bad_inputs(folder):
     """Write every file into a folder, beside the folders ``fleet`` and ``nothing``."""
     found = forms("vehicle", "v") | forms("map", "m") | KEPT["files"] | logs() | policies()
     mine = "".join(f"{k}: {v}\n" for k, v in KEPT["vehicle"].items())

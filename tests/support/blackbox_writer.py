@@ -2,8 +2,6 @@
 has, after the format's description in Betaflight's documentation.
 """
 
-from collections.abc import Mapping, Sequence
-
 import numpy as np
 
 # field: predictor and encoding in I frames, predictor and encoding in P frames
@@ -66,10 +64,10 @@ def flight(count=400, seed=0):
 
 
 def blackbox(
-    rows: Sequence[Mapping[str, int]],
-    headers: Mapping[str, str] | None = None,
-    variable: bool = True,
-) -> bytes:
+    rows,
+    headers=None,
+    variable=True,
+):
     """Return a log of rows, each with every field; loopIteration counts by two. Encoding 10 is left
     out where not ``variable``.
     """
@@ -93,8 +91,8 @@ def blackbox(
         *(f"H {key}:{value}" for key, value in stated.items()),
     ]
     out = ["\n".join(lines).encode() + b"\n"]
-    before: Mapping[str, int] = {}
-    older: Mapping[str, int] = {}
+    before = {}
+    older = {}
     for row in rows:
         if row["loopIteration"] % 32 == 0:
             out.append(b"I" + _frame(fields, row, {}, {}, 0))
@@ -112,12 +110,12 @@ def blackbox(
 
 
 def _frame(
-    fields: Mapping[str, tuple[int, int, int, int]],
-    row: Mapping[str, int],
-    before: Mapping[str, int],
-    older: Mapping[str, int],
-    which: int,
-) -> bytes:
+    fields,
+    row,
+    before,
+    older,
+    which,
+):
     out, names, i = b"", list(fields), 0
     while i < len(names):
         encoding = fields[names[i]][which + 1]
@@ -137,12 +135,12 @@ def _frame(
 
 
 def _foreseen(
-    predictor: int,
-    name: str,
-    row: Mapping[str, int],
-    before: Mapping[str, int],
-    older: Mapping[str, int],
-) -> int:
+    predictor,
+    name,
+    row,
+    before,
+    older,
+):
     if predictor == 1:
         return before[name]
     if predictor == 2:
@@ -159,7 +157,7 @@ def _foreseen(
     }[predictor]
 
 
-def _encoded(encoding: int, values: list[int]) -> bytes:
+def _encoded(encoding, values):
     if encoding == 0:
         return _signed(values[0])
     if encoding == 1:
@@ -178,7 +176,7 @@ def _encoded(encoding: int, values: list[int]) -> bytes:
     return b""
 
 
-def _unsigned(value: int) -> bytes:
+def _unsigned(value):
     out = []
     value &= 0xFFFFFFFF
     while value > 127:
@@ -187,11 +185,11 @@ def _unsigned(value: int) -> bytes:
     return bytes([*out, value])
 
 
-def _signed(value: int) -> bytes:
+def _signed(value):
     return _unsigned((value << 1) ^ (value >> 31))
 
 
-def _fits(values: Sequence[int], widths: Sequence[int]) -> bool:
+def _fits(values, widths):
     return all(-(1 << (w - 1)) <= v < 1 << (w - 1) for v, w in zip(values, widths, strict=True))
 
 
@@ -200,7 +198,7 @@ _EQUAL = (((2, 2, 2), (4, 2, 0)), ((4, 4, 4), (8, 4, 0)), ((6, 6, 6), (16, 8, 0)
 _VARIABLE = (((2, 2, 2), (4, 2, 0)), ((5, 5, 4), (9, 4, 0)), ((8, 7, 7), (14, 7, 0)))
 
 
-def _three(values: list[int], layouts: Sequence[tuple[Sequence[int], Sequence[int]]]) -> bytes:
+def _three(values, layouts):
     for kind, (widths, places) in enumerate(layouts):
         if _fits(values, widths):
             bits = kind << (8 * kind + 6)
@@ -215,7 +213,7 @@ def _three(values: list[int], layouts: Sequence[tuple[Sequence[int], Sequence[in
     return bytes([selector]) + out
 
 
-def _four(values: list[int]) -> bytes:
+def _four(values):
     selector, halves = 0, []
     for i, value in enumerate(values):
         kind = (

@@ -8,11 +8,10 @@ import gymnasium as gym
 import numpy as np
 
 import windwrench  # noqa: F401  registers the environments
-from windwrench.dynamics import load_vehicle
-from windwrench.envs.recording import record_flight
+from tests.support.flown import VEHICLE, without_pose
+from tests.support.imu_flights import imu_flight
 from windwrench.estimator import WrenchEKF, ukf_lanes
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.prediction import nis_without_wrench_state, rollout_error
 from windwrench.identification.wrench_series import estimate_log
 
@@ -25,7 +24,7 @@ def compile_environments():
     """
     ukf_lanes.step_address()
     pose = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
-    estimator = WrenchEKF(load_vehicle("ardrone2"))
+    estimator = WrenchEKF(VEHICLE)
     estimator.reset(*pose)
     estimator.step(np.full(4, 300.0), *pose)
     for name in ("FanTracking", "FanTracking2D", "WindHover"):
@@ -59,19 +58,15 @@ def compile_estimates():
     """Estimate with a pose, with an IMU beside it, smoothed with it and without, and with a pose
     five times a second; fly a model along; diagnose.
     """
-    vehicle = load_vehicle("ardrone2")
-    log = FlightLog(**record_flight(vehicle, (), "hover", 12.0, seed=0, imu=True))
+    log = imu_flight(VEHICLE, seconds=12.0, trajectory="hover")
     alone = replace(log, accelerometer=None, gyro=None)
-    estimate_log(alone, vehicle)
-    estimate_log(log, vehicle)
-    estimate_log(log, vehicle, smooth=True)
-    estimate_log(alone, vehicle, smooth=True)
-    flown = ((2.0, 10.0),)
-    nis_without_wrench_state(alone, vehicle, flown)
-    rollout_error(alone, vehicle, flown)
-    diagnose([alone], vehicle)
+    for flown in (alone, log):
+        estimate_log(flown, VEHICLE)
+        estimate_log(flown, VEHICLE, smooth=True)
+    segments = ((2.0, 10.0),)
+    nis_without_wrench_state(alone, VEHICLE, segments)
+    rollout_error(alone, VEHICLE, segments)
+    diagnose([alone], VEHICLE)
     rows = np.arange(len(log.t))
-    for seen in (rows % 40 == 0, rows < 0):
-        position = np.where(seen[:, None], log.position, np.nan)
-        quaternion = np.where(seen[:, None], log.quaternion, np.nan)
-        estimate_log(replace(log, position=position, quaternion=quaternion, valid=seen), vehicle)
+    for lost in (rows % 40 != 0, rows >= 0):
+        estimate_log(without_pose(log, lost), VEHICLE)

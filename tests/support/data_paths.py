@@ -50,7 +50,7 @@ SOURCES = {
 }
 
 
-def data_file(relative: str) -> Path:
+def data_file(relative):
     """Return the path of a whole original; skip the test where it is not there."""
     path = DATA / relative
     if not path.exists():
@@ -58,7 +58,7 @@ def data_file(relative: str) -> Path:
     return path
 
 
-def missing(relative: str) -> str:
+def missing(relative):
     """Return the words for an original that is not there: what it is and how to get it."""
     name = Path(relative).parts[0]
     return (
@@ -67,13 +67,13 @@ def missing(relative: str) -> str:
     )
 
 
-def excerpt(relative: str) -> Path:
+def excerpt(relative):
     """Return the path of an excerpt that comes with the checkout, one of them with the package."""
     shipped = EXAMPLE / Path(relative).name
     return shipped if shipped.exists() else EXCERPTS / relative
 
 
-def crazyswarm2_file(number: int | str) -> Path:
+def crazyswarm2_file(number):
     """Return the path of a crazyswarm2 log: an excerpt, which has all of its rows, where there is
     one.
     """

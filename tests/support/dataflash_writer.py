@@ -3,7 +3,6 @@ the flight of ``autopilot_flight`` as ArduPilot logs it.
 """
 
 import struct
-from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -24,8 +23,8 @@ _FACTORS = {"c": 100.0, "C": 100.0, "L": 1e7}
 
 
 def dataflash(
-    messages: Sequence[tuple[str, str, Mapping[str, Sequence[float | bytes]]]],
-) -> bytes:
+    messages,
+):
     """Return a log.
 
     Args:
@@ -44,9 +43,9 @@ def dataflash(
 
 
 def dataflash_text(
-    messages: Sequence[tuple[str, str, Mapping[str, Sequence[float | bytes]]]],
-    first: str = "ArduCopter V3.4",
-) -> str:
+    messages,
+    first="ArduCopter V3.4",
+):
     """Return the same log as a ground station writes it as text."""
     lines = [first, "", "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns"]
     for number, (name, letters, columns) in enumerate(messages, 10):
@@ -57,13 +56,13 @@ def dataflash_text(
     return "\r\n".join(lines)
 
 
-def _stored(letter: str, value: float | bytes) -> float | bytes:
+def _stored(letter, value):
     if isinstance(value, bytes) or letter == "f":
         return value
     return round(value * _FACTORS.get(letter, 1.0))
 
 
-def _format(number: int, length: int, name: str, letters: str, columns: str) -> bytes:
+def _format(number, length, name, letters, columns):
     packed = struct.pack(
         "<BB4s16s64s", number, length, name.encode(), letters.encode(), columns.encode()
     )

@@ -1,4 +1,8 @@
-"""Simulated flights with effects."""
+"""Simulated flights with effects, and flights whose pose is lost."""
+
+from dataclasses import replace
+
+import numpy as np
 
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.envs.recording import record_flight
@@ -17,5 +21,12 @@ def recorded(
     trajectory="excite", seconds=20.0, seed=1, background=None, vehicle=VEHICLE, **effects
 ):
     """Return the log of a simulated flight with effects, each by its coefficients."""
-    c = record_flight(vehicle, settings(effects), trajectory, seconds, seed, background)
-    return FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c["voltage"])
+    columns = record_flight(vehicle, settings(effects), trajectory, seconds, seed, background)
+    return FlightLog(**columns, name="flight")
+
+
+def without_pose(log, rows):
+    """Return a log whose poses are lost in some rows: a slice, or a mask (N,)."""
+    pose, valid = np.column_stack([log.position, log.quaternion]), log.valid.copy()
+    pose[rows], valid[rows] = np.nan, False
+    return replace(log, position=pose[:, :3], quaternion=pose[:, 3:], valid=valid)

@@ -10,15 +10,13 @@ import numpy as np
 
 from tests.identification.comparison.test_change import drawn
 from tests.identification.vehicle_fit.flown import ARM, MASS, inertial_flights
+from tests.support.flown import recorded, settings
 from tests.support.paths import ROOT
 from windwrench.dynamics import load_vehicle
-from windwrench.dynamics.vehicle import EffectSetting
-from windwrench.envs.recording import record_flight
 from windwrench.identification.comparison.change import compare
 from windwrench.identification.comparison.fault_channels import channels_of_log
 from windwrench.identification.comparison.fault_detection import find_fault
 from windwrench.identification.comparison.words import change_data, fault_data
-from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.prediction import nis_without_wrench_state, rollout_error
 from windwrench.identification.vehicle_fit.exports import EXPORTS
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
@@ -27,7 +25,7 @@ from windwrench.identification.vehicle_fit.report import identified_data
 
 GOLDEN = ROOT / "tests" / "golden" / "identification.json"
 CRAZYFLIE = load_vehicle("crazyflie")
-LAG = (EffectSetting("motor_lag", {"tau": 0.06}), EffectSetting("body_drag", {"dx": 0.02}))
+LAG = {"motor_lag": {"tau": 0.06}, "body_drag": {"dx": 0.02}}
 
 
 def failing_flight():
@@ -44,11 +42,7 @@ def failing_flight():
 @cache
 def posed():
     """Two flights of a Crazyflie with a lag and a drag that nobody declared."""
-    columns = [record_flight(CRAZYFLIE, LAG, name, 12.0, 1) for name in ("excite", "yaw")]
-    return [
-        FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], name="posed")
-        for c in columns
-    ]
+    return [recorded(name, 12.0, vehicle=CRAZYFLIE, **LAG) for name in ("excite", "yaw")]
 
 
 @cache
@@ -76,7 +70,7 @@ def made():
         "rotor": find_fault(channels_of_log(failing_flight())),
     }
     blocks = [(2.0, 6.0), (7.0, 11.0)]
-    models = {"plain": CRAZYFLIE, "with its effects": CRAZYFLIE.with_effects(*LAG)}
+    models = {"plain": CRAZYFLIE, "with its effects": CRAZYFLIE.with_effects(*settings(LAG))}
     return {
         "prediction": {
             name: [

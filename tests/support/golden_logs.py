@@ -74,6 +74,18 @@ def cases():
     return found
 
 
+def path_of(name):
+    """Return the path of a measured file by its case's name."""
+    room, _, rest = name.partition("/")
+    return {"shared": DATA, "tests": EXCERPTS, "shipped": EXAMPLE.parent}[room] / rest
+
+
+def vehicle_of(path):
+    """Return the vehicle that flew a measured file, by its folder."""
+    name = VEHICLES.get(path.parent.name, "ardrone2")
+    return load_vehicle(path.parent / name if name.endswith(".yaml") else name)
+
+
 def recorded(case):
     """Return what reading a case gives: a log in numbers, or an error line."""
     name, _, way = case.rpartition(" ")
@@ -82,14 +94,10 @@ def recorded(case):
         form = forms()[rest]
         with tempfile.TemporaryDirectory() as folder:
             path = lay_out(form, form.good(), Path(folder) / "log")
-            vehicle = "crazyflie" if rest.startswith(("crazy", "nano")) else "ardrone2"
-            return _recorded(path, way, vehicle, FORM_MAPS.get(rest), Path(folder))
-    folder = {"shared": DATA, "tests": EXCERPTS, "shipped": EXAMPLE.parent}[room]
-    path = folder / rest
-    vehicle = VEHICLES.get(path.parent.name, "ardrone2")
-    if vehicle.endswith(".yaml"):
-        vehicle = path.parent / vehicle
-    return _recorded(path, way, vehicle, MAPS.get(path.parent.name), path.parent)
+            flown = "crazyflie" if rest.startswith(("crazy", "nano")) else "ardrone2"
+            return _recorded(path, way, load_vehicle(flown), FORM_MAPS.get(rest), Path(folder))
+    path = path_of(name)
+    return _recorded(path, way, vehicle_of(path), MAPS.get(path.parent.name), path.parent)
 
 
 def _map(name):
@@ -109,7 +117,7 @@ def _without_paths(text, folder):
 
 
 def _recorded(path, way, vehicle, map_name, folder):
-    flown = load_vehicle(vehicle) if way != "alone" else None
+    flown = vehicle if way != "alone" else None
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

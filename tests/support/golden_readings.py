@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from tests.support import golden_logs
-from tests.support.data_paths import DATA, EXAMPLE, EXCERPTS
+from tests.support.data_paths import DATA, EXCERPTS
+from tests.support.golden_logs import path_of, vehicle_of
 from tests.support.hostile_conventions import HOSTILE
 from tests.support.paths import ROOT
 from tests.support.random_tables import fields_of, flight, random_table, save
@@ -41,10 +42,10 @@ FLIGHTS = (  # vehicle, trajectory, seed, seconds
 # an estimate asks the same of conventions, and notes what a diagnosis refuses of parts
 ESTIMATED = ("as it is", "conjugate", "rotors late", "rotors early")
 MEASURED = {  # logs that are written in other conventions, too
-    "nanobench": (EXCERPTS / "nanobench" / "B5_helix_fast_rep2.csv.gz", "crazyflie"),
-    "crazyswarm2": (EXCERPTS / "crazyswarm2" / "log202.csv.gz", "crazyflie"),
-    "racer": (DATA / "racer" / "flight_e.csv.gz", "vehicle.yaml"),
-    "labelled": (DATA / "flights" / "labelled_03.csv.gz", "vehicle.yaml"),
+    "nanobench": EXCERPTS / "nanobench" / "B5_helix_fast_rep2.csv.gz",
+    "crazyswarm2": EXCERPTS / "crazyswarm2" / "log202.csv.gz",
+    "racer": DATA / "racer" / "flight_e.csv.gz",
+    "labelled": DATA / "flights" / "labelled_03.csv.gz",
 }
 
 
@@ -54,37 +55,16 @@ def flown(index):
     return flight(*FLIGHTS[index])
 
 
-def _vehicle(name, path):
-    return load_vehicle(path.parent / name if name.endswith(".yaml") else name)
-
-
-@cache
-def _measured(name):
-    path, vehicle = MEASURED[name]
-    model = _vehicle(vehicle, path)
-    return read_log(path, vehicle=model), model
-
-
 def files():
-    """Return the measured files by their names, and the vehicle of each."""
-    found = {}
-    for case in golden_logs.cases():
-        name, _, way = case.rpartition(" ")
-        room, _, rest = name.partition("/")
-        if way == "vehicle" and room != "form":
-            folder = {"shared": DATA, "tests": EXCERPTS, "shipped": EXAMPLE.parent}[room]
-            path = folder / rest
-            vehicle = golden_logs.VEHICLES.get(path.parent.name, "ardrone2")
-            found[name] = path, vehicle
-    return found
+    """Return the measured files by their names."""
+    names = (case.rpartition(" ")[0] for case in golden_logs.cases())
+    return {name: path_of(name) for name in names if not name.startswith("form/")}
 
 
 def cases():
     """Return the names of all cases."""
     found = [f"file {name}" for name in files()]
-    found += [
-        f"table {name}" for name, (path, _) in files().items() if is_table(path)
-    ]  # fmt: skip
+    found += [f"table {name}" for name, path in files().items() if is_table(path)]
     found += [f"random {number}" for number in range(TABLES)]
     return found + [f"hostile {name}" for name in (*map(str, range(len(FLIGHTS))), *MEASURED)]
 
@@ -106,14 +86,14 @@ def available(case):
     """Return whether a case's file is there."""
     way, _, name = case.partition(" ")
     if way == "hostile" and name in MEASURED:
-        return MEASURED[name][0].exists()
+        return MEASURED[name].exists()
     return way in ("random", "hostile") or name in files()
 
 
 def _file(name):
-    path, vehicle = files()[name]
+    path = path_of(name)
     try:
-        found = check_log(path, vehicle=_vehicle(vehicle, path))
+        found = check_log(path, vehicle=vehicle_of(path))
     except InputError as error:
         return {"error": _plain(str(error), path.parent)}
     said = [d for d in found.doubts if not d.startswith(("guessed", "the noise"))]
@@ -133,9 +113,8 @@ def _fields(guess):
 
 
 def _table(name):
-    path, vehicle = files()[name]
-    said = {}
-    for way, model in (("alone", None), ("vehicle", _vehicle(vehicle, path))):
+    path, said = path_of(name), {}
+    for way, model in (("alone", None), ("vehicle", vehicle_of(path))):
         try:
             guess = guess_map(open_table(path), model)
             if guess.missing:
@@ -175,7 +154,8 @@ def _random(name):
 
 def _hostile(name):
     if name in MEASURED:
-        log, vehicle = _measured(name)
+        vehicle = vehicle_of(MEASURED[name])
+        log = read_log(MEASURED[name], vehicle=vehicle)
     else:
         log = replace(flown(int(name)), accelerometer=None, gyro=None, command=None)
         vehicle = load_vehicle(log.vehicle)

@@ -11,26 +11,15 @@ DOWN = np.diag([1.0, -1.0, -1.0])  # forward, left, up to forward, right, down
 Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # z up to y up
 
 
-def turned(log, position=None, attitude=None):
-    """The log with positions (3, 3) times themselves and a function on rotation matrices."""
+def framed(log, position=ONE, world=ONE, body=ONE):
+    """The log with positions times a matrix, and attitudes seen from another world and body."""
     quaternion = log.quaternion
-    if attitude is not None:
+    if world is not ONE or body is not ONE:
         quaternion = np.full_like(quaternion, np.nan)
         seen = log.valid & np.isfinite(log.quaternion).all(axis=1)
         R = Rotation.from_quat(log.quaternion[seen], scalar_first=True).as_matrix()
-        quaternion[seen] = Rotation.from_matrix(attitude(R)).as_quat(scalar_first=True)
-    return replace(
-        log,
-        position=log.position if position is None else log.position @ position.T,
-        quaternion=quaternion,
-    )
-
-
-def framed(log, position=ONE, world=ONE, body=ONE):
-    """The log with positions times a matrix, and attitudes seen from another world and body."""
-    if world is ONE and body is ONE:
-        return turned(log, position)
-    return turned(log, position, lambda R: world @ R @ body)
+        quaternion[seen] = Rotation.from_matrix(world @ R @ body).as_quat(scalar_first=True)
+    return replace(log, position=log.position @ position.T, quaternion=quaternion)
 
 
 def placed(log, order, signs=(1.0, 1.0, 1.0)):

@@ -4,19 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from windwrench.dynamics.vehicle import EffectSetting, Vehicle
 from windwrench.envs.recording import background, record_flight
 from windwrench.identification.logs.flight_log import FlightLog
 
 
 def imu_flight(
-    vehicle: Vehicle,
-    effects: tuple[EffectSetting, ...] = (),
-    seconds: float = 20.0,
-    trajectory: str = "excite",
-    seed: int = 1,
-    turbulence: float = 0.0,
-) -> FlightLog:
+    vehicle,
+    effects=(),
+    seconds=20.0,
+    trajectory="excite",
+    seed=1,
+    turbulence=0.0,
+):
     """A simulated flight: pose, rotor speeds, and an IMU with noise and bias."""
     settings = background(vehicle, turbulence)
     log = FlightLog(
@@ -31,7 +30,7 @@ def imu_flight(
     )
 
 
-def pose_removed(log: FlightLog, position_every: int = 0) -> FlightLog:
+def pose_removed(log, position_every=0):
     """The log without its pose, or with each so many-th position alone."""
     count = len(log.t)
     position = np.full((count, 3), np.nan)

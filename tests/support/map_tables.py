@@ -1,7 +1,5 @@
 """Tables of the columns that a map names: a vehicle hovers and climbs slowly."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from windwrench.dynamics import load_vehicle
@@ -47,7 +45,7 @@ def _hover(section, part, t, hover_rate):
     return {"wrench": [0.33, 0.0, 0.0, 0.0], "battery": [3.9]}[section]  # N, Nm; V
 
 
-def table_text(columns: Mapping[str, object]) -> bytes:
+def table_text(columns):
     """Return columns of numbers, or of arrays of one length, as CSV."""
     whole = np.broadcast_arrays(*map(np.asarray, columns.values()))
     lines = [",".join(f"{x:.17g}" for x in row) for row in np.stack(whole, axis=1).tolist()]

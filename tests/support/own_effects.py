@@ -1,6 +1,5 @@
 """Effects of a user's own, and the library under other names."""
 
-from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -39,7 +38,7 @@ EFFECT = Effect(
 '''
 
 
-def forget() -> None:
+def forget():
     """Let the library be read anew."""
     for known in (effects._files, effects.names, effects.get):
         if hasattr(known, "cache_clear"):
@@ -47,7 +46,7 @@ def forget() -> None:
 
 
 @contextmanager
-def joined(folder: Path) -> Iterator[None]:
+def joined(folder):
     """A library that a folder of a user's has joined."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("WINDWRENCH_EFFECTS", str(folder))
@@ -57,7 +56,7 @@ def joined(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def renamed(new: Callable[[str], str]) -> Iterator[dict[str, str]]:
+def renamed(new):
     """A library in which every effect has another name, and no other; yields the new names."""
     own = {name: effects.get(name) for name in effects.names()}
     held = {new(name): replace(effect, name=new(name)) for name, effect in own.items()}

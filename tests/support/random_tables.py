@@ -4,11 +4,8 @@ The writing shares no code with the reading: what it writes comes from the map's
 """
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import load_vehicle
@@ -25,9 +22,6 @@ from windwrench.identification.logs.log_map import (
     TimeColumn,
 )
 from windwrench.identification.logs.rotor_orders import ORDERS
-
-Array = NDArray[np.float64]
-Field = tuple[str, str]  # section and field of a map
 
 _TIMES = ("t", "time", "timestamp", "Time", "timestamp_{u}", "time ({u})", "Time [{u}]")
 _PLACES = ("{a}", "p{a}", "pos_{a}", "position.{a}", "mocap_{a}", "Position {A} [{u}]", "{a}_{u}")
@@ -56,7 +50,7 @@ class Written:
     text: str
 
 
-def flight(vehicle: str, trajectory: str, seed: int, seconds: float = 20.0) -> FlightLog:
+def flight(vehicle, trajectory, seed, seconds=20.0):
     """Return a simulated flight with an IMU and motor commands (rotor speed by 1.25 times the
     fastest).
     """
@@ -72,7 +66,7 @@ def flight(vehicle: str, trajectory: str, seed: int, seconds: float = 20.0) -> F
     )
 
 
-def random_table(log: FlightLog, rng: np.random.Generator, imu_only: float = 0.15) -> Written:
+def random_table(log, rng, imu_only=0.15):
     """Return a flight as a table in a random convention.
 
     Args:
@@ -81,20 +75,20 @@ def random_table(log: FlightLog, rng: np.random.Generator, imu_only: float = 0.1
         imu_only: share of tables without a pose.
     """
 
-    def pick(items: Any) -> Any:
+    def pick(items):
         return items[int(rng.integers(len(items)))]
 
     has_pose = bool(rng.random() >= imu_only)
     has_imu = not has_pose or bool(rng.random() < 0.4)
     world, body = pick((("enu", "flu"), ("ned", "frd"), ("enu", "flu"), ("enu", "frd")))
-    columns: dict[str, Array] = {}
+    columns = {}
 
     unit = pick(tuple(_TIME))
     begin = pick((0.0, 12.5, 1.7e9 if unit == "s" else 50.0))
     template = pick(_TIMES)
     name = template.format(u=unit)
     columns[name] = (log.t + begin) / _TIME[unit]
-    parts: dict[str, Any] = {"time": TimeColumn(name, unit), "world": world, "body": body}
+    parts = {"time": TimeColumn(name, unit), "world": world, "body": body}
 
     turn = np.array([1.0, -1.0, -1.0])
     world_turn = turn if world == "ned" else np.ones(3)
@@ -118,9 +112,7 @@ def random_table(log: FlightLog, rng: np.random.Generator, imu_only: float = 0.1
     return Written(log, LogMap(name="truth", **parts), text)
 
 
-def _distract(
-    log: FlightLog, columns: dict[str, Array], rng: np.random.Generator, pick: Any
-) -> None:
+def _distract(log, columns, rng, pick):
     """Add columns that a flight log needs not: velocities, set points, a magnetometer, a mode."""
     noise = rng.standard_normal((len(log.t), 3))
     for templates, values in (
@@ -137,15 +129,13 @@ def _distract(
         columns["temperature"] = 30.0 + 0.01 * log.t
 
 
-def _pose(
-    log: FlightLog, columns: dict[str, Array], world: Array, body: Array, pick: Any
-) -> dict[str, Any]:
+def _pose(log, columns, world, body, pick):
     unit = pick(tuple(_LENGTH))
     template = pick(_PLACES)
     names = tuple(template.format(a=a, A=a.upper(), u=unit) for a in "xyz")
     position = log.position * world / _LENGTH[unit]
     columns |= dict(zip(names, position.T, strict=True))
-    out: dict[str, Any] = {"position": Columns(names, unit)}
+    out = {"position": Columns(names, unit)}
     rotation = Rotation.from_matrix(
         world[:, None]
         * Rotation.from_quat(log.quaternion, scalar_first=True).as_matrix()
@@ -179,12 +169,8 @@ def _pose(
     return out
 
 
-def _imu(
-    log: FlightLog, columns: dict[str, Array], body: Array, axes: str, pick: Any
-) -> dict[str, Any]:
-    assert log.accelerometer is not None
-    assert log.gyro is not None
-    out: dict[str, Any] = {}
+def _imu(log, columns, body, axes, pick):
+    out = {}
     for section, templates, values, units in (
         ("accelerometer", _ACCELEROMETERS, log.accelerometer, {"m/s2": 1.0, "g": 9.80665}),
         ("gyro", _GYROS, log.gyro, {"rad/s": 1.0, "deg/s": np.pi / 180.0}),
@@ -197,7 +183,7 @@ def _imu(
     return out
 
 
-def _motors(log: FlightLog, columns: dict[str, Array], pick: Any) -> dict[str, Any]:
+def _motors(log, columns, pick):
     order = pick((*ORDERS.values(), tuple(int(i) for i in pick(((1, 3, 2, 4), (2, 1, 4, 3))))))
     # motor m stands at the kit's place order.index(m)
     at = [order.index(m) for m in (1, 2, 3, 4)]
@@ -210,10 +196,9 @@ def _motors(log: FlightLog, columns: dict[str, Array], pick: Any) -> dict[str, A
         template = template or pick(_SPEEDS)
         values = log.rotor_speeds[:, at] / scale
         names = tuple(template.format(i=i + 1, n=i) for i in range(4))
-        made: Any = Rotors(names, unit, order=order, pole_pairs=pairs)
+        made = Rotors(names, unit, order=order, pole_pairs=pairs)
         columns |= dict(zip(names, values.T, strict=True))
         return {"rotors": made}
-    assert log.command is not None
     low, high = (1000.0, 2000.0) if kind == "us" else (0.0, 1.0)
     values = low + (high - low) * log.command[:, at]
     template = pick(_PULSES if kind == "us" else _COMMANDS)
@@ -222,7 +207,7 @@ def _motors(log: FlightLog, columns: dict[str, Array], pick: Any) -> dict[str, A
     return {"commands": Commands(names, kind, order=order, range=(low, high))}
 
 
-def _text(columns: dict[str, Array], separator: str, decimal: str, comments: int) -> str:
+def _text(columns, separator, decimal, comments):
     lines = [f"# exported by a program, line {i + 1}" for i in range(comments)]
     lines.append(separator.join(columns))
     texts = [[f"{x:.17g}" for x in column.tolist()] for column in columns.values()]
@@ -232,15 +217,15 @@ def _text(columns: dict[str, Array], separator: str, decimal: str, comments: int
     return "\n".join(lines) + "\n"
 
 
-def save(written: Written, path: Path) -> Path:
+def save(written, path):
     """Write a table's text to a file."""
     path.write_text(written.text, encoding="utf-8")
     return path
 
 
-def fields_of(m: LogMap) -> dict[Field, Any]:
+def fields_of(m):
     """Return what a map's fields mean, each once, however they are written."""
-    out: dict[Field, Any] = {("time", "column"): m.time.column, ("time", "unit"): m.time.unit}
+    out = {("time", "column"): m.time.column, ("time", "unit"): m.time.unit}
     if m.position is not None:
         out |= {("world", ""): m.world, ("body", ""): m.body}
     for section, *names in (

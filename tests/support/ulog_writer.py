@@ -3,8 +3,6 @@ of ``autopilot_flight`` as PX4 logs it.
 """
 
 import struct
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -13,9 +11,7 @@ from tests.support.autopilot_flight import FLIP, PX4, growth, inertial, ned
 _TYPES = {"uint64_t": "Q", "float": "f", "uint8_t": "B", "int32_t": "i", "bool": "?"}
 
 
-def ulog_bytes(
-    topics: Mapping[str, Mapping[str, Any]], parameters: Mapping[str, int | float] | None = None
-) -> bytes:
+def ulog_bytes(topics, parameters=None):
     """Return a ULog.
 
     Args:
@@ -47,11 +43,11 @@ def ulog_bytes(
     return b"".join(out)
 
 
-def _message(kind: str, payload: bytes) -> bytes:
+def _message(kind, payload):
     return struct.pack("<HB", len(payload), ord(kind)) + payload
 
 
-def _formats(topic: str, fields: Mapping[str, Any]) -> list[bytes]:
+def _formats(topic, fields):
     """Return the format messages of a topic, its nested type's among them."""
     plain = "".join(_declare(key, column) for key, column in fields.items() if "." not in key)
     nested = [key.split() for key in fields if "." in key]
@@ -70,13 +66,13 @@ def _formats(topic: str, fields: Mapping[str, Any]) -> list[bytes]:
     ]
 
 
-def _declare(key: str, column: Any) -> str:
+def _declare(key, column):
     kind, name = key.split()
     width = getattr(column[0], "shape", ())
     return f"{kind}[{width[0]}] {name};" if width else f"{kind} {name};"
 
 
-def _flat(value: Any) -> list[Any]:
+def _flat(value):
     return (
         value.tolist()
         if getattr(value, "shape", ())

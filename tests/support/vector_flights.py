@@ -22,14 +22,16 @@ def make(num_envs, plant="mujoco", task="FanTracking", **kwargs):
     )
 
 
-def fly(envs, decisions, seed=3, law=None):
-    """Everything that the first decisions return, as one array (decisions, n, .)."""
+def fly(envs, decisions, seed=3):
+    """Everything that the first decisions return, as one array (decisions, n, .), frames first. The
+    random actions of one environment do not depend on how many there are.
+    """
     rng, rows = np.random.default_rng(seed), []
-    seen, infos = envs.reset(seed=seed)
+    envs.reset(seed=seed)
     for _ in range(decisions):
-        drawn = rng.uniform(-1, 1, (100, 1)).astype(np.float32)[: envs.num_envs]
-        seen, rewards, lost, over, infos = envs.step(drawn if law is None else law(seen))
-        numbers = [infos[name].reshape(envs.num_envs, -1) for name in NUMBERS]
+        drawn = rng.uniform(-1, 1, (100, *envs.action_space.shape[1:])).astype(np.float32)
+        seen, rewards, lost, over, infos = envs.step(drawn[: envs.num_envs])
+        numbers = [infos[name].reshape(envs.num_envs, -1) for name in NUMBERS if name in infos]
         rows.append(np.column_stack([seen, rewards, lost, over, *numbers]))
     envs.close()
     return np.array(rows)

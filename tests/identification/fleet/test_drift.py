@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import linregress, t
 
+from tests.support.diagnoses import fleet_row
 from windwrench.identification.fleet.drift import (
     DRIFT,
     Coefficient,
@@ -20,23 +21,6 @@ def trend(values, stds, among, sure=None):
         [np.arange(1, n + 1), values, stds, np.ones(n) if sure is None else sure]
     )
     return trend_of(Coefficient("a", "mass", "dm", "kg"), points, among)
-
-
-def row(who, flight, effects=(), status="diagnosed"):
-    data = {"id": who, "flight": flight, "status": status, "kind": "input", "verdict": "explained"}
-    return data | {
-        "effects": [
-            {
-                "name": name,
-                "coefficients": {"c": value},
-                "std": {"c": std},
-                "units": {"c": "kg"},
-                "tentative": tentative,
-                "indistinguishable_from": others,
-            }
-            for name, value, std, tentative, others in effects
-        ]
-    }
 
 
 def test_with_equal_deviations_it_is_ordinary_regression():
@@ -102,15 +86,18 @@ def test_flights_that_are_sure_count_alone_where_they_are_enough():
 
 
 def test_an_effect_that_comes_is_told_though_its_coefficient_is_constant():
-    rows = [row("a", i, [("mass", 1.0, 0.1, False, [])] if i > 8 else []) for i in range(1, 17)]
-    rows += [row("b", i, [("mass", 1.0, 0.1, False, [])] if i % 2 else []) for i in range(1, 17)]
-    rows.append(row("b", 17, status="refused"))
+    rows = [fleet_row("a", i, *[(1.0, 0.1)] * (i > 8)) for i in range(1, 17)]
+    rows += [fleet_row("b", i, *[(1.0, 0.1)] * (i % 2)) for i in range(1, 17)]
+    rows.append(fleet_row("b", 17) | {"status": "refused", "kind": "input"})
     fleet = fleet_of(rows)
     told = {one.id: one.told for one in fleet.appearances}
     assert told == {"a": True, "b": False}
     assert next(one for one in fleet.appearances if one.id == "a").later
     assert fleet.individuals["b"] == {"diagnosed": 16, "refused": 1}
-    assert (fleet.refused, fleet.verdicts) == ({"input": 1}, {"explained": 32})
+    assert (fleet.refused, fleet.verdicts) == (
+        {"input": 1},
+        {"explained": 16, "nothing to explain": 16},
+    )
     assert appearance_of("a", "mass", [1, 2], [1, 2, 3, 4]) is None
 
 
@@ -122,7 +109,7 @@ def test_drifts_are_told_and_chance_is_not():
         for flight in range(1, 13):
             s = float(rng.uniform(0.1, 0.3))
             value = 1.0 + slope * flight + s * float(rng.standard_normal())
-            rows.append(row(f"v{who}", flight, [("mass", value, s, False, [])]))
+            rows.append(fleet_row(f"v{who}", flight, (value, s)))
     fleet = fleet_of(rows)
     told = [int(one.of.id[1:]) for one in fleet.trends if one.told]
     assert set(told) >= set(range(6))

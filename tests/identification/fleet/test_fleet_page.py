@@ -8,7 +8,9 @@ import re
 
 import pytest
 
+from tests.support.alike import strict_json
 from tests.support.browser import look, needs_browser
+from tests.support.diagnoses import fleet_row
 from windwrench.identification.fleet.drift import fleet_of
 from windwrench.identification.fleet.files import fleet_data, write_fleet
 from windwrench.identification.fleet.manifest import FleetLog
@@ -20,28 +22,12 @@ HOSTILE = "<script>alert('x')</script>&\"=1+1"
 ERROR = {"force_rms_N": 0.5, "torque_rms_Nm": 0.01}
 
 
-def effect(name, value, std, tentative=False, others=()):
-    return {
-        "name": name,
-        "coefficients": {"dm": value},
-        "std": {"dm": std},
-        "units": {"dm": "kg"},
-        "tentative": tentative,
-        "indistinguishable_from": list(others),
-    }
-
-
-def diagnosed(who, flight, *effects):
-    return {
-        "id": who,
-        "flight": flight,
+def diagnosed(who, flight, *masses):
+    return fleet_row(who, flight, *masses) | {
         "log": f"{who}/flight{flight}.csv",
         "time": None,
-        "status": "diagnosed",
-        "verdict": "explained" if effects else "nothing to explain",
         "remainder": "none",
         "headline": "The model explains these logs.",
-        "effects": list(effects),
         "error": {"before": ERROR, "after": {**ERROR, "torque_rms_Nm": None}, "floor": ERROR},
         "notes": [],
         "seconds": 15.0,
@@ -50,12 +36,9 @@ def diagnosed(who, flight, *effects):
 
 
 FLIGHTS = [
-    *(
-        diagnosed("alpha", i, effect("mass", 0.01 * i + 0.001 * (i % 3), 0.002))
-        for i in range(1, 11)
-    ),
+    *(diagnosed("alpha", i, (0.01 * i + 0.001 * (i % 3), 0.002)) for i in range(1, 11)),
     *(diagnosed("beta", i) for i in range(1, 4)),
-    diagnosed("beta", 4, effect("mass", 0.02, None, True, ["thrust_scale"])),
+    diagnosed("beta", 4, (0.02, None, True, ["thrust_scale"])),
     {
         "id": HOSTILE,
         "flight": 1,
@@ -98,10 +81,7 @@ def test_the_first_sentence_says_what_changed():
 
 
 def test_the_numbers_are_strict_json(folder):
-    def refuse(text):
-        raise AssertionError(text)
-
-    data = json.loads((folder / "fleet.json").read_text(), parse_constant=refuse)
+    data = strict_json(folder / "fleet.json")
     assert data["flights"] == FLIGHTS
     assert {key: data[key] for key in data if key != "flights"} == json.loads(
         json.dumps(fleet_data(fleet_of(FLIGHTS)))

@@ -3,7 +3,6 @@
 import shutil
 import sys
 from contextlib import suppress
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,7 +25,7 @@ MAP = {
 }
 
 
-def saved(path: Path) -> Path:
+def saved(path):
     """Write the flight in the form that the file's name says."""
     if path.suffix == ".npz":
         np.savez_compressed(path, **{"t": T, "pose.p": PLACE, "pose.q": TURN, "rpm": RPM})
@@ -53,7 +52,7 @@ def saved(path: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", ["a.mat", "a.npz", "a.parquet", "a.csv"])
-def test_columns_of_arrays_and_lists_are_read_by_a_map(tmp_path: Path, name: str) -> None:
+def test_columns_of_arrays_and_lists_are_read_by_a_map(tmp_path, name):
     log = map_table(open_table(saved(tmp_path / name)), parse_map(MAP, "map"))
     rows = slice(COUNT - len(log.t), None)  # an empty list is a sample that is not there
     assert len(log.t) >= COUNT - 1
@@ -61,13 +60,13 @@ def test_columns_of_arrays_and_lists_are_read_by_a_map(tmp_path: Path, name: str
     np.testing.assert_allclose(log.rotor_speeds * 30.0 / np.pi, RPM[rows])
 
 
-def test_arrays_of_other_lengths_are_left_out_with_a_note(tmp_path: Path) -> None:
+def test_arrays_of_other_lengths_are_left_out_with_a_note(tmp_path):
     table = open_table(saved(tmp_path / "a.mat"))
     assert table.rows == COUNT
     assert table.notes == ("arrays of other lengths than 50 were left out: gains",)
 
 
-def test_lists_of_several_lengths_are_refused(tmp_path: Path) -> None:
+def test_lists_of_several_lengths_are_refused(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text('t,p\n0,"[1, 2]"\n1,"[1, 2, 3]"\n2,"[1, 2]"\n')
     with pytest.raises(InputError, match=r"row 2 \(line 3\) has 4 field\(s\); expected 3"):
@@ -81,9 +80,7 @@ def test_lists_of_several_lengths_are_refused(tmp_path: Path) -> None:
         (b"no arrays at all", "cannot be read as a flight log"),
     ],
 )
-def test_a_matlab_file_that_cannot_be_read_says_what_to_do(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, data: bytes, expected: str
-) -> None:
+def test_a_matlab_file_that_cannot_be_read_says_what_to_do(tmp_path, monkeypatch, data, expected):
     monkeypatch.setattr("windwrench.identification.logs.array_table.find_spec", lambda _: None)
     (tmp_path / "a.mat").write_bytes(data)
     with pytest.raises(InputError, match=expected):
@@ -91,7 +88,7 @@ def test_a_matlab_file_that_cannot_be_read_says_what_to_do(
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_spoiled_matlab_file_is_refused_or_read(tmp_path: Path, seed: int) -> None:
+def test_a_spoiled_matlab_file_is_refused_or_read(tmp_path, seed):
     """scipy's reader ends its process at some of these."""
     from scipy.io import savemat
 
@@ -104,9 +101,7 @@ def test_a_spoiled_matlab_file_is_refused_or_read(tmp_path: Path, seed: int) -> 
         assert open_table(tmp_path / "a.mat").rows > 1
 
 
-def test_a_reader_that_ends_its_process_ends_in_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_reader_that_ends_its_process_ends_in_one_line(tmp_path, monkeypatch):
     path = saved(tmp_path / "a.mat")
     monkeypatch.setattr(sys, "executable", shutil.which("false"))
     with pytest.raises(InputError, match=r"a\.mat: cannot be read as .*: a spoiled MATLAB file"):

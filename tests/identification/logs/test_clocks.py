@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from tests.support.dataflash_writer import dataflash, imu, parm, rcou
 from windwrench.dynamics import InputError
@@ -32,9 +30,10 @@ def stamped(changes):
         {599: T[599] + 40.0},
         {0: T[0] - 40.0},
         {200: T[199]},
+        {100: T[100] + 9.0, 101: T[101] + 9.0, 350: -3.0},
     ],
 )
-def test_one_wrong_stamp_costs_one_sample(wrong):
+def test_a_wrong_stamp_costs_its_sample(wrong):
     rows, late = in_order(stamped(wrong))
     assert late == 0
     assert set(np.arange(600)) - set(rows.tolist()) == set(wrong)
@@ -47,16 +46,6 @@ def test_rows_that_were_written_late_are_sorted_in():
     rows, late = in_order(T[order])
     assert late > 0
     assert np.array_equal(T[order][rows], T)
-
-
-@given(st.sets(st.integers(2, 597), max_size=20), st.floats(-1e3, 1e3))
-@settings(max_examples=50, deadline=None)
-def test_what_is_right_is_kept_whatever_the_wrong_stamps_are(wrong, shift):
-    t = T.copy()
-    t[sorted(wrong)] += shift
-    rows, _ = in_order(t)
-    assert np.all(np.diff(t[rows]) > 0.0)
-    assert len(rows) >= 600 - len(wrong) - 2
 
 
 def test_a_clock_of_32_bits_goes_on_after_its_rollover():

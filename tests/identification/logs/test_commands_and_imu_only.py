@@ -1,14 +1,13 @@
 """Logs of the kit's format without a pose, and with motor commands in place of rotor speeds."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from windwrench.dynamics import load_vehicle
-from windwrench.dynamics.vehicle import MotorCurve, Vehicle
-from windwrench.dynamics.vehicle_file import dump_vehicle, parse_vehicle
+from windwrench.dynamics.vehicle import MotorCurve
+from windwrench.identification.diagnosis.commanded_rotors import thrust_is_assumed
 from windwrench.identification.logs.commanded_speeds import with_commanded_speeds
 from windwrench.identification.logs.flight_log import FlightLog, write_log
 from windwrench.identification.logs.reading import read_log
@@ -16,18 +15,18 @@ from windwrench.identification.logs.screening import screen_log
 from windwrench.runtime.errors import InputError
 
 
-def curved() -> Vehicle:
+def curved():
     """A vehicle that states its motor curve: 0.12 N a rotor at the full command and 4 V."""
     curve = MotorCurve(thrust=(0.0, 0.02, 0.10), voltage_exponent=2.0, command=(0.0, 65535.0))
     return replace(load_vehicle("crazyflie"), motor_curve=curve, voltage_ref=4.0)
 
 
-def inertial_log(**fields: object) -> FlightLog:
+def inertial_log(**fields):
     """Two seconds of commands and inertial sensors at 100 Hz, without a pose."""
     count = 200
     nothing = np.full((count, 3), np.nan)
     command = np.tile([0.5, 0.6, 0.7, 0.8], (count, 1))
-    given: dict[str, object] = {
+    given = {
         "t": 0.01 * np.arange(count),
         "position": nothing,
         "quaternion": np.full((count, 4), np.nan),
@@ -40,30 +39,21 @@ def inertial_log(**fields: object) -> FlightLog:
     return FlightLog(**{**given, **fields})  # type: ignore[arg-type]
 
 
-def test_a_log_of_commands_and_imu_reads_back(tmp_path: Path) -> None:
-    """No pose and no rotor speeds: what is not there is not in the file, and is NaN when read."""
-    path = tmp_path / "imu.csv"
-    write_log(inertial_log(), path)
-    log = read_log(path)
-    assert not log.has_pose
-    assert not log.has_rotor_speeds
-    assert log.command is not None
-    np.testing.assert_array_equal(log.command, inertial_log().command)
-    assert np.isnan(log.position).all()
-
-
-def test_a_motor_curve_turns_commands_into_rotor_speeds(tmp_path: Path) -> None:
+def test_a_motor_curve_turns_commands_into_rotor_speeds(tmp_path):
     """At 3.8 V of 4 V and an exponent of 2, thrust is 0.9025 of the curve's."""
     path, vehicle = tmp_path / "imu.csv", curved()
     write_log(inertial_log(), path)
+    assert not read_log(path).has_rotor_speeds
     log = read_log(path, vehicle=vehicle)
     assert log.commanded
+    assert not thrust_is_assumed([log], vehicle)
+    assert any("motor curve" in note for note in log.notes)
     u = np.array([0.5, 0.6, 0.7, 0.8])
     thrust = (0.02 * u + 0.10 * u**2) * (3.8 / 4.0) ** 2
     np.testing.assert_allclose(vehicle.k * log.rotor_speeds[0] ** 2, thrust, rtol=1e-12)
 
 
-def test_commands_without_a_curve_are_refused_where_thrust_is_needed() -> None:
+def test_commands_without_a_curve_are_refused_where_thrust_is_needed():
     """A vehicle without a motor curve cannot say what a command gives."""
     log = inertial_log(
         position=np.zeros((200, 3)), quaternion=np.tile([1.0, 0.0, 0.0, 0.0], (200, 1))
@@ -72,20 +62,7 @@ def test_commands_without_a_curve_are_refused_where_thrust_is_needed() -> None:
         screen_log(log, load_vehicle("crazyflie"))
 
 
-def test_a_command_beyond_its_range_is_refused(tmp_path: Path) -> None:
-    """A command of 1.5 is no command of 0 to 1."""
-    path = tmp_path / "imu.csv"
-    write_log(inertial_log(command=np.full((200, 4), 1.5)), path)
-    with pytest.raises(InputError, match=r"cmd1.*from 0 to 1"):
-        read_log(path)
-
-
-def test_a_motor_curve_is_written_and_read_back() -> None:
-    """The YAML of a vehicle holds its motor curve."""
-    assert parse_vehicle(dump_vehicle(curved())).motor_curve == curved().motor_curve
-
-
-def test_the_scale_of_commands_counts_the_dips_between_high_thrusts() -> None:
+def test_the_scale_of_commands_counts_the_dips_between_high_thrusts():
     """Thrust that swings from 0.2 to 1.8 of the weight has the weight as its mean; without its dips
     the mean is above it, and the scale would be too small.
     """
@@ -105,7 +82,7 @@ def test_the_scale_of_commands_counts_the_dips_between_high_thrusts() -> None:
     np.testing.assert_allclose(full, 3.0, rtol=0.01)  # N of a motor at full command
 
 
-def test_without_pose_and_curve_the_accelerometer_sets_the_scale(tmp_path: Path) -> None:
+def test_without_pose_and_curve_the_accelerometer_sets_the_scale(tmp_path):
     """Commands beside an IMU, the most common log: thrust in flight is the mass times what the
     accelerometer feels along the rotors' axis; the note says what that cannot tell.
     """

@@ -5,12 +5,23 @@ import pytest
 
 from tests.support.data_paths import DATA
 from tests.support.golden_logs import load_golden, recorded
+from tests.support.parameters import mostly_slow
 
 GOLDEN = load_golden()
 RELATIVE = 1e-9  # of an array's root mean square
+# a file each of the folders whose files are of one kind
+QUICK = ("log10", "normal_flight__E8_log00", "labelled_00", "multisine", "B2_", "flight_c")
+MANY = ("crazyflie_imu", "crazypad", "flights", "idsia", "nanobench", "racer")
 
 
-@pytest.mark.parametrize("case", GOLDEN)
+def is_quick(case):
+    kind = case.removeprefix("shared/").partition("/")[0]
+    return not (case.startswith("shared") and kind in MANY) or any(
+        f"{kind}/{name}" in case for name in QUICK
+    )
+
+
+@pytest.mark.parametrize("case", mostly_slow(GOLDEN, is_quick))
 def test_a_file_gives_the_flight_log_that_was_recorded(case):
     room, _, rest = case.rpartition(" ")[0].partition("/")
     if room == "shared" and not (DATA / rest).exists():

@@ -1,14 +1,13 @@
 """Logs without a pose: what their IMU claims is asked of gravity and of the rotors."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.support.imu_flights import imu_flight, pose_removed
 from windwrench.dynamics import load_vehicle
-from windwrench.identification.logs.flight_log import FlightLog, with_rows, write_log
+from windwrench.identification.logs.flight_log import with_rows, write_log
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
 from windwrench.identification.motion.inertial_signals import pose_rate, reads_imu
@@ -20,12 +19,12 @@ BETAFLIGHT = np.eye(4)[[3, 2, 0, 1]]  # that order of rotors, by the torques aga
 
 
 @pytest.fixture(scope="module")
-def flown() -> FlightLog:
+def flown():
     """A flight of 12 s with pose and IMU."""
     return imu_flight(VEHICLE, seconds=12.0)
 
 
-def test_a_log_without_a_pose_passes(flown: FlightLog) -> None:
+def test_a_log_without_a_pose_passes(flown):
     """Nothing is wrong with it, for either use."""
     log = pose_removed(flown)
     assert reads_imu(log)
@@ -47,9 +46,7 @@ def test_a_log_without_a_pose_passes(flown: FlightLog) -> None:
         ({"rotor_speeds": BETAFLIGHT}, "betaflight.* As logged, the gyro contradicts the rotors"),
     ],
 )
-def test_other_units_and_axes_are_refused(
-    flown: FlightLog, fields: dict[str, object], words: str
-) -> None:
+def test_other_units_and_axes_are_refused(flown, fields, words):
     """The message says what the columns look like and what to do."""
     log = pose_removed(flown)
     changed = {
@@ -60,7 +57,7 @@ def test_other_units_and_axes_are_refused(
         screen_log(replace(log, **changed), VEHICLE)
 
 
-def test_a_log_that_is_too_slow_or_too_short_is_refused(flown: FlightLog) -> None:
+def test_a_log_that_is_too_slow_or_too_short_is_refused(flown):
     """30 readings a second, and 8 s."""
     log = pose_removed(flown)
 
@@ -71,7 +68,7 @@ def test_a_log_that_is_too_slow_or_too_short_is_refused(flown: FlightLog) -> Non
         screen_log(with_rows(log, rows < 1600), VEHICLE)
 
 
-def test_positions_without_an_attitude_are_a_log(flown: FlightLog, tmp_path: Path) -> None:
+def test_positions_without_an_attitude_are_a_log(flown, tmp_path):
     """Ten positions a second beside the IMU: written, read back, and read by the IMU."""
     log = pose_removed(flown, position_every=20)
     path = tmp_path / "slow.csv"

@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,10 +12,9 @@ from windwrench.dynamics import load_vehicle
 from windwrench.identification.logs import map_guess
 from windwrench.identification.logs import table as table_module
 from windwrench.identification.logs.column_names import Group
-from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.log_map import parse_map
 from windwrench.identification.logs.magnitudes import motor_unit
-from windwrench.identification.logs.map_guess import Guess, guess_map
+from windwrench.identification.logs.map_guess import guess_map
 from windwrench.identification.logs.map_text import map_yaml
 from windwrench.identification.logs.mapped_log import map_table
 from windwrench.identification.logs.tables import open_table
@@ -24,19 +22,17 @@ from windwrench.runtime.errors import InputError
 
 
 @pytest.fixture(scope="module")
-def flown() -> FlightLog:
+def flown():
     """A lively flight."""
     return flight("ardrone2", "excite", 1, 15.0)
 
 
-def guessed(path: Path, name: str = "") -> Guess:
+def guessed(path, name=""):
     table = open_table(path)
     return guess_map(table, load_vehicle(name) if name else None)
 
 
-def test_the_map_that_is_written_is_the_map_that_was_guessed(
-    tmp_path: Path, flown: FlightLog
-) -> None:
+def test_the_map_that_is_written_is_the_map_that_was_guessed(tmp_path, flown):
     for seed in range(4):
         written = random_table(flown, np.random.default_rng(seed))
         found = guessed(save(written, tmp_path / "table.csv"))
@@ -46,7 +42,7 @@ def test_the_map_that_is_written_is_the_map_that_was_guessed(
         assert text.count("# GUESS") == len(found.doubts)
 
 
-def test_pose_and_motors_in_rows_of_their_own_are_read(tmp_path: Path, flown: FlightLog) -> None:
+def test_pose_and_motors_in_rows_of_their_own_are_read(tmp_path, flown):
     """A logger that writes each message in a row leaves the other columns empty."""
     rows = ["t,x,y,z,qw,qx,qy,qz,rpm1,rpm2,rpm3,rpm4"]
     for k, t in enumerate(flown.t):
@@ -58,12 +54,10 @@ def test_pose_and_motors_in_rows_of_their_own_are_read(tmp_path: Path, flown: Fl
     assert not guessed(path).doubts
 
 
-def columns_of(log: FlightLog, names: str, is_ned: bool = False) -> dict[str, np.ndarray]:
+def columns_of(log, names, is_ned=False):
     """Return a flight's columns under names of time, position, quaternion, velocity, accelerometer,
     gyro and rotors (rad/s), in this order; a name such as ``c%`` is that of all, by their numbers.
     """
-    assert log.accelerometer is not None
-    assert log.gyro is not None
     down = np.array([1.0, -1.0, -1.0]) if is_ned else np.ones(3)
     turned = log.quaternion * (np.array([1.0, 1.0, -1.0, -1.0]) if is_ned else 1.0)
     velocity = np.gradient(log.position, log.t, axis=0)
@@ -74,7 +68,7 @@ def columns_of(log: FlightLog, names: str, is_ned: bool = False) -> dict[str, np
     return dict(zip(listed, values.T, strict=True))
 
 
-def table_of(columns: dict[str, np.ndarray], path: Path) -> Path:
+def table_of(columns, path):
     """Write columns as CSV."""
     rows = np.column_stack(list(columns.values()))
     np.savetxt(path, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.9g")
@@ -112,9 +106,7 @@ _VICON = "/vicon/drone/transform"
         "c%",  # names that say nothing: the numbers do
     ],
 )
-def test_parts_are_found_by_what_their_numbers_obey(
-    tmp_path: Path, flown: FlightLog, names: str
-) -> None:
+def test_parts_are_found_by_what_their_numbers_obey(tmp_path, flown, names):
     columns = columns_of(flown, names, is_ned=True)
     listed, found = list(columns), guessed(table_of(columns, tmp_path / "a.csv"), "ardrone2")
     log_map = found.log_map
@@ -124,7 +116,6 @@ def test_parts_are_found_by_what_their_numbers_obey(
     for name, first in parts.items():
         part = log_map.sections[name]
         assert list(part.columns) == listed[first : first + len(part.columns)]
-    assert log_map.rotors is not None
     assert log_map.rotors.unit == "rad/s"
 
 
@@ -134,8 +125,8 @@ def test_parts_are_found_by_what_their_numbers_obey(
 )
 @pytest.mark.parametrize("is_there", [False, True])  # without a number in it
 def test_what_is_missing_is_left_open_beside_what_is_known(
-    tmp_path: Path, flown: FlightLog, dropped: str, field: str, is_there: bool
-) -> None:
+    tmp_path, flown, dropped, field, is_there
+):
     columns = columns_of(flown, f"t x y z {_QUATERNION} {_SENSORS} w1 w2 w3 w4")
     for name in [name for name in columns if name.startswith(("a", "g", "v"))]:
         del columns[name]
@@ -150,9 +141,7 @@ def test_what_is_missing_is_left_open_beside_what_is_known(
     assert written["position"]["columns"] == ["x", "y", "z"]
 
 
-def test_of_a_huge_table_columns_are_read_whose_names_say_something(
-    tmp_path: Path, flown: FlightLog, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_of_a_huge_table_columns_are_read_whose_names_say_something(tmp_path, flown, monkeypatch):
     columns = columns_of(flown, f"t x y z {_QUATERNION} {_SENSORS} rpm1 rpm2 rpm3 rpm4")
     columns |= {f"blob{name}": columns["vx"] for name in "abcdefgh"}
     path = table_of(columns, tmp_path / "a.csv")
@@ -163,7 +152,7 @@ def test_of_a_huge_table_columns_are_read_whose_names_say_something(
 
 
 @pytest.mark.parametrize("way", ["date", "time of day", "seconds and nanoseconds"])
-def test_clocks_as_people_write_them(tmp_path: Path, flown: FlightLog, way: str) -> None:
+def test_clocks_as_people_write_them(tmp_path, flown, way):
     columns = columns_of(flown, f"t x y z {_QUATERNION} {_SENSORS} rpm1 rpm2 rpm3 rpm4")
     t = columns.pop("t")
     stamps = np.datetime64("2024-02-29T23:10:00", "us") + np.round(1e6 * t).astype("m8[us]")
@@ -185,7 +174,7 @@ def test_clocks_as_people_write_them(tmp_path: Path, flown: FlightLog, way: str)
     np.testing.assert_allclose(log.t, flown.t - flown.t[0], atol=2e-6)
 
 
-def test_what_a_pilot_or_a_controller_wants_is_no_part(tmp_path: Path, flown: FlightLog) -> None:
+def test_what_a_pilot_or_a_controller_wants_is_no_part(tmp_path, flown):
     """As RotorPy and the racing dataset of TII write them; rotors may be called r1 to r4."""
     columns = columns_of(flown, f"t x y z {_QUATERNION} {_SENSORS} r1 r2 r3 r4")
     for name in ("ax", "ay", "az", "gx", "gy", "gz"):
@@ -193,15 +182,13 @@ def test_what_a_pilot_or_a_controller_wants_is_no_part(tmp_path: Path, flown: Fl
     columns |= {f"{name}des": columns[name] for name in ("x", "qw", "qx", "qy", "qz", "r1")}
     columns |= {f"channels_{name}": 1500.0 + flown.t for name in ("roll", "pitch", "yaw")}
     found = guessed(table_of(columns | {"battery_percent": 80.0 - flown.t}, tmp_path / "a.csv"))
-    assert found.log_map.attitude is not None
     assert found.log_map.attitude.columns == ("qw", "qx", "qy", "qz")
     assert found.log_map.accelerometer is None
     assert found.log_map.battery is None
-    assert found.log_map.rotors is not None
     assert found.log_map.rotors.columns == ("r1", "r2", "r3", "r4")
 
 
-def test_motion_capture_with_y_up(tmp_path: Path, flown: FlightLog) -> None:
+def test_motion_capture_with_y_up(tmp_path, flown):
     """As OptiTrack writes poses: y up in the world and in the body, millimetres, w last."""
     x, y, z = 1e3 * flown.position.T
     w, qx, qy, qz = flown.quaternion.T
@@ -220,7 +207,7 @@ def test_motion_capture_with_y_up(tmp_path: Path, flown: FlightLog) -> None:
     np.testing.assert_allclose(alike, 1.0, atol=1e-9)
 
 
-def test_more_than_four_rotors_that_move_are_refused(tmp_path: Path, flown: FlightLog) -> None:
+def test_more_than_four_rotors_that_move_are_refused(tmp_path, flown):
     columns = columns_of(flown, f"t x y z {_QUATERNION} {_SENSORS} w1 w2 w3 w4")
     rng = np.random.default_rng(0)
     good = guessed(table_of(columns, tmp_path / "quad.csv")).log_map
@@ -237,7 +224,7 @@ def test_more_than_four_rotors_that_move_are_refused(tmp_path: Path, flown: Flig
     assert not guessed(table_of(columns, tmp_path / "idle.csv")).missing
 
 
-def test_units_are_told_by_physics_not_by_names(tmp_path: Path, flown: FlightLog) -> None:
+def test_units_are_told_by_physics_not_by_names(tmp_path, flown):
     """Speeds lift with their square, pulses stand on an offset, and no name is believed that the
     numbers contradict.
     """
@@ -245,12 +232,11 @@ def test_units_are_told_by_physics_not_by_names(tmp_path: Path, flown: FlightLog
     speeds = {name: columns.pop(name) for name in ("m1", "m2", "m3", "m4")}
     most = max(float(x.max()) for x in speeds.values())
 
-    def unit_of(names: str, scale: float, offset: float = 0.0, vehicle: str = "") -> str:
+    def unit_of(names, scale, offset=0.0, vehicle=""):
         values = [offset + scale * x for x in speeds.values()]
         made = columns | {names.replace("%", str(i + 1)): x for i, x in enumerate(values)}
         found = guessed(table_of(made, tmp_path / "a.csv"), vehicle)
         part = found.log_map.rotors or found.log_map.commands
-        assert part is not None
         sure = all(r.field != "unit" or r.section == "gyro" for r in found.doubts)
         return f"{part.unit}{'' if sure else '?'}"
 
@@ -262,9 +248,7 @@ def test_units_are_told_by_physics_not_by_names(tmp_path: Path, flown: FlightLog
         columns[f"a{name} [m/s2]"] = columns.pop(f"a{name}") / 9.80665
         columns[f"{name} [mm]"] = columns.pop(name)
     found = guessed(table_of(columns | speeds, tmp_path / "g.csv"))
-    assert found.log_map.accelerometer is not None
     assert found.log_map.accelerometer.unit == "g"
-    assert found.log_map.position is not None
     assert found.log_map.position.unit == "m"
     for unit in ("m/s2", "mm"):
         assert any(f"though the columns' names say {unit}" in r.why for r in found.doubts)
@@ -274,9 +258,7 @@ def test_units_are_told_by_physics_not_by_names(tmp_path: Path, flown: FlightLog
     ("name", "highest", "expected"),
     [("duty", 80.0, ("commands", "percent")), ("m", 80.0, None), ("m", 120.0, ("rotors", "Hz"))],
 )
-def test_percents_are_not_silently_taken_for_turns_a_second(
-    name: str, highest: float, expected: tuple[str, str] | None
-) -> None:
+def test_percents_are_not_silently_taken_for_turns_a_second(name, highest, expected):
     """Numbers below 100 that would carry the weight in Hz may be percents all the same."""
     vehicle = load_vehicle("ardrone2")
     hover = np.sqrt(vehicle.weight / vehicle.k.sum()) / (2.0 * np.pi)

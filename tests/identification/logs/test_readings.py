@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from windwrench.identification.logs.readings import DECLARED, Reading, log_readings, rotations
+from windwrench.identification.logs.readings import DECLARED, log_readings, rotations
 
 POSES = [r for r in log_readings(has_pose=True) if r.moves != DECLARED.moves and r.length == "m"]
 
 
-def taken(reading: Reading, what: str, columns: dict[str, float]) -> np.ndarray:
+def taken(reading, what, columns):
     """The columns combined as the sentence says; unchanged where it says nothing of them."""
     found = re.search(rf"(?:0\.7071 )?(\([^()]*\)) as the {what}", reading.says)
     text = found[1] if found else f"({', '.join(columns)})"
@@ -19,7 +19,7 @@ def taken(reading: Reading, what: str, columns: dict[str, float]) -> np.ndarray:
 
 
 @pytest.mark.parametrize("first", range(0, len(POSES), 10))
-def test_the_advice_of_a_sentence_makes_the_pose_that_the_reading_means(first: int) -> None:
+def test_the_advice_of_a_sentence_makes_the_pose_that_the_reading_means(first):
     """90 ways to write a pose, each undone by its own advice."""
     rng = np.random.default_rng(first)
     for reading in POSES[first : first + 10]:
@@ -34,7 +34,7 @@ def test_the_advice_of_a_sentence_makes_the_pose_that_the_reading_means(first: i
         assert (made.inv() * meant).magnitude() < 1e-6
 
 
-def test_every_reading_of_a_log_says_something_of_its_own() -> None:
+def test_every_reading_of_a_log_says_something_of_its_own():
     """No two readings share a sentence, and the one as declared has nothing to say."""
     for has_pose in (True, False):
         declared, *others = log_readings(has_pose)

@@ -11,14 +11,10 @@ from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.logs.reading import read_log
 
+VEHICLE = load_vehicle("crazyflie")
 COUNT = 40
 TIME = 0.004 * np.arange(COUNT)
 AXES = ("roll_rad", "pitch_rad", "yaw_rad")
-
-
-@pytest.fixture
-def vehicle():
-    return load_vehicle("crazyflie")
 
 
 @pytest.fixture
@@ -36,25 +32,25 @@ def read(tmp_path):
     return read_table
 
 
-def test_requests_of_crazypad_are_linear_in_thrust(read, vehicle):
-    curved = replace(vehicle, motor_curve=MotorCurve((0.0, 0.2)))
+def test_requests_of_crazypad_are_linear_in_thrust(read):
+    curved = replace(VEHICLE, motor_curve=MotorCurve((0.0, 0.2)))
     log = read("crazypad", curved, est_ax_g=0.5, est_ay_g=None)
     assert log.commanded
-    np.testing.assert_allclose(np.square(log.rotor_speeds) * vehicle.k, 0.2 * log.command)
+    np.testing.assert_allclose(np.square(log.rotor_speeds) * VEHICLE.k, 0.2 * log.command)
     assert "onboard_acceleration" not in log.extra  # one of its three columns is missing
 
 
-def test_wrenches_of_crazyswarm2_become_rotor_speeds(read, vehicle):
+def test_wrenches_of_crazyswarm2_become_rotor_speeds(read):
     torque = dict(zip((f"torque_cmd_{a}_Nm" for a in "xyz"), (1e-3, -5e-4, 1e-4), strict=True))
-    log = read("crazyswarm2", vehicle, thrust_cmd_N=0.3, **torque)
-    wrench = vehicle.rotor_wrench(log.rotor_speeds[7])
+    log = read("crazyswarm2", VEHICLE, thrust_cmd_N=0.3, **torque)
+    wrench = VEHICLE.rotor_wrench(log.rotor_speeds[7])
     np.testing.assert_allclose(wrench, [0.3, *torque.values()], rtol=1e-9)
     assert "reader crazyswarm2" in log.source
     assert any("inverse of the rotor mixing of crazyflie" in note for note in log.notes)
     pull = np.where((np.arange(COUNT) >= 5) & (np.arange(COUNT) < 8), 0.02, 0.0)
-    log = read("crazyswarm2", vehicle, thrust_cmd_N=0.3, torque_cmd_x_Nm=pull)
+    log = read("crazyswarm2", VEHICLE, thrust_cmd_N=0.3, torque_cmd_x_Nm=pull)
     assert log.rotor_speeds.min() == 0.0
-    assert log.rotor_speeds.max() <= vehicle.omega_max
+    assert log.rotor_speeds.max() <= VEHICLE.omega_max
     assert any("commands of 3 sample(s)" in note for note in log.notes)
 
 

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from windwrench.dynamics import load_vehicle
-from windwrench.envs.recording import record_flight
+from tests.support.flown import VEHICLE, recorded
 from windwrench.identification import diagnose, read_log
-from windwrench.identification.logs.flight_log import FlightLog, write_log
+from windwrench.identification.logs.flight_log import write_log
 from windwrench.identification.logs.screening import screen_log
 from windwrench.identification.logs.source_rates import between_samples, source_rate
 from windwrench.identification.wrench_series import estimate_log
@@ -62,10 +61,7 @@ def test_what_lies_between_samples_is_bounded_by_their_neighbours():
 @pytest.fixture(scope="module")
 def flown():
     """A simulated flight of 14 s at 200 Hz."""
-    columns = record_flight(load_vehicle("ardrone2"), seconds=14.0, seed=3)
-    return FlightLog(
-        *(columns[name] for name in ("t", "position", "quaternion", "rotor_speeds")), name="flown"
-    )
+    return recorded(seconds=14.0, seed=3)
 
 
 def with_rotors_at(rate, log):
@@ -79,16 +75,15 @@ def with_rotors_at(rate, log):
 
 @pytest.mark.parametrize(("rate", "force"), [(4.0, True), (30.0, False)])
 def test_slow_rotors_tell_no_torque_and_no_effect(rate, force, flown, tmp_path):
-    vehicle, path = load_vehicle("ardrone2"), tmp_path / "slow.csv"
-    slow = with_rotors_at(rate, flown)
-    write_log(slow, path)
+    path = tmp_path / "slow.csv"
+    write_log(with_rotors_at(rate, flown), path)
     log = read_log(path)
     said = rf"rotor speeds come {rate:g} times a second; expected at least 45"
     with pytest.raises(InputError, match=said):
-        screen_log(log, vehicle)
+        screen_log(log, VEHICLE)
     with pytest.raises(InputError, match=said):
-        diagnose([log], vehicle)
-    series, told = estimate_log(log, vehicle), estimate_log(replace(log, rates={}), vehicle)
+        diagnose([log], VEHICLE)
+    series, told = estimate_log(log, VEHICLE), estimate_log(replace(log, rates={}), VEHICLE)
     assert np.isnan(series.torque).all()
     assert np.isnan(series.std_torque).all()
     assert np.array_equal(series.force, told.force)

@@ -1,13 +1,23 @@
 """Text tables as people write them."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from windwrench.identification.logs.tables import open_table
 from windwrench.runtime.errors import InputError
+
+
+@pytest.fixture
+def opened(tmp_path):
+    """Return what writes a text to a file and opens it as a table."""
+
+    def open_text(text, name="a.csv", encoding="utf-8"):
+        (tmp_path / name).write_bytes(text.encode(encoding))
+        return open_table(tmp_path / name)
+
+    return open_text
 
 
 @pytest.mark.parametrize(
@@ -26,30 +36,22 @@ from windwrench.runtime.errors import InputError
         ("a.csv", "1,2,3\n2,3,4\n", "1 2 3", [1, 2, 3]),
     ],
 )
-def test_a_layout_is_found(
-    tmp_path: Path, name: str, text: str, header: str, first: list[float]
-) -> None:
-    path = tmp_path / name
-    path.write_bytes(text.encode())
-    table = open_table(path)
+def test_a_layout_is_found(opened, name, text, header, first):
+    table = opened(text, name)
     assert " ".join(table.header) == header
     values = table.read(list(table.header))
     np.testing.assert_array_equal([column[0] for column in values.values()], first)
     assert table.rows == 2
 
 
-def test_units_behind_the_header_are_kept(tmp_path: Path) -> None:
-    path = tmp_path / "a.csv"
-    path.write_text("t,x\n[s],[mm]\n0,1\n1,2\n")
-    table = open_table(path)
+def test_units_behind_the_header_are_kept(opened):
+    table = opened("t,x\n[s],[mm]\n0,1\n1,2\n")
     assert table.units == ("[s]", "[mm]")
     assert table.row(0) == "row 1 (line 3)"
 
 
-def test_a_last_line_that_was_cut_off_is_left_out(tmp_path: Path) -> None:
-    path = tmp_path / "a.csv"
-    path.write_text("t;x;y\n0;1;2\n1;2;3\n2;3")
-    table = open_table(path)
+def test_a_last_line_that_was_cut_off_is_left_out(opened):
+    table = opened("t;x;y\n0;1;2\n1;2;3\n2;3")
     assert table.rows == 2
     assert table.notes[1:] == ("the last line was cut off, and left out",)
     assert table.read(["y"])["y"].tolist() == [2.0, 3.0]
@@ -67,20 +69,16 @@ def test_a_last_line_that_was_cut_off_is_left_out(tmp_path: Path) -> None:
         ("t,x,x\n0,1,2\n1,2,3\n", "column x stands there more than once"),
     ],
 )
-def test_a_wrong_row_is_named_with_its_line(tmp_path: Path, text: str, expected: str) -> None:
-    path = tmp_path / "a.csv"
-    path.write_text(text)
-    table = open_table(path)
+def test_a_wrong_row_is_named_with_its_line(opened, text, expected):
+    table = opened(text)
     with pytest.raises(InputError, match=re.escape(expected)):
         table.read(["t", "x"])
 
 
-def test_rows_with_few_numbers_at_the_start_are_rows(tmp_path: Path) -> None:
+def test_rows_with_few_numbers_at_the_start_are_rows(opened):
     """A pose that comes late: the header is before all rows, not before the first that is full."""
-    path = tmp_path / "a.csv"
     late = "".join(f"{k},,,,{k}\n" for k in range(20))
-    path.write_text("t,x,y,z,m\n" + late + "".join(f"{k},1,2,3,{k}\n" for k in range(20, 60)))
-    table = open_table(path)
+    table = opened("t,x,y,z,m\n" + late + "".join(f"{k},1,2,3,{k}\n" for k in range(20, 60)))
     assert (table.header, table.rows, table.notes) == (("t", "x", "y", "z", "m"), 60, ())
     values = table.read(["m", "x"])
     np.testing.assert_array_equal(values["m"], np.arange(60))
@@ -97,14 +95,10 @@ def test_rows_with_few_numbers_at_the_start_are_rows(tmp_path: Path) -> None:
         ("t,x\n0,5,1,5\n1,5,2,5\n", "twice as many as the header; decimal commas"),
     ],
 )
-def test_what_is_no_table_is_refused(tmp_path: Path, text: str, expected: str) -> None:
-    path = tmp_path / "a.csv"
-    path.write_text(text)
+def test_what_is_no_table_is_refused(opened, text, expected):
     with pytest.raises(InputError, match=expected):
-        open_table(path)
+        opened(text)
 
 
-def test_latin_letters_of_an_old_encoding_are_read(tmp_path: Path) -> None:
-    path = tmp_path / "a.csv"
-    path.write_bytes("t;roll [°]\n0;1\n1;2\n".encode("latin-1"))
-    assert open_table(path).header == ("t", "roll [°]")
+def test_latin_letters_of_an_old_encoding_are_read(opened):
+    assert opened("t;roll [°]\n0;1\n1;2\n", encoding="latin-1").header == ("t", "roll [°]")

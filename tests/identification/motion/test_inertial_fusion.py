@@ -11,7 +11,7 @@ GYRO_BIAS, FORCE_BIAS = np.array([0.01, -0.02, 0.015]), np.array([0.05, -0.1, 0.
 
 
 @pytest.fixture(scope="module")
-def motion() -> dict[str, np.ndarray]:
+def motion():
     """Waves in a room for 40 s, tilted towards the acceleration, from a heading of 2 rad; sensors
     with white noise and biases.
     """
@@ -44,12 +44,12 @@ def motion() -> dict[str, np.ndarray]:
     }
 
 
-def tilt_error(rotation: np.ndarray, truth: np.ndarray) -> np.ndarray:
+def tilt_error(rotation, truth):
     """Angle (rad) between the verticals of two attitudes, in body axes."""
     return np.linalg.norm(rotation[:, 2] - truth[:, 2], axis=1)
 
 
-def test_an_imu_alone_keeps_the_vertical(motion: dict[str, np.ndarray]) -> None:
+def test_an_imu_alone_keeps_the_vertical(motion):
     """Tilt within some mrad, as it says; heading from zero, and velocity not known."""
     fused = fuse(motion["t"], motion["gyro"], motion["force"], GRAVITY, (0.005, 0.1))
     at = np.searchsorted(motion["t"], fused.t - 1e-9)
@@ -61,8 +61,8 @@ def test_an_imu_alone_keeps_the_vertical(motion: dict[str, np.ndarray]) -> None:
 
 
 def test_ten_positions_a_second_show_heading_velocity_and_biases(
-    motion: dict[str, np.ndarray],
-) -> None:
+    motion,
+):
     """All within a few of the standard deviations that it states."""
     every = slice(None, None, 20)
     placed = motion["position"][every] + 0.002 * motion["noise"][every]

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 
-from tests.support.flown import recorded
+from tests.support.flown import VEHICLE, recorded
 from windwrench.dynamics import load_vehicle, preset_names
-from windwrench.envs.recording import record_flight
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.noise_spectrum import (
     filtering_notes,
@@ -16,8 +15,6 @@ from windwrench.identification.motion.noise_spectrum import (
     pose_was_filtered,
 )
 from windwrench.studies.trials.logged_poses import FILTERS
-
-VEHICLE = load_vehicle("ardrone2")
 
 
 @pytest.fixture(scope="module", params=["excite", "hover"])
@@ -79,8 +76,7 @@ def test_a_log_that_is_short_or_still_says_nothing():
 @pytest.mark.parametrize("vehicle", preset_names())
 @pytest.mark.parametrize("trajectory", ["hover", "fast"])
 def test_a_rotor_s_own_lag_is_no_filter(vehicle, trajectory):
-    flown = record_flight(load_vehicle(vehicle), (), trajectory, 15.0, 5)
-    log = FlightLog(**flown, name="flight")
+    log = recorded(trajectory, 15.0, 5, vehicle=load_vehicle(vehicle))
     assert filtering_notes(log) == ()
     smoothed = sosfilt(butter(1, 0.2, output="sos"), log.rotor_speeds, axis=0)
     (note,) = filtering_notes(replace(log, rotor_speeds=np.abs(smoothed)))

@@ -84,10 +84,9 @@ def test_the_rms_of_any_choice_of_effects_is_exact():
         assert rms == pytest.approx(np.sqrt(np.mean(x**2)), rel=1e-3)
 
 
-@pytest.mark.parametrize("effects", [("rotor_drag",), tuple("abcdef")])
-def test_a_page_of_a_minute_is_below_600_kb(effects, tmp_path):
+def test_a_page_of_a_minute_is_below_600_kb(tmp_path):
     """Of noise, which nothing makes smaller, at four times the rate of a residual."""
-    made = made_diagnosis(made_trace(effects=effects, rate=100.0))
+    made = made_diagnosis(made_trace(effects=tuple("abcdef"), rate=100.0))
     assert write_report(made, tmp_path)[1].stat().st_size < 600_000
 
 

@@ -10,6 +10,7 @@ from html.parser import HTMLParser
 
 import pytest
 
+from tests.support.alike import strict_json
 from tests.support.browser import look, needs_browser
 from tests.support.diagnoses import made_diagnosis, made_trace
 from tests.support.golden_report import GOLDEN, said
@@ -122,18 +123,11 @@ def reports(diagnosis, tmp_path_factory):
     }
 
 
-def strict(path):
-    def refuse(name):
-        raise AssertionError(f"{name} is not JSON")
-
-    return json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
-
-
 def test_the_numbers(reports):
     diagnosis, paths = reports["plain"]
     assert [p.name for p in paths] == ["report.json", "report.html", "vehicle.yaml"]
     assert set(paths[0].parent.iterdir()) == set(paths)
-    data = strict(paths[0])
+    data = strict_json(paths[0])
     first = "verdict remainder effects alternatives unknown error advice"
     assert " ".join(list(data)[:7]) == first
     assert (data["verdict"], data["remainder"]) == ("explained", "random")
@@ -159,7 +153,7 @@ def test_the_numbers(reports):
     text = dump_vehicle(diagnosis.amended, std)
     assert paths[2].read_text(encoding="utf-8") == text
     made, (numbers, *_) = reports["hard"]
-    blocks = strict(numbers)["error"]["held_out_by_log"]
+    blocks = strict_json(numbers)["error"]["held_out_by_log"]
     assert set(blocks) == {made.logs[0], "second", "flight"}
     assert blocks["second"] == [[1.0, 2.5]]
 
@@ -168,7 +162,7 @@ def test_names_that_are_no_text(diagnosis, tmp_path):
     numbers, html, _ = write_report(
         replace(diagnosis, logs=("log\udcff",)), tmp_path, command="windwrench diagnose log\udcff"
     )
-    assert strict(numbers)["logs"] == ["log?"]
+    assert strict_json(numbers)["logs"] == ["log?"]
     assert "windwrench diagnose log?" in html.read_text(encoding="utf-8")
 
 

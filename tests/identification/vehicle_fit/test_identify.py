@@ -20,13 +20,10 @@ from tests.identification.vehicle_fit.flown import (
     inertial_flights,
 )
 from tests.support.alike import assert_alike
+from tests.support.flown import recorded
 from tests.support.golden_identification import GOLDEN, made, vehicles
 from windwrench.dynamics import load_vehicle
-from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.dynamics.vehicle_file import dump_vehicle, parse_vehicle
-from windwrench.envs.recording import record_flight
-from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.screening import screen_log
 from windwrench.identification.vehicle_fit.channels import MotionPiece, Sources
 from windwrench.identification.vehicle_fit.columns import Drive
@@ -38,11 +35,6 @@ from windwrench.identification.wrench_series import estimate_log
 from windwrench.runtime.errors import InputError
 
 
-def plant_flight(vehicle, effects=(), trajectory="excite", seconds=15.0, seed=1):
-    c = record_flight(vehicle, effects, trajectory, seconds, seed)
-    return FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], name=trajectory)
-
-
 @pytest.fixture(scope="module")
 def crazyflie():
     return load_vehicle("crazyflie")
@@ -50,8 +42,8 @@ def crazyflie():
 
 @pytest.fixture(scope="module")
 def commanded(crazyflie):
-    effects = (EffectSetting("motor_lag", {"tau": 0.06}),)
-    return [plant_flight(crazyflie, effects, t) for t in ("excite", "shake", "yaw")]
+    lag = {"motor_lag": {"tau": 0.06}}
+    return [recorded(t, 15.0, vehicle=crazyflie, **lag) for t in ("excite", "shake", "yaw")]
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +82,7 @@ def test_commanded_speeds_show_the_vehicle_and_its_lag(crazyflie, commanded):
 def test_a_vehicle_of_rounded_speeds_reads_the_log_that_it_comes_from(crazyflie):
     """Its file states the step of the speeds and no fastest one: 255 steps are no limit."""
     step = 3.490658
-    log = plant_flight(crazyflie, trajectory="shake")
+    log = recorded("shake", 15.0, vehicle=crazyflie)
     log = replace(log, rotor_speeds=step * np.round(log.rotor_speeds / step))
     assert np.median(log.rotor_speeds) > 1.5 * 255 * step
     found = identify([log], crazyflie.mass, parse_geometry(str(crazyflie.arm_l)))
@@ -99,11 +91,10 @@ def test_a_vehicle_of_rounded_speeds_reads_the_log_that_it_comes_from(crazyflie)
     assert not any("reads" in note for note in screen_log(log, again)[1])
     force = estimate_log(log, again).force
     assert np.abs(np.mean(force[len(force) // 2 :], axis=0)).max() < 0.02 * again.weight
-    assert diagnose([log], again).declared.omega_lsb == again.omega_lsb
 
 
 def test_a_hover_does_not_show_what_it_does_not_excite(crazyflie):
-    hover = [plant_flight(crazyflie, trajectory="hover", seconds=12.0)]
+    hover = [recorded("hover", 12.0, vehicle=crazyflie)]
     found = identify(hover, crazyflie.mass, parse_geometry(str(crazyflie.arm_l)))
     assert found["Jzz"].status == "assumed"
     assert found["motor_lag"].status == "not identifiable"

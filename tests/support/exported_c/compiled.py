@@ -3,29 +3,22 @@
 import ctypes
 import shutil
 import subprocess
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from windwrench.estimator import WrenchUKF
 from windwrench.estimator.estimate import STATUSES
-from windwrench.live.export_c import Exported
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 PARTS = ("attitude", "angular_velocity", "position", "velocity", "torque", "force")
-Array = NDArray[np.float64]
 _NUMBERS = {"single": ctypes.c_float, "double": ctypes.c_double}
 
 
-def missing(*programs: str) -> list[str]:
+def missing(*programs):
     """Return which of some programs are not installed."""
     return [program for program in programs if shutil.which(program) is None]
 
 
-def write(exported: Exported, folder: Path) -> Path:
+def write(exported, folder):
     """Write the files of an export into a folder; return it."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in exported.files.items():
@@ -33,7 +26,7 @@ def write(exported: Exported, folder: Path) -> Path:
     return folder
 
 
-def run(*words: object, cwd: Path, timeout: float = 600.0) -> str:
+def run(*words, cwd, timeout=600.0):
     """Run a program; return what it says.
 
     Raises:
@@ -49,9 +42,9 @@ def run(*words: object, cwd: Path, timeout: float = 600.0) -> str:
     return done.stdout
 
 
-def _estimate_type(imu: bool, number: Any) -> Any:
+def _estimate_type(imu, number):
     names = ("position", "quaternion", "velocity", "angular_velocity", "torque", "force")
-    fields: list[tuple[str, Any]] = [(n, number * (4 if n == "quaternion" else 3)) for n in names]
+    fields = [(n, number * (4 if n == "quaternion" else 3)) for n in names]
     fields += [(f"std_{n}", number * 3) for n in PARTS]
     fields += [("nis", number), ("status", ctypes.c_int), ("restarts", ctypes.c_uint)]
     fields += [("dead_reckoning", number)]
@@ -65,7 +58,7 @@ def _estimate_type(imu: bool, number: Any) -> Any:
 class CompiledFilter:
     """An export, compiled, with the methods of the Python filter; each returns what C returns."""
 
-    def __init__(self, exported: Exported, folder: Path, compiler: str = "gcc") -> None:
+    def __init__(self, exported, folder, compiler="gcc"):
         write(exported, folder)
         header = exported.files["windwrench_filter.h"]
         lines = ['#include "windwrench_filter.h"']
@@ -83,9 +76,9 @@ class CompiledFilter:
             *("-o", library.name, "-lm"),
             cwd=folder,
         )
-        self.c: Any = ctypes.CDLL(str(library.resolve()))
-        self._number: Any = _NUMBERS[exported.precision]
-        pointer: Any = ctypes.POINTER(self._number)
+        self.c = ctypes.CDLL(str(library.resolve()))
+        self._number = _NUMBERS[exported.precision]
+        pointer = ctypes.POINTER(self._number)
         self.c.ww_predict.argtypes = [ctypes.c_void_p, pointer, self._number]
         self.bytes = int(self.c.size_of_filter())
         self.memory = ctypes.create_string_buffer(self.bytes)
@@ -96,41 +89,41 @@ class CompiledFilter:
             self._policy = ctypes.create_string_buffer(self.policy_bytes)
             self.c.ww_policy_init(self._policy)
 
-    def _array(self, values: Any) -> Any:
+    def _array(self, values):
         return None if values is None else (self._number * len(values))(*map(float, values))
 
-    def reset(self, position: Any, quaternion: Any) -> int:
+    def reset(self, position, quaternion):
         """Call ww_init."""
         return int(self.c.ww_init(self.memory, self._array(position), self._array(quaternion)))
 
-    def predict(self, rotor_speeds: Any, dt: float) -> int:
+    def predict(self, rotor_speeds, dt):
         """Call ww_predict."""
         return int(self.c.ww_predict(self.memory, self._array(rotor_speeds), dt))
 
-    def correct(self, position: Any, quaternion: Any) -> int:
+    def correct(self, position, quaternion):
         """Call ww_correct_pose."""
         return int(
             self.c.ww_correct_pose(self.memory, self._array(position), self._array(quaternion))
         )
 
-    def correct_imu(self, gyro: Any, accelerometer: Any) -> int:
+    def correct_imu(self, gyro, accelerometer):
         """Call ww_correct_imu."""
         return int(
             self.c.ww_correct_imu(self.memory, self._array(gyro), self._array(accelerometer))
         )
 
-    def policy(self, estimate: Any) -> float:
+    def policy(self, estimate):
         """Call ww_policy."""
         return float(self.c.ww_policy(self._policy, ctypes.byref(estimate)))
 
     @property
-    def estimate(self) -> Any:
+    def estimate(self):
         """What ww_get writes; the next call writes over it."""
         self.c.ww_get(self.memory, ctypes.byref(self._now))
         return self._now
 
 
-def differences(c: CompiledFilter, python: WrenchUKF) -> dict[str, float]:
+def differences(c, python):
     """Return the largest difference of each part of two estimates, in standard deviations of the
     Python filter's; that of the standard deviations, relative; and whether status or restarts
     differ.
@@ -154,9 +147,7 @@ def differences(c: CompiledFilter, python: WrenchUKF) -> dict[str, float]:
     return out
 
 
-def compare(
-    c: CompiledFilter, python: WrenchUKF, flight: Mapping[str, Array], every: int = 1
-) -> dict[str, float]:
+def compare(c, python, flight, every=1):
     """Fly both filters along a flight of ``flights``; return the largest of ``differences``, looked
     at ``every`` so many steps, and the share of those looked at in which a part differs by more
     than 1 % of its standard deviation (``over``).
@@ -164,7 +155,7 @@ def compare(
     first = int(np.flatnonzero(np.isfinite(flight["position"]).all(axis=1))[0])
     c.reset(flight["position"][first], flight["quaternion"][first])
     python.reset(flight["position"][first], flight["quaternion"][first])
-    worst: dict[str, float] = {}
+    worst = {}
     over = looked = 0
     for k in range(first + 1, len(flight["dt"])):
         dt, position, quaternion = flight["dt"][k], flight["position"][k], flight["quaternion"][k]

@@ -6,7 +6,6 @@ not a cycle: divisions and roots take 14 on a real one, and flash may wait.
 """
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tests.support.exported_c.compiled import run, write
-from windwrench.live.export_c import Exported
 from windwrench.live.export_c.c_numbers import table
 
 Array = NDArray[np.float64]
@@ -38,7 +36,7 @@ class Measured:
     loop: int  # instructions that the timer saw in the loop of 2,000
 
 
-def object_size(exported: Exported, folder: Path) -> int:
+def object_size(exported, folder):
     """Return the bytes of the filter's object on a Cortex-M4F.
 
     Raises:
@@ -50,7 +48,7 @@ def object_size(exported: Exported, folder: Path) -> int:
     return int(run(TOOLS[1], "filter.o", cwd=folder).splitlines()[1].split()[0])
 
 
-def fly(exported: Exported, flight: Mapping[str, Array], folder: Path) -> Measured:
+def fly(exported, flight, folder):
     """Fly a filter along a flight on the board, at most some thousand steps.
 
     Raises:
@@ -85,7 +83,7 @@ def fly(exported: Exported, flight: Mapping[str, Array], folder: Path) -> Measur
     return _read(said, code)
 
 
-def _read(said: str, code: int) -> Measured:
+def _read(said, code):
     words = {name: int(value, 16) for name, value in re.findall(r"^(\w+) (\w{8}) $", said, re.M)}
     rows = [
         [int(word, 16) for word in line.split()[1:]]

@@ -1,19 +1,15 @@
 """Five flights for C and Python, with faults of a pose: numbers as single precision holds them."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import parse_setting
-from windwrench.dynamics.vehicle import Vehicle
 from windwrench.envs.recording import record_flight
 
-Array = NDArray[np.float64]
 # name: vehicle, trajectory, declared effects, centre of mass (m), rows of the flight between poses
-FLIGHTS: dict[str, tuple[str, str, tuple[str, ...], tuple[float, float, float], int]] = {
+FLIGHTS = {
     "ardrone2, turning": ("ardrone2", "yaw", (), (0.0, 0.0, 0.0), 1),
     "crazyflie, brisk": ("crazyflie", "fast", (), (0.0, 0.0, 0.0), 1),
     "hummingbird, centre of mass off": ("hummingbird", "excite", (), (0.01, -0.005, 0.02), 1),
@@ -30,7 +26,7 @@ _FAULT = 0.01  # chance a step that a fault begins
 _LENGTHS = (0.015, 0.08, 0.3, 0.8, 1.5)  # s
 
 
-def vehicle_of(name: str) -> Vehicle:
+def vehicle_of(name):
     """Return the vehicle that flies a flight."""
     vehicle, _, effects, com, every = FLIGHTS[name]
     model = replace(load_vehicle(vehicle), com=np.array(com))
@@ -38,9 +34,7 @@ def vehicle_of(name: str) -> Vehicle:
     return replace(model, mocap=rate).with_effects(*(parse_setting(e, model) for e in effects))
 
 
-def flight(
-    name: str, steps: int, seed: int = 0, faults: bool = True, imu: bool = False
-) -> dict[str, Array]:
+def flight(name, steps, seed=0, faults=True, imu=False):
     """Return ``dt`` (n,), ``rotor_speeds`` (n, 4), ``position`` (n, 3), ``quaternion`` (n, 4), and
     with an IMU ``gyro`` and ``accelerometer`` (n, 3); what was not measured is NaN.
 
@@ -82,14 +76,14 @@ def flight(
     return {key: np.asarray(value, dtype=np.float32).astype(float) for key, value in out.items()}
 
 
-def _saturate(rng: np.random.Generator, accelerometer: Array) -> None:
+def _saturate(rng, accelerometer):
     """Let the accelerometer shake and saturate now and then, for up to 0.8 s."""
     for begin in np.flatnonzero(rng.random(len(accelerometer)) < 0.001):
         rows = slice(begin, begin + int(rng.integers(1, 160)))
         accelerometer[rows] = np.clip(8.0 * accelerometer[rows], -39.0, 39.0)
 
 
-def _faults(rng: np.random.Generator, n: int, period: float) -> Iterator[tuple[int, int, str]]:
+def _faults(rng, n, period):
     k = round(0.5 / period)
     while k < n:
         if rng.random() < _FAULT * period / 0.005:

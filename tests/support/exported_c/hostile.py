@@ -1,11 +1,7 @@
 """Hostile sequences for C and Python: what vehicles, motion capture and radios do, at its worst."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from windwrench.dynamics.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 STEPS = 1_000
 PERIOD = 0.0055  # s: no bound of the filters is a multiple of it, which rounding alone would decide
 KINDS = (
@@ -14,7 +10,7 @@ KINDS = (
 )
 
 
-def hostile(vehicle: Vehicle, seed: int) -> dict[str, Array]:
+def hostile(vehicle, seed):
     """Return a hover (``STEPS`` rows, as of ``flights.flight``) to which something happens every
     half a second: for 5 ms to 0.6 s, 1 cm to 30 m far. Signs of quaternions change at random.
     """
@@ -40,7 +36,7 @@ def hostile(vehicle: Vehicle, seed: int) -> dict[str, Array]:
     return {name: values.astype(np.float32).astype(np.float64) for name, values in flown.items()}
 
 
-def befall(kind: str, when: slice, x: Array, q: Array, W: Array, rng: np.random.Generator) -> Array:
+def befall(kind, when, x, q, W, rng):
     """Let something happen to positions (n, 3), quaternions (n, 4) or rotor speeds (n, 4); return
     how far positions jump (3,), where they do.
     """
