@@ -1,8 +1,9 @@
 """Control laws of the tasks in the wind: from an observation (27,) to an acceleration (3,) m/s2
 beside the flight loop's own.
 
-All of them are what their papers state for the position loop alone: attitude and rates stay with
-the flight loop. They add to its proportional, derivative and weak integral action.
+All of them are what their papers state for the position loop: attitude and rates stay with the
+flight loop. They add to its proportional, derivative and weak integral action. Those that answer
+the torque ask the flight loop for the tilt that its attitude loop turns against it.
 """
 
 import math
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..runtime.errors import InputError
 from .axis_models import tilting
+from .flight import FlightGains
 from .wind_observation import (
     FORCE,
     MAX_ACCELERATION,
@@ -31,6 +33,11 @@ Array = NDArray[np.floating[Any]]
 Wide = NDArray[np.float64]
 _GRAVITY = 9.81  # m/s2
 _MASS = 0.465  # kg, declared, of the tasks' standard vehicle
+_INERTIA = np.array([2.985236e-3, 2.237568e-3])  # kg m2, likewise, against tilting along x and y
+# m/s2 for 1 Nm: of which the attitude loop makes an angular acceleration of 1 Nm over the inertia
+_TURN = np.array([*(_GRAVITY / (FlightGains.attitude * _INERTIA)), 0.0])
+# s, of the attitude loop behind an acceleration that is asked for; upwards there is none
+_ATTITUDE_LAG = FlightGains.rate / FlightGains.attitude * np.array([1.0, 1.0, 0.0])
 
 
 @dataclass(eq=False)
@@ -51,6 +58,7 @@ class WindLaw:
     def reset(self) -> None:
         """Forget the last episode."""
         self._sum: Wide = np.zeros(3)
+        self._last: dict[str, Wide] = {}
 
     def __call__(self, observation: Array, info: Mapping[str, Any] | None = None) -> Array:
         """Return the action (3,) m/s2 for an observation (27,)."""
@@ -74,6 +82,18 @@ class WindLaw:
         """Return the part (3,) m/s2 that cancels the wind; none in this one."""
         return np.zeros(3)
 
+    def _led(self, name: str, value: Wide, lead: float | Wide) -> Wide:
+        """Return ``value + lead dvalue/dt`` by the change of this ``name`` over a decision."""
+        last = self._last.get(name, value)
+        self._last[name] = value
+        led: Wide = value + lead * ((value - last) / WIND_PERIOD)
+        return led
+
+
+def _tilting(o: Wide) -> Wide:
+    """Return what of the estimated torque tilts the vehicle along x and y, and 0: (3,) Nm."""
+    return np.array([*tilting(o[TORQUE]), 0.0])
+
 
 class FlightLoopAlone(WindLaw):
     """Adds nothing to the flight loop: the lower end of the score, 0."""
@@ -95,47 +115,31 @@ class PIDWithForce(WindLaw):
     lead: float = 0.0  # s, by which the force's change over a decision is added
     mass: float = _MASS  # kg
 
-    def reset(self) -> None:
-        """Forget the last episode."""
-        super().reset()
-        self._last: Wide | None = None
-
     def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
         """Return ``- gain (f + lead df/dt) / m``."""
-        force = o[FORCE]
-        rate = 0.0 * force if self._last is None else (force - self._last) / WIND_PERIOD
-        self._last = force
-        against: Wide = -self.gain / self.mass * (force + self.lead * rate)
+        against: Wide = -self.gain / self.mass * self._led("force", o[FORCE], self.lead)
         return against
 
 
 @dataclass(eq=False)
 class PIDWithWrench(PIDWithForce):
     """The same with the estimated torque, too, which tilts the vehicle, and the tilt carries it
-    away: the flight loop is asked for the tilt that its own attitude loop turns against it.
+    away.
     """
 
     tilt: float = 10.0  # m/s2 for 1 Nm; g / (J k_attitude) cancels all of a steady torque: 30
     tilt_lead: float = 0.1  # s, by which the torque's change over a decision is added
 
-    def reset(self) -> None:
-        """Forget the last episode."""
-        super().reset()
-        self._last_torque: Wide | None = None
-
     def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
         """Return the force's part, and ``- tilt (tau + tilt_lead dtau/dt)`` across."""
-        torque = np.array([*tilting(o[TORQUE]), 0.0])
-        last = torque if self._last_torque is None else self._last_torque
-        self._last_torque = torque
-        turned = torque + self.tilt_lead * (torque - last) / WIND_PERIOD
+        turned = self._led("torque", _tilting(o), self.tilt_lead)
         against: Wide = super().against_the_wind(o, info) - self.tilt * turned
         return against
 
 
 @dataclass(eq=False)
 class INDI(WindLaw):
-    """Incremental nonlinear dynamic inversion of the position loop.
+    """Incremental nonlinear dynamic inversion of the position loop, and of the torque.
 
     Tal and Karaman, *Accurate tracking of aggressive quadrotor trajectories using incremental
     nonlinear dynamic inversion and differential flatness*, IEEE TCST 29(3), 2021, the incremental
@@ -143,15 +147,20 @@ class INDI(WindLaw):
     is commanded is the one now, plus what the acceleration lacks, both behind the same low-pass (a
     Butterworth of second order; so in Smeur, Chu and de Croon, JGCD 39(3), 2016). With the flight
     loop's command as ``a_c`` this adds ``-(a_f - (tau b_z)_f + g)``, which is the low-passed
-    difference of accelerometer and rotor model. Unlike there, the attitude loop is the flight
-    loop's, not an INDI of angular acceleration, and measurements come as means over 40 ms.
+    difference of accelerometer and rotor model.
+
+    The paper's law of angular acceleration, ``mu_c = mu_f + J (alpha_c - alpha_f)``, takes the
+    torque that the rotors do not explain from the command. Here the wrench filter estimates it, and
+    the flight loop's attitude loop, ``alpha = k_attitude a / g``, is inverted: ``a = - g (tau +
+    tilt_lead dtau/dt) / (J k_attitude)``. The lead makes good for the lag of estimate and motors.
+    Both increments pass the same low-pass, as there. Measurements come as means over 40 ms.
 
     Raises:
         InputError: ``cutoff`` lies beyond half the rate of decisions.
     """
 
     cutoff: float = 5.0  # Hz, of the second-order Butterworth low-pass
-    gain: float = 1.0  # share of the increment that is taken; 1 in the paper
+    tilt_lead: float = 0.25  # s, by which the torque's change over a decision is added
 
     def __post_init__(self) -> None:
         if not 0.0 < self.cutoff < 0.5 / WIND_PERIOD:
@@ -169,27 +178,31 @@ class INDI(WindLaw):
         self._state: Wide | None = None
 
     def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
-        """Return the low-passed difference of rotor model and accelerometer."""
+        """Return the low-passed difference of rotor model and accelerometer, less the tilt."""
         from scipy.signal import lfilter, lfilter_zi
 
-        x = o[ROTOR_FORCE] - o[SPECIFIC_FORCE]
+        turned = self._led("torque", _tilting(o), self.tilt_lead)
+        x = o[ROTOR_FORCE] - o[SPECIFIC_FORCE] - _TURN * turned
         if self._state is None:  # as if it had always been so
             self._state = np.outer(lfilter_zi(*self._filter), x)
         y, self._state = lfilter(*self._filter, x[np.newaxis], axis=0, zi=self._state)
-        return np.asarray(self.gain * y[0])
+        return np.asarray(y[0])
 
 
 @dataclass(eq=False)
 class L1Adaptive(WindLaw):
-    """L1 adaptive augmentation of the position loop.
+    """L1 adaptive augmentation of the position loop, and of the torque.
 
     Wu, Cheng, Ackerman, Gahlawat, Lakshmanan, Zhao and Hovakimyan, *L1 adaptive augmentation for
     geometric tracking control of quadrotors*, ICRA 2022 (and L1Quad, arXiv 2302.07208): a state
     predictor ``dv^/dt = f/m - g + sigma^ + A_s (v^ - v)``, the piecewise constant adaptation law
     ``sigma^ = -Phi^-1 exp(A_s T) (v^ - v)`` with ``Phi = A_s^-1 (exp(A_s T) - I)``, and the control
-    ``-C(s) sigma^`` with a first-order low-pass. Here on the translational part alone, with the
-    rotors' specific force by the declared model as its input; all three axes count as matched,
-    since the flight loop turns the thrust to where it is wanted.
+    ``-C(s) sigma^`` with a first-order low-pass. The predictor's input is the rotors' specific
+    force by the declared model, and of the torque the wrench filter's estimate stands for
+    ``sigma^``. Neither acts where the command does, before the attitude loop: both are unmatched,
+    and the control is ``-C(s) H_m^-1(s) H_um(s) sigma^`` (Xargay, Hovakimyan and Cao, ACC 2010). To
+    first order that is ``sigma^ + k_rate / k_attitude dsigma^/dt`` for the force, and as in
+    ``INDI`` for the torque.
 
     Raises:
         InputError: a number is not above zero.
@@ -197,6 +210,7 @@ class L1Adaptive(WindLaw):
 
     pole: float = 5.0  # 1/s, -A_s
     bandwidth: float = 5.0  # rad/s, of C(s)
+    tilt_lead: float = 0.25  # s, by which the torque's change over a decision is added
 
     def __post_init__(self) -> None:
         for name in ("pole", "bandwidth"):
@@ -217,13 +231,15 @@ class L1Adaptive(WindLaw):
     def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
         """Advance predictor and adaptation by a decision; return ``-C(s) sigma^``."""
         v, pushed = o[VELOCITY], o[ROTOR_FORCE] - np.array([0.0, 0.0, _GRAVITY])
+        turned = _TURN * self._led("torque", _tilting(o), self.tilt_lead)
         if self._gap is None:  # hovering: the wind is what the rotors balance
-            self._gap, self._sigma, self._filtered = np.zeros(3), -pushed, -pushed
+            self._gap, self._sigma, self._filtered = np.zeros(3), -pushed, turned - pushed
         else:
             # the predictor over the interval that ends now, with its input and estimate
             risen = (v - self._velocity) / WIND_PERIOD
             self._gap = self._decay * self._gap + self._phi * (pushed + self._sigma - risen)
             self._sigma = -self._adapt * self._gap
-            self._filtered = self._sigma + self._keep * (self._filtered - self._sigma)
+            matched = self._led("sigma", self._sigma, _ATTITUDE_LAG) + turned
+            self._filtered = matched + self._keep * (self._filtered - matched)
         self._velocity = v.copy()
         return -self._filtered

@@ -6,7 +6,15 @@ times a second; they add up with ``+``. Any other wind flies as it is, and faste
 was sampled on (``on_grid``).
 """
 
-from .adapters import PyFlytWind, RotorPyWind, pyflyt_wind_type
+from .adapters import (
+    PyFlytWind,
+    RotorPyWind,
+    WindDrag,
+    blow_crazyflow,
+    blow_pybullet_drones,
+    isaac_lab_multirotor_type,
+    pyflyt_wind_type,
+)
 from .field import CompiledWind, Sum, Wind, winds_of
 from .grid import GridWind, on_grid, read_wind, write_wind
 from .jets import FanWall, VehicleWash, switching
@@ -26,6 +34,10 @@ __all__ = [
     "Uniform",
     "VehicleWash",
     "Wind",
+    "WindDrag",
+    "blow_crazyflow",
+    "blow_pybullet_drones",
+    "isaac_lab_multirotor_type",
     "low_altitude",
     "on_grid",
     "pyflyt_wind_type",

@@ -1,16 +1,21 @@
-"""The same wind in other simulators: PyFlyt and RotorPy. Neither is needed to make one.
+"""The same wind in other simulators, none of which is needed to make one.
 
-Both ask for the wind at points of the world in m, z up, and take m/s, as these winds do.
+PyFlyt and RotorPy ask for the wind at points of the world in m, z up, and take m/s, as these winds
+do. crazyflow, gym-pybullet-drones and Isaac Lab take force and torque: those of ``WindDrag``. What
+drag a simulator has of its own comes on top.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
+from ...runtime.errors import InputError
 from .field import Array, Wind
 
 
@@ -66,3 +71,96 @@ class RotorPyWind:
         at = np.asarray(position, dtype=np.float64).reshape(1, 3)
         seen: Array = np.asarray(self.wind.velocity(at, float(t)), dtype=np.float64)[0]
         return seen
+
+
+_CORNERS = np.sqrt(0.5) * np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
+
+
+@dataclass(frozen=True)
+class WindDrag:
+    """What a wind does to quadrotors: linear drag of each rotor in the air where it is."""
+
+    wind: Wind
+    arm: float  # m, from the centre to each rotor
+    drag: float  # N/(m/s), of one rotor
+
+    def wrench(
+        self, time: float, position: Array, rotation: Rotation, velocity: Array, rate: Array
+    ) -> tuple[Array, Array]:
+        """Return force (n, 3) N and torque (n, 3) Nm about the centre, world, on n vehicles at
+        ``position`` m with ``rotation`` body to world, ``velocity`` m/s and angular velocity
+        ``rate`` rad/s, (n, 3), world.
+        """
+        reach = np.stack([rotation.apply(self.arm * corner) for corner in _CORNERS], axis=1)
+        points = (position[:, None] + reach).reshape(-1, 3)
+        air = np.asarray(self.wind.velocity(points, time)).reshape(reach.shape)
+        force = self.drag * (air - velocity[:, None] - np.cross(rate[:, None], reach))
+        return force.sum(axis=1), np.cross(reach, force).sum(axis=1)
+
+
+def blow_crazyflow(data: Any, drag: WindDrag) -> Any:
+    """Return crazyflow's ``SimData`` with force and torque of the wind, for all worlds and drones:
+    ``sim.data = blow_crazyflow(sim.data, drag)`` before each ``sim.step``.
+
+    Tested with crazyflow 0.4.0.
+    """
+    s, time = data.states, float(data.core.steps.max()) / data.core.freq
+    position, quaternion, velocity, rate = (
+        np.asarray(part, dtype=np.float64).reshape(-1, part.shape[-1])
+        for part in (s.pos, s.quat, s.vel, s.ang_vel)
+    )
+    rotation = Rotation.from_quat(quaternion)
+    force, torque = drag.wrench(time, position, rotation, velocity, rotation.apply(rate))
+    force, torque = force.reshape(s.force.shape), torque.reshape(s.torque.shape)
+    return data.replace(
+        states=s.replace(force=s.force.at[:].set(force), torque=s.torque.at[:].set(torque))
+    )
+
+
+def blow_pybullet_drones(env: Any, drag: WindDrag) -> None:
+    """Apply force and torque of the wind to all drones of a ``BaseAviary`` of gym-pybullet-drones,
+    before each ``env.step``.
+
+    Tested with its commit 90b178a and PyBullet 3.2.7.
+
+    Raises:
+        InputError: several physics steps a control step, of which only the first would feel it.
+    """
+    import pybullet
+
+    if env.PYB_STEPS_PER_CTRL != 1:
+        raise InputError(
+            "blow_pybullet_drones: expected ctrl_freq equal to pyb_freq, got "
+            f"{env.CTRL_FREQ} and {env.PYB_FREQ} Hz"
+        )
+    time, rotation = env.step_counter * env.PYB_TIMESTEP, Rotation.from_quat(env.quat)
+    force, torque = drag.wrench(time, env.pos, rotation, env.vel, env.ang_v)
+    for body, at, f, t in zip(env.DRONE_IDS, env.pos, force, torque, strict=True):
+        place = -1, f, at, pybullet.WORLD_FRAME, env.CLIENT
+        pybullet.applyExternalForce(body, *place)
+        pybullet.applyExternalTorque(body, -1, t, pybullet.WORLD_FRAME, env.CLIENT)
+
+
+def isaac_lab_multirotor_type(drag: WindDrag, clock: Callable[[], float]) -> type:
+    """Return a ``MultirotorCfg.class_type`` of Isaac Lab that flies in the wind; ``clock`` returns
+    the time in s, as ``lambda: sim.current_time``.
+
+    **Never run in Isaac Lab**: written by the documentation of 2.3.2, tested with a stand-in.
+    """
+    from isaaclab_contrib.assets import Multirotor
+
+    class WindyMultirotor(Multirotor):  # type: ignore[misc]
+        def _combine_thrusts(self) -> None:
+            super()._combine_thrusts()
+            data = self.data
+            moving = data.root_pos_w, data.root_quat_w, data.root_lin_vel_w, data.root_ang_vel_w
+            place, quaternion, velocity, rate = (
+                part.cpu().numpy().astype(np.float64) for part in moving
+            )
+            rotation = Rotation.from_quat(quaternion, scalar_first=True)
+            wrench = drag.wrench(clock(), place, rotation, velocity, rate)
+            targets = self._internal_force_target_sim, self._internal_torque_target_sim
+            for target, world in zip(targets, wrench, strict=True):
+                target[:, 0] += target.new_tensor(rotation.inv().apply(world))
+
+    return WindyMultirotor

@@ -1,4 +1,4 @@
-"""Winds: spectra against theory, formulas, files, and the same field in other simulators."""
+"""Winds: spectra against theory, formulas, and files."""
 
 import math
 
@@ -12,8 +12,6 @@ from windwrench.envs.wind import (
     FanWall,
     GridWind,
     Gust,
-    PyFlytWind,
-    RotorPyWind,
     Shear,
     Turbulence,
     Uniform,
@@ -21,7 +19,6 @@ from windwrench.envs.wind import (
     Wind,
     low_altitude,
     on_grid,
-    pyflyt_wind_type,
     read_wind,
     spectrum,
     write_wind,
@@ -253,19 +250,3 @@ def test_what_cannot_be_is_named_in_one_line(make, words):
     with pytest.raises(InputError, match=words) as refused:
         make()
     assert "\n" not in str(refused.value)
-
-
-def test_pyflyt_gets_the_same_field():
-    wind = Turbulence(0, 1.0, 2.0, (4, 0, 0))
-    points = np.random.default_rng(7).uniform(-1, 1, (5, 3))
-    # as Aviary makes and asks for it
-    field = pyflyt_wind_type(wind)(np_random=np.random.default_rng(0))
-    for one in (field, PyFlytWind(wind)):
-        np.testing.assert_array_equal(one(0.4, points), wind.velocity(points, 0.4))
-        assert one(0.0, np.array([[0.0, 0.0, 1.0]] * 5)).shape == (5, 3)
-
-
-def test_rotorpy_gets_the_same_field():
-    wind = FanWall(np.full(9, 4.0))
-    seen = RotorPyWind(wind).update(0.4, np.array([2.0, 0.1, 1.2]))
-    np.testing.assert_array_equal(seen, wind.velocity([[2.0, 0.1, 1.2]], 0.4)[0])

@@ -1,0 +1,172 @@
+"""The same wind in other simulators, by stand-ins of what each of them documents."""
+
+import sys
+from types import ModuleType, SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from windwrench.dynamics import InputError
+from windwrench.envs.wind import (
+    FanWall,
+    PyFlytWind,
+    RotorPyWind,
+    Turbulence,
+    WindDrag,
+    blow_crazyflow,
+    blow_pybullet_drones,
+    isaac_lab_multirotor_type,
+    pyflyt_wind_type,
+)
+
+rng = np.random.default_rng(3)
+PLACE, VELOCITY, RATE = rng.normal(size=(3, 2, 3))
+ROTATION = Rotation.random(2, rng)
+ARM, DRAG = 0.1, 0.02
+
+
+class Sheared:
+    """Blows along x, faster with y and time."""
+
+    def velocity(self, points, time):
+        y = np.asarray(points)[:, 1]
+        return np.column_stack([3.0 + 2.0 * y + time, 0.0 * y, 0.0 * y])
+
+
+def test_pyflyt_gets_the_same_field():
+    wind = Turbulence(0, 1.0, 2.0, (4, 0, 0))
+    points = np.random.default_rng(7).uniform(-1, 1, (5, 3))
+    # as Aviary makes and asks for it
+    field = pyflyt_wind_type(wind)(np_random=np.random.default_rng(0))
+    for one in (field, PyFlytWind(wind)):
+        np.testing.assert_array_equal(one(0.4, points), wind.velocity(points, 0.4))
+        assert one(0.0, np.array([[0.0, 0.0, 1.0]] * 5)).shape == (5, 3)
+
+
+def test_rotorpy_gets_the_same_field():
+    wind = FanWall(np.full(9, 4.0))
+    seen = RotorPyWind(wind).update(0.4, np.array([2.0, 0.1, 1.2]))
+    np.testing.assert_array_equal(seen, wind.velocity([[2.0, 0.1, 1.2]], 0.4)[0])
+
+
+def still(time=0.0):
+    """Return the drag of vehicles at their places that neither move nor turn."""
+    zero = np.zeros((2, 3))
+    return WindDrag(Sheared(), ARM, DRAG).wrench(time, PLACE, Rotation.identity(2), zero, zero)
+
+
+def test_a_wind_pushes_and_a_shear_turns():
+    force, torque = still(time=0.5)
+    along = 4.0 * DRAG * (3.5 + 2.0 * PLACE[:, 1])
+    np.testing.assert_allclose(force, np.column_stack([along, 0 * along, 0 * along]), atol=1e-12)
+    # sum of -y F_x over four rotors at y = arm / sqrt 2
+    np.testing.assert_allclose(torque, [[0, 0, -4 * DRAG * 2.0 * ARM**2 / 2]] * 2, atol=1e-12)
+    calm = WindDrag(Turbulence(0, 1e-12, 1.0, (1, 0, 0)), ARM, DRAG)
+    force, torque = calm.wrench(0.0, PLACE, ROTATION, VELOCITY, RATE)
+    np.testing.assert_allclose(force, -4 * DRAG * VELOCITY, atol=1e-10)
+    assert np.all(np.sum(torque * RATE, axis=1) < 0.0)  # drag brakes
+
+
+def expected(time):
+    return WindDrag(Sheared(), ARM, DRAG).wrench(time, PLACE, ROTATION, VELOCITY, RATE)
+
+
+class Leaf(np.ndarray):
+    """An array with JAX's ``at[:].set``."""
+
+    @property
+    def at(self):
+        return self
+
+    def __getitem__(self, key):
+        return self if key == slice(None) else super().__getitem__(key)
+
+    def set(self, new):
+        return np.asarray(new).view(Leaf)
+
+
+class Tree(SimpleNamespace):
+    def replace(self, **new):
+        return Tree(**{**vars(self), **new})
+
+
+def test_crazyflow_gets_force_and_torque_of_all_worlds():
+    parts = {
+        "pos": PLACE,
+        "quat": ROTATION.as_quat(),
+        "vel": VELOCITY,
+        "ang_vel": ROTATION.inv().apply(RATE),  # body
+        "force": np.zeros((2, 3)),
+        "torque": np.zeros((2, 3)),
+    }
+    states = Tree(**{name: part[:, None].view(Leaf) for name, part in parts.items()})
+    data = Tree(states=states, core=Tree(steps=np.full((2, 1), 250), freq=500))
+    blown = blow_crazyflow(data, WindDrag(Sheared(), ARM, DRAG)).states
+    for seen, wanted in zip((blown.force, blown.torque), expected(0.5), strict=True):
+        np.testing.assert_allclose(np.asarray(seen)[:, 0], wanted, atol=1e-12)
+    assert blown.pos is states.pos
+
+
+def test_pybullet_drones_get_force_and_torque(monkeypatch):
+    applied = {"Force": [], "Torque": []}
+    bullet = ModuleType("pybullet")
+    bullet.WORLD_FRAME = 2
+    bullet.applyExternalForce = lambda body, link, force, at, frame, client: applied[
+        "Force"
+    ].append((body, link, *force, *at, frame, client))
+    bullet.applyExternalTorque = lambda body, link, torque, frame, client: applied["Torque"].append(
+        (body, link, *torque, frame, client)
+    )
+    monkeypatch.setitem(sys.modules, "pybullet", bullet)
+    env = SimpleNamespace(
+        PYB_STEPS_PER_CTRL=1,
+        PYB_FREQ=240,
+        CTRL_FREQ=240,
+        PYB_TIMESTEP=1 / 240,
+        step_counter=120,
+        pos=PLACE,
+        quat=ROTATION.as_quat(),
+        vel=VELOCITY,
+        ang_v=RATE,
+        DRONE_IDS=np.array([4, 5]),
+        CLIENT=1,
+    )
+    drag = WindDrag(Sheared(), ARM, DRAG)
+    blow_pybullet_drones(env, drag)
+    force, torque = expected(0.5)
+    for i, body in enumerate(env.DRONE_IDS):
+        np.testing.assert_allclose(applied["Force"][i], [body, -1, *force[i], *PLACE[i], 2, 1])
+        np.testing.assert_allclose(applied["Torque"][i], [body, -1, *torque[i], 2, 1])
+    env.PYB_STEPS_PER_CTRL, env.CTRL_FREQ = 5, 48
+    with pytest.raises(InputError, match="expected ctrl_freq equal to pyb_freq, got 48 and 240 Hz"):
+        blow_pybullet_drones(env, drag)
+
+
+def test_isaac_lab_adds_the_wind_to_the_thrust(monkeypatch):
+    torch = pytest.importorskip("torch", reason="pip install 'windwrench[rl]'")
+
+    class Multirotor:
+        def __init__(self):
+            self._internal_force_target_sim = torch.zeros(2, 5, 3)
+            self._internal_torque_target_sim = torch.zeros(2, 5, 3)
+            quaternion = ROTATION.as_quat(scalar_first=True)
+            names = "root_pos_w", "root_quat_w", "root_lin_vel_w", "root_ang_vel_w"
+            values = PLACE, quaternion, VELOCITY, RATE
+            self.data = SimpleNamespace(
+                **dict(zip(names, map(torch.as_tensor, values), strict=True))
+            )
+
+        def _combine_thrusts(self):
+            self._internal_force_target_sim[:, 0, 2] = 7.0
+
+    for name in ("isaaclab_contrib", "isaaclab_contrib.assets"):
+        monkeypatch.setitem(sys.modules, name, ModuleType(name))
+    sys.modules["isaaclab_contrib.assets"].Multirotor = Multirotor
+    robot = isaac_lab_multirotor_type(WindDrag(Sheared(), ARM, DRAG), lambda: 0.5)()
+    robot._combine_thrusts()
+    force, torque = (ROTATION.inv().apply(part) for part in expected(0.5))
+    seen = robot._internal_force_target_sim, robot._internal_torque_target_sim
+    for target, wanted in zip(seen, (force + np.array([0, 0, 7.0]), torque), strict=True):
+        np.testing.assert_allclose(target[:, 0], wanted, rtol=1e-5, atol=1e-6)
+        assert not target[:, 1:].any()
