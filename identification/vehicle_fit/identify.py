@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.effects import Role
+from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from .assemble import advice_of, vehicle_of
@@ -23,6 +24,7 @@ from .columns import ANSWERED_HZ, Drive
 from .effect_settings import effect_of
 from .estimates import Estimates, Intervals, thrust_of
 from .geometry import SPIN, USUAL, Geometry
+from .held_out import predicted, warnings_of
 from .motors import motor_response
 from .parameters import ANSWERED, FORCE_BIAS, OPTIONAL, POSITIVE, first_model
 from .result import IDENTIFIED, NOTHING, WIDEST, Estimate, Identified, told
@@ -114,26 +116,38 @@ def identify(
             "the accelerometer's scale is taken as right: an error of 1 % in it is one of 1 % in "
             "thrust"
         )
-    estimates = Estimates(fit, sources, geometry, kept).say_all(pieces, not_told)
-    if "lag" in fit.model.free:
-        estimates.append(_lag_alone(pieces, fit))
     motors = None if commands or "lag" in fit.model.free else motor_response(pieces)
+
+    def described(fit: VehicleFit) -> tuple[dict[str, Estimate], Vehicle]:
+        said = Estimates(fit, sources, geometry, kept).say_all(pieces, not_told)
+        named = {estimate.name: estimate for estimate in said}
+        return named, vehicle_of(name, fit, named, geometry, logs, voltage, step, motors)
+
+    named, vehicle = described(fit)
+    if "lag" in fit.model.free:
+        named |= {alone.name: alone for alone in [_lag_alone(pieces, fit)]}
     if motors is not None:
         how = (
             f"rotor speeds against commands, {100 * motors.left:.0f} % of their variation left over"
         )
-        lag = Estimate(effect_of(Role.LAG), *motors.known, "s", IDENTIFIED, how)
-        estimates = [lag if e.name == lag.name else e for e in estimates]
-    named = {e.name: e for e in estimates}
-    vehicle = vehicle_of(name, fit, named, geometry, logs, voltage, step, motors)
+        lag = effect_of(Role.LAG)
+        named[lag] = Estimate(lag, *motors.known, "s", IDENTIFIED, how)
+    report(0.9, "predicting what is held out")
+    errors = {}
+    try:
+        errors = predicted(pieces, logs, fit, lambda part: described(part)[1])
+    except InputError as error:
+        notes.append(f"nothing that is held out was predicted: {error}")
+    notes += warnings_of(errors)
     return Identified(
         vehicle,
-        tuple(estimates),
+        tuple(named.values()),
         sources,
         tuple(pieces),
         fit,
         tuple(notes),
         tuple(advice_of(named)),
+        errors,
     )
 
 

@@ -85,6 +85,10 @@ def test_commanded_speeds_show_the_vehicle_and_its_lag(crazyflie, commanded):
     share = explained(found)  # of force z and all torques; along x and y nothing acts
     assert (share[2:] > 0.9).all()
     assert (share[:2] < 0.1).all()
+    assert list(found.predicted) == ["held_out_blocks", "flights_left_out"]
+    for errors in found.predicted.values():
+        assert not errors.worse
+        assert (errors.model[:, -1] < 0.3 * errors.still[:, -1]).all()
 
 
 def test_a_vehicle_of_rounded_speeds_reads_the_log_that_it_comes_from(crazyflie):
@@ -126,6 +130,30 @@ def test_an_imu_and_commands_are_enough():
     assert vehicle.motor_curve is not None
     thrust = vehicle.commanded_thrust(np.full((1, 4), hover))
     assert thrust.sum() == pytest.approx(MASS * 9.81, rel=0.05)
+
+
+def test_a_discharge_tells_the_voltage_from_the_thrust_curve(inertial):
+    log, _ = inertial[0]
+    volts = np.linspace(4.2, 3.5, len(log.t))
+    used = replace(log, voltage=volts, command=log.command * (volts[:, None] / 3.85) ** -0.6)
+    found = identify([used], MASS, parse_geometry(str(ARM)))
+    check(found, "voltage_exponent", 1.2, 0.15)
+    hover = np.sqrt(MASS * 9.81 / (4 * K)) / FULL
+    empty, full = (e for e in found.estimates if e.name.startswith("hover command at"))
+    for volt, known in ((3.535, empty), (4.165, full)):
+        assert known.low < hover * (volt / 3.85) ** -0.6 < known.high
+    assert found.vehicle.motor_curve.voltage_exponent == found["voltage_exponent"].value
+
+
+def test_without_a_discharge_voltage_and_curve_are_not_told_apart(inertial):
+    log, _ = inertial[0]
+    same = identify(
+        [replace(log, voltage=np.full(len(log.t), 3.9))], MASS, parse_geometry(str(ARM))
+    )
+    assert same["voltage_exponent"].status == "not identifiable"
+    assert "hardly changes" in same["voltage_exponent"].how
+    assert any("with a full and with an empty battery" in line for line in same.advice)
+    assert same.vehicle.motor_curve.voltage_exponent == 0.0
 
 
 @pytest.mark.slow
