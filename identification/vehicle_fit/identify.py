@@ -84,7 +84,9 @@ def identify(
     commands = sources.rotors == "commands"
     step = 0.0 if commands else rounding_step(logs)
     reference, noise = voltage if commands else 0.0, step / math.sqrt(12.0)
-    drive = Drive(geometry.positions, SPIN, commands, voltage_ref=reference, speed_noise=noise)
+    drive = Drive(
+        geometry.positions, SPIN, geometry.known, commands, voltage_ref=reference, speed_noise=noise
+    )
     report(0.05, "fitting forces and torques")
     fit, turned = _first_fit(pieces, sources, drive, mass)
     report(0.4, "asking whether slow and quick motion agree")

@@ -109,7 +109,7 @@ def fitted(found: Identified, piece: MotionPiece) -> tuple[Array, Array]:
     """
     fit = found.fit
     rotors = rotor_columns(piece, fit.drive)
-    names = (*rotors, *(air := air_columns(piece)))
+    names = (*rotors, *(air := air_columns(piece, fit.drive)))
     late = {
         name: np.interp(piece.t - fit.drive.delay, piece.t, column)
         for name, column in rotors.items()
