@@ -143,7 +143,7 @@ class Estimates:
         reference = self.fit.drive.voltage_ref
 
         def hover(values: Values, share: float = 1.0) -> float:
-            weight = self.fit.model.weight * share ** -values.get("gamma", 0.0)
+            weight = self.fit.model.weight * math.pow(share, -values.get("gamma", 0.0))
 
             def excess(u: float) -> float:
                 return 4.0 * thrust_of(values, exponents, u) - weight

@@ -33,13 +33,15 @@ def predicted(
     for log in logs:
         if not log.has_pose:
             raise InputError(f"{log.name}: has no pose; expected one, to predict from")
-    number, spans = [], []  # of each segment: its log, and from and to, s after its log's start
+    # of each segment: its log, and from and to, s after its log's start
+    number: list[int] = []
+    spans: list[tuple[float, float]] = []
     for piece in pieces:
         t, edges = piece.t - logs[piece.log].t[0], edges_of(len(piece.t), piece.period)
         number += [piece.log] * (len(edges) - 1)
         spans += list(zip(t[edges[:-1]].tolist(), t[edges[1:] - 1].tolist(), strict=True))
     turn = np.arange(len(number)) % FOLDS
-    found = {}
+    found: dict[str, PredictionErrors] = {}
     for where, fold in {"held_out_blocks": turn, "flights_left_out": np.array(number)}.items():
         names = np.unique(fold)
         if len(names) < 2 and where == "flights_left_out":

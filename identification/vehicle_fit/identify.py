@@ -18,6 +18,7 @@ from ...dynamics.effects import Role
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
+from ..prediction import PredictionErrors
 from .assemble import advice_of, vehicle_of
 from .channels import MotionPiece, Sources, pieces_of, rounding_step
 from .columns import ANSWERED_HZ, Drive
@@ -135,7 +136,7 @@ def identify(
         lag = effect_of(Role.LAG)
         named[lag] = Estimate(lag, *motors.known, "s", IDENTIFIED, how)
     report(0.9, "predicting what is held out")
-    errors = {}
+    errors: dict[str, PredictionErrors] = {}
     try:
         errors = predicted(pieces, logs, fit, lambda part: described(part)[1])
     except InputError as error:
