@@ -1,6 +1,7 @@
 """Two sets of flights of one vehicle, compared."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ _EXAMPLE = """A Crazyflie 2.1 flies 26 s with a propeller of the rear left rotor
 def compare(
     logs: list[Path] | None = None,
     against: list[Path] | None = None,
+    by_folder: bool = False,
     example: bool = False,
     reading: Reading = AS_THEY_ARE,
     out: Path = Path("results/compare"),
@@ -37,25 +39,30 @@ def compare(
             resources.files("windwrench.identification.comparison") / "example"
         ) as flown:
             normal = sorted(flown.glob("normal-*.csv.gz"))
-            return _compare([flown / "cut.csv.gz"], normal, AS_THEY_ARE, out)
+            return _compare([flown / "cut.csv.gz"], normal, AS_THEY_ARE, by_folder, out)
     if not logs or not against:
         raise InputError(
             f"compare: expected logs after the change and {_AGAINST} logs before it, or --example"
         )
-    return _compare(logs, against, reading, out)
+    return _compare(logs, against, reading, by_folder, out)
 
 
 def _compare(
-    logs: Sequence[Path], against: Sequence[Path], reading: Reading, out: Path
+    logs: Sequence[Path], against: Sequence[Path], reading: Reading, by_folder: bool, out: Path
 ) -> dict[str, Any]:
     """Compare two sets of flights; write the result."""
     from ..identification.comparison.change import compare as find_change
     from ..identification.comparison.trim import trim_of_log
     from ..identification.comparison.words import change_data, change_headline, write_change
 
-    every, model = read_flights([*logs, *against], reading)
+    paths = [*logs, *against]
+    every, model = read_flights(paths, reading)
+    sessions = [str(path.resolve().parent) if by_folder else "" for path in paths]
     folder = results_folder(out)
-    trims = [trim_of_log(log, model) for log in every]
+    trims = [
+        replace(trim_of_log(log, model), session=session)
+        for log, session in zip(every, sessions, strict=True)
+    ]
     change = find_change(trims[: len(logs)], trims[len(logs) :])
     written = write_change(change, folder)
     log_notes(text for log in every for text in log.notes)

@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -69,12 +70,13 @@ def identify(
     windows = [w if math.isfinite(w[1]) else common for _, w in parts]
     with working("identifying") as progress:
         found = fit(flights, mass, where, windows[: len(logs)], out.stem, report=progress)
-    errors = None
     if unseen:
         with working("predicting"):
-            errors = prediction_errors(unseen, found.vehicle, windows=windows[len(logs) :])
+            parts_of = [[window] for window in windows[len(logs) :]]
+            errors = prediction_errors(unseen, found.vehicle, windows=parts_of)
+        found = replace(found, predicted={**found.predicted, "prediction": errors})
     run.record = out.with_name(f"{out.stem}.run.json")
-    written = write_identified(found, out, errors)
+    written = write_identified(found, out)
     log_notes([*(text for flight in flights for text in flight.notes), *found.notes])
     seconds = found.fit.balance.seconds
     console.print(f"{seconds:.0f} s of flight, mass {mass:g} kg: {headline(found)}.")
@@ -96,14 +98,15 @@ def identify(
             console.print(f"{e.name}: {e.status}: {e.how}")
     for line in found.advice:
         console.print(line)
-    if errors is not None:
+    for of, errors in found.predicted.items():
         ends = zip(QUANTITIES.items(), errors.model[:, -1], errors.still[:, -1], strict=True)
-        console.print(f"predicted from {errors.starts} starts, {errors.horizon[-1]:.2g} s later:")
+        after = f"{errors.horizon[-1]:.2g} s after {errors.starts} starts"
+        console.print(f"{of.replace('_', ' ')}: {after}, by what was not fitted to them:")
         show_table(
             ("mean error", "of the vehicle", "if nothing changes", "unit"),
             [(name, f"{x:.3g}", f"{y:.3g}", unit) for (name, unit), x, y in ends],
         )
-    result = identified_data(found, errors)
+    result = identified_data(found)
     if export is not None:
         text = EXPORTS[export](found)
         console.print(text, soft_wrap=True)

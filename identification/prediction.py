@@ -28,6 +28,7 @@ from ..estimator.innovations import innovations, pieces_of
 from ..estimator.ukf import default_covariance
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
+from .logs.commanded_speeds import with_commanded_speeds
 from .logs.flight_log import FlightLog
 from .motion.sensing_effects import undo_log_sensing
 from .motion.signals import Signals, log_signals
@@ -152,12 +153,26 @@ class PredictionErrors:
     model: Array  # (4, m)
     still: Array  # (4, m) where velocity and body rate stay as they are at the start
 
+    @property
+    def worse(self) -> list[str]:
+        """The quantities that the model predicts worse than the guess, at the horizon's end."""
+        ends = zip(QUANTITIES, self.model[:, -1], self.still[:, -1], strict=True)
+        return [name for name, model, still in ends if model > still]
+
+    @classmethod
+    def pooled(cls, parts: Sequence[PredictionErrors]) -> PredictionErrors:
+        """Return the errors over all starts of several, which have one horizon."""
+        starts = [part.starts for part in parts]
+        both = [[part.model for part in parts], [part.still for part in parts]]
+        means = (np.average(of, axis=0, weights=starts) for of in both)
+        return cls(sum(starts), parts[0].horizon, *means)
+
 
 def prediction_errors(
     logs: Sequence[FlightLog],
     vehicle: Vehicle,
     horizon_s: float = 0.5,
-    windows: Segments | None = None,
+    windows: Sequence[Segments] | None = None,
 ) -> PredictionErrors:
     """Return how well a model predicts flights, beside the guess that nothing changes.
 
@@ -165,19 +180,23 @@ def prediction_errors(
     is the pose below 5 Hz; the angle between two attitudes is their distance.
 
     Args:
-        logs: with a pose; flights that the model was not fitted to, or its errors mean little.
+        logs: with a pose; flights that the model was not fitted to, or its errors mean little. For
+            commands alone the vehicle's motor curve says the rotor speeds.
         vehicle: whose model predicts, with its declared effects.
         horizon_s: s.
-        windows: for each log, from and to in s after its start; None: all of it.
+        windows: for each log, its parts: from and to in s after its start; None: all of it.
 
     Raises:
         InputError: no stretch of pose is long enough, or poses come at different rates.
     """
     model: list[Array] = []
     still: list[Array] = []
-    for log, (begin, end) in zip(logs, windows or [(0.0, math.inf)] * len(logs), strict=True):
-        ends = [(float(log.t[0]) + begin, min(float(log.t[0]) + end, float(log.t[-1])))]
-        for piece, states, rows, path in _predictions(log, vehicle, ends, horizon_s):
+    whole = [[(0.0, math.inf)]] * len(logs)
+    for log, parts in zip(logs, windows or whole, strict=True):
+        first, last = log.t[[0, -1]].tolist()
+        ends = [(first + begin, min(first + end, last)) for begin, end in parts]
+        flown = with_commanded_speeds(log, vehicle)
+        for piece, states, rows, path in _predictions(flown, vehicle, ends, horizon_s):
             begun = rows[:, 0] - 1
             ahead = piece.period * np.arange(1, rows.shape[1] + 1)[:, None]
             seen = Rotation.from_matrix(piece.rotation)

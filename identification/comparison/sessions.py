@@ -1,10 +1,12 @@
-"""The mean of a vehicle's flights, which scatter from flight to flight and from session to session.
+"""By how much two sets of a vehicle's flights differ, where flights scatter from one to the next
+and from session to session.
 
 A battery is never put in twice at the same place, and a vehicle is taken apart between two days:
 all flights of one session are off by the same, and by more than they differ among each other. So
 ten flights of one session say little more of the vehicle than two. Which flights belong together is
-told by the batteries (a voltage that rises from one flight to the next) and by the flights
-themselves: every way to cut their sequence into sessions counts by its likelihood. How much one
+named by the user; or told by the batteries (a voltage that rises from one flight to the next) and
+by the flights themselves: every way to cut their sequence into sessions counts by its likelihood.
+What all flights of a session are off by cancels where it has flights of both sets. How much one
 vehicle scatters more or less than others, at either level, is summed over likewise.
 """
 
@@ -42,7 +44,7 @@ class ScatterSettings:
     ends: float = 0.3
     ends_at_rise: float = 0.9
     rise: float = 0.01
-    most_ends: int = 6  # places where a session may end, those where flights differ most
+    most_ends: int = 8  # places where a session may end, those where flights differ most
     least_log: float = -12.0  # below the likeliest way; what is less likely does not count
 
 
@@ -50,39 +52,32 @@ SCATTER = ScatterSettings()
 
 
 @dataclass(frozen=True, eq=False)
-class Means:
-    """What the mean (4,) of the unchanged vehicle may be: a normal density of each of n ways, which
-    are cuts into sessions and scales of the scatter.
+class Difference:
+    """What the difference (4,) of two sets may be, if nothing changed between them but the vehicle:
+    a normal density of each of n ways, which are cuts into sessions and scales of the scatter.
     """
 
     mean: Array  # (n, 4)
     variance: Array  # (n, 4)
-    log: Array  # (n,) logarithm of how likely the flights are in that way
-    scale: NDArray[np.intp]  # (n,) which scales of the scatter it has
+    log: Array  # (n,) logarithm of how likely the flights are in that way, normalised
 
 
-def means_of(trims: Sequence[Trim]) -> Means:
-    """Return what the mean of the flights' sessions is, in their order of time."""
-    x = np.array([trim.features for trim in trims])
-    noise = np.mean([np.diagonal(trim.noise) for trim in trims], axis=0)
-    session, flight, _ = _scales()
-    flight = flight + noise
-    parts = [_of_cut(x, cut, session, flight, log) for cut, log in _cuts(trims, x)]
-    means, variances, logs = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return Means(means, variances, logs, np.tile(np.arange(len(session)), len(parts)))
-
-
-def difference(after: Sequence[Trim], before: Sequence[Trim]) -> Means:
-    """Return what the difference of two sets' means may be, of the likeliest ways; their ``log``
-    are normalised.
+def difference(after: Sequence[Trim], before: Sequence[Trim]) -> Difference:
+    """Return what the difference of two sets of flights may be, in the likeliest ways; either set
+    is in the order of time.
     """
-    a, b = means_of(after), means_of(before)
-    i, j = np.nonzero(a.scale[:, None] == b.scale)
-    log = a.log[i] + b.log[j] + _scales()[2][a.scale[i]]
+    # flights of one name stand together, behind those without a name
+    every = [*((trim, 0.0) for trim in before), *((trim, 1.0) for trim in after)]
+    names = [trim.session for trim, _ in every]
+    every.sort(key=lambda flown: names.index(flown[0].session) if flown[0].session else -1)
+    trims, later = [trim for trim, _ in every], np.array([which for _, which in every])
+    x = np.array([trim.features for trim in trims])
+    noise = np.array([np.diagonal(trim.noise) for trim in trims])
+    parts = [_of_cut(x, later, noise, cut, log) for cut, log in _cuts(trims, later, x)]
+    mean, variance, log = (np.concatenate(part) for part in zip(*parts, strict=True))
     log -= np.logaddexp.reduce(log)
     keep = log > log.max() + SCATTER.least_log
-    i, j, log = i[keep], j[keep], log[keep]
-    return Means(a.mean[i] - b.mean[j], a.variance[i] + b.variance[j], log, a.scale[i])
+    return Difference(mean[keep], variance[keep], log[keep])
 
 
 def _scales() -> tuple[Array, Array, Array]:
@@ -99,7 +94,7 @@ def _scales() -> tuple[Array, Array, Array]:
     )
 
 
-def _cuts(trims: Sequence[Trim], x: Array) -> list[tuple[NDArray[np.intp], float]]:
+def _cuts(trims: Sequence[Trim], later: Array, x: Array) -> list[tuple[NDArray[np.intp], float]]:
     """Return each way to cut the flights into sessions: the number of each flight's session, and
     the logarithm of its prior.
     """
@@ -108,10 +103,14 @@ def _cuts(trims: Sequence[Trim], x: Array) -> list[tuple[NDArray[np.intp], float
     volts = np.array([np.nan if trim.voltage is None else trim.voltage for trim in trims])
     rises = np.diff(volts) > use.rise * volts[:-1]  # False where one is not known
     chance = np.where(rises, use.ends_at_rise, use.ends)
-    places = np.argsort(-apart, kind="stable")[: use.most_ends]
+    names = np.array([trim.session for trim in trims])
+    told = (names[1:] != "") | (names[:-1] != "") | (np.diff(later) != 0.0)
+    known = np.where(names[1:] != "", names[1:] != names[:-1], True)
+    places = np.argsort(np.where(told, np.inf, -apart), kind="stable")
+    places = places[: min(int((~told).sum()), use.most_ends)]
     out = []
     for chosen in itertools.product((False, True), repeat=len(places)):
-        ends = np.zeros(len(apart), dtype=np.bool_)
+        ends = told & known
         ends[places] = chosen
         log = float(np.log(np.where(ends, chance, 1.0 - chance)[places]).sum())
         out.append((np.concatenate([[0], np.cumsum(ends)]).astype(np.intp), log))
@@ -119,21 +118,26 @@ def _cuts(trims: Sequence[Trim], x: Array) -> list[tuple[NDArray[np.intp], float
 
 
 def _of_cut(
-    x: Array, cut: NDArray[np.intp], session: Array, flight: Array, log: float
+    x: Array, later: Array, noise: Array, cut: NDArray[np.intp], log: float
 ) -> tuple[Array, Array, Array]:
-    """Return mean and variance (k, 4) of the vehicle's mean, and the logarithm (k,) of how likely
-    flights (n, 4) are, for variances (k, 4) between sessions and flights; the vehicle's mean is
-    integrated out.
+    """Return mean and variance (k, 4) of the difference between flights (n, 4) that are ``later``
+    (n,) and those that are not, and the logarithm (k,) of how likely they are, at each pair of
+    scales of the scatter; the vehicle's mean is integrated out.
     """
-    count = np.bincount(cut)
-    middle = np.array([x[cut == i].mean(axis=0) for i in range(len(count))])
-    within = np.square(x - middle[cut]).sum(axis=0)
-    freedom = len(x) - len(count)
-    logs = -0.5 * (within / flight + freedom * np.log(2.0 * np.pi * flight)).sum(axis=1)
-    logs -= 2.0 * np.log(count).sum()
-    variance = session[:, None] + flight[:, None] / count[:, None]  # (k, sessions, 4)
-    total = (1.0 / variance).sum(axis=1)
-    mean = (middle / variance).sum(axis=1) / total
-    off = np.square(middle - mean[:, None]) / variance + np.log(2.0 * np.pi * variance)
-    logs += 0.5 * (np.log(2.0 * np.pi / total).sum(axis=1) - off.sum(axis=(1, 2)))
-    return mean, 1.0 / total, logs + log
+    session, flight, prior = _scales()
+    weight = 1.0 / (flight[:, None] + noise)  # (k, n, 4)
+    of = np.eye(int(cut[-1]) + 1)[cut]  # (n, sessions)
+    # of the vehicle's mean, the difference, and the flights: products under the inverse covariance
+    # of flights that share their session's error (Woodbury)
+    parts = np.stack([np.ones_like(x), np.broadcast_to(later[:, None], x.shape), x])
+    sums = np.einsum("ns,knf,pnf->pksf", of, weight, parts)
+    shrink = session[:, None] / (1.0 + session[:, None] * sums[0])
+    (aa, ab, ax), (_, bb, bx), (*_, xx) = np.einsum(
+        "knf,pnf,qnf->pqkf", weight, parts, parts
+    ) - np.einsum("ksf,pksf,qksf->pqkf", shrink, sums, sums)
+    determinant = aa * bb - ab**2
+    mean = (aa * bx - ab * ax) / determinant
+    level = (bb * ax - ab * bx) / determinant
+    left = xx - level * ax - mean * bx + np.log(determinant) - np.log(weight).sum(axis=1)
+    left += np.log1p(session[:, None] * sums[0]).sum(axis=1)
+    return mean, aa / determinant, log + prior - 0.5 * left.sum(axis=1)

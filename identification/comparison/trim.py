@@ -48,6 +48,7 @@ class Trim:
     # (4, 4) covariance of ``features`` (``change.py``) as means of one flight; zero: not known
     noise: Array = field(default_factory=lambda: np.zeros((4, 4)))
     voltage: float | None = None  # V, mean over the same time
+    session: str = ""  # flights of one name share it; empty: not known
 
     @property
     def total(self) -> float:

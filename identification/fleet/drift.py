@@ -4,10 +4,11 @@ The trend is a meta-regression: each flight's coefficient has its own standard d
 flights differ by more than that, by a variance between flights that is estimated (Paule and Mandel
 1982; for a regression: DerSimonian and Kacker 2007). The interval is that of Knapp and Hartung
 (2003). The pooled value's is not narrower than the flights' own deviations allow; a trend's may be,
-since what is wrong in all flights alike cancels in it. A coefficient is only seen where its
-effect was named; whether flights name it earlier or later than others do is a second test, of ranks
-(Mann and Whitney 1947). All tests of a fleet together are held to one false discovery rate
-(Benjamini and Hochberg 1995).
+since what is wrong in all flights alike cancels in it. Flights of a session that was named count
+as one, their pooled value: what a session is off by, all of them are. A coefficient is only seen
+where its effect was named; whether flights name it earlier or later than others do is a second
+test, of ranks (Mann and Whitney 1947). All tests of a fleet together are held to one false
+discovery rate (Benjamini and Hochberg 1995).
 """
 
 import math
@@ -144,15 +145,37 @@ def meta_regression(
     return scale * coefficients, spread, scale * math.sqrt(variance)
 
 
-def trend_of(of: Coefficient, points: Array, among: int) -> Trend:
+def _by_session(
+    x: Array, y: Array, s: Array, sessions: Mapping[float, str]
+) -> tuple[Array, Array, Array]:
+    """Return number, value and standard deviation of the flights, those of one session pooled."""
+    names = np.array([sessions.get(number) or f"flight {number}" for number in x])
+    pooled = []
+    for name in dict.fromkeys(names.tolist()):
+        (of,) = np.nonzero(names == name)
+        value, deviation = y[of[0]], s[of[0]]
+        if len(of) > 1:
+            (value,), covariance, _ = meta_regression(np.ones((len(of), 1)), y[of], s[of], True)
+            deviation = math.sqrt(covariance[0, 0])
+        pooled.append((x[of].mean(), value, deviation))
+    number, value, deviation = np.array(pooled).reshape(-1, 3).T
+    return number, value, deviation
+
+
+def trend_of(
+    of: Coefficient, points: Array, among: int, sessions: Mapping[float, str] | None = None
+) -> Trend:
     """Return the pooled coefficient and, with enough flights, its trend per flight.
 
-    Flights that are sure of the effect's name count alone where there are enough of them.
+    Flights that are sure of the effect's name count alone where there are enough of them; those of
+    one session, of which ``sessions`` has the name by the flight's number, count as one.
     """
     x, y, s, sure = points.T
     few_sure = bool(sure.sum() < DRIFT.least_flights)
     good = np.isfinite(y) & np.isfinite(s) & (s > 0.0) & (few_sure | (sure > 0.0))
     x, y, s = x[good], y[good], s[good]
+    if sessions:
+        x, y, s = _by_session(x, y, s, sessions)
     if len(y) < 2:
         pooled, between = float(np.median(points[:, 1])), None
         half = 1.96 * float(s[0]) if len(y) else math.nan
@@ -201,6 +224,7 @@ def fleet_of(rows: Iterable[Mapping[str, Any]]) -> Fleet:
     points: defaultdict[Coefficient, list[tuple[float, ...]]] = defaultdict(list)
     named: defaultdict[tuple[str, str], list[int]] = defaultdict(list)
     diagnosed: defaultdict[str, list[int]] = defaultdict(list)
+    sessions: defaultdict[str, dict[float, str]] = defaultdict(dict)
     individuals: defaultdict[str, dict[str, int]] = defaultdict(
         lambda: {"diagnosed": 0, "refused": 0}
     )
@@ -214,6 +238,7 @@ def fleet_of(rows: Iterable[Mapping[str, Any]]) -> Fleet:
             continue
         verdicts[row["verdict"]] += 1
         diagnosed[who].append(flight)
+        sessions[who][flight] = row.get("session", "")
         possible: set[str] = set()
         for effect in row["effects"]:
             name, rivals = effect["name"], effect["indistinguishable_from"]
@@ -227,7 +252,10 @@ def fleet_of(rows: Iterable[Mapping[str, Any]]) -> Fleet:
                 points[of].append((flight, *known, sure))
         for name in possible:
             named[who, name].append(flight)
-    trends = [trend_of(of, np.array(p, float), len(diagnosed[of.id])) for of, p in points.items()]
+    trends = [
+        trend_of(of, np.array(p, float), len(diagnosed[of.id]), sessions[of.id])
+        for of, p in points.items()
+    ]
     told = {(of.id, of.effect) for of in points}
     tried = (
         appearance_of(who, name, flights, diagnosed[who])

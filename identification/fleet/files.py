@@ -16,7 +16,8 @@ from .picture import draw_fleet
 
 FlightRow = Mapping[str, Any]
 _COLUMNS = (
-    *("id", "flight", "log", "time", "vehicle", "status", "reason", "verdict", "residual"),
+    *("id", "flight", "log", "time", "session"),
+    *("vehicle", "status", "reason", "verdict", "residual"),
     *("effect", "coefficient", "value", "std", "unit", "tentative", "indistinguishable_from"),
     *("force_before_N", "force_after_N", "torque_before_Nm", "torque_after_Nm"),
 )
@@ -78,7 +79,7 @@ def fleet_data(fleet: Fleet) -> dict[str, Any]:
 
 def _lines(row: FlightRow) -> Iterable[dict[str, Any]]:
     """Yield a flight's lines of the table: one a coefficient, or one if there is none."""
-    line = {key: row.get(key) for key in _COLUMNS[:8]} | {"residual": row.get("remainder")}
+    line = {key: row.get(key) for key in _COLUMNS[:9]} | {"residual": row.get("remainder")}
     for side in ("before", "after") if row["status"] == "diagnosed" else ():
         line[f"force_{side}_N"] = row["error"][side]["force_rms_N"]
         line[f"torque_{side}_Nm"] = row["error"][side]["torque_rms_Nm"]

@@ -12,9 +12,10 @@ log itself. The manifest is YAML::
         reader: nanobench     # or map: map.yaml, for a table of other columns
         piece: 2              # of a file with several; default: the longest
         time: 2026-03-01T10:00
+        session: monday       # flights of one name are off by the same; default: each by its own
 
-or CSV with these columns, ``log,vehicle,id,reader,map,piece,time``. The first entry that fits a log
-counts.
+or CSV with these columns, ``log,vehicle,id,reader,map,piece,time,session``. The first entry that
+fits a log counts.
 """
 
 import csv
@@ -58,6 +59,7 @@ class FleetLog:
     map: str | None = None  # a map's name or file, in place of a reader
     piece: int | None = None  # which part of the file, from 1
     time: float | None = None  # s; orders the flights of an individual; None: their names do
+    session: str = ""  # flights of one name share what they are off by; empty: its own
     key: str = ""  # of its outcome
 
 
@@ -88,6 +90,7 @@ class ManifestEntry:
     map: str | None = None  # a map's name or file, in place of a reader
     piece: int | None = None  # which part of the file, from 1
     time: _Moment | None = None  # s
+    session: str | None = None
 
 
 @dataclass(frozen=True)

@@ -130,7 +130,8 @@ def rows(done: Sequence[FleetLog], outcomes: Outcomes) -> list[dict[str, Any]]:
     for name, log in sorted(named, key=place):
         flights[name] += 1
         known = {"id": as_text(name), "flight": flights[name], "log": as_text(log.name)}
-        found.append({**known, "time": log.time, **outcomes[log.key]})
+        known |= {"time": log.time, "session": as_text(log.session)}
+        found.append({**known, **outcomes[log.key]})
         for key in ("key", "limit_s"):
             found[-1].pop(key, None)
     return found

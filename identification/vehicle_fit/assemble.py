@@ -39,7 +39,7 @@ def vehicle_of(
     effects = list(_effects(estimates))
     curve = None
     if fit.drive.commands:
-        curve = _curve(fit)
+        curve = _curve(fit, estimates["voltage_exponent"])
         k = fit.model.weight / (4.0 * USUAL.hover_speed**2)
     else:
         k = estimates["k"].value
@@ -139,12 +139,12 @@ def _effects(estimates: Mapping[str, Estimate]) -> Sequence[EffectSetting]:
     return out
 
 
-def _curve(fit: VehicleFit) -> MotorCurve:
+def _curve(fit: VehicleFit, exponent: Estimate) -> MotorCurve:
     values = fit.values
     thrust = [0.0] * (max(fit.drive.exponents) + 1)
     for j, e in enumerate(fit.drive.exponents):
         thrust[e] = values[f"a{j}"]
-    return MotorCurve(tuple(thrust), values.get("gamma", 0.0))
+    return MotorCurve(tuple(thrust), exponent.value if exponent.status == IDENTIFIED else 0.0)
 
 
 def advice_of(estimates: Mapping[str, Estimate]) -> list[str]:
@@ -167,6 +167,8 @@ def advice_of(estimates: Mapping[str, Estimate]) -> list[str]:
         lag: "Climb, roll and pitch in quick steps: they tell a motor's lag from a time offset.",
         "thrust(0.75)": climb,
         "thrust(0.25)": climb,
+        "voltage_exponent": "Log the voltage, and climb and sink with a full and with an empty "
+        "battery: it tells the voltage from the thrust curve.",
         "com x": brisk,
         "com y": brisk,
         "drag": "Fly to and fro at 2 m/s and more along both body axes: it shows drag.",

@@ -3,7 +3,9 @@ the air may contribute, before any coefficient.
 
 A rotor's thrust is ``sum_j a_j phi_j``: of measured speeds ``phi = [W^2]``, of commands
 ``phi = [1, u, u^2] (V/V_ref)^gamma`` or some of these. Rotors follow with a first-order lag and a
-time offset.
+time offset. Drag, inflow and lift act at each rotor, at its own velocity, and so turn the vehicle,
+too. Forward velocity goes with pitch rate, so that the moment of lift while yawing looks like a
+gyroscopic one, from which ``Jz`` is told.
 """
 
 from collections.abc import Mapping
@@ -33,6 +35,7 @@ class Drive:
 
     positions: Array  # (4, 3) m, or of length 1 where the arm is not known
     spin: Array  # (4,)
+    known_arm: bool = True
     commands: bool = False  # the rotors are known by their commands, not by their speeds
     exponents: tuple[int, ...] = (2,)  # of the basis functions
     voltage_ref: float = 0.0  # V; 0: voltage is not used
@@ -70,7 +73,7 @@ def balance(pieces: list[MotionPiece], drive: Drive, nonlinear: tuple[str, ...])
     noise: list[Array] = []
     for piece in pieces:
         here = rotor_columns(piece, drive)
-        air = air_columns(piece)
+        air = air_columns(piece, drive)
         slow = [i for i, name in enumerate(here) if name[0] in "XYZ"]
         names = (*here, *air, *(f"slow {name}" for name in here if name[0] in "XYZ"))
         base = np.column_stack([piece.measured(), *here.values(), *air.values()])
@@ -126,14 +129,24 @@ def rotor_columns(piece: MotionPiece, drive: Drive) -> dict[str, Array]:
     out["spin up"] = -derivative(smooth, piece.period)[:, 0]
     out["spin x"], out["spin y"] = -w[:, 1] * momentum, w[:, 0] * momentum
     if piece.velocity is not None:
-        total = speed.sum(axis=1)
+        drag = -speed[:, :, None] * _local(piece, piece.velocity, drive)
         for i, axis in enumerate("xyz"):
-            out[f"rotor drag {axis}"] = -total * piece.velocity[:, i]
+            out[f"rotor drag {axis}"] = drag[:, :, i].sum(axis=1)
+        out["moment of rotor drag x"] = -drag[:, :, 0] @ y
+        out["moment of rotor drag y"] = drag[:, :, 1] @ x
+        out["moment x of rotor drag z"] = drag[:, :, 2] @ y
+        out["moment y of rotor drag z"] = -drag[:, :, 2] @ x
     return out
 
 
-def air_columns(piece: MotionPiece) -> dict[str, Array]:
-    """Return the columns (n,) that do not depend on the rotors."""
+def _local(piece: MotionPiece, velocity: Array, drive: Drive) -> Array:
+    """Return each rotor's velocity (n, 4, 3) in body axes; the vehicle's where no arm is known."""
+    turning = np.cross(piece.angular_velocity[:, None], drive.positions)
+    return velocity[:, None] + drive.known_arm * turning
+
+
+def air_columns(piece: MotionPiece, drive: Drive) -> dict[str, Array]:
+    """Return the columns (n,) that do not depend on the rotors' speeds."""
     w, period = piece.angular_velocity, piece.period
     dw = derivative(w, period)
     out = {"1": np.ones(len(piece.t))}
@@ -148,7 +161,11 @@ def air_columns(piece: MotionPiece) -> dict[str, Array]:
         for i, a in enumerate("xyz"):
             out[f"linear drag {a}"] = -v[:, i]
             out[f"quadratic drag {a}"] = -speed * v[:, i]
-        out["lift"] = v[:, 0] ** 2 + v[:, 1] ** 2
+        local = _local(piece, v, drive)
+        lift = 0.25 * (local[:, :, 0] ** 2 + local[:, :, 1] ** 2)
+        out["lift"] = lift.sum(axis=1)
+        out["moment x of lift"] = lift @ drive.positions[:, 1]
+        out["moment y of lift"] = -lift @ drive.positions[:, 0]
     return out
 
 

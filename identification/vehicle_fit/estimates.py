@@ -140,17 +140,35 @@ class Estimates:
                 *((how, IDENTIFIED) if low <= u <= high else (beyond, ASSUMED)),
             )
 
-        def excess(u: float, values: Values) -> float:
-            return 4.0 * thrust_of(values, exponents, u) - self.fit.model.weight
+        reference = self.fit.drive.voltage_ref
 
-        def hover(values: Values) -> float:
-            return (
-                float(brentq(excess, 0.0, 2.0, args=(values,))) if excess(2.0, values) > 0 else 2.0
-            )
+        def hover(values: Values, share: float = 1.0) -> float:
+            weight = self.fit.model.weight * math.pow(share, -values.get("gamma", 0.0))
+
+            def excess(u: float) -> float:
+                return 4.0 * thrust_of(values, exponents, u) - weight
+
+            # a curve of few flights may carry the weight at no command, or at none up to 2
+            low, high = excess(0.0), excess(2.0)
+            return float(brentq(excess, 0.0, 2.0)) if low < 0.0 < high else 2.0 * (low < 0.0)
 
         self._say("hover command", hover, "1", how)
-        if "gamma" in self.fit.model.free:
-            self._add("voltage_exponent", self._of("gamma"), "1", how + " and voltage")
+        if "gamma" not in self.fit.model.free:
+            logged = all(p.voltage is not None for p in pieces)
+            how = "the voltage hardly changes" if logged else "no voltage is logged"
+            how += ": the curve holds for the voltage of these flights"
+            self._add("voltage_exponent", UNKNOWN, "1", how, NOTHING)
+            return
+        known, how = self._of("gamma"), f"{how} and voltage"
+        if known[2] - known[1] > USUAL.voltage_exponents:
+            how = "command and voltage change together: what the voltage does, the curve may do"
+            self._add("voltage_exponent", known, "1", how, NOTHING)
+            return
+        self._add("voltage_exponent", known, "1", how)
+        flown = np.concatenate([p.voltage for p in pieces if p.voltage is not None])
+        for volts in np.quantile(flown, [0.05, 0.95]).tolist():
+            share = volts / reference
+            self._say(f"hover command at {volts:.2f} V", lambda v, s=share: hover(v, s), "1", how)  # type: ignore[misc]
 
     def _say_arm(self) -> None:
         if self.geometry.known:

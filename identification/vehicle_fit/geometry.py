@@ -34,6 +34,9 @@ class Usual:
     # show: at one rotor speed sessions differ by 0.6 to 2.4 %, at one command by 10 %
     thrust_spread: float = 0.015
     command_spread: float = 0.1
+    # width of what a voltage's exponent may be: 0 where the firmware makes up for the battery, 2
+    # where rotor speed follows it
+    voltage_exponents: float = 2.0
     hover_speed: float = 1000.0  # rad/s, where no log says what a rotor's speed is
 
 

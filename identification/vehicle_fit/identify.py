@@ -15,14 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.effects import Role
+from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
+from ..prediction import PredictionErrors
 from .assemble import advice_of, vehicle_of
 from .channels import MotionPiece, Sources, pieces_of, rounding_step
 from .columns import ANSWERED_HZ, Drive
 from .effect_settings import effect_of
 from .estimates import Estimates, Intervals, thrust_of
 from .geometry import SPIN, USUAL, Geometry
+from .held_out import predicted, warnings_of
 from .motors import motor_response
 from .parameters import ANSWERED, FORCE_BIAS, OPTIONAL, POSITIVE, first_model
 from .result import IDENTIFIED, NOTHING, WIDEST, Estimate, Identified, told
@@ -82,7 +85,9 @@ def identify(
     commands = sources.rotors == "commands"
     step = 0.0 if commands else rounding_step(logs)
     reference, noise = voltage if commands else 0.0, step / math.sqrt(12.0)
-    drive = Drive(geometry.positions, SPIN, commands, voltage_ref=reference, speed_noise=noise)
+    drive = Drive(
+        geometry.positions, SPIN, geometry.known, commands, voltage_ref=reference, speed_noise=noise
+    )
     report(0.05, "fitting forces and torques")
     fit, turned = _first_fit(pieces, sources, drive, mass)
     report(0.4, "asking whether slow and quick motion agree")
@@ -114,26 +119,38 @@ def identify(
             "the accelerometer's scale is taken as right: an error of 1 % in it is one of 1 % in "
             "thrust"
         )
-    estimates = Estimates(fit, sources, geometry, kept).say_all(pieces, not_told)
-    if "lag" in fit.model.free:
-        estimates.append(_lag_alone(pieces, fit))
     motors = None if commands or "lag" in fit.model.free else motor_response(pieces)
+
+    def described(fit: VehicleFit) -> tuple[dict[str, Estimate], Vehicle]:
+        said = Estimates(fit, sources, geometry, kept).say_all(pieces, not_told)
+        named = {estimate.name: estimate for estimate in said}
+        return named, vehicle_of(name, fit, named, geometry, logs, voltage, step, motors)
+
+    named, vehicle = described(fit)
+    if "lag" in fit.model.free:
+        named |= {alone.name: alone for alone in [_lag_alone(pieces, fit)]}
     if motors is not None:
         how = (
             f"rotor speeds against commands, {100 * motors.left:.0f} % of their variation left over"
         )
-        lag = Estimate(effect_of(Role.LAG), *motors.known, "s", IDENTIFIED, how)
-        estimates = [lag if e.name == lag.name else e for e in estimates]
-    named = {e.name: e for e in estimates}
-    vehicle = vehicle_of(name, fit, named, geometry, logs, voltage, step, motors)
+        lag = effect_of(Role.LAG)
+        named[lag] = Estimate(lag, *motors.known, "s", IDENTIFIED, how)
+    report(0.9, "predicting what is held out")
+    errors: dict[str, PredictionErrors] = {}
+    try:
+        errors = predicted(pieces, logs, fit, lambda part: described(part)[1])
+    except InputError as error:
+        notes.append(f"nothing that is held out was predicted: {error}")
+    notes += warnings_of(errors)
     return Identified(
         vehicle,
-        tuple(estimates),
+        tuple(named.values()),
         sources,
         tuple(pieces),
         fit,
         tuple(notes),
         tuple(advice_of(named)),
+        errors,
     )
 
 

@@ -95,6 +95,12 @@ def coefficients(p: Mapping[str, float], names: tuple[str, ...], mass: float, po
         for kind in ("rotor drag", "linear drag", "quadratic drag"):
             if (value := get(f"{kind} {axis}")) is not None:
                 out[i, place[f"{kind} {axis}"]] += value / mass
+    if "rotor drag x" in p:
+        moment[2, place["moment of rotor drag x"]] += p["rotor drag x"]
+        moment[2, place["moment of rotor drag y"]] += p["rotor drag y"]
+    for kind in ("rotor drag z", "lift"):
+        for i, axis in enumerate("xy" if kind in p else ""):
+            moment[i, place[f"moment {axis} of {kind}"]] += p[kind]
     if "lift" in p:
         out[2, place["lift"]] += p["lift"] / mass
     spin = get("Jr", 0.0)

@@ -30,13 +30,8 @@ _LEAST_HZ = 0.4  # of the shares: what is slower holds the mean, such as the wei
 _SHOWN_SECONDS = 10.0
 
 
-def identified_data(found: Identified, errors: PredictionErrors | None = None) -> dict[str, Any]:
-    """Return the dictionary of ``identify.json``; None for what is not known.
-
-    Args:
-        found: the vehicle.
-        errors: of its predictions, where they were asked for.
-    """
+def identified_data(found: Identified) -> dict[str, Any]:
+    """Return the dictionary of ``identify.json``; None for what is not known."""
     data: dict[str, Any] = {
         "vehicle": found.vehicle.name,
         "mass_kg": found.vehicle.mass,
@@ -57,15 +52,14 @@ def identified_data(found: Identified, errors: PredictionErrors | None = None) -
         "notes": found.notes,
         "advice": found.advice,
     }
-    if errors is not None:
-        data["prediction"] = {
+    for where, errors in found.predicted.items():
+        of = zip(QUANTITIES.items(), errors.model, errors.still, strict=True)
+        data[where] = {
             "starts": errors.starts,
             "horizon_s": errors.horizon,
             **{
                 name.replace(" ", "_"): {"unit": unit, "model": model, "if_nothing_changes": still}
-                for (name, unit), model, still in zip(
-                    QUANTITIES.items(), errors.model, errors.still, strict=True
-                )
+                for (name, unit), model, still in of
             },
         }
     told: dict[str, Any] = plain(data)
@@ -82,11 +76,9 @@ def headline(found: Identified) -> str:
     return f"{told} is identified; assumed, since these logs do not tell: {', '.join(open_ones)}"
 
 
-def write_identified(
-    found: Identified, path: Path, errors: PredictionErrors | None = None
-) -> list[Path]:
+def write_identified(found: Identified, path: Path) -> list[Path]:
     """Write the vehicle to a YAML file, and beside it ``NAME.identify.json``,
-    ``NAME.identify.png`` and, with errors of its predictions, ``NAME.prediction.png``; return them.
+    ``NAME.identify.png`` and, where it predicted, ``NAME.prediction.png``; return them.
 
     Raises:
         InputError: a file cannot be written.
@@ -102,12 +94,12 @@ def write_identified(
     }
     save_vehicle(found.vehicle, path, std)
     data, picture = (path.with_name(f"{path.stem}.identify.{end}") for end in ("json", "png"))
-    write_text(json.dumps(identified_data(found, errors), indent=1) + "\n", data)
+    write_text(json.dumps(identified_data(found), indent=1) + "\n", data)
     write_png(_picture(found), picture)
     written = [path, data, picture]
-    if errors is not None:
+    if found.predicted:
         written.append(path.with_name(f"{path.stem}.prediction.png"))
-        write_png(_prediction_picture(errors), written[-1])
+        write_png(_prediction_picture(*list(found.predicted.items())[-1]), written[-1])
     return written
 
 
@@ -117,7 +109,7 @@ def fitted(found: Identified, piece: MotionPiece) -> tuple[Array, Array]:
     """
     fit = found.fit
     rotors = rotor_columns(piece, fit.drive)
-    names = (*rotors, *(air := air_columns(piece)))
+    names = (*rotors, *(air := air_columns(piece, fit.drive)))
     late = {
         name: np.interp(piece.t - fit.drive.delay, piece.t, column)
         for name, column in rotors.items()
@@ -182,7 +174,7 @@ def _picture(found: Identified) -> "Figure":
 
 
 @styled()
-def _prediction_picture(errors: PredictionErrors) -> "Figure":
+def _prediction_picture(where: str, errors: PredictionErrors) -> "Figure":
     figure = new_figure(2.6)
     rows = zip(figure.subplots(1, 4), QUANTITIES.items(), errors.model, errors.still, strict=True)
     for axes, (name, unit), model, still in rows:
@@ -190,5 +182,5 @@ def _prediction_picture(errors: PredictionErrors) -> "Figure":
         axes.plot(errors.horizon, model, ESTIMATE, label="of the vehicle")
         axes.set(title=f"{name} ({unit})", xlabel="time after the start (s)", ylim=(0.0, None))
     axes.legend()
-    figure.suptitle(f"mean error of predictions, {errors.starts} starts")
+    figure.suptitle(f"mean error, {errors.starts} starts: {where.replace('_', ' ')}")
     return figure

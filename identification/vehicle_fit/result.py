@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
+from ..prediction import PredictionErrors
 from .channels import MotionPiece, Sources
 from .solve import VehicleFit
 
@@ -51,6 +52,9 @@ class Identified:
     fit: VehicleFit
     notes: tuple[str, ...]
     advice: tuple[str, ...]
+    # of what was not fitted to: held_out_blocks, flights_left_out (each in turn, of several), and
+    # prediction, of further flights
+    predicted: Mapping[str, PredictionErrors]
 
     def __getitem__(self, name: str) -> Estimate:
         """Return an estimate by its name."""

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ...runtime.errors import InputError
 from .channels import MotionPiece
 from .columns import BalanceSpectra, Drive, balance
 from .model import LOGARITHMIC, NONLINEAR, Model, jacobian
@@ -97,12 +98,8 @@ def solve(pieces: list[MotionPiece], drive: Drive, model: Model, start: Array) -
     powers = [np.mean(np.abs(s.columns[:, :, :6]) ** 2, axis=0) for s in made.segments]
     spectra = residual_spectra(made.segments, powers)
     for number in range(SOLVE.rounds):
-        total, moved = np.sum(_grams(made, spectra), axis=0), 0.0
-        for _ in range(SOLVE.steps):
-            step, information, *_ = _newton(made, total, model, theta)
-            theta = _bounded(theta + np.clip(step, -1.0, 1.0), model, made.drive)
-            size = np.abs(step) * np.sqrt(np.maximum(np.diag(information), 0.0))
-            moved = max(moved, float(size.max()))
+        total = np.sum(_grams(made, spectra), axis=0)
+        theta, information, moved = _moved(made, total, model, theta, SOLVE.steps)
         made = linear() if model.nonlinear else made
         if number >= 2 and moved < SOLVE.close:
             break
@@ -118,6 +115,24 @@ def solve(pieces: list[MotionPiece], drive: Drive, model: Model, start: Array) -
     )
     loss = float(SPECTRUM.tapers * sum(logs))
     return VehicleFit(model, theta, information, scores, loss, made, spectra)
+
+
+def refitted(fit: VehicleFit, kept: Sequence[NDArray[np.bool_]]) -> list[VehicleFit]:
+    """Return a fit's coefficients by those of its segments (s,) alone that are ``kept``, of which
+    the noise has the spectrum that it has.
+
+    Raises:
+        InputError: no segment is kept.
+    """
+    grams, out = np.array(_grams(fit.balance, fit.spectra)), []
+    for keep in kept:
+        if not keep.any():
+            raise InputError("the flight is too short; expected more than 5 s without a break")
+        total = grams[keep].sum(axis=0)
+        theta, information, _ = _moved(fit.balance, total, fit.model, fit.theta, SOLVE.rounds)
+        again = replace(fit, theta=theta, information=information, scores=fit.scores[keep])
+        out.append(again)
+    return out
 
 
 def fall_with(fit: VehicleFit, model: Model, start: Array) -> float:
@@ -139,6 +154,21 @@ def lag_with(pieces: list[MotionPiece], fit: VehicleFit) -> float:
     total = np.sum(_grams(made, fit.spectra), axis=0)
     step, information, *_ = _newton(made, total, model, start)
     return float(step[-1] / np.sqrt(np.linalg.inv(information)[-1, -1]))
+
+
+def _moved(
+    made: BalanceSpectra, total: Array, model: Model, theta: Array, steps: int
+) -> tuple[Array, Array, float]:
+    """Return the parameters (p,) after some steps, the information (p, p) before the last, and the
+    longest step in standard deviations.
+    """
+    moved = 0.0
+    for _ in range(steps):
+        step, information, *_ = _newton(made, total, model, theta)
+        theta = _bounded(theta + np.clip(step, -1.0, 1.0), model, made.drive)
+        size = np.abs(step) * np.sqrt(np.maximum(np.diag(information), 0.0))
+        moved = max(moved, float(size.max()))
+    return theta, information, moved
 
 
 def _grams(made: BalanceSpectra, spectra: Sequence[Array]) -> list[Array]:

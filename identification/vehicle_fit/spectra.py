@@ -43,15 +43,18 @@ class Segment:
     columns: Complex  # (K, m, c): per root Hz
 
 
+def edges_of(n: int, period: float) -> NDArray[np.intp]:
+    """Return the ends (count + 1,) of the segments, of about equal length, of a piece."""
+    count = max(1, round(n * period / SPECTRUM.segment))
+    return np.linspace(0, n, count + 1).astype(np.intp)
+
+
 def segments_of(columns: Array, period: float, log: int, band: float) -> list[Segment]:
     """Return the transforms of a piece's columns (n, c), cut into segments of about equal
     length.
     """
-    n = len(columns)
-    count = max(1, round(n * period / SPECTRUM.segment))
-    edges = np.linspace(0, n, count + 1).astype(int)
     out = []
-    for a, b in itertools.pairwise(edges):
+    for a, b in itertools.pairwise(edges_of(len(columns), period)):
         size = b - a
         frequency = np.asarray(np.fft.rfftfreq(size, period), dtype=np.float64)
         inside = frequency <= min(band, 0.4 / period)

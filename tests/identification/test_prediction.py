@@ -137,7 +137,7 @@ def test_only_whole_predictions_inside_a_segment_count(clean):
 def test_errors_of_predictions_are_those_of_the_motion():
     """In hover 0.04 kg too little is g dm / m of acceleration, and nothing changes."""
     log = fly("hover", 12.0, mass={"dm": 0.04})
-    found = prediction_errors([log, log], VEHICLE, 0.5, [(2.0, 11.0), (2.0, math.inf)])
+    found = prediction_errors([log, log], VEHICLE, 0.5, [[(2.0, 11.0)], [(2.0, math.inf)]])
     fall = VEHICLE.gravity * 0.04 / VEHICLE.mass
     assert found.horizon[[0, -1]] == pytest.approx([0.005, 0.5])
     assert found.starts == 35 + 38  # up to 10.5 s, and to 0.6 s before the end
@@ -159,4 +159,4 @@ def test_a_turn_at_one_rate_is_no_change():
     assert np.all(found.still < 2e-3)
     assert np.all(found.model < 2e-3)
     with pytest.raises(InputError, match=r"flight: expected poses at one rate, unbroken for 4 s"):
-        prediction_errors([replace(log, name="flight")], VEHICLE, 3.0, [(0.0, 2.0)])
+        prediction_errors([replace(log, name="flight")], VEHICLE, 3.0, [[(0.0, 2.0)]])

@@ -57,6 +57,16 @@ def vehicles():
     }
 
 
+def said(found):
+    """Return what is said of a vehicle, of its predictions the end of the horizon alone."""
+    data = identified_data(found)
+    for where in found.predicted:
+        data[where]["horizon_s"] = data[where]["horizon_s"][-1:]
+        for errors in (x for x in data[where].values() if isinstance(x, dict)):
+            errors |= {name: errors[name][-1:] for name in ("model", "if_nothing_changes")}
+    return data
+
+
 def made():
     """Return all that is kept, as plain data."""
     one = inertial_flights([0])[0][0]
@@ -80,7 +90,7 @@ def made():
             ]
             for name, model in models.items()
         },
-        "identified": {name: identified_data(v) for name, v in vehicles().items()},
+        "identified": {name: said(v) for name, v in vehicles().items()},
         "exports": {n: {k: f(v) for k, f in EXPORTS.items()} for n, v in vehicles().items()},
         "changes": {name: change_data(change) for name, change in changes.items()},
         "faults": {name: fault_data(fault) for name, fault in faults.items()},

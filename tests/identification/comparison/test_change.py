@@ -16,7 +16,7 @@ from windwrench.identification.comparison.change import (
     SOMETHING_ELSE,
     compare,
 )
-from windwrench.identification.comparison.sessions import SCATTER, means_of
+from windwrench.identification.comparison.sessions import SCATTER, difference
 from windwrench.identification.comparison.trim import Trim, trim_of, trim_of_log
 from windwrench.identification.comparison.words import change_headline, write_change
 
@@ -70,14 +70,33 @@ def test_more_sessions_make_an_answer_surer_and_more_flights_of_one_do_not():
 
 def test_a_session_ends_where_the_battery_was_changed():
     """Flights with two batteries know their vehicle better than as many with one."""
-    flights = drawn(np.random.default_rng(5), 4)
+    after, *flights = drawn(np.random.default_rng(5), 5)
 
     def std(volts):
-        found = means_of([replace(x, voltage=v) for x, v in zip(flights, volts, strict=True)])
-        share = np.exp(found.log - np.logaddexp.reduce(found.log))
-        return np.sqrt(share @ found.variance)
+        known = [replace(x, voltage=v) for x, v in zip(flights, volts, strict=True)]
+        found = difference([after], known)
+        return np.sqrt(np.exp(found.log) @ found.variance)
 
     assert np.all(std([12.4, 12.0, 12.4, 12.0]) < 0.95 * std([12.4, 12.2, 12.0, 11.8]))
+
+
+def test_a_named_session_is_one_and_what_it_is_off_by_cancels():
+    """Of 60 pairs each: the spread of the difference is what its deviation says."""
+    rng = np.random.default_rng(8)
+    for shared in (True, False):
+        scores = []
+        for _ in range(60):
+            *before, first, second = drawn(rng, 5)
+            if not shared:
+                first, second = drawn(rng, 2)
+            names = "mon", "mon" if shared else "tue"
+            before = [replace(trim, session=names[0]) for trim in before]
+            found = difference([replace(x, session=names[1]) for x in (first, second)], before)
+            share = np.exp(found.log)
+            size = np.sqrt(share @ found.variance)
+            scores.append(share @ found.mean / size)
+            assert np.all(size < 2.5 * np.array(SCATTER.flight)) == shared
+        assert 0.8 < np.sqrt(np.mean(np.square(scores))) < 1.2
 
 
 @pytest.mark.parametrize(
@@ -167,6 +186,8 @@ def test_a_measured_weight_is_named_from_the_requests_alone(tmp_path):
     assert result.exit_code == 0, result.output
     found = json.loads((tmp_path / "change.json").read_text(encoding="utf-8"))
     assert found["place"] == ROTORS[1]
+    # as flights of one session, whose scatter is smaller
+    options = ["--by-folder", *options]
     result = CliRunner().invoke(app, ["compare", normal[0], "--against", normal[1], *options])
     assert result.exit_code == 0, result.output
     assert json.loads((tmp_path / "change.json").read_text("utf-8"))["place"] == NOWHERE

@@ -23,6 +23,20 @@ def trend(values, stds, among, sure=None):
     return trend_of(Coefficient("a", "mass", "dm", "kg"), points, among)
 
 
+def test_flights_of_a_named_session_count_as_one():
+    """Sessions of four flights scatter, and nothing drifts: some 5 of 100 pass by chance."""
+    rng, names = np.random.default_rng(6), {i + 1.0: f"day {i // 4}" for i in range(24)}
+    told = {"named": 0, "not named": 0}
+    for _ in range(200):
+        values = np.repeat(rng.standard_normal(6), 4) + 0.3 * rng.standard_normal(24)
+        points = np.column_stack([np.arange(1, 25), values, np.full(24, 0.3), np.ones(24)])
+        of = Coefficient("a", "mass", "dm", "kg")
+        told["named"] += trend_of(of, points, 24, names).p < 0.05
+        told["not named"] += trend_of(of, points, 24).p < 0.05
+    assert told["named"] <= 20
+    assert told["not named"] > 60
+
+
 def test_with_equal_deviations_it_is_ordinary_regression():
     rng = np.random.default_rng(0)
     y = 1.0 + 0.2 * np.arange(8) + rng.standard_normal(8)

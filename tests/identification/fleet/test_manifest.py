@@ -53,7 +53,8 @@ def test_a_manifest_says_what_logs_do_not(folder, form):
         path = folder / "fleet.yaml"  # found by itself
         path.write_text(
             "logs:\n"
-            "  - {log: 'alpha/*9.csv', vehicle: beta/vehicle.yaml, id: A, time: 2026-03-01T10:00}\n"
+            "  - {log: 'alpha/*9.csv', vehicle: beta/vehicle.yaml, id: A, session: a,\n"
+            "     time: 2026-03-01T10:00}\n"
             "  - {log: 'alpha/*', vehicle: hummingbird, time: 7}\n"
             "  - {log: 'gamma/*', vehicle: hummingbird}\n"
             "  - {log: '*.ulg', reader: px4_ulog}\n"
@@ -61,17 +62,18 @@ def test_a_manifest_says_what_logs_do_not(folder, form):
     else:
         path = folder / "list.csv"
         path.write_text(
-            "log,vehicle,id,reader,time\n"
-            "alpha/*9.csv,beta/vehicle.yaml,A,,2026-03-01T10:00\n"
-            "alpha/*,hummingbird,,,7\n"
-            "gamma/*,hummingbird,,,\n"
-            "*.ulg,,,px4_ulog,\n"
+            "log,vehicle,id,reader,time,session\n"
+            "alpha/*9.csv,beta/vehicle.yaml,A,,2026-03-01T10:00,a\n"
+            "alpha/*,hummingbird,,,7,\n"
+            "gamma/*,hummingbird,,,,\n"
+            "*.ulg,,,px4_ulog,,\n"
         )
     logs, doubts = find_logs([folder], None if form == "yaml" else path, without=folder / "out")
     found = {log.name: log for log in logs}
     nine, ten = found["alpha/flight9.csv"], found["alpha/flight10.csv"]
-    assert (nine.id, nine.vehicle, nine.time) == (
+    assert (nine.id, nine.session, nine.vehicle, nine.time) == (
         "A",
+        "a",
         str(folder / "beta/vehicle.yaml"),
         1772359200.0,
     )

@@ -77,6 +77,10 @@ def test_commanded_speeds_show_the_vehicle_and_its_lag(crazyflie, commanded):
     share = explained(found)  # of force z and all torques; along x and y nothing acts
     assert (share[2:] > 0.9).all()
     assert (share[:2] < 0.1).all()
+    assert list(found.predicted) == ["held_out_blocks", "flights_left_out"]
+    for errors in found.predicted.values():
+        assert not errors.worse
+        assert (errors.model[:, -1] < 0.3 * errors.still[:, -1]).all()
 
 
 def test_a_vehicle_of_rounded_speeds_reads_the_log_that_it_comes_from(crazyflie):
@@ -91,6 +95,20 @@ def test_a_vehicle_of_rounded_speeds_reads_the_log_that_it_comes_from(crazyflie)
     assert not any("reads" in note for note in screen_log(log, again)[1])
     force = estimate_log(log, again).force
     assert np.abs(np.mean(force[len(force) // 2 :], axis=0)).max() < 0.02 * again.weight
+
+
+def test_lift_at_the_rotors_is_not_taken_for_a_gyroscopic_torque():
+    """Its moment goes with forward velocity times yaw rate, and took 7 % off Jzz and p/k."""
+    bird = load_vehicle("hummingbird")
+    air = (
+        EffectSetting("translational_lift", {"kh": 3.4e-3}),
+        EffectSetting("rotor_drag", {"kdx": 1.2e-4, "kdy": 1.2e-4}),
+    )
+    logs = [plant_flight(bird, air, name, 20.0) for name in ("excite", "yaw")]
+    found = identify(logs, bird.mass, parse_geometry(str(bird.arm_l)))
+    check(found, "Jzz", bird.inertia[2, 2], 0.03)
+    check(found, "p/k", bird.p[0] / bird.k[0], 0.03)
+    check(found, "translational_lift kh", 3.4e-3, 0.1)
 
 
 def test_a_hover_does_not_show_what_it_does_not_excite(crazyflie):
@@ -117,6 +135,30 @@ def test_an_imu_and_commands_are_enough():
     assert vehicle.motor_curve is not None
     thrust = vehicle.commanded_thrust(np.full((1, 4), hover))
     assert thrust.sum() == pytest.approx(MASS * 9.81, rel=0.05)
+
+
+def test_a_discharge_tells_the_voltage_from_the_thrust_curve(inertial):
+    log, _ = inertial[0]
+    volts = np.linspace(4.2, 3.5, len(log.t))
+    used = replace(log, voltage=volts, command=log.command * (volts[:, None] / 3.85) ** -0.6)
+    found = identify([used], MASS, parse_geometry(str(ARM)))
+    check(found, "voltage_exponent", 1.2, 0.15)
+    hover = np.sqrt(MASS * 9.81 / (4 * K)) / FULL
+    empty, full = (e for e in found.estimates if e.name.startswith("hover command at"))
+    for volt, known in ((3.535, empty), (4.165, full)):
+        assert known.low < hover * (volt / 3.85) ** -0.6 < known.high
+    assert found.vehicle.motor_curve.voltage_exponent == found["voltage_exponent"].value
+
+
+def test_without_a_discharge_voltage_and_curve_are_not_told_apart(inertial):
+    log, _ = inertial[0]
+    same = identify(
+        [replace(log, voltage=np.full(len(log.t), 3.9))], MASS, parse_geometry(str(ARM))
+    )
+    assert same["voltage_exponent"].status == "not identifiable"
+    assert "hardly changes" in same["voltage_exponent"].how
+    assert any("with a full and with an empty battery" in line for line in same.advice)
+    assert same.vehicle.motor_curve.voltage_exponent == 0.0
 
 
 @pytest.mark.slow

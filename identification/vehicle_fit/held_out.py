@@ -1,0 +1,69 @@
+"""How well a vehicle predicts what it was not fitted to: its coefficients are fitted anew without
+some segments of its flights, or without one of the flights, and predict those. Which parameters it
+has, and the noise's spectrum, are not asked again.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from ...dynamics.vehicle import Vehicle
+from ...runtime.errors import InputError
+from ..logs.flight_log import FlightLog
+from ..prediction import PredictionErrors, prediction_errors
+from .channels import MotionPiece
+from .solve import VehicleFit, refitted
+from .spectra import edges_of
+
+FOLDS = 3  # of all segments, every third is held out at a time
+
+
+def predicted(
+    pieces: Sequence[MotionPiece],
+    logs: Sequence[FlightLog],
+    fit: VehicleFit,
+    vehicle_of: Callable[[VehicleFit], Vehicle],
+) -> dict[str, PredictionErrors]:
+    """Return the errors of predicted blocks of 5 s, and of several flights each predicted by the
+    others.
+
+    Raises:
+        InputError: a log has no pose, or too little would be left of them.
+    """
+    for log in logs:
+        if not log.has_pose:
+            raise InputError(f"{log.name}: has no pose; expected one, to predict from")
+    # of each segment: its log, and from and to, s after its log's start
+    number: list[int] = []
+    spans: list[tuple[float, float]] = []
+    for piece in pieces:
+        t, edges = piece.t - logs[piece.log].t[0], edges_of(len(piece.t), piece.period)
+        number += [piece.log] * (len(edges) - 1)
+        spans += list(zip(t[edges[:-1]].tolist(), t[edges[1:] - 1].tolist(), strict=True))
+    turn = np.arange(len(number)) % FOLDS
+    found: dict[str, PredictionErrors] = {}
+    for where, fold in {"held_out_blocks": turn, "flights_left_out": np.array(number)}.items():
+        names = np.unique(fold)
+        if len(names) < 2 and where == "flights_left_out":
+            continue
+        parts = []
+        for held, part in zip(names, refitted(fit, [fold != name for name in names]), strict=True):
+            windows: dict[int, list[tuple[float, float]]] = {}
+            for i in np.flatnonzero(fold == held):
+                windows.setdefault(number[i], []).append(spans[i])
+            of = [logs[i] for i in windows]
+            parts.append(prediction_errors(of, vehicle_of(part), windows=list(windows.values())))
+        found[where] = PredictionErrors.pooled(parts)
+    return found
+
+
+def warnings_of(errors: Mapping[str, PredictionErrors]) -> list[str]:
+    """Return a warning for each kind of flight that a vehicle predicts worse than the guess that
+    nothing changes.
+    """
+    return [
+        f"warning: {where.replace('_', ' ')}: {', '.join(of.worse)}: predicted worse than by the "
+        "guess that nothing changes. This vehicle is no model of it"
+        for where, of in errors.items()
+        if of.worse
+    ]
