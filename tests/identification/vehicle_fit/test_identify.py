@@ -100,11 +100,8 @@ def test_a_vehicle_of_rounded_speeds_reads_the_log_that_it_comes_from(crazyflie)
 def test_lift_at_the_rotors_is_not_taken_for_a_gyroscopic_torque():
     """Its moment goes with forward velocity times yaw rate, and took 7 % off Jzz and p/k."""
     bird = load_vehicle("hummingbird")
-    air = (
-        EffectSetting("translational_lift", {"kh": 3.4e-3}),
-        EffectSetting("rotor_drag", {"kdx": 1.2e-4, "kdy": 1.2e-4}),
-    )
-    logs = [plant_flight(bird, air, name, 20.0) for name in ("excite", "yaw")]
+    air = {"translational_lift": {"kh": 3.4e-3}, "rotor_drag": {"kdx": 1.2e-4, "kdy": 1.2e-4}}
+    logs = [recorded(name, vehicle=bird, **air) for name in ("excite", "yaw")]
     found = identify(logs, bird.mass, parse_geometry(str(bird.arm_l)))
     check(found, "Jzz", bird.inertia[2, 2], 0.03)
     check(found, "p/k", bird.p[0] / bird.k[0], 0.03)
