@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from windwrench.controllers import (
-    CONTROLLERS,
-    AdmittancePID,
-    make_controller,
-)
+from windwrench.controllers import CONTROLLERS, AdmittancePID, make_controller
 from windwrench.controllers.flight import flight_record, fly, move_setpoint
 from windwrench.controllers.observation import FORCE_X, MAX_COMMAND, OBSERVATION_SIZE, TORQUE_Z
 from windwrench.dynamics import load_vehicle

@@ -7,12 +7,7 @@ from hypothesis import strategies as st
 
 from tests.support.flights import PERIOD, yawing_flight
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
-from windwrench.estimator import (
-    ConstantGainFilter,
-    TimedFilter,
-    WrenchEKF,
-    WrenchUKF,
-)
+from windwrench.estimator import ConstantGainFilter, TimedFilter, WrenchEKF, WrenchUKF
 
 LAG = EffectSetting("motor_lag", {"tau": 0.04})
 DELAY = EffectSetting("latency", {"d": 0.02})
