@@ -78,10 +78,11 @@ def test_any_form_of_the_same_numbers_gives_the_same_estimate(form):
     np.testing.assert_array_equal(*states)
 
 
-def test_a_copy_and_an_estimate_go_their_own_way():
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy])
+def test_a_copy_and_an_estimate_go_their_own_way(duplicate):
     one = WrenchUKF(VEHICLE)
     one.reset([0, 0, 1], QUATERNION)
-    first, other = one.step(*ARGUMENTS), copy.deepcopy(one)
+    first, other = one.step(*ARGUMENTS), duplicate(one)
     state, covariance = first.state.copy(), first.covariance.copy()
     second = one.step(*ARGUMENTS)
     assert not np.array_equal(second.state, state)

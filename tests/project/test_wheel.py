@@ -2,7 +2,6 @@
 
 import json
 import os
-import subprocess
 import sys
 import sysconfig
 import venv
@@ -11,17 +10,11 @@ from pathlib import Path
 import pytest
 
 from tests.support.paths import ROOT
+from tests.support.programs import said as done
 from windwrench.cli import app
 
 CHECKOUT_ONLY = ("studies", "tests")
 MOST_BYTES = 2_000_000  # of the wheel
-
-
-def done(*words, **options):
-    """Return what a program says; it must succeed."""
-    ended = subprocess.run(words, capture_output=True, text=True, **options)
-    assert ended.returncode == 0, ended.stdout + ended.stderr
-    return ended.stdout
 
 
 @pytest.fixture(scope="module")

@@ -3,11 +3,11 @@ names that are no text. Memory and time are measured in a process of their own.
 """
 
 import gzip
+import hashlib
 import io
 import json
 import os
 import struct
-import subprocess
 import sys
 import zipfile
 from dataclasses import replace
@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.support.programs import said
 from windwrench.controllers.trained_policy import FORMAT, load_policy
 from windwrench.dynamics import load_vehicle
 from windwrench.identification import read_log
@@ -87,8 +88,6 @@ def policy_bomb(path):
             member.write(bytes(2**26))
     data = out.getvalue()
     path.write_bytes(data)
-    import hashlib
-
     card = {"format": FORMAT, "sha256": hashlib.sha256(data).hexdigest()}
     path.with_suffix(".json").write_text(json.dumps(card))
 
@@ -184,19 +183,14 @@ def test_files_that_unpack_to_gigabytes_cost_little(tmp_path):
         file.write(EMPTY_DATAFLASH)
         file.truncate(2**34)
     expected["sparse.BIN"] = "more than 268435456 bytes"
-    done = subprocess.run(
-        [sys.executable, "-c", CHILD, *(str(tmp_path / name) for name in expected)],
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=120,
-    )
-    found = [json.loads(line) for line in done.stdout.splitlines()]
+    paths = (str(tmp_path / name) for name in expected)
+    told = said(sys.executable, "-c", CHILD, *paths, timeout=120)
+    found = [json.loads(line) for line in told.splitlines()]
     assert len(found) == len(expected)
-    for path, said, seconds, memory in found:
-        assert said.startswith(str(tmp_path)), said
-        assert expected[Path(path).name] in said
-        assert "\n" not in said
+    for path, line, seconds, memory in found:
+        assert line.startswith(str(tmp_path)), line
+        assert expected[Path(path).name] in line
+        assert "\n" not in line
         assert seconds < SECONDS, path
         assert memory < MEMORY, path
 

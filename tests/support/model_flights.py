@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.rotation import normalise, quaternion_from_mrp, quaternion_multiply
 from windwrench.estimator import UKFTuning
 from windwrench.estimator.estimate import FORCE, POSITION, QUATERNION, RATE, TORQUE, VELOCITY, Array
@@ -21,6 +22,10 @@ ANISOTROPIC = UKFTuning(
     force_walk=(2e-3, 3e-3, 4e-3),
     position_noise=(0.001, 0.002, 0.003),
     attitude_noise=(0.003, 0.005, 0.008),
+)
+WITH_EFFECTS = load_vehicle("ardrone2").with_effects(
+    EffectSetting("com_offset", {"cx": 0.01, "cz": -0.02}),
+    EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}),
 )
 
 
@@ -57,6 +62,11 @@ class ModelRun:
             self.initial_velocity,
             self.initial_angular_velocity,
         )
+
+    def log(self, period=0.005):
+        """Return times, rotor speeds, positions and quaternions, which a test may spoil."""
+        pose = self.measured_position.copy(), self.measured_quaternion.copy()
+        return period * np.arange(1, len(self.rotor_speeds) + 1), self.rotor_speeds, *pose
 
 
 def simulate_model(
