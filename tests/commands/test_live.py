@@ -16,27 +16,17 @@ import pytest
 
 from tests.live.stream import Running, as_csv, flight
 from tests.live.test_pipeline import offline
+from tests.support.programs import started
 from windwrench.cli import app
 from windwrench.identification.logs.reading import read_log
 from windwrench.live.terminal_page import page
 from windwrench.live.web_view import WebView
 from windwrench.runtime.errors import InputError
 
-START = "from windwrench.cli import main; main()"
-
 
 def run(capsys, *arguments):
     app(["live", *map(str, arguments)], standalone_mode=False)
     return capsys.readouterr()
-
-
-def start(*arguments):
-    return subprocess.Popen(
-        [sys.executable, "-c", START, "live", *map(str, arguments)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
 
 
 def test_the_simulated_vehicle_prints_records_and_sums_up(tmp_path, capsys):
@@ -145,7 +135,8 @@ def fed(log, *rows):
     estimates; their lines, and the thread that reads them.
     """
     text = as_csv(flight()).splitlines(keepends=True)
-    running = start("-", "--vehicle", "ardrone2", "--record", log)
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    running = started("live", "-", "--vehicle", "ardrone2", "--record", log, **pipes)
     lines = []
     reader = threading.Thread(target=lambda: lines.extend(running.stdout))
     reader.start()

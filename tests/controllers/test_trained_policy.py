@@ -89,9 +89,7 @@ def test_a_recurrent_policy_forgets_at_the_start_of_an_episode(cell):
 
 @pytest.mark.parametrize("name", ["lstm", "gru"])
 def test_a_cell_is_torch_s(name):
-    torch = pytest.importorskip(
-        "torch", reason="torch is not installed: pip install 'windwrench[rl]'"
-    )
+    torch = pytest.importorskip("torch", reason="pip install 'windwrench[rl]'")
     torch.manual_seed(0)
     cell = getattr(torch.nn, name.upper())(5, 7)
     parts = {"input": "weight_ih", "hidden": "weight_hh"}

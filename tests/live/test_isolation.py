@@ -5,7 +5,6 @@ import pty
 import resource
 import socket
 import subprocess
-import sys
 import threading
 import time
 from contextlib import ExitStack, contextmanager, suppress
@@ -14,6 +13,7 @@ import numpy as np
 import pytest
 
 from tests.live.stream import Kept, Running, free_port
+from tests.support.programs import started
 from windwrench.identification.logs.reading import read_log
 from windwrench.live.outlets import Outlet
 from windwrench.live.outputs import Lines
@@ -126,10 +126,8 @@ def test_a_reader_who_reads_nothing_stalls_nobody(outputs):
 def test_a_terminal_that_stalls_costs_no_estimate(tmp_path):
     """Nobody reads on after the first page, as after Ctrl-S: the flight goes on to its end."""
     path, (terminal, end) = tmp_path / "flight.csv", pty.openpty()
-    words = ["live", "sim:static", "--seconds", "5", "--record", path]
-    child = subprocess.Popen(
-        [sys.executable, "-m", "windwrench", *words], stdout=end, stderr=subprocess.PIPE
-    )
+    words = ("live", "sim:static", "--seconds", "5", "--record", path)
+    child = started(*words, stdout=end, stderr=subprocess.PIPE)
     os.close(end)
     told = b""
     while b"status" not in told:

@@ -45,10 +45,7 @@ def test_a_controller_of_ones_own_follows_the_fan(example, capsys):
 
 
 def test_stable_baselines3_trains_on_the_plain_environment(example):
-    pytest.importorskip(
-        "stable_baselines3",
-        reason="stable-baselines3 is not installed: pip install 'windwrench[rl]'",
-    )
+    pytest.importorskip("stable_baselines3", reason="pip install 'windwrench[rl]'")
     found = example("sb3_ten_lines").main(steps=60, episodes=1)
     assert all(0.0 < reward <= 250.0 for reward in found.values())
     assert found["learned"] != found["hover"]

@@ -3,8 +3,6 @@
 import subprocess
 import sys
 
-WINDWRENCH = (sys.executable, "-m", "windwrench")
-
 
 def said(*words, **options):
     """Return what a program says on standard output; it must succeed."""
@@ -13,7 +11,10 @@ def said(*words, **options):
     return ended.stdout
 
 
-def started(*words, **options):
-    """Start the command in a session of its own; what it says goes nowhere unless asked for."""
+def started(*words, of=("-m", "windwrench"), **options):
+    """Start the command, or a program of Python's, in a session of its own; what it says goes
+    nowhere unless asked for.
+    """
     streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL} | options
-    return subprocess.Popen([*WINDWRENCH, *map(str, words)], start_new_session=True, **streams)
+    words = [sys.executable, *of, *map(str, words)]
+    return subprocess.Popen(words, start_new_session=True, **streams)
