@@ -173,14 +173,6 @@ def test_a_recording_repeats_with_its_seed(log, tmp_path):
     assert hovered(tmp_path / "flight.csv").read_bytes() == log.read_bytes()
 
 
-def test_an_old_result_survives_a_run_that_fails(call, tmp_path):
-    (tmp_path / "flight.csv").write_text("old")
-    crash = ["--seconds", "5", "--effect", "constant_torque:tx=50", "--out", "flight.csv"]
-    assert call("record", *crash)[0] == 2
-    assert (tmp_path / "flight.csv").read_text() == "old"
-    assert [p.name for p in tmp_path.iterdir()] == ["flight.csv"]
-
-
 def test_the_page_of_effects_is_the_one_in_the_docs():
     assert (ROOT / "docs" / "effects.md").read_text(encoding="utf-8") == effects_page()
 

@@ -17,7 +17,6 @@ def test_what_is_mirrored_is_known():
 @pytest.mark.parametrize(
     ("frame", "history", "scale", "words"),
     [
-        (("torque",), 1, (), "unknown quantity"),
         ((), 1, (), "must name different"),
         (("torque_z", "torque_z"), 1, (), "must name different"),
         (("torque_z",), 0, (), "history must be at least 1"),
@@ -43,5 +42,3 @@ def test_seeds_of_training_validation_and_test_never_meet():
     validation = validation_seeds(100_000)
     assert (validation[0], validation[-1]) == (FIRST_VALIDATION_SEED, FIRST_TEST_SEED - 1)
     assert min(benchmark_seeds(0, 10_000)) > validation[-1]
-    with pytest.raises(InputError, match="there are 100000 episodes"):
-        validation_seeds(2, first=99_999)

@@ -7,9 +7,7 @@ from windwrench.controllers.registry import shipped_policies
 from windwrench.controllers.trained_policy import (
     TaskPolicy,
     TrainedPolicy,
-    gru,
     load_policy,
-    lstm,
     save_policy,
 )
 from windwrench.dynamics import InputError
@@ -85,29 +83,6 @@ def test_a_recurrent_policy_forgets_at_the_start_of_an_episode(cell):
     assert len(set(first)) == 3  # it remembers
     policy.reset()
     assert [policy(observation)[0] for _ in range(3)] == first
-
-
-@pytest.mark.parametrize("name", ["lstm", "gru"])
-def test_a_cell_is_torch_s(name):
-    torch = pytest.importorskip("torch", reason="pip install 'windwrench[rl]'")
-    torch.manual_seed(0)
-    cell = getattr(torch.nn, name.upper())(5, 7)
-    parts = {"input": "weight_ih", "hidden": "weight_hh"}
-    parts |= {"input_bias": "bias_ih", "hidden_bias": "bias_hh"}
-    weights = {
-        f"{name}_{part}": getattr(cell, f"{other}_l0").detach().numpy()
-        for part, other in parts.items()
-    }
-    inputs = torch.randn(6, 1, 5)
-    with torch.no_grad():
-        expected = cell(inputs)[0][:, 0].numpy()
-    hidden, state = np.zeros(7, dtype=np.float32), np.zeros(7, dtype=np.float32)
-    for x, h in zip(inputs[:, 0].numpy(), expected, strict=True):
-        if name == "lstm":
-            hidden, state = lstm(weights, x, hidden, state)
-        else:
-            hidden = gru(weights, x, hidden)
-        np.testing.assert_allclose(hidden, h, atol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -128,9 +128,8 @@ def test_bounds_hold_where_there_is_no_noise_to_find():
     assert np.linalg.norm(estimate.force - truth.force[-1]) < 0.05
 
 
-def test_lost_held_and_wild_poses_change_little():
-    t, speeds, position, quaternion = flight(seconds=20.0)
-    clean = fit_noise(VEHICLE, t, speeds, position, quaternion)
+def test_lost_held_and_wild_poses_change_little(fits):
+    clean, (t, speeds, position, quaternion) = fits[0], flight(seed=0)
     rng = np.random.default_rng(1)
     wild = rng.choice(len(t), len(t) // 100, replace=False)
     position[wild] += rng.uniform(-0.3, 0.3, (len(wild), 3))

@@ -115,20 +115,15 @@ def test_the_fast_update_is_that_of_stable_baselines3(make_env):
     )  # something was learned
 
 
-def test_a_checkpoint_of_another_configuration_is_refused(tmp_path):
-    train(tiny("sac"), "base", 0, tmp_path)
+def test_a_run_says_beside_the_policy_what_it_was_and_another_is_refused(tmp_path):
+    path = train(tiny("sac", "learner.gamma=0.9"), "base", 2, tmp_path)
     other = tiny("sac", "net=[9]")
     env = make_env(other)
     with pytest.raises(InputError, match="not a checkpoint of this configuration"):
         load_checkpoint(make_learner(other, env, 0), env, tmp_path / "checkpoint.pt")
-    with pytest.raises(InputError, match="another configuration, scenario or seed"):
-        train(other, "base", 0, tmp_path)
-    with pytest.raises(InputError, match="another configuration, scenario or seed"):
-        train(tiny("sac"), "fast", 0, tmp_path)
-
-
-def test_a_run_says_beside_the_policy_what_it_was(tmp_path):
-    path = train(tiny("sac", "learner.gamma=0.9"), "base", 2, tmp_path)
+    for config, scenario in ((tiny("sac"), "base"), (tiny("sac", "learner.gamma=0.9"), "fast")):
+        with pytest.raises(InputError, match="another configuration, scenario or seed"):
+            train(config, scenario, 2, tmp_path)
     card = load_policy(path).card
     assert (card["algorithm"], card["scenario"], card["seed"]) == ("sac", "base", 2)
     assert card["config"]["learner"]["gamma"] == 0.9
@@ -169,8 +164,6 @@ def test_a_configuration_file_comes_before_single_settings(tmp_path):
     config = load_config("sac", ["learner.gamma=0.8"], tmp_path / "mine.yaml")
     learner = config["learner"]
     assert (learner["gamma"], learner["tau"], config["steps"]) == (0.8, 0.02, 99)
-    with pytest.raises(InputError, match=r"mine2.yaml: cannot be read"):
-        load_config("sac", [], tmp_path / "mine2.yaml")
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import ctypes
 import shutil
 
 import numpy as np
+import pytest
 
 from tests.support.programs import said
 from windwrench.estimator.estimate import STATUSES
@@ -16,6 +17,15 @@ _NUMBERS = {"single": ctypes.c_float, "double": ctypes.c_double}
 def missing(*programs):
     """Return which of some programs are not installed."""
     return [program for program in programs if shutil.which(program) is None]
+
+
+def needs(*programs):
+    """Skip a test where one of some programs is not installed."""
+    if lacking := missing(*programs):
+        pytest.skip(f"not installed: {', '.join(lacking)}")
+
+
+needs_gcc = pytest.mark.skipif(bool(missing("gcc")), reason="not installed: gcc")
 
 
 def write(exported, folder):
