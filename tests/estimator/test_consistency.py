@@ -19,12 +19,8 @@ def run_filter(make, vehicle, tuning, runs, steps):
     out = np.empty((2, runs, steps))
     for r in range(runs):
         run = simulate_model(vehicle, tuning, speeds, seed=r, **YAWED)
-        run.begin(estimator)
-        for k in range(steps):
-            e = estimator.step(
-                run.rotor_speeds[k], run.measured_position[k], run.measured_quaternion[k]
-            )
-            out[0, r, k], out[1, r, k] = nees(e, run.state[k]), e.nis
+        for k, e in enumerate(run.fly(estimator)):
+            out[:, r, k] = nees(e, run.state[k]), e.nis
     return *out.mean(axis=1), chi2_band(18, runs), chi2_band(6, runs)
 
 

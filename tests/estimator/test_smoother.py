@@ -56,10 +56,7 @@ def test_the_smoother_is_consistent(vehicle, tuning, runs, steps, missing):
         speeds = np.full((steps, 4), vehicle.hover_rate)
         run = simulate_model(vehicle, tuning, speeds, seed=r, **YAWED)
         ukf = RecordingUKF(vehicle, tuning)
-        run.begin(ukf)
-        for k in range(steps):
-            pose = run.measured_position[k], run.measured_quaternion[k]
-            ukf.step(run.rotor_speeds[k], *((None, None) if k in missing else pose))
+        run.fly(ukf, missing)
         found = ukf.smooth(covariance=True)
         for k in range(steps):
             e = found.at(1 + k)
