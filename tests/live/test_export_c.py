@@ -41,6 +41,11 @@ POLICY = ROOT / "training" / "policies" / "sac-0.npz"
 pytestmark = needs_gcc
 
 
+def declaring(model, *effects):
+    """Return a vehicle with effects, each by its name or with its coefficients."""
+    return model.with_effects(*(parse_setting(effect, model) for effect in effects))
+
+
 def assert_same(worst):
     """Every part within 1 % of its standard deviation; standard deviations, statuses, restarts."""
     assert worst["status"] == 0.0
@@ -82,12 +87,8 @@ def test_in_double_c_and_python_are_the_same_numbers(estimator, tmp_path):
 def test_c_undoes_what_a_pose_is_declared_to_suffer(estimator, tmp_path):
     name = "ardrone2, turning"
     model = vehicle_of(name)
-    effects = (
-        "world_tilt:ax=0.03,ay=-0.05",
-        "marker_offset:mx=0.03,mz=0.05",
-        "attitude_gain:g=0.1",
-    )
-    exported = export_c(model.with_effects(*(parse_setting(e, model) for e in effects)), estimator)
+    suffered = ("world_tilt:ax=0.03,ay=-0.05", "marker_offset:mx=0.03,mz=0.05")
+    exported = export_c(declaring(model, *suffered, "attitude_gain:g=0.1"), estimator)
     c = CompiledFilter(exported, tmp_path)
     flown = flight(name, QUICK)
     assert_same(compare(c, exported.filter, flown, 10))
@@ -98,9 +99,7 @@ def test_c_undoes_what_a_pose_is_declared_to_suffer(estimator, tmp_path):
 
 def test_c_is_told_the_voltage_of_a_battery_that_sags(tmp_path):
     name = "ardrone2, turning"
-    model = vehicle_of(name)
-    model = model.with_effects(parse_setting("battery_sag:n=1.7", model))
-    exported = export_c(model, "ekf")
+    exported = export_c(declaring(vehicle_of(name), "battery_sag:n=1.7"), "ekf")
     c, python = CompiledFilter(exported, tmp_path), exported.filter
     c.c.ww_set_voltage.argtypes = [ctypes.c_void_p, ctypes.c_float]
     flown = flight(name, 400)
@@ -144,7 +143,7 @@ def test_compilers_find_nothing_to_say(estimator, tmp_path):
     compilers = [name for name in ("gcc", "clang") if not missing(name)]
     model = load_vehicle("ardrone2")
     effects = ("rotor_drag", "motor_lag", "ground_effect", "com_offset", "attitude_gain")
-    model = model.with_effects(*(parse_setting(e, model) for e in effects))
+    model = declaring(model, *effects)
     names = {"ekf": "sac-0", "ukf": "tracker", "constant-gain": "lead"}
     policy = exportable_policy(names[estimator])
     for number, exported in enumerate(
@@ -162,8 +161,7 @@ def test_compilers_find_nothing_to_say(estimator, tmp_path):
 
 def test_only_the_allowed_functions_of_libm_are_called(tmp_path):
     needs("nm")
-    model = load_vehicle("ardrone2")
-    model = model.with_effects(*(parse_setting(e, model) for e in exportable_effects()))
+    model = declaring(load_vehicle("ardrone2"), *exportable_effects())
     allowed = {*(f"{name}f" for name in FUNCTIONS), "memcpy", "memset"}
     for estimator in ("ekf", "ukf"):
         exported = export_c(model, estimator, policy=exportable_policy("sac-0"))
@@ -183,8 +181,7 @@ def test_only_the_allowed_functions_of_libm_are_called(tmp_path):
     ],
 )
 def test_no_fault_makes_it_read_elsewhere_or_lose_its_numbers(estimator, steps, tmp_path):
-    model = load_vehicle("ardrone2")
-    model = model.with_effects(*(parse_setting(e, model) for e in ("rotor_drag", "motor_lag")))
+    model = declaring(load_vehicle("ardrone2"), "rotor_drag", "motor_lag")
     exported = export_c(model, estimator)
     write(exported, tmp_path)
     shutil.copy(ROOT / "tests/support/exported_c/faults.c", tmp_path)
@@ -207,7 +204,7 @@ def test_effects_in_c_are_those_in_python(tmp_path):
     model = replace(load_vehicle("ardrone2"), ceiling_z=3.0)
     names = [n for n in exportable_effects() if get(n).kind != "body"]
     assert {"rotor_drag", "body_drag", "inflow_thrust", "motor_lag", "ground_effect"} <= set(names)
-    model = model.with_effects(*(parse_setting(n, model) for n in names))
+    model = declaring(model, *names)
     folder = write(export_c(model, "ekf"), tmp_path)
     # its functions are the file's own: here they are called from outside
     text = (
@@ -324,10 +321,9 @@ def test_what_cannot_be_exported_is_said_in_a_line():
         ("fan_jet", "a table"),
         ("slung_payload", "a motion of its own"),
     ):
-        declared = model.with_effects(parse_setting(effect, model))
         expected = rf"^ardrone2: effects: {effect} cannot .*{why}.*--effects none.*rotor_drag"
         with pytest.raises(InputError, match=expected) as refused:
-            export_c(declared)
+            export_c(declaring(model, effect))
         assert "\n" not in str(refused.value)
     with pytest.raises(InputError, match="recurrent"):
         exportable_policy("recurrent-ppo-0")

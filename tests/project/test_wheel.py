@@ -68,11 +68,6 @@ def installed(empty):
     return next(empty.parent.rglob("windwrench/__init__.py")).parent.parent
 
 
-def run(installed, code, folder):
-    whole = f"import sys; sys.path.insert(0, {str(installed)!r})\n{code}"
-    return done(sys.executable, "-c", whole, cwd=folder)
-
-
 def call(empty, folder, *arguments):
     environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
     return done(empty / "windwrench", *arguments, cwd=folder, env=environment)
@@ -132,8 +127,6 @@ def test_tasks_fly_where_there_is_no_checkout(empty, tmp_path):
 
 
 def test_importing_the_package_is_light(installed, tmp_path):
-    code = (
-        "import windwrench\n"
-        "print([m for m in ('mujoco', 'torch', 'numba', 'scipy') if m in sys.modules])"
-    )
-    assert run(installed, code, tmp_path).strip() == "[]"
+    code = f"import sys; sys.path.insert(0, {str(installed)!r}); import windwrench\n"
+    code += "print([m for m in ('mujoco', 'torch', 'numba', 'scipy') if m in sys.modules])"
+    assert done(sys.executable, "-c", code, cwd=tmp_path).strip() == "[]"

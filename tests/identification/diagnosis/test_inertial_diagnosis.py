@@ -30,6 +30,8 @@ def test_a_weak_rotor_is_named_without_a_pose():
     data = report_data(found)
     assert data["effects"][0]["channels"] == list(effect.channels)
     assert any("An IMU alone does not show" in text for text in found.advice)
+    assert found.probabilities.names.keys() == {WEAK.name}
+    assert found.probabilities.names[WEAK.name] > 0.3
 
 
 def test_what_a_few_positions_add():
@@ -43,14 +45,6 @@ def test_what_a_few_positions_add():
     assert {"rotor_drag", "wind", "fan_jet"} <= alone.needs_pose
     assert "rotor_drag" not in placed.not_identifiable
     assert not {"rotor_efficiency", "motor_lag", "inertia"} & alone.not_identifiable
-
-
-@pytest.mark.slow
-def test_an_imu_has_probabilities():
-    log = pose_removed(imu_flight(VEHICLE, (WEAK,), seconds=15.0))
-    found = diagnose([log], VEHICLE)
-    assert set(found.probabilities.names) == {effect.name for effect in found.effects}
-    assert found.probabilities.names[WEAK.name] > 0.3
 
 
 def test_a_pose_and_an_imu_are_not_mixed():
