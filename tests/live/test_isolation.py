@@ -254,11 +254,10 @@ def test_a_page_that_fails_is_told_and_the_stream_goes_on(monkeypatch, watched):
 
 
 def test_it_listens_to_this_machine_alone_unless_told_and_says_so():
-    for host, at in (("", "127.0.0.1"), ("0.0.0.0", "0.0.0.0")):
-        for kind in ("mavlink:udp", "mavlink:udpin", "udp-json"):
-            port = free_port()
-            running = Running(f"{kind}://{host}:{port}")
-            running.until(lambda one=running: one.source.link.opened)
-            assert running.source.link.opened.getsockname() == (at, port)
-            running.end()
-            assert running.tallies.news() == [f"listening at {at}:{port}, UDP"]
+    for kind, host in (("mavlink:udp", ""), ("mavlink:udpin", "0.0.0.0"), ("udp-json", "")):
+        port, at = free_port(), host or "127.0.0.1"
+        running = Running(f"{kind}://{host}:{port}")
+        running.until(lambda one=running: one.source.link.opened)
+        assert running.source.link.opened.getsockname() == (at, port)
+        running.end()
+        assert running.tallies.news() == [f"listening at {at}:{port}, UDP"]
