@@ -18,8 +18,7 @@ def written():
 
 def run(capsys, *arguments):
     app([*map(str, arguments), "--json"], standalone_mode=False)
-    found = json.loads(capsys.readouterr().out)["result"]
-    return found
+    return json.loads(capsys.readouterr().out)["result"]
 
 
 def test_check_proposes_a_map_and_writes_the_log_by_it(tmp_path, written, capsys):

@@ -17,8 +17,7 @@ PLAIN = load_vehicle("ardrone2")
 VEHICLES = {
     "plain": PLAIN,
     "effects that remember": PLAIN.with_effects(LAG, DELAY),
-    "crazyflie with drag": load_vehicle("crazyflie").with_effects(DRAG, LAG),
-    "hummingbird, seen at a marker": load_vehicle("hummingbird").with_effects(MARKER, LAG),
+    "drag, seen at a marker": load_vehicle("hummingbird").with_effects(MARKER, DRAG, LAG),
 }
 FILTERS = (WrenchUKF, WrenchEKF, ConstantGainFilter)
 

@@ -303,12 +303,9 @@ def test_on_a_cortex_m4_it_says_the_same_within_its_limits(tmp_path):
             c.predict(flown["rotor_speeds"][k], flown["dt"][k])
             c.correct(flown["position"][k], flown["quaternion"][k])
             e = c.estimate
-            names = ("position", "velocity", "angular_velocity", "torque", "force")
-            mine = np.concatenate(
-                [getattr(e, name) for name in (*names[:1], "quaternion", *names[1:])]
-            )
-            std = [np.array(getattr(e, f"std_{name}")) for name in names]
-            std = np.concatenate([std[0], [0.01] * 4, *std[1:]])
+            parts = ("position", "quaternion", "velocity", "angular_velocity", "torque", "force")
+            mine = np.concatenate([getattr(e, name) for name in parts])
+            std = np.concatenate([getattr(e, f"std_{name}", [0.01] * 4) for name in parts])
             assert board.status[k - 1] == e.status
             assert np.all(np.abs(board.estimates[k - 1] - mine) < LARGEST * std)
 
