@@ -324,6 +324,9 @@ def test_what_cannot_be_exported_is_said_in_a_line():
         assert "\n" not in str(refused.value)
     with pytest.raises(InputError, match="recurrent"):
         exportable_policy("recurrent-ppo-0")
+    for wrong in ({"estimator": "kalman"}, {"precision": "half"}):
+        with pytest.raises(InputError, match=next(iter(wrong))):
+            export_c(model, **wrong)
 
 
 def test_names_cannot_end_the_comment_that_holds_them(tmp_path):
