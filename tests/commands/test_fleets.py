@@ -13,7 +13,10 @@ from windwrench.identification.fleet.outcomes import Outcomes
 from windwrench.identification.fleet.running import OUTCOMES
 from windwrench.runtime import workers
 
-FOUND = fleet_row("", "", (0.04, 0.001)) | {
+FOUND = {
+    "status": "diagnosed",
+    "verdict": "explained",
+    "effects": fleet_row("", 0, (0.04, 0.001))["effects"],
     "remainder": "none",
     "headline": "The model lacked mass.",
     "error": {

@@ -409,18 +409,22 @@ def test_the_thrusts_that_rotor_effects_leave():
 
 
 @pytest.mark.parametrize("d", [0.0, 0.005, 0.0125, 0.1])
-@pytest.mark.parametrize(
-    "steps",
-    [[PERIOD] * 60, [0.01] * 60, [0.001] * 1000, ([0.03] + [PERIOD] * 3) * 15],
-    ids=["200 Hz", "100 Hz", "more than its memory holds", "uneven"],
-)
-def test_latency_is_a_pure_delay_between_samples_too(d, steps):
-    rotors, slope, t = Rotors(setting("latency", d=d)), np.array([1, -1, 2, 0]), 0.0
-    for k, dt in enumerate(steps):
-        t += dt * (k > 0)
-        out = rotors(400.0 + 10.0 * t * slope, dt=dt)
-        expected = 400.0 + 10.0 * max(t - d, 0.0) * slope
-        np.testing.assert_allclose(out, expected, rtol=1e-12)
+@pytest.mark.parametrize("dt", [PERIOD, 0.01])
+def test_latency_is_a_pure_delay_between_samples_too(d, dt):
+    rotors = Rotors(setting("latency", d=d))
+    for k in range(60):
+        t = k * dt
+        out = rotors(400.0 + 10.0 * t * np.array([1, -1, 2, 0]), dt=dt)
+        np.testing.assert_allclose(
+            out, 400.0 + 10.0 * max(t - d, 0.0) * np.array([1, -1, 2, 0]), rtol=1e-12
+        )
+
+
+def test_latency_holds_at_a_rate_that_its_memory_could_not():
+    rotors = Rotors(setting("latency", d=0.08))
+    for k in range(1000):
+        out = rotors([400.0 + 10.0 * 0.001 * k] * 4, dt=0.001)
+    np.testing.assert_allclose(out, 400.0 + 10.0 * (0.999 - 0.08), rtol=1e-12)
 
 
 @pytest.mark.parametrize("d", [0.0013, 0.0125, 0.0311])
@@ -433,11 +437,17 @@ def test_latency_takes_nothing_from_what_falls_between_samples(d):
     )  # a line between two samples would be off by up to 0.08
 
 
-def test_latency_stays_within_the_samples_where_they_leap():
+def test_latency_stays_within_the_samples_where_they_leap_or_are_not_even():
     rotors = Rotors(setting("latency", d=0.0125))
     out = [rotors([600.0 * (k > 20)] * 4)[0] for k in range(40)]
     assert min(out) == 0.0
     assert max(out) == 600.0
+    rotors, t = Rotors(setting("latency", d=0.0125)), 0.0
+    for k in range(60):
+        dt = 0.03 if k % 4 == 0 else PERIOD
+        t += dt
+        out = rotors(400.0 + 10.0 * t * np.ones(4), dt=dt)
+    np.testing.assert_allclose(out, 400.0 + 10.0 * (t - 0.0125), rtol=1e-12)
 
 
 POSE = np.array([0.4, -1.2, 1.5])
