@@ -42,3 +42,5 @@ def test_seeds_of_training_validation_and_test_never_meet():
     validation = validation_seeds(100_000)
     assert (validation[0], validation[-1]) == (FIRST_VALIDATION_SEED, FIRST_TEST_SEED - 1)
     assert min(benchmark_seeds(0, 10_000)) > validation[-1]
+    with pytest.raises(InputError, match="there are 100000 episodes"):
+        validation_seeds(2, first=99_999)
