@@ -4,7 +4,14 @@ import sys
 
 import pytest
 
-from windwrench.cli import main
+from windwrench.cli import app, main
+
+
+def recorded(path, *words, effect="constant_force:fx=0.2", seconds=12):
+    """Record a flight with an effect, a force of 0.2 N along x, into a file; return its path."""
+    chosen = ("--effect", effect, "--seconds", str(seconds), *words, "--out", str(path))
+    app(["record", *chosen], standalone_mode=False)
+    return path
 
 
 @pytest.fixture

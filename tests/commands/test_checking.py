@@ -1,31 +1,27 @@
 """``check``: anyone's table in, by the command line."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.support.random_tables import Written, flight, random_table, save
+from tests.support.random_tables import flight, random_table, save
 from windwrench.cli import app
 from windwrench.identification.logs.reading import read_log
 from windwrench.runtime.errors import InputError
 
 
 @pytest.fixture(scope="module")
-def written() -> Written:
+def written():
     return random_table(flight("ardrone2", "excite", 1, 12.0), np.random.default_rng(4), 0.0)
 
 
-def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, object]:
+def run(capsys, *arguments):
     app([*map(str, arguments), "--json"], standalone_mode=False)
-    found: dict[str, object] = json.loads(capsys.readouterr().out)["result"]
-    return found
+    return json.loads(capsys.readouterr().out)["result"]
 
 
-def test_check_proposes_a_map_and_writes_the_log_by_it(
-    tmp_path: Path, written: Written, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_check_proposes_a_map_and_writes_the_log_by_it(tmp_path, written, capsys):
     theirs, map_file = save(written, tmp_path / "theirs.csv"), tmp_path / "map.yaml"
     found = run(
         capsys, "check", theirs, "--vehicle", "ardrone2", "--write-map", map_file, "--out", tmp_path
@@ -33,7 +29,7 @@ def test_check_proposes_a_map_and_writes_the_log_by_it(
     assert found["read_by"] == "a map that was guessed"
     assert (tmp_path / "check.png").read_bytes().startswith(b"\x89PNG")
     assert found["map"] == map_file.read_text()
-    assert all(field["why"] for field in found["fields"])  # type: ignore[attr-defined]
+    assert all(field["why"] for field in found["fields"])
     ours = tmp_path / "ours.csv.gz"
     run(capsys, "check", theirs, "--map", map_file, "--write", ours, "--out", tmp_path / "by_map")
     log = read_log(ours)
@@ -43,9 +39,7 @@ def test_check_proposes_a_map_and_writes_the_log_by_it(
     assert again["vehicle"] == "ardrone2"
 
 
-def test_commands_stay_commands_when_they_are_written(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_commands_stay_commands_when_they_are_written(tmp_path, capsys):
     """What nobody measured must not come back as if it had been."""
     lines = ["time,x,y,z,roll,pitch,yaw,pwm1,pwm2,pwm3,pwm4"]
     lines += [f"{0.01 * k:.2f},0,0,1,0,0,0,1500,1500,1500,1500" for k in range(50)]
@@ -59,9 +53,7 @@ def test_commands_stay_commands_when_they_are_written(
     assert "omega1" not in out.read_text().split("\n")[0]
 
 
-def test_positions_without_an_attitude_are_a_channel_and_an_imu_is_checked(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_positions_without_an_attitude_are_a_channel_and_an_imu_is_checked(tmp_path, capsys):
     """Five positions a second beside an accelerometer that reads in g."""
     t = 0.01 * np.arange(1500)
     position = np.where(np.arange(1500)[:, None] % 20 == 0, np.sin(np.outer(t, [1, 2, 3])), np.nan)
@@ -71,14 +63,12 @@ def test_positions_without_an_attitude_are_a_channel_and_an_imu_is_checked(
     rows = np.column_stack([t, position, sensors, speeds])
     np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header=names, comments="")
     found = run(capsys, "check", tmp_path / "a.csv", "--vehicle", "ardrone2", "--out", tmp_path)
-    channels: dict[str, dict[str, float]] = found["channels"]  # type: ignore[assignment]
+    channels = found["channels"]
     assert channels["position"]["rate_hz"] == pytest.approx(5.0)
-    assert any("ax, ay, az look like g" in text for text in found["doubts"])  # type: ignore[attr-defined]
+    assert any("ax, ay, az look like g" in text for text in found["doubts"])
 
 
-def test_a_map_with_something_missing_is_written_and_finished_by_hand(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_map_with_something_missing_is_written_and_finished_by_hand(tmp_path, capsys):
     """Four columns that do not move: nothing shows that they are rotors, or in which unit."""
     log, path, map_file = flight("ardrone2", "excite", 1, 12.0), tmp_path / "a.csv", tmp_path / "m"
     columns = [log.t, *log.position.T, *log.quaternion.T, *np.full((4, len(log.t)), 380.0)]
@@ -98,9 +88,7 @@ def test_a_map_with_something_missing_is_written_and_finished_by_hand(
     assert found["samples"] == len(log.t)
 
 
-def test_the_map_that_is_printed_names_its_columns(
-    tmp_path: Path, written: Written, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_map_that_is_printed_names_its_columns(tmp_path, written, capsys):
     app(
         ["check", str(save(written, tmp_path / "theirs.csv")), "--out", str(tmp_path)],
         standalone_mode=False,

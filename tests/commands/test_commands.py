@@ -14,6 +14,7 @@ import pytest
 import typer
 import yaml
 
+from tests.commands.conftest import recorded
 from tests.support.paths import ROOT
 from windwrench.cli import app
 from windwrench.commands.options import listed, names_of, offering
@@ -24,15 +25,27 @@ from windwrench.runtime.plain_values import plain
 COMMANDS = sorted(command.name for command in app.registered_commands)
 EXPENSIVE = ("benchmark", "reproduce")
 COMMAND = Path(sys.executable).with_name("windwrench")
-RECORD = ["record", "--effect", "constant_force:fx=0.2", "--trajectory", "hover", "--seconds", "8"]
+needs_command = pytest.mark.skipif(
+    not COMMAND.exists(), reason=f"no windwrench command beside {sys.executable}: pip install -e ."
+)
+
+
+def hovered(path):
+    """Record a hover with a constant force of 0.2 N along x."""
+    return recorded(path, "--trajectory", "hover", seconds=8)
+
+
+def ended(folder, *words, **environment):
+    """Run the installed command with some variables, and others of them unset."""
+    changed = {k: v for k, v in (os.environ | environment).items() if v is not None}
+    return subprocess.run(
+        [COMMAND, *words], env=changed, cwd=folder, capture_output=True, text=True
+    )
 
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
-    """A recorded flight with a constant force of 0.2 N along x."""
-    path = tmp_path_factory.mktemp("log") / "flight.csv"
-    app([*RECORD, "--out", str(path)], standalone_mode=False)
-    return path
+    return hovered(tmp_path_factory.mktemp("log") / "flight.csv")
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -156,17 +169,8 @@ def test_a_recorded_flight_can_be_estimated(call, log, tmp_path):
     assert np.mean(wrench["fx"][wrench["t"] > 5.0]) == pytest.approx(0.2, abs=0.03)
 
 
-def test_a_recording_repeats_with_its_seed(call, log, tmp_path):
-    call(*RECORD, "--out", "flight.csv")
-    assert (tmp_path / "flight.csv").read_bytes() == log.read_bytes()
-
-
-def test_an_old_result_survives_a_run_that_fails(call, tmp_path):
-    (tmp_path / "flight.csv").write_text("old")
-    crash = ["--seconds", "5", "--effect", "constant_torque:tx=50", "--out", "flight.csv"]
-    assert call("record", *crash)[0] == 2
-    assert (tmp_path / "flight.csv").read_text() == "old"
-    assert [p.name for p in tmp_path.iterdir()] == ["flight.csv"]
+def test_a_recording_repeats_with_its_seed(log, tmp_path):
+    assert hovered(tmp_path / "flight.csv").read_bytes() == log.read_bytes()
 
 
 def test_the_page_of_effects_is_the_one_in_the_docs():
@@ -265,34 +269,19 @@ def test_every_entry_of_the_options_is_an_option_and_its_names_are_there():
                 assert names_of(said["names"]), name
 
 
-@pytest.mark.skipif(
-    not COMMAND.exists(), reason=f"no windwrench command beside {sys.executable}: pip install -e ."
+@needs_command
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [("windwrench diag", "diagnose"), ("windwrench fly --vehicle ar", "ardrone2")],
 )
-def test_a_shell_completes_commands_and_names(tmp_path):
-    def completed(words):
-        environment = {
-            **os.environ,
-            "_WINDWRENCH_COMPLETE": "complete_bash",
-            "COMP_WORDS": words,
-            "COMP_CWORD": str(len(words.split(" ")) - 1),
-        }
-        return subprocess.run(
-            [COMMAND], env=environment, cwd=tmp_path, capture_output=True, text=True
-        ).stdout.split()
-
-    assert completed("windwrench diag") == ["diagnose"]
-    assert completed("windwrench fly --vehicle ar") == ["ardrone2"]
+def test_a_shell_completes_commands_and_names(tmp_path, words, offered):
+    asked = {"_WINDWRENCH_COMPLETE": "complete_bash", "COMP_WORDS": words}
+    done = ended(tmp_path, **asked, COMP_CWORD=str(words.count(" ")))
+    assert done.stdout.split() == [offered]
 
 
-@pytest.mark.skipif(
-    not COMMAND.exists(), reason=f"no windwrench command beside {sys.executable}: pip install -e ."
-)
-def test_no_color_is_honoured(tmp_path):
-    def error(**more):
-        environment = {**{k: v for k, v in os.environ.items() if k != "NO_COLOR"}, **more}
-        return subprocess.run(
-            [COMMAND, "flie"], env=environment, cwd=tmp_path, capture_output=True, text=True
-        ).stderr
-
-    assert "\x1b[" in error(FORCE_COLOR="1", TERM="xterm-256color")
-    assert "\x1b[3" not in error(FORCE_COLOR="1", TERM="xterm-256color", NO_COLOR="1")
+@needs_command
+@pytest.mark.parametrize("no_color", [None, "1"])
+def test_no_color_is_honoured(tmp_path, no_color):
+    coloured = {"FORCE_COLOR": "1", "TERM": "xterm-256color", "NO_COLOR": no_color}
+    assert ("\x1b[3" in ended(tmp_path, "flie", **coloured).stderr) == (no_color is None)

@@ -24,7 +24,7 @@ GOLDEN = ROOT / "tests" / "golden" / "error_lines.json"
 CASES = json.loads(GOLDEN.read_text(encoding="utf-8"))
 
 
-def refusal(command: str, folder: Path) -> list[object]:
+def refusal(command, folder):
     """Return the exit code of a command in a folder, and the line that says what is wrong."""
     said = io.StringIO()
     before = Path.cwd(), sys.argv
@@ -45,7 +45,7 @@ def refusal(command: str, folder: Path) -> list[object]:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     """A folder of bad inputs."""
     made = tmp_path_factory.mktemp("bad")
     write_bad_inputs(made)
@@ -53,13 +53,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("command", CASES)
-def test_a_bad_input_ends_in_its_golden_line(command: str, folder: Path) -> None:
+def test_a_bad_input_ends_in_its_golden_line(command, folder):
     before = names(folder)
     assert refusal(command, folder) == CASES[command]
     assert names(folder) == before
 
 
-def names(folder: Path) -> list[str]:
+def names(folder):
     """Return what a folder holds, but for the bytecode that Python keeps of a user's own file."""
     return sorted(path.name for path in folder.iterdir() if path.name != "__pycache__")
 

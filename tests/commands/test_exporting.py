@@ -35,24 +35,15 @@ def test_files_that_are_there_stay_unless_said_otherwise(call, tmp_path):
     assert "ww_init" in mine.read_text()
 
 
-def test_declared_effects_are_in_it_or_refused(call, tmp_path):
+def test_declared_effects_are_in_it_unless_none_are_wanted(call, tmp_path):
     vehicle = tmp_path / "mine.yaml"
     text = "name: mine\nmass: 0.5\ninertia: [3e-3, 3e-3, 5e-3]\narm_l: 0.12\n"
     text += "k: [8e-6, 8e-6, 8e-6, 8e-6]\np: [2e-7, 2e-7, 2e-7, 2e-7]\neffects:\n"
-    drag = "- {name: rotor_drag, coefficients: {kdx: 1.0e-4, kdy: 1.0e-4}}\n"
-    vehicle.write_text(text + drag)
-    code, out, _ = call("export-c", "--vehicle", vehicle, "--out", tmp_path / "a", "--json")
-    assert code == 0
-    assert json.loads(out)["result"]["effects"] == ["rotor_drag"]
-    assert "effect_rotor_drag" in (tmp_path / "a" / "windwrench_filter.c").read_text()
-    vehicle.write_text(text + drag + "- {name: latency, coefficients: {d: 0.02}}\n")
-    code, _, err = call("export-c", "--vehicle", vehicle, "--out", tmp_path / "b")
-    assert code == 2
-    assert "latency" in err
-    assert "rotor_drag" in err
-    assert not (tmp_path / "b").exists()
-    code, out, _ = call(
-        "export-c", "--vehicle", vehicle, "--effects", "none", "--out", tmp_path / "c", "--json"
-    )
-    assert code == 0
-    assert json.loads(out)["result"]["effects"] == []
+    vehicle.write_text(text + "- {name: rotor_drag, coefficients: {kdx: 1.0e-4, kdy: 1.0e-4}}\n")
+    for words, effects in (((), ["rotor_drag"]), (("--effects", "none"), [])):
+        out = tmp_path / f"{len(effects)} effects"
+        code, text, _ = call("export-c", "--vehicle", vehicle, *words, "--out", out, "--json")
+        assert code == 0
+        assert json.loads(text)["result"]["effects"] == effects
+        source = (out / "windwrench_filter.c").read_text()
+        assert ("effect_rotor_drag" in source) == bool(effects)

@@ -6,6 +6,7 @@ import json
 import pytest
 from pebble import ProcessExpired
 
+from tests.support.diagnoses import fleet_row
 from windwrench.identification.fleet.flight import key_of
 from windwrench.identification.fleet.manifest import find_logs
 from windwrench.identification.fleet.outcomes import Outcomes
@@ -15,18 +16,9 @@ from windwrench.runtime import workers
 FOUND = {
     "status": "diagnosed",
     "verdict": "explained",
+    "effects": fleet_row("", 0, (0.04, 0.001))["effects"],
     "remainder": "none",
     "headline": "The model lacked mass.",
-    "effects": [
-        {
-            "name": "mass",
-            "coefficients": {"dm": 0.04},
-            "std": {"dm": 0.001},
-            "units": {"dm": "kg"},
-            "tentative": False,
-            "indistinguishable_from": [],
-        }
-    ],
     "error": {
         side: {"force_rms_N": 0.5, "torque_rms_Nm": 0.01} for side in ("before", "after", "floor")
     },

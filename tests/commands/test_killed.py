@@ -1,7 +1,5 @@
 """Commands that are killed (no chance to clean up) leave no half file and no process."""
 
-import gzip
-import json
 import os
 import signal
 import subprocess
@@ -11,13 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from windwrench.dynamics import load_vehicle
-from windwrench.envs.recording import record_flight
-from windwrench.identification.logs.flight_log import FlightLog, write_log
+from tests.commands.conftest import recorded
+from tests.support.programs import started
 from windwrench.runtime.whole_files import replaced
 
-START = "from windwrench.cli import main; main()"
-ESTIMATE = "estimate flight.csv --no-tune --out out"
 WORK = """
 import time
 from pathlib import Path
@@ -34,11 +29,6 @@ if __name__ == "__main__":
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/stat").exists(), reason="looks for processes in Linux's /proc"
 )
-
-
-def start(folder, *words, **options):
-    streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL} | options
-    return subprocess.Popen([sys.executable, *words], cwd=folder, start_new_session=True, **streams)
 
 
 def processes_of(session):
@@ -61,35 +51,9 @@ def assert_ends(session, seconds=20.0):
     assert processes_of(session) == []
 
 
-def assert_whole(folder):
-    """Every result that is there is whole; a temporary file has a name that no one takes for a
-    result.
-    """
-    for path in folder.rglob("*"):
-        if path.name.startswith("."):
-            continue
-        if path.suffix == ".json":
-            json.loads(path.read_text(encoding="utf-8"))
-        elif path.suffix == ".gz":
-            assert gzip.decompress(path.read_bytes()).endswith(b"\n"), path
-        elif path.suffix == ".png":
-            assert path.read_bytes().endswith(b"IEND\xaeB`\x82"), path
-        elif path.suffix in (".svg", ".html"):
-            assert path.read_text(encoding="utf-8").rstrip().endswith(("</svg>", "</html>")), path
-
-
-@pytest.fixture(scope="module")
-def flight(tmp_path_factory):
-    """The bytes of a short flight log."""
-    path = tmp_path_factory.mktemp("flight") / "flight.csv"
-    flown = record_flight(load_vehicle("ardrone2"), trajectory="gentle", seconds=12.0)
-    write_log(FlightLog(**flown, vehicle="ardrone2"), path)
-    return path.read_bytes()
-
-
 def test_the_workers_of_a_killed_run_end(tmp_path):
     (tmp_path / "work.py").write_text(WORK)
-    run = start(tmp_path, "work.py")
+    run = started("work.py", cwd=tmp_path, of=())
     while not ((tmp_path / "one").exists() and (tmp_path / "two").exists()):
         assert run.poll() is None
         time.sleep(0.05)
@@ -98,14 +62,16 @@ def test_the_workers_of_a_killed_run_end(tmp_path):
     assert_ends(run.pid)
 
 
-def test_a_reader_who_goes_away_costs_no_results(tmp_path, flight):
+def test_a_reader_who_goes_away_costs_no_results(tmp_path):
     """As a pipe to ``head`` does: what is written comes before what is said."""
-    (tmp_path / "flight.csv").write_bytes(flight)
-    run = start(tmp_path, "-c", START, *ESTIMATE.split(), stdout=subprocess.PIPE)
+    recorded(tmp_path / "flight.csv", "--trajectory", "gentle")
+    words = ["estimate", "flight.csv", "--no-tune", "--out", "out"]
+    run = started(*words, cwd=tmp_path, stdout=subprocess.PIPE)
     run.stdout.close()
     run.wait()
-    assert {path.name for path in (tmp_path / "out").iterdir()} >= {"wrench.csv", "wrench.png"}
-    assert_whole(tmp_path / "out")
+    out = tmp_path / "out"
+    assert (out / "wrench.csv").read_bytes().endswith(b"\n")
+    assert (out / "wrench.png").read_bytes().endswith(b"IEND\xaeB`\x82")
 
 
 def test_what_a_killed_writer_left_is_swept_away(tmp_path):

@@ -1,10 +1,8 @@
 """``live``: what it prints, records, serves and refuses; ended by its user, and killed."""
 
 import json
-import os
 import signal
 import subprocess
-import sys
 import threading
 import time
 import urllib.error
@@ -16,27 +14,18 @@ import pytest
 
 from tests.live.stream import Running, as_csv, flight
 from tests.live.test_pipeline import offline
+from tests.support.browser import browse, needs_browser
+from tests.support.programs import started
 from windwrench.cli import app
 from windwrench.identification.logs.reading import read_log
 from windwrench.live.terminal_page import page
 from windwrench.live.web_view import WebView
 from windwrench.runtime.errors import InputError
 
-START = "from windwrench.cli import main; main()"
-
 
 def run(capsys, *arguments):
     app(["live", *map(str, arguments)], standalone_mode=False)
     return capsys.readouterr()
-
-
-def start(*arguments):
-    return subprocess.Popen(
-        [sys.executable, "-c", START, "live", *map(str, arguments)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
 
 
 def test_the_simulated_vehicle_prints_records_and_sums_up(tmp_path, capsys):
@@ -118,50 +107,30 @@ def test_the_page_in_a_browser_is_served_here_alone(watched):
 
 
 @pytest.mark.slow
+@needs_browser
 def test_the_page_in_a_real_browser(watched, tmp_path):
-    from tests.support.browser import BROWSER
-
-    if BROWSER is None:
-        pytest.skip("no browser is installed")
     with WebView(watched, 0) as view:
         threading.Timer(15.0, view._over.set).start()  # the page is done
-        shown = subprocess.run(
-            [
-                BROWSER, "--headless=new", "--no-sandbox", "--disable-gpu",
-                "--disable-dev-shm-usage", f"--user-data-dir={tmp_path}",
-                "--enable-logging=stderr", "--virtual-time-budget=3000", "--timeout=20000",
-                "--dump-dom", view.address,
-            ],
-            capture_output=True, text=True, timeout=120,
-        )  # fmt: skip
+        shown = browse(view.address, tmp_path)
     assert "sim:base?speed=0, ardrone2" in shown.stdout
     assert "rates: row" in shown.stdout
     assert "finished: 2 s have passed" in shown.stdout
     assert not [line for line in shown.stderr.splitlines() if "CONSOLE" in line]
 
 
-def fed(log, *rows):
-    """A command that was fed a flight up to each of some rows, once it has printed as many
-    estimates; their lines, and the thread that reads them.
-    """
-    text = as_csv(flight()).splitlines(keepends=True)
-    running = start("-", "--vehicle", "ardrone2", "--record", log)
+def test_its_user_ends_it_and_loses_nothing(tmp_path):
+    """It has been fed 700 rows of a flight, and has printed as many estimates."""
+    log = tmp_path / "flight.csv"
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    running = started("live", "-", "--vehicle", "ardrone2", "--record", log, **pipes)
     lines = []
     reader = threading.Thread(target=lambda: lines.extend(running.stdout))
     reader.start()
-    fed_lines = 0
-    for end in rows:
-        running.stdin.write("".join(text[fed_lines : end + 1]).encode())
-        running.stdin.flush()
-        fed_lines = end + 1
-        while len(lines) < fed_lines and running.poll() is None:
-            time.sleep(0.02)
-    return running, lines, reader
-
-
-def test_its_user_ends_it_and_loses_nothing(tmp_path):
-    log = tmp_path / "flight.csv"
-    running, lines, reader = fed(log, 700)
+    fed = as_csv(flight()).splitlines(keepends=True)[:701]
+    running.stdin.write("".join(fed).encode())
+    running.stdin.flush()
+    while len(lines) < len(fed) and running.poll() is None:
+        time.sleep(0.02)
     running.send_signal(signal.SIGINT)
     said = running.stderr.read().decode()
     assert running.wait() == 130
@@ -171,23 +140,3 @@ def test_its_user_ends_it_and_loses_nothing(tmp_path):
     found = np.array([line.split(b",")[:7] for line in lines[1:]], dtype=float)
     np.testing.assert_allclose(found, offline(flight())[:700], atol=1e-9, rtol=0)
     assert len(read_log(log).t) == 700
-
-
-def test_a_recording_that_is_killed_is_a_log_up_to_its_last_second(tmp_path):
-    log = tmp_path / "flight.csv"
-    running, _, reader = fed(log, 1200, 1210)  # what is printed is recorded before more is read
-    os.kill(running.pid, signal.SIGKILL)
-    running.wait()
-    reader.join()
-    assert read_log(log).t[-1] > 0.005 * 1199 - 1.0
-
-
-@pytest.mark.parametrize("text", ["t,px,py\n1,2,3\n", ""])
-def test_nothing_is_half_recorded_of_what_is_no_stream(tmp_path, monkeypatch, text):
-    (tmp_path / "in").write_text(text)
-    log = tmp_path / "flight.csv"
-    with open(tmp_path / "in") as stdin:
-        monkeypatch.setattr(sys, "stdin", stdin)
-        with pytest.raises(InputError, match="standard input: no"):
-            app(["live", "-", "--vehicle", "ardrone2", "--record", str(log)], standalone_mode=False)
-    assert not log.exists()

@@ -6,25 +6,12 @@ from pathlib import Path
 
 import pytest
 
-RECORD = [
-    "record",
-    "--effect",
-    "constant_force:fx=0.2",
-    "--trajectory",
-    "excite",
-    "--seconds",
-    "12",
-]
+from tests.commands.conftest import recorded
 
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
-    """A recorded flight with a constant force of 0.2 N along x."""
-    from windwrench.cli import app
-
-    path = tmp_path_factory.mktemp("look") / "flight.csv"
-    app([*RECORD, "--out", str(path)], standalone_mode=False)
-    return path
+    return recorded(tmp_path_factory.mktemp("look") / "flight.csv", "--trajectory", "excite")
 
 
 def test_a_log_in_place_of_a_command_ends_with_a_sentence_and_a_page(call, log):

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.parameters import mostly_slow
+from tests.support.programs import started
 from windwrench.commands.terminal import console, show_table
 from windwrench.runtime.printable import printable
 
@@ -72,7 +73,10 @@ def test_a_table_cuts_no_interval_and_no_name(width, monkeypatch, capsys):
     assert all(len(line) <= max(width, 8) for line in said.splitlines())
 
 
-@pytest.mark.parametrize("arguments", [["estimate", "--help"], ["--version"], ["--help"]])
+@pytest.mark.parametrize(
+    "arguments",
+    mostly_slow([["estimate", "--help"], ["--version"], ["--help"]], ["--version"].__eq__),
+)
 def test_a_full_disk_ends_in_one_line(arguments):
     with open("/dev/full", "wb") as full:
         done = run(*arguments, stdout=full)
@@ -139,13 +143,8 @@ def test_an_unknown_way_to_draw_is_named(tmp_path):
 
 @pytest.mark.parametrize("delay", mostly_slow([0.25, 0.4, 0.7, 1.1, 1.6], {0.4, 1.1}.__contains__))
 def test_an_interrupt_ends_in_one_word_at_any_time(delay, tmp_path):
-    child = subprocess.Popen(
-        [*COMMAND, "benchmark", "--controllers", "hover", "--episodes", "500"],
-        cwd=tmp_path,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        start_new_session=True,
-    )
+    words = ("benchmark", "--controllers", "hover", "--episodes", "500")
+    child = started(*words, cwd=tmp_path, stderr=subprocess.PIPE)
     time.sleep(delay)
     child.send_signal(signal.SIGINT)
     said = child.communicate(timeout=60)[1]

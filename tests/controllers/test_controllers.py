@@ -3,15 +3,10 @@
 import numpy as np
 import pytest
 
-from windwrench.controllers import (
-    CONTROLLERS,
-    AdmittancePID,
-    make_controller,
-)
+from windwrench.controllers import CONTROLLERS, AdmittancePID, make_controller
 from windwrench.controllers.flight import flight_record, fly, move_setpoint
 from windwrench.controllers.observation import FORCE_X, MAX_COMMAND, OBSERVATION_SIZE, TORQUE_Z
 from windwrench.dynamics import load_vehicle
-from windwrench.dynamics.rotation import quaternion_of_yaw
 from windwrench.estimator.estimate import STATE_SIZE
 
 VEHICLE = load_vehicle("ardrone2")
@@ -33,18 +28,14 @@ def test_a_command_is_one_number_within_bounds(name):
         assert abs(command[0]) <= MAX_COMMAND
 
 
-def state(position=(0.0, 0.0, 1.0), yaw=0.0, velocity=(0.0, 0.0, 0.0), rate=(0.0, 0.0, 0.0)):
-    x = np.zeros(STATE_SIZE)
-    x[:3], x[3:7], x[7:10], x[10:13] = position, quaternion_of_yaw(yaw), velocity, rate
-    return x
-
-
 def test_the_flight_loop_s_commands_can_be_flown():
+    turning = np.zeros(STATE_SIZE)
+    turning[2], turning[3], turning[10:13] = 1.0, 1.0, (30.0, -30.0, 10.0)
     for where in ({0: 100.0, 1: -100.0, 2: 100.0, 9: 3.0}, {2: -100.0}):
         c = flight_record(VEHICLE)[0]
         for index, value in where.items():
             c["setpoint"][index] = value
-        fly(c, state(rate=(30.0, -30.0, 10.0)), 0.005)
+        fly(c, turning, 0.005)
         assert np.all(np.isfinite(c["command"]))
         assert np.all((c["command"] >= 0) & (c["command"] <= VEHICLE.omega_max))
 

@@ -17,7 +17,6 @@ def test_what_is_mirrored_is_known():
 @pytest.mark.parametrize(
     ("frame", "history", "scale", "words"),
     [
-        (("torque",), 1, (), "unknown quantity"),
         ((), 1, (), "must name different"),
         (("torque_z", "torque_z"), 1, (), "must name different"),
         (("torque_z",), 0, (), "history must be at least 1"),

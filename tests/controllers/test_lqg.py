@@ -8,11 +8,7 @@ import pytest
 from windwrench.controllers.axis_models import PLACE, axis_models
 from windwrench.controllers.lqg import LQG
 from windwrench.controllers.wind_laws import PIDWithWrench
-from windwrench.controllers.wind_observation import (
-    TORQUE,
-    WIND_OBSERVATION_SIZE,
-    WIND_PERIOD,
-)
+from windwrench.controllers.wind_observation import TORQUE, WIND_OBSERVATION_SIZE, WIND_PERIOD
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.plant import TICK, PlantSettings

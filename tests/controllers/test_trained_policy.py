@@ -7,9 +7,7 @@ from windwrench.controllers.registry import shipped_policies
 from windwrench.controllers.trained_policy import (
     TaskPolicy,
     TrainedPolicy,
-    gru,
     load_policy,
-    lstm,
     save_policy,
 )
 from windwrench.dynamics import InputError
@@ -77,41 +75,6 @@ def recurrent(cell, seen=1, state=4, size=1):
     return {k: 0.3 * rng.standard_normal(s).astype(np.float32) for k, s in shapes.items()}
 
 
-@pytest.mark.parametrize("cell", ["lstm", "gru"])
-def test_a_recurrent_policy_forgets_at_the_start_of_an_episode(cell):
-    policy = TrainedPolicy(CARD, recurrent(cell))
-    observation = np.full(8, 0.02)
-    first = [policy(observation)[0] for _ in range(3)]
-    assert len(set(first)) == 3  # it remembers
-    policy.reset()
-    assert [policy(observation)[0] for _ in range(3)] == first
-
-
-@pytest.mark.parametrize("name", ["lstm", "gru"])
-def test_a_cell_is_torch_s(name):
-    torch = pytest.importorskip(
-        "torch", reason="torch is not installed: pip install 'windwrench[rl]'"
-    )
-    torch.manual_seed(0)
-    cell = getattr(torch.nn, name.upper())(5, 7)
-    parts = {"input": "weight_ih", "hidden": "weight_hh"}
-    parts |= {"input_bias": "bias_ih", "hidden_bias": "bias_hh"}
-    weights = {
-        f"{name}_{part}": getattr(cell, f"{other}_l0").detach().numpy()
-        for part, other in parts.items()
-    }
-    inputs = torch.randn(6, 1, 5)
-    with torch.no_grad():
-        expected = cell(inputs)[0][:, 0].numpy()
-    hidden, state = np.zeros(7, dtype=np.float32), np.zeros(7, dtype=np.float32)
-    for x, h in zip(inputs[:, 0].numpy(), expected, strict=True):
-        if name == "lstm":
-            hidden, state = lstm(weights, x, hidden, state)
-        else:
-            hidden = gru(weights, x, hidden)
-        np.testing.assert_allclose(hidden, h, atol=1e-6)
-
-
 @pytest.mark.parametrize(
     ("card", "weights", "words"),
     [
@@ -144,17 +107,20 @@ TASK_CARD = {
 }
 
 
-def test_a_policy_comes_back_from_its_file_and_remembers(tmp_path):
-    rng = np.random.default_rng(0)
-    policy = TaskPolicy(TASK_CARD, recurrent("gru", 27, 5, 3))
-    again = load_policy(save_policy(TASK_CARD, policy.weights, tmp_path / "mine.npz"))
-    seen = rng.standard_normal((4, 27)).astype(np.float32)
-    said = np.array([policy(x) for x in seen])
-    np.testing.assert_array_equal(said, [again(x) for x in seen])
-    assert np.all(np.abs(said) <= 4.0)
-    assert not np.array_equal(policy(seen[0]), said[0])  # it remembers
+@pytest.mark.parametrize(
+    ("kind", "card", "weights"),
+    [
+        (TrainedPolicy, CARD, recurrent("lstm")),
+        (TrainedPolicy, CARD, recurrent("gru")),
+        (TaskPolicy, TASK_CARD, recurrent("gru", 27, 5, 3)),
+    ],
+)
+def test_a_recurrent_policy_forgets_at_the_start_of_an_episode(kind, card, weights):
+    policy, observation = kind(card, weights), np.full(27, 0.02)
+    first = [policy(observation)[0] for _ in range(3)]
+    assert len(set(first)) == 3  # it remembers
     policy.reset()
-    np.testing.assert_array_equal(policy(seen[0]), said[0])
+    assert [policy(observation)[0] for _ in range(3)] == first
 
 
 @pytest.mark.parametrize(

@@ -76,7 +76,7 @@ def test_an_effect_says_what_it_is(name):
         assert any(c.typical[size] != 0 for c in effect.coefficients)
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", mostly_slow(names(), SHOWN.__contains__))
 def test_the_plant_flies_an_effect(name):
     trajectory = FLIGHTS.get(name, "excite")
     with_effect, without = flight(name), flight(None, trajectory)

@@ -21,8 +21,7 @@ NAME = "windwrench/FanTracking-v0"
 
 def test_stable_baselines_checker_finds_nothing():
     checker = pytest.importorskip(
-        "stable_baselines3.common.env_checker",
-        reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'",
+        "stable_baselines3.common.env_checker", reason="pip install 'windwrench[rl]'"
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -12,13 +12,7 @@ import numpy as np
 import pytest
 
 import windwrench  # noqa: F401 - registers the environment
-from tests.support.golden_trajectories import (
-    GOLDEN,
-    GOLDEN_TASKS,
-    SEED,
-    SEED_OF_TASKS,
-    trajectory,
-)
+from tests.support.golden_trajectories import GOLDEN, GOLDEN_TASKS, SEED, SEED_OF_TASKS, trajectory
 from tests.support.vector_flights import fly_alone
 from windwrench.envs import FanTrackingEnv
 from windwrench.evaluation.tasks import TASKS

@@ -4,29 +4,23 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.support.model_flights import ANISOTROPIC, YAWED, simulate_model
-from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from tests.support.model_flights import ANISOTROPIC, WITH_EFFECTS, YAWED, simulate_model
+from windwrench.dynamics import InputError, load_vehicle
 from windwrench.estimator import UKFTuning, WrenchEKF, WrenchEstimate, WrenchUKF
 from windwrench.estimator.consistency import chi2_band, nees, state_error
 
 VEHICLE = load_vehicle("ardrone2")
 
 
-def run_filter(make, vehicle, tuning, runs, steps, claimed=None):
-    """Return the mean over the runs of NEES and NIS (steps,) of a filter that claims ``claimed`` on
-    truth drawn from ``tuning``, and the bands of one entry of each.
-    """
-    estimator = make(vehicle, tuning if claimed is None else claimed)
+def run_filter(make, vehicle, tuning, runs, steps):
+    """Return the mean over the runs of NEES and NIS (steps,), and the bands of an entry of each."""
+    estimator = make(vehicle, tuning)
     speeds = np.full((steps, 4), vehicle.hover_rate)
     out = np.empty((2, runs, steps))
     for r in range(runs):
         run = simulate_model(vehicle, tuning, speeds, seed=r, **YAWED)
-        run.begin(estimator)
-        for k in range(steps):
-            e = estimator.step(
-                run.rotor_speeds[k], run.measured_position[k], run.measured_quaternion[k]
-            )
-            out[0, r, k], out[1, r, k] = nees(e, run.state[k]), e.nis
+        for k, e in enumerate(run.fly(estimator)):
+            out[:, r, k] = nees(e, run.state[k]), e.nis
     return *out.mean(axis=1), chi2_band(18, runs), chi2_band(6, runs)
 
 
@@ -34,18 +28,12 @@ def share_within(values, band):
     return np.mean((values >= band[0]) & (values <= band[1]))
 
 
-EFFECTS = VEHICLE.with_effects(
-    EffectSetting("com_offset", {"cx": 0.01, "cz": -0.02}),
-    EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}),
-)
-
-
 @pytest.mark.parametrize(
     ("make", "vehicle", "tuning"),
     [
         (WrenchUKF, VEHICLE, UKFTuning()),
-        (WrenchUKF, EFFECTS, ANISOTROPIC),
-        (WrenchEKF, EFFECTS, ANISOTROPIC),
+        (WrenchUKF, WITH_EFFECTS, ANISOTROPIC),
+        (WrenchEKF, WITH_EFFECTS, ANISOTROPIC),
     ],
     ids=["unscented", "unscented with effects", "extended with effects"],
 )

@@ -103,23 +103,16 @@ def test_jacobian_equals_finite_differences(vehicle, rate):
     assert np.allclose(F, numeric, rtol=0, atol=1e-8)
 
 
-def both(vehicle, flight, missing=()):
-    """The estimates of the unscented filter and of this one along a flight."""
-    filters = WrenchUKF(vehicle, ANISOTROPIC, PERIOD), WrenchEKF(vehicle, ANISOTROPIC, PERIOD)
+def test_close_to_the_unscented_filter_over_a_yawing_flight():
+    flight = yawing_flight(VEHICLE, 1401, seed=3, substeps=5)
+    filters = [kind(VEHICLE, ANISOTROPIC, PERIOD) for kind in (WrenchUKF, WrenchEKF)]
     for estimator in filters:
         begin(estimator, flight)
-    return list(zip(*(fly(estimator, flight, missing) for estimator in filters), strict=True))
-
-
-def assert_close(pairs, force, torque):
-    for u, e in pairs:
-        assert np.abs(u.force - e.force).max() < force
-        assert np.abs(u.torque - e.torque).max() < torque
-
-
-def test_close_to_the_unscented_filter_over_a_yawing_flight():
-    pairs = both(VEHICLE, yawing_flight(VEHICLE, 1401, seed=3, substeps=5), range(500, 520))
-    assert_close(pairs[300:], 1e-3, 2e-5)
+    estimates = [fly(estimator, flight, range(500, 520)) for estimator in filters]
+    pairs = list(zip(*estimates, strict=True))
+    for u, e in pairs[300:]:
+        assert np.abs(u.force - e.force).max() < 1e-3
+        assert np.abs(u.torque - e.torque).max() < 2e-5
     deviations = np.sqrt([[np.diag(x.covariance) for x in pair] for pair in pairs[300:]])
     np.testing.assert_allclose(deviations[:, 0], deviations[:, 1], rtol=5e-3)
     errors = [np.r_[e.force - [0.3, -0.2, -0.1], e.torque - [0, 0, 0.02]] for _, e in pairs[700:]]
@@ -129,8 +122,3 @@ def test_close_to_the_unscented_filter_over_a_yawing_flight():
     assert np.isnan(pairs[505][1].nis)
     nis = np.array([[u.nis, e.nis] for u, e in pairs[700:]])
     np.testing.assert_allclose(nis[:, 0], nis[:, 1], rtol=1e-2, atol=1e-2)
-
-
-def test_close_to_the_unscented_filter_with_effects():
-    pairs = both(VEHICLE.with_effects(*EFFECTS), yawing_flight(VEHICLE, 601, seed=4))
-    assert_close(pairs[300:], 2e-3, 5e-5)

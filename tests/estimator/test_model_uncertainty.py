@@ -39,10 +39,7 @@ def test_intervals_hold_what_they_say(source):
         sway = 1.0 + rng.uniform(0.0, 0.3) * np.sin(0.015 * np.arange(steps) + rng.uniform(0, 6))
         speeds = np.tile(true.hover_rate * np.sqrt(sway)[:, None], 4)
         run = simulate_model(true, tuning, speeds, seed=r, **YAWED)
-        ukf = WrenchUKF(vehicle, tuning)
-        run.begin(ukf)
-        for k in range(steps):
-            e = ukf.step(run.rotor_speeds[k], run.measured_position[k], run.measured_quaternion[k])
+        e = run.fly(WrenchUKF(vehicle, tuning))[-1]
         error[0, r] = np.concatenate([e.torque - run.torque[-1], e.force - run.force[-1]])
         error[1, r] = np.concatenate([e.std_torque, e.std_force])
         error[2, r] = e.std[12:]

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.support.model_flights import simulate_model
-from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from tests.support.model_flights import WITH_EFFECTS, simulate_model
+from windwrench.dynamics import InputError, load_vehicle
 from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.estimator.consistency import chi2_band
 from windwrench.estimator.innovations import innovations, pieces_of
@@ -37,13 +37,7 @@ def flight(tuning=TRUE, seconds=20.0, seed=0, vehicle=VEHICLE, whole=False):
     steps = round(seconds / PERIOD)
     speeds = np.full((steps, 4), vehicle.hover_rate)
     run = simulate_model(vehicle, tuning, speeds, PERIOD, seed, rate_gain=5.0)
-    log = (
-        PERIOD * np.arange(1, steps + 1),
-        run.rotor_speeds,
-        run.measured_position.copy(),
-        run.measured_quaternion.copy(),
-    )
-    return (log, run) if whole else log
+    return (run.log(), run) if whole else run.log()
 
 
 def logarithms(tuning):
@@ -134,9 +128,8 @@ def test_bounds_hold_where_there_is_no_noise_to_find():
     assert np.linalg.norm(estimate.force - truth.force[-1]) < 0.05
 
 
-def test_lost_held_and_wild_poses_change_little():
-    t, speeds, position, quaternion = flight(seconds=20.0)
-    clean = fit_noise(VEHICLE, t, speeds, position, quaternion)
+def test_lost_held_and_wild_poses_change_little(fits):
+    clean, (t, speeds, position, quaternion) = fits[0], flight(seed=0)
     rng = np.random.default_rng(1)
     wild = rng.choice(len(t), len(t) // 100, replace=False)
     position[wild] += rng.uniform(-0.3, 0.3, (len(wild), 3))
@@ -188,11 +181,7 @@ def test_a_long_log_is_thinned_and_a_slow_one_is_scaled():
 
 
 def test_declared_effects_are_part_of_the_model():
-    vehicle = VEHICLE.with_effects(
-        EffectSetting("com_offset", {"cx": 0.01, "cz": -0.02}),
-        EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}),
-    )
-    fit = fit_noise(vehicle, *flight(seconds=5.0, vehicle=vehicle))
+    fit = fit_noise(WITH_EFFECTS, *flight(seconds=5.0, vehicle=WITH_EFFECTS))
     low, high = chi2_band(6, fit.after.poses)
     assert low <= fit.after.nis <= high
 

@@ -6,29 +6,15 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from tests.support.flights import PERIOD, begin, fly, yawing_flight
-from tests.support.reference_filters import as_reference, initial_covariance
 from windwrench.dynamics import load_vehicle
 from windwrench.envs.vector import TaskVectorEnv
 from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF
 from windwrench.estimator.ekf import WrenchEKF
-from windwrench.estimator.reference import ReferenceUKF
 
 VEHICLE = load_vehicle("ardrone2")
 HOVER = np.full(4, VEHICLE.hover_rate)
 POSE = [0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0]
 FILTERS = {"ukf": WrenchUKF, "ekf": WrenchEKF, "constant-gain": ConstantGainFilter}
-
-
-def test_a_turn_of_sixty_radians_a_second_is_the_reference_s():
-    flight, tuning = yawing_flight(VEHICLE, 60, seed=3, yaw_rate=60.0), UKFTuning()
-    fast, slow = WrenchUKF(VEHICLE, tuning, PERIOD), ReferenceUKF(VEHICLE, tuning, PERIOD)
-    for one in (fast, slow):
-        begin(one, flight, initial_covariance())
-    for k, estimate in enumerate(fly(fast, flight, ()), 1):
-        slow.predict(flight["rotors"][k])
-        slow.correct(flight["position"][k], flight["quaternion"][k])
-        assert np.abs(as_reference(estimate, slow.state) - slow.state).max() < 1e-9
 
 
 @pytest.mark.parametrize("name", FILTERS)

@@ -7,42 +7,27 @@ import numpy as np
 import pytest
 
 from tests.support.flights import PERIOD
-from tests.support.model_flights import ANISOTROPIC, YAWED, simulate_model
-from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from tests.support.model_flights import ANISOTROPIC, WITH_EFFECTS, YAWED, simulate_model
+from windwrench.dynamics import InputError, load_vehicle
 from windwrench.estimator import UKFTuning, WrenchUKF, rauch_tung_striebel, smoother
 from windwrench.estimator.consistency import chi2_band, state_error
 from windwrench.estimator.row_steps import steps_between
 from windwrench.estimator.smoother import RecordingUKF
 
 VEHICLE = load_vehicle("ardrone2")
-EFFECTS = VEHICLE.with_effects(
-    EffectSetting("com_offset", {"cx": 0.01, "cz": -0.02}),
-    EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}),
-)
 
 
-def log_of(run):
+def model_log(steps, seed=1):
     """Return the arguments of ``smooth`` for a run drawn from the model."""
-    return (
-        PERIOD * np.arange(len(run.rotor_speeds)),
-        run.rotor_speeds,
-        run.measured_position.copy(),
-        run.measured_quaternion.copy(),
-    )
+    hover = np.full((steps, 4), VEHICLE.hover_rate)
+    return simulate_model(VEHICLE, UKFTuning(), hover, seed=seed, **YAWED).log()
 
 
-def model_run(steps, seed=1, tuning=None):
-    tuning = UKFTuning() if tuning is None else tuning
-    return simulate_model(
-        VEHICLE, tuning, np.full((steps, 4), VEHICLE.hover_rate), seed=seed, **YAWED
-    )
-
-
-def smooth(t, speeds, x, q, restarted=(), covariance=False, tuning=None):
+def smooth(t, speeds, x, q, restarted=(), covariance=False):
     """Return the smoothed estimate at the rows of a log, the filter started at the first and the
     ``restarted`` ones.
     """
-    ukf = RecordingUKF(VEHICLE, tuning, float(np.median(np.diff(t))))
+    ukf = RecordingUKF(VEHICLE, None, float(np.median(np.diff(t))))
     events = []
     for k in range(len(t)):
         if k == 0 or k in restarted:
@@ -55,15 +40,11 @@ def smooth(t, speeds, x, q, restarted=(), covariance=False, tuning=None):
     return ukf.smooth(events, covariance)
 
 
-def rms(error):
-    return float(np.sqrt(np.mean(np.square(error))))
-
-
 @pytest.mark.parametrize(
     ("vehicle", "tuning", "runs", "steps", "missing"),
     [
         pytest.param(VEHICLE, UKFTuning(), 100, 800, range(400, 440), marks=pytest.mark.slow),
-        (EFFECTS, ANISOTROPIC, 20, 150, ()),
+        (WITH_EFFECTS, ANISOTROPIC, 20, 150, ()),
     ],
     ids=["with a gap", "effects and anisotropic noise"],
 )
@@ -75,10 +56,7 @@ def test_the_smoother_is_consistent(vehicle, tuning, runs, steps, missing):
         speeds = np.full((steps, 4), vehicle.hover_rate)
         run = simulate_model(vehicle, tuning, speeds, seed=r, **YAWED)
         ukf = RecordingUKF(vehicle, tuning)
-        run.begin(ukf)
-        for k in range(steps):
-            pose = run.measured_position[k], run.measured_quaternion[k]
-            ukf.step(run.rotor_speeds[k], *((None, None) if k in missing else pose))
+        run.fly(ukf, missing)
         found = ukf.smooth(covariance=True)
         for k in range(steps):
             e = found.at(1 + k)
@@ -92,8 +70,7 @@ def test_the_smoother_is_consistent(vehicle, tuning, runs, steps, missing):
 
 
 def test_nothing_is_smoothed_across_a_restart():
-    run = model_run(600)
-    t, speeds, x, q = log_of(run)
+    t, speeds, x, q = model_log(600)
     whole = smooth(t, speeds, x, q, restarted=[250])
     before = smooth(t[:250], speeds[:250], x[:250], q[:250])
     after = smooth(t[250:], speeds[250:], x[250:], q[250:])
@@ -105,7 +82,7 @@ def test_nothing_is_smoothed_across_a_restart():
     moved[250:] += [100.0, 0, 0]
     jump = smooth(t, speeds, moved, q, restarted=[250])
     assert np.array_equal(jump.state[:250], whole.state[:250], equal_nan=True)
-    assert rms(jump.force - whole.force) < 1e-9
+    assert np.sqrt(np.mean(np.square(jump.force - whole.force))) < 1e-9
 
 
 def test_a_link_is_cut_where_there_is_no_joint_distribution():
@@ -129,7 +106,7 @@ def test_a_link_is_cut_where_there_is_no_joint_distribution():
 
 @pytest.mark.parametrize("block", [1, 7])
 def test_blocks_change_nothing(block, monkeypatch):
-    log = log_of(model_run(300))
+    log = model_log(300)
     log[2][100:120] = np.nan
     whole = smooth(*log, covariance=True)
     monkeypatch.setattr(smoother, "_BLOCK", block)
@@ -139,7 +116,7 @@ def test_blocks_change_nothing(block, monkeypatch):
 
 
 def test_a_recording_filter_is_the_filter():
-    _, speeds, x, q = log_of(model_run(200))
+    _, speeds, x, q = model_log(200)
     x[40:50], q[45:60] = np.nan, np.nan
     plain, recording = WrenchUKF(VEHICLE, None, PERIOD), RecordingUKF(VEHICLE, None, PERIOD)
     for ukf in (plain, recording):
@@ -158,7 +135,7 @@ def test_a_recording_filter_is_the_filter():
 @pytest.mark.parametrize("seed", [0, 2, 5])
 def test_covariances_stay_positive_definite_whatever_was_flown(seed):
     rng = np.random.default_rng(seed)
-    _, speeds, x, q = log_of(model_run(400, seed))
+    _, speeds, x, q = model_log(400, seed)
     x += np.cumsum(rng.choice([0.0, 1.0], (400, 1), p=[0.98, 0.02]) * rng.normal(0, 2, (400, 3)), 0)
     lost = slice(150, 150 + 40 * (seed + 1))
     x[lost], q[lost] = np.nan, np.nan

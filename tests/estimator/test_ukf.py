@@ -1,7 +1,5 @@
 """The wrench filter and its smoother against the literal ones, and what the filter must hold."""
 
-import copy
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,7 @@ from tests.support.reference_filters import (
 )
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import compile_effects
-from windwrench.estimator import UKFTuning, WrenchUKF
+from windwrench.estimator import UKFTuning, WrenchUKF, WrenchUKFBatch
 from windwrench.estimator.smoother import RecordingUKF
 
 VEHICLE = load_vehicle("ardrone2")
@@ -25,17 +23,19 @@ GROUND = EffectSetting("ground_effect", {"rho": 3.0})
 
 
 @pytest.mark.parametrize(
-    ("effects", "steps", "wrench"),
+    ("effects", "steps", "wrench", "yaw_rate"),
     [
-        ((), 600, {}),
-        ((OFFSET,), 100, {}),
-        ((DRAG, GROUND), 80, {"drag": 1.5e-4, "ground": 3.0}),
-        ((DRAG, OFFSET), 50, {"drag": 1.5e-4}),
+        ((), 600, {}, 3.0),
+        ((), 60, {}, 60.0),
+        ((OFFSET,), 100, {}, 3.0),
+        ((DRAG, GROUND), 80, {"drag": 1.5e-4, "ground": 3.0}, 3.0),
+        ((DRAG, OFFSET), 50, {"drag": 1.5e-4}, 3.0),
     ],
-    ids=["plain", "offset", "drag and ground", "drag and offset"],
+    ids=["plain", "sixty radians a second", "offset", "drag and ground", "drag and offset"],
 )
-def test_filter_and_smoother_equal_the_literal_ones_over_a_yawing_flight(effects, steps, wrench):
-    vehicle, flight = VEHICLE.with_effects(*effects), yawing_flight(VEHICLE, steps, seed=3)
+def test_filter_and_smoother_equal_the_literal_ones(effects, steps, wrench, yaw_rate):
+    vehicle = VEHICLE.with_effects(*effects)
+    flight = yawing_flight(VEHICLE, steps, seed=3, yaw_rate=yaw_rate)
     fast = RecordingUKF(vehicle, ANISOTROPIC, PERIOD)
     acting = rotor_effects(vehicle, **wrench) if wrench else None
     slow = ReferenceSmoother(compile_effects(vehicle).vehicle, ANISOTROPIC, PERIOD, acting)
@@ -128,6 +128,7 @@ def test_a_missing_measurement_is_a_prediction():
 @pytest.mark.parametrize(
     ("make", "words"),
     [
+        (lambda: WrenchUKF(VEHICLE).step(np.ones(4), [0, 0, 1], [1, 0, 0, 0]), "call reset before"),
         (lambda: WrenchUKF("ardrone2"), r"must be a Vehicle, such as load_vehicle\('ardrone2'\)"),
         (lambda: UKFTuning(torque_walk=-1.0), "torque_walk"),
         (lambda: UKFTuning(position_noise=(1, 2)), "position_noise"),
@@ -140,22 +141,15 @@ def test_a_missing_measurement_is_a_prediction():
             lambda: WrenchUKF(VEHICLE).reset([0, 0, 0], [1, 0, 0, 0], -np.eye(18)),
             "positive definite",
         ),
+        (lambda: WrenchUKFBatch(VEHICLE, 0), "one vehicle or one for each of 0"),
+        (lambda: WrenchUKFBatch([VEHICLE, VEHICLE], 3), "one for each of 3, got 2"),
+        (lambda: WrenchUKFBatch(VEHICLE, 2).reset(np.zeros((3, 3)), [1, 0, 0, 0]), "position"),
+        (
+            lambda: WrenchUKFBatch(VEHICLE, 2).reset([0, 0, 0], [[1, 0, 0, 0], [3, 0, 0, 0]]),
+            r"length 1, got 3 \(filter 1\)",
+        ),
     ],
 )
 def test_bad_settings_are_named(make, words):
     with pytest.raises(InputError, match=words):
         make()
-
-
-def test_a_filter_that_was_not_reset_says_so():
-    with pytest.raises(InputError, match="call reset before a step"):
-        WrenchUKF(VEHICLE).step(np.full(4, 400.0), [0, 0, 1], [1, 0, 0, 0])
-
-
-def test_a_copy_has_a_memory_of_its_own():
-    ukf = WrenchUKF(VEHICLE)
-    ukf.reset([0, 0, 1], [1, 0, 0, 0])
-    other = copy.copy(ukf)
-    ukf.step(np.full(4, 400.0), [0.1, 0, 1], [1, 0, 0, 0])
-    np.testing.assert_array_equal(other.estimate.position, [0, 0, 1])
-    assert ukf.estimate.position[0] > 0.0

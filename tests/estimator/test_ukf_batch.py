@@ -160,20 +160,3 @@ def test_bad_measurements_are_named_and_change_nothing(arguments, words):
         batch.step(*arguments)
     np.testing.assert_array_equal(batch.estimate.state, before)
     np.testing.assert_array_equal(batch.covariance, P)
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: WrenchUKFBatch(VEHICLE, 0), "one vehicle or one for each of 0"),
-        (lambda: WrenchUKFBatch([VEHICLE, VEHICLE], 3), "one for each of 3, got 2"),
-        (lambda: WrenchUKFBatch(VEHICLE, 2).reset(np.zeros((3, 3)), [1, 0, 0, 0]), "position"),
-        (
-            lambda: WrenchUKFBatch(VEHICLE, 2).reset([0, 0, 0], [[1, 0, 0, 0], [3, 0, 0, 0]]),
-            r"length 1, got 3 \(filter 1\)",
-        ),
-    ],
-)
-def test_bad_settings_are_named(make, words):
-    with pytest.raises(InputError, match=words):
-        make()

@@ -315,15 +315,7 @@ _PARQUET = (_spoiled_parquet, spoiled_bytes)
 _BAGS = {"rosbag 1": "bag", "rosbag 2, SQLite": "db3", "rosbag 2, MCAP": "mcap"}
 
 
-def _form_of_log(
-    name,
-    file,
-    good,
-    ways,
-    reader=None,
-    vehicle="ardrone2",
-    beside=dict,
-):
+def _form_of_log(name, file, good, ways, reader=None, vehicle="ardrone2", beside=dict):
     """Return the form of a log that is read, and estimated, by a reader or the file's content."""
     named = () if reader is None else ("--reader", reader)
     command = ("estimate", "--out", "out", "--vehicle", vehicle, *named)

@@ -14,11 +14,7 @@ from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
 from windwrench.identification.wrench_series import estimate_log
-from windwrench.studies.measured_flights import (
-    compare,
-    imu_check,
-    linear_drag,
-)
+from windwrench.studies.measured_flights import compare, imu_check, linear_drag
 
 VEHICLE = load_vehicle("crazyflie")
 NANOBENCH = ("B2_circle_fast_rep3", "B5_helix_fast_rep2")

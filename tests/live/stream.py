@@ -108,7 +108,7 @@ class Running:
 
     def __init__(
         self, text, vehicle=VEHICLE, log_map=None, descriptor=None, kept=None, record=None,
-        **settings,
+        **settings
     ):  # fmt: skip
         self.tallies, self.kept, self.failed = Tallies(), kept or Kept(), []
         self.outputs = self.kept.items

@@ -11,7 +11,7 @@ from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.live.sources.open import make_source
 from windwrench.live.tallies import Tallies
 
-pytest.importorskip("cflib", reason="cflib is not installed: pip install 'windwrench[crazyflie]'")
+pytest.importorskip("cflib", reason="pip install 'windwrench[crazyflie]'")
 
 import cflib.crtp
 

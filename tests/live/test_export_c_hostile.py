@@ -4,11 +4,12 @@ languages.
 
 import pytest
 
-from tests.support.exported_c.compiled import PARTS, CompiledFilter, compare, missing
+from tests.support.exported_c.compiled import PARTS, CompiledFilter, compare, needs_gcc
 from tests.support.exported_c.hostile import PERIOD, hostile
 from windwrench.dynamics import load_vehicle
 from windwrench.live.export_c import export_c
 
+pytestmark = needs_gcc
 SEEDS, MANY = (0, 1, 104), range(2, 86)  # 104: on 17 m away; 1,044 sequences in all
 # of a standard deviation, by which estimates may differ: rounding
 LARGEST = {"single": 0.05, "double": 1e-6}
@@ -36,8 +37,6 @@ def test_c_and_python_agree_along_hostile_sequences(
     estimator, gate, imu, precision, seeds, tmp_path
 ):
     """Statuses and counts of restarts at every step, estimates within rounding."""
-    if lacking := missing("gcc"):
-        pytest.skip(f"not installed: {', '.join(lacking)}")
     vehicle = load_vehicle("ardrone2")
     exported = export_c(vehicle, estimator, rate=1.0 / PERIOD, gate=gate, precision=precision)
     c, restarts = CompiledFilter(exported, tmp_path), 0.0

@@ -1,11 +1,9 @@
 """The tracker in C: the same commands as in Python, given the same random numbers."""
 
-import shutil
-
 import numpy as np
 import pytest
 
-from tests.support.exported_c.compiled import CompiledFilter
+from tests.support.exported_c.compiled import CompiledFilter, needs
 from tests.support.synthetic_wrench import TICKS, observations
 from windwrench.controllers import Tracker
 from windwrench.controllers.observation import FORCE_X, FORCE_Y, TORQUE_Z, VELOCITY_Y
@@ -66,8 +64,7 @@ class OwnTracker(Tracker):
 
 @pytest.fixture(scope="module")
 def c(tmp_path_factory):
-    if shutil.which("gcc") is None:
-        pytest.skip("not installed: gcc")
+    needs("gcc")
     policy = exportable_policy("tracker")
     exported = export_c(VEHICLE, "constant-gain", 200.0, 0.45, policy=policy)
     return CompiledFilter(exported, tmp_path_factory.mktemp("tracker"))

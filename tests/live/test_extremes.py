@@ -221,7 +221,7 @@ def test_crazyflie(count):
 def test_ros2(count, monkeypatch):
     fake = pytest.importorskip("tests.support.fake_ros")
     kinds = {"/p": "geometry_msgs/msg/PoseStamped", "/m": "std_msgs/msg/Float64MultiArray"}
-    world, flown = fake.World(kinds), flight()
+    world, flown = fake.World(kinds, lasts=True), flight()
     fake.install(monkeypatch, world)
     monkeypatch.setattr(
         "windwrench.live.sources.ros2.given_map",
@@ -247,11 +247,4 @@ def test_ros2(count, monkeypatch):
             ns = int(stream.any((0, -1, 1, 2**31 * 10**9, 1_700_000_000 * 10**9)))
             world.waiting.append(("/p", fake.pose(ns, values[:3], values[3:])))
 
-    class Executor:
-        def spin_once(self, timeout_sec):
-            if world.waiting:
-                topic, message = world.waiting.pop(0)
-                world.callbacks[topic](message)
-
-    stream.source._executor = Executor()
     stream.run(count, good, extreme)

@@ -5,7 +5,6 @@ import pty
 import resource
 import socket
 import subprocess
-import sys
 import threading
 import time
 from contextlib import ExitStack, contextmanager, suppress
@@ -14,6 +13,7 @@ import numpy as np
 import pytest
 
 from tests.live.stream import Kept, Running, free_port
+from tests.support.programs import started
 from windwrench.identification.logs.reading import read_log
 from windwrench.live.outlets import Outlet
 from windwrench.live.outputs import Lines
@@ -126,10 +126,8 @@ def test_a_reader_who_reads_nothing_stalls_nobody(outputs):
 def test_a_terminal_that_stalls_costs_no_estimate(tmp_path):
     """Nobody reads on after the first page, as after Ctrl-S: the flight goes on to its end."""
     path, (terminal, end) = tmp_path / "flight.csv", pty.openpty()
-    words = ["live", "sim:static", "--seconds", "5", "--record", path]
-    child = subprocess.Popen(
-        [sys.executable, "-m", "windwrench", *words], stdout=end, stderr=subprocess.PIPE
-    )
+    words = ("live", "sim:static", "--seconds", "5", "--record", path)
+    child = started(*words, stdout=end, stderr=subprocess.PIPE)
     os.close(end)
     told = b""
     while b"status" not in told:
@@ -256,11 +254,10 @@ def test_a_page_that_fails_is_told_and_the_stream_goes_on(monkeypatch, watched):
 
 
 def test_it_listens_to_this_machine_alone_unless_told_and_says_so():
-    for host, at in (("", "127.0.0.1"), ("0.0.0.0", "0.0.0.0")):
-        for kind in ("mavlink:udp", "mavlink:udpin", "udp-json"):
-            port = free_port()
-            running = Running(f"{kind}://{host}:{port}")
-            running.until(lambda one=running: one.source.link.opened)
-            assert running.source.link.opened.getsockname() == (at, port)
-            running.end()
-            assert running.tallies.news() == [f"listening at {at}:{port}, UDP"]
+    for kind, host in (("mavlink:udp", ""), ("mavlink:udpin", "0.0.0.0"), ("udp-json", "")):
+        port, at = free_port(), host or "127.0.0.1"
+        running = Running(f"{kind}://{host}:{port}")
+        running.until(lambda one=running: one.source.link.opened)
+        assert running.source.link.opened.getsockname() == (at, port)
+        running.end()
+        assert running.tallies.news() == [f"listening at {at}:{port}, UDP"]

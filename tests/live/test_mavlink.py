@@ -12,9 +12,7 @@ from windwrench.dynamics import EffectSetting
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.live.sources.esc_status import CHECKSUM, add_esc_status
 
-pytest.importorskip(
-    "pymavlink", reason="pymavlink is not installed: pip install windwrench[mavlink]"
-)
+pytest.importorskip("pymavlink", reason="pip install 'windwrench[mavlink]'")
 
 os.environ.setdefault("MAVLINK20", "1")
 from pymavlink import mavutil
@@ -38,41 +36,37 @@ class Autopilot(Running):
         )
         self.mav = self.link.mav
 
-    def play(self, rows, motors=None, pose="odometry", name="ODOMETRY", beside=lambda k: None):
+    def play(self, rows, motors=None, pose="ODOMETRY", beside=lambda k: None):
         """Play rows of the flight, each taken before the next."""
-        taken = self.count(name)
+        taken = self.count(pose)
         for n, k in enumerate(rows):
             (motors or self.esc)(k)
             beside(k)
             self.pose(k, pose)
-            self.taken(name, taken + n + 1)
+            self.taken(pose, taken + n + 1)
         return self
 
-    def pose(self, k, kind="odometry"):
-        x, y, z = self.flown["position"][k] * NED
-        q = self.flown["quaternion"][k] * HALF
+    def pose(self, k, kind="ODOMETRY"):
+        x, y, z = flight()["position"][k] * NED
+        q = flight()["quaternion"][k] * HALF
         us = self.us(k)
-        if kind == "odometry":
+        if kind == "ODOMETRY":
             self.mav.odometry_send(us, 1, 12, x, y, z, q, *[0] * 6, *[[0.0] * 21] * 2, 0, 0, 0)
-        elif kind == "mocap":
+        elif kind == "ATT_POS_MOCAP":
             self.mav.att_pos_mocap_send(us, q, x, y, z)
-        elif kind == "vision":
+        elif kind == "VISION_POSITION_ESTIMATE":
             yaw, pitch, roll = Rotation.from_quat(q, scalar_first=True).as_euler("ZYX")
             self.mav.vision_position_estimate_send(us, x, y, z, roll, pitch, yaw)
-        elif kind == "local":
+        else:
             self.mav.attitude_quaternion_send(us // 1000, *q, 0, 0, 0)
             self.mav.local_position_ned_send(us // 1000, x, y, z, 0, 0, 0)
 
     def us(self, k):
-        return round(self.flown["t"][k] * 1e6)
+        return round(flight()["t"][k] * 1e6)
 
     def esc(self, k):
-        rpm = [round(w * 30 / np.pi) for w in self.flown["rotor_speeds"][k][MOTORS]]
+        rpm = [round(w * 30 / np.pi) for w in flight()["rotor_speeds"][k][MOTORS]]
         self.mav.send(ESC_STATUS(0, self.us(k), rpm, [11.0] * 4, [1.0] * 4))
-
-    @property
-    def flown(self):
-        return flight()
 
     def end(self):
         super().end()
@@ -99,16 +93,10 @@ def test_the_checksum_of_esc_status_is_that_of_its_definition():
 
 
 @pytest.mark.parametrize(
-    ("kind", "name"),
-    [
-        ("odometry", "ODOMETRY"),
-        ("mocap", "ATT_POS_MOCAP"),
-        ("vision", "VISION_POSITION_ESTIMATE"),
-        ("local", "LOCAL_POSITION_NED"),
-    ],
+    "pose", ["ODOMETRY", "ATT_POS_MOCAP", "VISION_POSITION_ESTIMATE", "LOCAL_POSITION_NED"]
 )
-def test_each_pose_in_the_kits_frames(kind, name):
-    pilot = Autopilot(options=f"?pose={name}").play(range(100, 200), pose=kind, name=name).end()
+def test_each_pose_in_the_kits_frames(pose):
+    pilot = Autopilot(options=f"?pose={pose}").play(range(100, 200), pose=pose).end()
     assert not pilot.failed
     assert len(pilot.outputs) == 100
     row, flown, k = pilot.outputs[50].row, flight(), 150

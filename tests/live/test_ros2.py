@@ -18,7 +18,7 @@ from windwrench.live.messages import Malformed
 from windwrench.live.sources.open import make_source
 from windwrench.live.tallies import Tallies
 
-pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'windwrench[logs]'")
+pytest.importorskip("rosbags", reason="pip install 'windwrench[logs]'")
 
 from tests.support.fake_ros import STORE, World, array, install, pose
 from windwrench.live.sources.ros_conversions import (

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.support.flights import PERIOD, yawing_flight
+from tests.support.flights import PERIOD, begin, fly, yawing_flight
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.paper import NonlinearObserver, ObserverTuning
 
@@ -31,21 +31,14 @@ def loaded_hover(observer, steps, force, torque):
     )
 
 
-def fly(observer, flight, missing=(), signs=None):
+def errors_along(flight, missing=()):
     """Return force, torque, position, velocity and body-rate errors (steps, 15)."""
-    observer.reset(
-        flight["true_x"][0], flight["true_q"][0], None, flight["velocity"][0], flight["omega"][0]
-    )
-    out = []
-    for k in range(1, len(flight["rotors"])):
-        q = flight["quaternion"][k] * (1.0 if signs is None else signs[k])
-        e = observer.step(
-            flight["rotors"][k], *(() if k in missing else (flight["position"][k], q))
-        )
-        moving = e.position - flight["true_x"][k], e.velocity - flight["velocity"][k]
-        turning = e.angular_velocity - flight["omega"][k]
-        out.append(np.concatenate([e.force - FORCE, e.torque - TORQUE, *moving, turning]))
-    return np.array(out)
+    observer = NonlinearObserver(VEHICLE)
+    begin(observer, flight)
+    true = {"force": [FORCE], "torque": [TORQUE], "position": flight["true_x"][1:]}
+    true |= {"velocity": flight["velocity"][1:], "angular_velocity": flight["omega"][1:]}
+    found = fly(observer, flight, missing)
+    return np.hstack([np.array([getattr(e, n) for e in found]) - x for n, x in true.items()])
 
 
 def test_steady_state_is_exact_after_a_rise_of_a_second():
@@ -66,25 +59,26 @@ def test_steady_state_is_exact_after_a_rise_of_a_second():
 
 def test_a_yawing_flight_is_no_wrench():
     flight = yawing_flight(VEHICLE, 2501, sigma_position=0.0, sigma_attitude=0.0, substeps=6)
-    clean = fly(NonlinearObserver(VEHICLE), flight)[1200:]
+    clean = errors_along(flight)[1200:]
     bounds = np.repeat([2e-3, 5e-5, 1e-3, 1e-3], 3)
     np.testing.assert_array_less(np.abs(clean[:, :12]).max(axis=0), bounds)
     flight = yawing_flight(VEHICLE, 2501, seed=2, substeps=3)
-    errors = fly(NonlinearObserver(VEHICLE), flight)
+    errors = errors_along(flight)
     noisy = np.sqrt(np.mean(errors[1200:] ** 2, axis=0))
     np.testing.assert_array_less(noisy[:12], np.repeat([6e-3, 0.6e-3, 1e-3, 0.01], 3))
     signs = np.random.default_rng(0).choice([-1.0, 1.0], 2501)
-    np.testing.assert_array_equal(fly(NonlinearObserver(VEHICLE), flight, signs=signs), errors)
+    flipped = flight | {"quaternion": signs[:, None] * flight["quaternion"]}
+    np.testing.assert_array_equal(errors_along(flipped), errors)
 
 
 def test_missing_measurements_leave_the_wrench_where_it_was():
     flight = yawing_flight(VEHICLE, 2501, seed=1, substeps=3)
     random = set(np.random.default_rng(3).choice(2501, 1250, replace=False))
-    errors = fly(NonlinearObserver(VEHICLE), flight, missing=random)[1200:]
+    errors = errors_along(flight, random)[1200:]
     assert np.sqrt(np.mean(errors[:, :3] ** 2)) < 8e-3
     assert np.sqrt(np.mean(errors[:, 3:6] ** 2)) < 1e-3
     # half a second blind, then the pose again
-    errors = fly(NonlinearObserver(VEHICLE), flight, missing=range(1500, 1600))
+    errors = errors_along(flight, range(1500, 1600))
     assert np.abs(errors[1499:1598, :3] - errors[1498, :3]).max() < 1e-12
     assert np.abs(errors[1499:1598, 6:9]).max() < 0.05
     assert np.abs(errors[1599:, :3]).max() < 0.15

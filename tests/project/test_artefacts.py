@@ -1,11 +1,11 @@
 """What is kept of results: little, in one form each, shown by a page that says what made it."""
 
 import re
-import subprocess
 
 import pytest
 
 from tests.support.paths import ROOT
+from tests.support.programs import said
 
 MOST = 5_400_000  # bytes, of all that git keeps of docs/ beside its films
 MOST_OF_FILMS = 3_000_000  # bytes, of these: a reader of README waits for them
@@ -26,9 +26,7 @@ MADE = re.compile(
 
 
 def git(*words):
-    return subprocess.run(
-        ["git", *words], cwd=ROOT, capture_output=True, text=True, check=True
-    ).stdout
+    return said("git", *words, cwd=ROOT)
 
 
 @pytest.fixture(scope="module")

@@ -23,13 +23,6 @@ def example(monkeypatch, tmp_path):
     return importlib.import_module
 
 
-@pytest.fixture
-def own_library(tmp_path):
-    """Take effects that a test adds to the library out again."""
-    with joined(tmp_path):
-        yield
-
-
 def test_every_script_is_tested_and_in_the_table():
     scripts = {path.stem for path in FOLDER.glob("*.py")}
     table = (FOLDER / "README.md").read_text(encoding="utf-8")
@@ -45,10 +38,7 @@ def test_a_controller_of_ones_own_follows_the_fan(example, capsys):
 
 
 def test_stable_baselines3_trains_on_the_plain_environment(example):
-    pytest.importorskip(
-        "stable_baselines3",
-        reason="stable-baselines3 is not installed: pip install 'windwrench[rl]'",
-    )
+    pytest.importorskip("stable_baselines3", reason="pip install 'windwrench[rl]'")
     found = example("sb3_ten_lines").main(steps=60, episodes=1)
     assert all(0.0 < reward <= 250.0 for reward in found.values())
     assert found["learned"] != found["hover"]
@@ -65,9 +55,10 @@ def test_fans_on_paths_of_ones_own_are_followed_and_drawn(example, tmp_path):
     assert (tmp_path / "followed" / "fan_path.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_an_effect_of_ones_own_is_found_with_its_coefficient(example, own_library, capsys):
-    assert "tether" not in library.names()
-    found = example("custom_effect").main(seconds=20.0, stiffness=0.12, seed=1)
+def test_an_effect_of_ones_own_is_found_with_its_coefficient(example, tmp_path, capsys):
+    with joined(tmp_path):  # and leaves the library again
+        assert "tether" not in library.names()
+        found = example("custom_effect").main(seconds=20.0, stiffness=0.12, seed=1)
     assert found.verdict == "explained"
     assert [effect.name for effect in found.effects] == ["tether"]
     assert found.effects[0].coefficients["k"] == pytest.approx(0.12, rel=0.08)

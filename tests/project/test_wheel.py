@@ -2,7 +2,6 @@
 
 import json
 import os
-import subprocess
 import sys
 import sysconfig
 import venv
@@ -11,17 +10,11 @@ from pathlib import Path
 import pytest
 
 from tests.support.paths import ROOT
+from tests.support.programs import said as done
 from windwrench.cli import app
 
 CHECKOUT_ONLY = ("studies", "tests")
 MOST_BYTES = 2_000_000  # of the wheel
-
-
-def done(*words, **options):
-    """Return what a program says; it must succeed."""
-    ended = subprocess.run(words, capture_output=True, text=True, **options)
-    assert ended.returncode == 0, ended.stdout + ended.stderr
-    return ended.stdout
 
 
 @pytest.fixture(scope="module")
@@ -73,11 +66,6 @@ def empty(wheel, tmp_path_factory):
 def installed(empty):
     """The folder that the wheel was installed to."""
     return next(empty.parent.rglob("windwrench/__init__.py")).parent.parent
-
-
-def run(installed, code, folder):
-    whole = f"import sys; sys.path.insert(0, {str(installed)!r})\n{code}"
-    return done(sys.executable, "-c", whole, cwd=folder)
 
 
 def call(empty, folder, *arguments):
@@ -139,8 +127,6 @@ def test_tasks_fly_where_there_is_no_checkout(empty, tmp_path):
 
 
 def test_importing_the_package_is_light(installed, tmp_path):
-    code = (
-        "import windwrench\n"
-        "print([m for m in ('mujoco', 'torch', 'numba', 'scipy') if m in sys.modules])"
-    )
-    assert run(installed, code, tmp_path).strip() == "[]"
+    code = f"import sys; sys.path.insert(0, {str(installed)!r}); import windwrench\n"
+    code += "print([m for m in ('mujoco', 'torch', 'numba', 'scipy') if m in sys.modules])"
+    assert done(sys.executable, "-c", code, cwd=tmp_path).strip() == "[]"

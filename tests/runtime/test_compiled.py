@@ -1,11 +1,11 @@
 """A first call that compiles says so; the next one does not."""
 
 import os
-import subprocess
 import sys
 
 import pytest
 
+from tests.support.programs import said
 from windwrench.runtime.compile_notice import LINE, CompileNotice
 
 
@@ -45,15 +45,5 @@ def test_numba_tells_what_it_compiles_and_not_what_it_loads(tmp_path):
         "print(double(3), begun)\n"
     )
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-    cold, warm = (
-        subprocess.run(
-            [sys.executable, "loops.py"],
-            cwd=tmp_path,
-            env=environment,
-            capture_output=True,
-            text=True,
-        )
-        for _ in range(2)
-    )
-    assert cold.stdout == "6 ['double']\n", cold.stderr
-    assert warm.stdout == "6 []\n", warm.stderr
+    runs = [said(sys.executable, "loops.py", cwd=tmp_path, env=environment) for _ in range(2)]
+    assert runs == ["6 ['double']\n", "6 []\n"]

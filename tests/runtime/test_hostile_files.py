@@ -3,11 +3,11 @@ names that are no text. Memory and time are measured in a process of their own.
 """
 
 import gzip
+import hashlib
 import io
 import json
 import os
 import struct
-import subprocess
 import sys
 import zipfile
 from dataclasses import replace
@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.support.programs import said
 from windwrench.controllers.trained_policy import FORMAT, load_policy
 from windwrench.dynamics import load_vehicle
 from windwrench.identification import read_log
@@ -87,8 +88,6 @@ def policy_bomb(path):
             member.write(bytes(2**26))
     data = out.getvalue()
     path.write_bytes(data)
-    import hashlib
-
     card = {"format": FORMAT, "sha256": hashlib.sha256(data).hexdigest()}
     path.with_suffix(".json").write_text(json.dumps(card))
 
@@ -125,6 +124,7 @@ EMPTY_DATAFLASH = struct.pack("<3sBB4s16s64s", b"\xa3\x95\x80", 9, 3, b"RCOU", b
 # a log whose events hold 400 variables of a byte each
 NARROW_SD_CARD = struct.pack("<BHHH", 0xBC, 2, 1, 7) + b"e\0" + struct.pack("<H", 400)
 NARROW_SD_CARD += b"".join(b"v%d(B)\0" % i for i in range(400))
+NARROW_ROW = b"\x07\0" + bytes(408)
 # a log whose frames are a letter each
 EMPTY_FRAMES = b"".join(
     [
@@ -140,63 +140,46 @@ TEXTS_ULOG = ulog(*[("P", b"\x09float " + b"%3x" % i + b"\0\0\0\0") for i in ran
     not Path("/proc/self/status").exists(), reason="memory is read as Linux tells it"
 )
 def test_files_that_unpack_to_gigabytes_cost_little(tmp_path):
-    expected = {"zeros.csv.gz": "more than 1000000 in line 2"}
-    (tmp_path / "zeros.csv.gz").write_bytes(packed_often(b"0" * 2**26, 20))
-    expected["lines.csv.gz"] = "more than 4000000 rows"
-    (tmp_path / "lines.csv.gz").write_bytes(packed_often(b"1,2\n" * 2**24, 20))
-    expected["blank.csv.gz"] = "more than 536870912 characters"
     blank = b"1,2\n" * 2 + (b" " * 999_999 + b"\n") * 64
-    (tmp_path / "blank.csv.gz").write_bytes(packed_often(blank, 10))
-    expected["parts.csv.gz"] = "packed bytes unpack to 0"
-    (tmp_path / "parts.csv.gz").write_bytes(gzip.compress(b"") * 1_000_000)
-    expected["columns.csv"] = "no table of numbers in its first 1 line"
-    (tmp_path / "columns.csv").write_text(",".join(f"{i:x}" for i in range(150_000)) + "\n1\n")
-    with (tmp_path / "sparse.csv").open("wb") as file:
-        file.truncate(2**34)
-    expected["sparse.csv"] = "zero bytes"
+    columns = ",".join(f"{i:x}" for i in range(150_000)) + "\n1\n"
+    dataflash = EMPTY_DATAFLASH + (b"\xa3\x95\x09" * 2**20) * 20 + bytes(7)
+    files = {
+        "zeros.csv.gz": (packed_often(b"0" * 2**26, 20), "more than 1000000 in line 2"),
+        "lines.csv.gz": (packed_often(b"1,2\n" * 2**24, 20), "more than 4000000 rows"),
+        "blank.csv.gz": (packed_often(blank, 10), "more than 536870912 characters"),
+        "parts.csv.gz": (gzip.compress(b"") * 1_000_000, "packed bytes unpack to 0"),
+        "columns.csv": (columns.encode(), "no table of numbers in its first 1 line"),
+        "deep.yaml": (b"[" * 100_000, "more than 60 deep"),
+        "empty.BIN": (dataflash, "no motors that turn; expected ESC"),
+        "narrow_log00": (NARROW_SD_CARD + NARROW_ROW * 90_000, "more than 33554432 numbers"),
+        "empty.bbl": (EMPTY_FRAMES + b"IP" * 2**22, "more than 4000000 frames"),
+        "damaged.bbl": (EMPTY_FRAMES + b"I\xff" * 2**22, "frame(s) that can be decoded"),
+        "sparse.csv": (b"", "zero bytes"),
+        "sparse.BIN": (EMPTY_DATAFLASH, "more than 268435456 bytes"),
+        "giant.yaml": (b"", "more than 200000 bytes"),
+    }
+    if ULOG:
+        files["nested.ulg"] = NESTED_ULOG, "more than 200000 fields"
+        files["texts.ulg"] = TEXTS_ULOG, "more than 200000 parameters"
+    for name, (content, _) in files.items():
+        (tmp_path / name).write_bytes(content)
+    for name, size in (("sparse.csv", 2**34), ("sparse.BIN", 2**34), ("giant.yaml", 50 * 2**30)):
+        os.truncate(tmp_path / name, size)
+    expected = {name: words for name, (_, words) in files.items()}
     policy_bomb(tmp_path / "policy.npz")
     expected["policy.npz"] = "unpacks to 2684355"
-    (tmp_path / "deep.yaml").write_text("[" * 100_000)
-    expected["deep.yaml"] = "more than 60 deep"
-    with (tmp_path / "giant.yaml").open("wb") as file:
-        file.truncate(50 * 2**30)
-    expected["giant.yaml"] = "more than 200000 bytes"
     if PARQUET:
         dictionary_bomb(tmp_path / "texts.parquet")
         expected["texts.parquet"] = "column px cannot be read: it holds"
-    if ULOG:
-        (tmp_path / "nested.ulg").write_bytes(NESTED_ULOG)
-        expected["nested.ulg"] = "more than 200000 fields"
-        (tmp_path / "texts.ulg").write_bytes(TEXTS_ULOG)
-        expected["texts.ulg"] = "more than 200000 parameters"
-    (tmp_path / "empty.BIN").write_bytes(
-        EMPTY_DATAFLASH + (b"\xa3\x95\x09" * 2**20) * 20 + bytes(7)
-    )
-    expected["empty.BIN"] = "no motors that turn; expected ESC"
-    (tmp_path / "narrow_log00").write_bytes(NARROW_SD_CARD + (b"\x07\0" + bytes(408)) * 90_000)
-    expected["narrow_log00"] = "more than 33554432 numbers"
     (tmp_path / "few.bbl").write_bytes(EMPTY_FRAMES + b"IP" * 8)
-    (tmp_path / "empty.bbl").write_bytes(EMPTY_FRAMES + b"IP" * 2**22)
-    expected["empty.bbl"] = "more than 4000000 frames"
-    (tmp_path / "damaged.bbl").write_bytes(EMPTY_FRAMES + b"I\xff" * 2**22)
-    expected["damaged.bbl"] = "frame(s) that can be decoded"
-    with (tmp_path / "sparse.BIN").open("wb") as file:
-        file.write(EMPTY_DATAFLASH)
-        file.truncate(2**34)
-    expected["sparse.BIN"] = "more than 268435456 bytes"
-    done = subprocess.run(
-        [sys.executable, "-c", CHILD, *(str(tmp_path / name) for name in expected)],
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=120,
-    )
-    found = [json.loads(line) for line in done.stdout.splitlines()]
+    paths = (str(tmp_path / name) for name in expected)
+    told = said(sys.executable, "-c", CHILD, *paths, timeout=120)
+    found = [json.loads(line) for line in told.splitlines()]
     assert len(found) == len(expected)
-    for path, said, seconds, memory in found:
-        assert said.startswith(str(tmp_path)), said
-        assert expected[Path(path).name] in said
-        assert "\n" not in said
+    for path, line, seconds, memory in found:
+        assert line.startswith(str(tmp_path)), line
+        assert expected[Path(path).name] in line
+        assert "\n" not in line
         assert seconds < SECONDS, path
         assert memory < MEMORY, path
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.support.own_effects import HOSE, forget
 from windwrench.controllers.own_file import is_file_name
 from windwrench.dynamics import InputError, effects, load_vehicle
 from windwrench.dynamics.effects import compile_effects, parse_setting
@@ -24,20 +25,8 @@ class Left:
     def __call__(self, observation, info=None):
         return np.array([min(self.speed, LIMIT)], dtype=np.float32)
 """
-EFFECT = '''"""A pull along x, in proportion to x."""
-
-from numba import cfunc
-from windwrench.dynamics.effects.base import EFFECT_MODEL, POSITION, Coefficient, Effect
-
-
-@cfunc(EFFECT_MODEL, cache=True)
-def model(c, vehicle, state, wrench):
-    wrench[0] -= c[0] * state[POSITION]
-
-
-EFFECT = Effect(name="NAME", kind="wrench", coefficients=(Coefficient("k", "N/m", (0.1, 0.01), "stiffness"),), source="test",
-                excitation="flight along x", model=model)
-'''
+# starts, without which a pull that comes and goes is refused
+EFFECT = HOSE.replace("# more", "starting_points=lambda flights: [{'a': 0.2, 'w': 3.0}]")
 
 
 @pytest.fixture
@@ -53,8 +42,7 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.setenv("WINDWRENCH_EFFECTS", "")
     yield tmp_path
     monkeypatch.undo()
-    for known in (effects._files, effects.names, effects.get):
-        known.cache_clear()
+    forget()
 
 
 def test_a_class_of_a_file_is_a_controller(laws):
@@ -75,16 +63,16 @@ def test_a_subclass_is_one_too(laws):
 
 
 def test_a_folder_s_files_join_the_library(folder):
-    (folder / "own_spring.py").write_text(EFFECT.replace("NAME", "own_spring"))
+    (folder / "hose.py").write_text(EFFECT)
     (folder / "_helper.py").write_text("x = 1")
-    assert effects.add_folder(folder) == ("own_spring",)
-    assert "own_spring" in effects.names()
+    assert effects.add_folder(folder) == ("hose",)
+    assert "hose" in effects.names()
     assert "rotor_drag" in effects.names()
     assert os.environ["WINDWRENCH_EFFECTS"] == str(folder)
-    setting = parse_setting("own_spring")
-    assert setting.coefficients == {"k": 0.1}
+    setting = parse_setting("hose")
+    assert setting.coefficients == {"a": 0.2, "w": 3.0}
     assert compile_effects(load_vehicle("ardrone2").with_effects(setting)).wrench_models[0] != 0
-    assert effect_summary("own_spring") == "A pull along x, in proportion to x."
+    assert effect_summary("hose") == "A pull that comes and goes."
     effects.add_folder(folder)  # once more changes nothing
     assert os.environ["WINDWRENCH_EFFECTS"] == str(folder)
 
@@ -93,10 +81,7 @@ def test_a_folder_s_files_join_the_library(folder):
     ("text", "words"),
     [
         ("x = 1", "expected EFFECT = Effect.name='own_spring'"),
-        (
-            EFFECT.replace("NAME", "another"),
-            "expected EFFECT = Effect.name='own_spring', ....*got 'another'",
-        ),
+        (EFFECT, "expected EFFECT = Effect.name='own_spring', ....*got 'hose'"),
         ("raise RuntimeError('no')", "line 1: RuntimeError: no"),
     ],
 )

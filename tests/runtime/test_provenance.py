@@ -2,11 +2,11 @@
 
 import gzip
 import json
-import subprocess
 
 import pytest
 from matplotlib.figure import Figure
 
+from tests.support.programs import said
 from windwrench import __version__
 from windwrench.dynamics import InputError
 from windwrench.runtime.page_files import write_figure, write_json, write_text
@@ -14,13 +14,7 @@ from windwrench.runtime.provenance import commit, made_by
 
 
 def git(folder, *words):
-    return subprocess.run(
-        ["git", "-c", "user.name=a", "-c", "user.email=a@b", *words],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout.strip()
+    return said("git", "-c", "user.name=a", "-c", "user.email=a@b", *words, cwd=folder).strip()
 
 
 def test_a_checkout_has_a_commit_and_says_what_is_not_in_it(tmp_path):

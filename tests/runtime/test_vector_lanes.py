@@ -8,14 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from windwrench.runtime.vector_lanes import (
-    WIDTH,
-    LaneRecord,
-    all_of,
-    any_of,
-    choose,
-    corners,
-)
+from windwrench.runtime.vector_lanes import WIDTH, LaneRecord, all_of, any_of, choose, corners
 
 SINGLE = np.dtype(
     [

@@ -36,6 +36,14 @@ def lives(process):
     return True
 
 
+def assert_ends(process):
+    deadline = time.monotonic() + 20.0
+    while lives(process) and time.monotonic() < deadline:
+        multiprocessing.active_children()  # takes note of those that are gone
+        time.sleep(0.05)
+    assert not lives(process)
+
+
 def outcomes(tasks, count=1, limit=60.0):
     return list(each(work, tasks, limit, count))
 
@@ -47,10 +55,7 @@ def test_a_worker_stays_warm_and_alone(monkeypatch):
     assert {threads for _, (_, threads) in done} == {"1"}
     (process,) = {process for _, (process, _) in done}
     assert process != os.getpid()
-    deadline = time.monotonic() + 20.0
-    while lives(process) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert not lives(process)  # it ends with the work
+    assert_ends(process)  # with the work
     assert "OPENBLAS_NUM_THREADS" not in os.environ
 
 
@@ -91,10 +96,7 @@ def test_a_worker_that_dies_while_it_waits_is_replaced():
     running = each(work, [0, 1], 60.0, 1)
     _, (process, _) = next(running)
     os.kill(process, signal.SIGKILL)
-    deadline = time.monotonic() + 20.0
-    while lives(process) and time.monotonic() < deadline:
-        multiprocessing.active_children()  # takes note of those that are gone
-        time.sleep(0.05)
+    assert_ends(process)
     time.sleep(0.5)  # for the pool to see it
     (task, (other, _)) = next(running)
     assert (task, other == process) == (1, False)

@@ -11,11 +11,7 @@ from windwrench.dynamics import load_vehicle
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.commanded_rotors import in_flight
 from windwrench.identification.logs.reading import read_log
-from windwrench.studies.measured_flights import (
-    CARRIER,
-    payload_vehicle,
-    swing,
-)
+from windwrench.studies.measured_flights import CARRIER, payload_vehicle, swing
 
 VEHICLE = load_vehicle("crazyflie")
 

@@ -63,11 +63,7 @@ def flight(count=400, seed=0):
     return rows
 
 
-def blackbox(
-    rows,
-    headers=None,
-    variable=True,
-):
+def blackbox(rows, headers=None, variable=True):
     """Return a log of rows, each with every field; loopIteration counts by two. Encoding 10 is left
     out where not ``variable``.
     """
@@ -109,13 +105,7 @@ def blackbox(
     return b"".join(out)
 
 
-def _frame(
-    fields,
-    row,
-    before,
-    older,
-    which,
-):
+def _frame(fields, row, before, older, which):
     out, names, i = b"", list(fields), 0
     while i < len(names):
         encoding = fields[names[i]][which + 1]
@@ -134,13 +124,7 @@ def _frame(
     return out
 
 
-def _foreseen(
-    predictor,
-    name,
-    row,
-    before,
-    older,
-):
+def _foreseen(predictor, name, row, before, older):
     if predictor == 1:
         return before[name]
     if predictor == 2:

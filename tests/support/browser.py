@@ -42,6 +42,16 @@ addEventListener("load", async () => {
 """
 
 
+def browse(address, profile, *options):
+    """Run the browser: standard output is the page as it then is, errors are its complaints."""
+    alone = ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage")
+    told = ("--enable-logging=stderr", "--virtual-time-budget=5000", "--timeout=20000")
+    options += (f"--user-data-dir={profile}", "--no-first-run", "--dump-dom", address)
+    return subprocess.run(
+        [BROWSER, *alone, *told, *options], capture_output=True, text=True, timeout=120
+    )
+
+
 def look(page, width, folder, dark=False, act="", scripts=True):
     """Show a page (HTML text) ``width`` pixels wide; return what was found in it, with the
     browser's ``complaints``.
@@ -61,26 +71,12 @@ def look(page, width, folder, dark=False, act="", scripts=True):
         encoding="utf-8",
     )
     for attempt in range(3):  # on a busy machine a browser may die before it has shown anything
-        shown = subprocess.run(
-            [
-                BROWSER,
-                "--headless=new",
-                "--no-sandbox",
-                "--disable-gpu",
-                "--disable-dev-shm-usage",
-                "--hide-scrollbars",
-                "--no-first-run",
-                f"--user-data-dir={Path(folder) / f'profile{attempt}'}",
-                "--enable-logging=stderr",
-                f"--blink-settings=preferredColorScheme={0 if dark else 1}",
-                f"--window-size={max(width, 500)},1000",
-                "--virtual-time-budget=5000",
-                "--dump-dom",
-                path.resolve().as_uri(),
-            ],
-            capture_output=True,
-            text=True,
-            timeout=120,
+        shown = browse(
+            path.resolve().as_uri(),
+            Path(folder) / f"profile{attempt}",
+            "--hide-scrollbars",
+            f"--blink-settings=preferredColorScheme={0 if dark else 1}",
+            f"--window-size={max(width, 500)},1000",
         )
         dumped = re.search(r'<pre id="found">(.+?)</pre>', shown.stdout, re.DOTALL)
         if dumped:

@@ -22,9 +22,7 @@ _CODES = {
 _FACTORS = {"c": 100.0, "C": 100.0, "L": 1e7}
 
 
-def dataflash(
-    messages,
-):
+def dataflash(messages):
     """Return a log.
 
     Args:
@@ -42,10 +40,7 @@ def dataflash(
     return b"".join(out)
 
 
-def dataflash_text(
-    messages,
-    first="ArduCopter V3.4",
-):
+def dataflash_text(messages, first="ArduCopter V3.4"):
     """Return the same log as a ground station writes it as text."""
     lines = [first, "", "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns"]
     for number, (name, letters, columns) in enumerate(messages, 10):

@@ -11,8 +11,8 @@ STORE = typestore(False)
 class World:
     """The topics of a machine."""
 
-    def __init__(self, topics):
-        self.topics = topics  # name: type
+    def __init__(self, topics, lasts=False):
+        self.topics, self.lasts = topics, lasts  # name: type; whether it goes on once all was said
         self.callbacks = {}
         self.waiting = []
         self.published = {}
@@ -46,7 +46,7 @@ def install(monkeypatch, world):
                 topic, message = world.waiting.pop(0)
                 world.callbacks[topic](message)
             elif world.callbacks:
-                world.up = False  # all was said
+                world.up = world.lasts
 
     def shut():
         world.up = False

@@ -8,14 +8,7 @@ from windwrench.envs.recording import background, record_flight
 from windwrench.identification.logs.flight_log import FlightLog
 
 
-def imu_flight(
-    vehicle,
-    effects=(),
-    seconds=20.0,
-    trajectory="excite",
-    seed=1,
-    turbulence=0.0,
-):
+def imu_flight(vehicle, effects=(), seconds=20.0, trajectory="excite", seed=1, turbulence=0.0):
     """A simulated flight: pose, rotor speeds, and an IMU with noise and bias."""
     settings = background(vehicle, turbulence)
     log = FlightLog(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.rotation import normalise, quaternion_from_mrp, quaternion_multiply
 from windwrench.estimator import UKFTuning
 from windwrench.estimator.estimate import FORCE, POSITION, QUATERNION, RATE, TORQUE, VELOCITY, Array
@@ -22,25 +23,21 @@ ANISOTROPIC = UKFTuning(
     position_noise=(0.001, 0.002, 0.003),
     attitude_noise=(0.003, 0.005, 0.008),
 )
+WITH_EFFECTS = load_vehicle("ardrone2").with_effects(
+    EffectSetting("com_offset", {"cx": 0.01, "cz": -0.02}),
+    EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}),
+)
 
 
 @dataclass(frozen=True, eq=False)
 class ModelRun:
     """Truth and measurement at the end of each of K steps, in the units of the filter."""
 
-    initial_position: Array  # (3,), which the filter starts with; the truth is drawn around it
-    initial_quaternion: Array
-    initial_velocity: Array
-    initial_angular_velocity: Array
-    initial_covariance: Array  # (18, 18)
+    start: tuple[Array, ...]  # of a filter's ``reset``; the truth is drawn around it
     rotor_speeds: Array  # (K, 4), and so on
     measured_position: Array
     measured_quaternion: Array
-    state: Array  # (K, 20) the truth, laid out as the filter's; its parts follow
-    position: Array
-    quaternion: Array
-    velocity: Array
-    angular_velocity: Array
+    state: Array  # (K, 20) the truth, laid out as the filter's; parts of it follow
     torque: Array
     force: Array
     gyro: Array  # (K, 3) as measured
@@ -50,13 +47,21 @@ class ModelRun:
 
     def begin(self, estimator):
         """Start an estimator where the truth is drawn around."""
-        estimator.reset(
-            self.initial_position,
-            self.initial_quaternion,
-            self.initial_covariance,
-            self.initial_velocity,
-            self.initial_angular_velocity,
-        )
+        estimator.reset(*self.start)
+
+    def fly(self, estimator, missing=()):
+        """Step an estimator along, some poses missing; return its estimates."""
+        self.begin(estimator)
+        poses = zip(self.measured_position, self.measured_quaternion, strict=True)
+        return [
+            estimator.step(speeds, *((None, None) if k in missing else pose))
+            for k, (speeds, pose) in enumerate(zip(self.rotor_speeds, poses, strict=True))
+        ]
+
+    def log(self, period=0.005):
+        """Return times, rotor speeds, positions and quaternions, which a test may spoil."""
+        pose = self.measured_position.copy(), self.measured_quaternion.copy()
+        return period * np.arange(1, len(self.rotor_speeds) + 1), self.rotor_speeds, *pose
 
 
 def simulate_model(
@@ -65,11 +70,9 @@ def simulate_model(
     rotor_speeds,
     period=0.005,
     seed=0,
-    position=(0.0, 0.0, 1.0),
     quaternion=(1.0, 0.0, 0.0, 0.0),
     velocity=(0.0, 0.0, 0.0),
     angular_velocity=(0.0, 0.0, 0.0),
-    covariance=None,
     rate_gain=20.0,
     push=None,
 ):
@@ -77,15 +80,15 @@ def simulate_model(
 
     Every step draws a rotor torque error and a rotor force error (body frame), moves the external
     torque and force (world) by their walks, and measures the pose, all normal with the deviations
-    of ``tuning``. The start is drawn from ``covariance`` about the given pose and twist, with no
-    external wrench in the mean. ``rate_gain`` (1/s) is of a loop on the true body rate, without
-    which a walk of the torque spins the vehicle up. ``push`` (K, 6), Nm and N, is added to the
-    external torque and force after each step.
+    of ``tuning``. The start is drawn from the filter's covariance about 1 m up and the given
+    attitude and twist, with no external wrench in the mean. ``rate_gain`` (1/s) is of a loop on the
+    true body rate, without which a walk of the torque spins the vehicle up. ``push`` (K, 6), Nm and
+    N, is added to the external torque and force after each step.
     """
     speeds = np.array(rotor_speeds, dtype=np.float64)
-    P = default_covariance(vehicle, tuning) if covariance is None else covariance
+    P = default_covariance(vehicle, tuning)
     start = np.zeros(20)
-    start[POSITION], start[QUATERNION] = position, quaternion
+    start[POSITION], start[QUATERNION] = (0.0, 0.0, 1.0), quaternion
     start[VELOCITY], start[RATE] = velocity, angular_velocity
     rng = np.random.default_rng(seed)
     steps = len(speeds)
@@ -119,16 +122,14 @@ def simulate_model(
         measured,
         imu,
     )
-    parts = {"position": POSITION, "quaternion": QUATERNION, "velocity": VELOCITY}
-    parts |= {"angular_velocity": RATE, "torque": TORQUE, "force": FORCE}
     return ModelRun(
-        **{f"initial_{name}": start[part] for name, part in list(parts.items())[:4]},
-        initial_covariance=P,
+        start=(start[POSITION], start[QUATERNION], P, start[VELOCITY], start[RATE]),
         rotor_speeds=speeds,
         measured_position=measured[:, :3],
         measured_quaternion=measured[:, 3:],
         state=states,
-        **{name: states[:, part] for name, part in parts.items()},
+        torque=states[:, TORQUE],
+        force=states[:, FORCE],
         gyro=imu[:, :3],
         accelerometer=imu[:, 3:],
         gyro_bias=biases[:, :3],

@@ -6,73 +6,30 @@ import os
 import signal
 import threading
 import time
+from itertools import product
 
 import numpy as np
 import pytest
 
+from tests.runtime.test_workers import work
+from tests.training.tiny import TINY
 from windwrench.dynamics import InputError
 from windwrench.evaluation.benchmark import fly_all
 from windwrench.runtime.workers import each, every
 from windwrench.training.rllib import register_with_rllib
 from windwrench.training.sweep import jobs_of, run_job, run_jobs
 
-# settings of a training run of seconds, with checkpoints in its middle
-TINY = [
-    "steps=240",
-    "environments=2",
-    "net=[8]",
-    "learner.learning_starts=40",
-    "learner.batch_size=16",
-    "checkpoint=60",
-    "validation.every=120",
-    "validation.episodes=1",
-]
-
-
-def assert_same_runs(jobs, there, here, folder):
-    """Hold runs done in ``folder``/there to those in ``folder``/here, byte for byte."""
-    assert [r["run"] for r in there] == [r["run"] for r in here]
-    assert [r["validation_rmse_m"] for r in there] == [r["validation_rmse_m"] for r in here]
-    for job in jobs:
-        for name in ("best.npz", "last.npz"):
-            assert (folder / "there" / job.name / name).read_bytes() == (
-                folder / "here" / job.name / name
-            ).read_bytes()
-
-
-def assert_same_flights(there, here):
-    """Hold the episodes of one benchmark to those of another, number for number."""
-    assert list(there) == list(here)
-    for key, flown in here.items():
-        for a, b in zip(flown, there[key], strict=True):
-            np.testing.assert_array_equal(a.y, b.y)
-            assert (a.rmse, a.seed, a.lost) == (b.rmse, b.seed, b.lost)
-
 
 def test_a_sweep_is_every_value_with_every_seed():
     jobs = jobs_of("sac", "base", range(2), TINY, ["learner.gamma=0.9|0.95", "net=[8]|[16]"])
-    assert [job.name for job in jobs][:3] == [
-        "gamma-0.9-net-8-seed-0",
-        "gamma-0.9-net-8-seed-1",
-        "gamma-0.9-net-16-seed-0",
-    ]
-    assert [(job.config["learner"]["gamma"], job.config["net"], job.seed) for job in jobs] == [
-        (0.9, [8], 0),
-        (0.9, [8], 1),
-        (0.9, [16], 0),
-        (0.9, [16], 1),
-        (0.95, [8], 0),
-        (0.95, [8], 1),
-        (0.95, [16], 0),
-        (0.95, [16], 1),
-    ]
+    said = [(job.config["learner"]["gamma"], job.config["net"], job.seed) for job in jobs]
+    assert said == list(product((0.9, 0.95), ([8], [16]), (0, 1)))
+    assert [job.name for job in jobs][1:3] == ["gamma-0.9-net-8-seed-1", "gamma-0.9-net-16-seed-0"]
 
 
 @pytest.fixture(scope="module")
 def cluster():
-    ray = pytest.importorskip(
-        "ray", reason="Ray is not installed: pip install 'windwrench[cluster]'"
-    )
+    ray = pytest.importorskip("ray", reason="pip install 'windwrench[cluster]'")
     # "local": a cluster of its own, whatever else runs on this machine
     ray.init("local", num_cpus=2, include_dashboard=False, log_to_driver=False)
     yield "local"  # the one that is connected already
@@ -81,10 +38,7 @@ def cluster():
 
 @pytest.mark.slow  # a task that is done again, and a run that goes on where it stopped, are quick
 def test_runs_on_a_cluster_are_the_local_ones_though_a_worker_is_killed(cluster, tmp_path):
-    pytest.importorskip(
-        "stable_baselines3",
-        reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'",
-    )
+    pytest.importorskip("stable_baselines3", reason="pip install 'windwrench[rl]'")
     jobs = jobs_of("sac", "base", range(2), TINY, [])
     process, killed = tmp_path / "process", []
 
@@ -108,7 +62,11 @@ def test_runs_on_a_cluster_are_the_local_ones_though_a_worker_is_killed(cluster,
     assert killed
     assert int(process.read_text()) != killed[0]  # another process went on
     here = [run_job(job, tmp_path / "here") for job in jobs]
-    assert_same_runs(jobs, there, here, tmp_path)
+    for name in ("run", "validation_rmse_m"):
+        assert [r[name] for r in there] == [r[name] for r in here]
+    for job, name in product(jobs, ("best.npz", "last.npz")):
+        ours, theirs = (tmp_path / place / job.name / name for place in ("here", "there"))
+        assert ours.read_bytes() == theirs.read_bytes()
 
 
 def refuse(task):
@@ -136,7 +94,11 @@ def test_a_task_that_fails_is_named(cluster):
 def test_flights_on_a_cluster_are_the_local_ones(cluster):
     there = fly_all(["admittance"], ["base"], 4, seed=0, cluster=cluster)
     here = fly_all(["admittance"], ["base"], 4, seed=0, jobs=1)
-    assert_same_flights(there, here)
+    assert list(there) == list(here)
+    for key, flown in here.items():
+        for a, b in zip(flown, there[key], strict=True):
+            np.testing.assert_array_equal(a.y, b.y)
+            assert (a.rmse, a.seed, a.lost) == (b.rmse, b.seed, b.lost)
 
 
 def test_rllib_knows_the_environment_after_one_line(cluster):
@@ -157,30 +119,19 @@ def test_rllib_knows_the_environment_after_one_line(cluster):
     algorithm.stop()
 
 
-def fleet_work(task):
-    """Answer, or end as the task says."""
-    if task == "exits":
-        os._exit(3)
-    if task == "sleeps":
-        time.sleep(600.0)
-    return task
-
-
 def test_a_task_that_dies_or_takes_too_long_costs_itself_alone(cluster):
-    done = dict(each(fleet_work, [0, "exits", 1], cluster=cluster))
-    assert (done.pop("exits").kind, done) == ("died", {0: 0, 1: 1})
+    done = dict(each(work, [0, "exits", 1], cluster=cluster))
+    assert (done.pop("exits").kind, done.keys()) == ("died", {0, 1})
     for _ in range(2):  # the first time a worker starts again, the second time none
         begun = time.monotonic()
-        assert dict(each(fleet_work, [0, 1], cluster=cluster)) == {0: 0, 1: 1}
+        assert dict(each(work, [0, 1], cluster=cluster)).keys() == {0, 1}
     limit = 3.0 + 3.0 * (time.monotonic() - begun)  # however busy this machine is
-    done = dict(each(fleet_work, [0, "sleeps", 1], limit, cluster=cluster))
-    assert (done.pop("sleeps").kind, done) == ("time", {0: 0, 1: 1})
+    done = dict(each(work, [0, "sleeps", 1], limit, cluster=cluster))
+    assert (done.pop("sleeps").kind, done.keys()) == ("time", {0, 1})
 
 
 def test_a_cluster_that_is_not_there_is_named():
-    ray = pytest.importorskip(
-        "ray", reason="Ray is not installed: pip install 'windwrench[cluster]'"
-    )
+    ray = pytest.importorskip("ray", reason="pip install 'windwrench[cluster]'")
     if ray.is_initialized():  # last in this file: those before have one cluster
         ray.shutdown()
     with pytest.raises(InputError, match=r"127\.0\.0\.1:1: no Ray cluster there"):

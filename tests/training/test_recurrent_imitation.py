@@ -10,10 +10,8 @@ from windwrench.controllers.trained_policy import TrainedPolicy, load_policy
 from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.training.configuration import features_of, load_config
 
-pytest.importorskip("torch", reason="torch is not installed: pip install 'windwrench[rl]'")
-pytest.importorskip(
-    "stable_baselines3", reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'"
-)
+pytest.importorskip("torch", reason="pip install 'windwrench[rl]'")
+pytest.importorskip("stable_baselines3", reason="pip install 'windwrench[rl]'")
 import torch
 
 from windwrench.training.belief_network import BeliefNetwork, Sequences, fit

@@ -11,34 +11,25 @@ import zipfile
 
 import pytest
 
-pytest.importorskip("torch", reason="torch is not installed: pip install 'windwrench[rl]'")
+pytest.importorskip("torch", reason="pip install 'windwrench[rl]'")
 pytest.importorskip("stable_baselines3", reason="pip install 'windwrench[rl]'")
 
 import torch
 
+from tests.training.tiny import TINY
 from windwrench.runtime.errors import InputError
 from windwrench.training.configuration import load_config
 from windwrench.training.run import read_progress
 from windwrench.training.train import train
 
-TINY = [
-    "net=[8]",
-    "validation.every=120",
-    "validation.episodes=1",
-    "steps=120",
-    "environments=2",
-    "checkpoint=60",
-    "learner.learning_starts=20",
-    "learner.buffer_size=500",
-    "learner.batch_size=16",
-]
+SHORT = [*TINY, "steps=120", "learner.learning_starts=20", "learner.buffer_size=500"]
 NAMES = ("checkpoint.pt", "training.json")
 
 
 @pytest.fixture(scope="module")
 def stopped(tmp_path_factory):
     folder = tmp_path_factory.mktemp("stopped") / "run"
-    train(load_config("sac", TINY), "base", 0, folder, stop_after=60)
+    train(load_config("sac", SHORT), "base", 0, folder, stop_after=60)
     return folder
 
 
@@ -103,7 +94,7 @@ def test_a_spoiled_file_is_named_in_one_line(name, how, stopped, tmp_path):
     path = folder / name
     path.write_bytes((SPOILED | CHECKPOINTS)[how](path.read_bytes()))
     with pytest.raises(InputError) as refused:
-        train(load_config("sac", TINY), "base", 0, folder)
+        train(load_config("sac", SHORT), "base", 0, folder)
     message = str(refused.value)
     assert message.startswith((f"{path}: ", f"{folder}: "))
     assert len(message) < 700
@@ -117,7 +108,7 @@ def test_a_pipe_in_its_place_is_refused_at_once(name, stopped, tmp_path):
     (folder / name).unlink()
     os.mkfifo(folder / name)
     with pytest.raises(InputError, match=f"{name}: is a pipe"):
-        train(load_config("sac", TINY), "base", 0, folder)
+        train(load_config("sac", SHORT), "base", 0, folder)
 
 
 @pytest.mark.parametrize("text", ["", "[]", "7", '{"steps": 1}', '{"steps": ["a"]}', '{"x": 1}'])

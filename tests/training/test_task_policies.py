@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-pytest.importorskip("torch", reason="torch is not installed: pip install 'windwrench[rl]'")
+pytest.importorskip("torch", reason="pip install 'windwrench[rl]'")
 
 import torch
 

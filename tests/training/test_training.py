@@ -8,15 +8,14 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from tests.training.tiny import TINY
 from windwrench.controllers.trained_policy import TrainedPolicy, load_policy
 from windwrench.dynamics import InputError
 from windwrench.evaluation.benchmark import fly_all
 from windwrench.training.configuration import ALGORITHMS, load_config
 
-pytest.importorskip("torch", reason="torch is not installed: pip install 'windwrench[rl]'")
-pytest.importorskip(
-    "stable_baselines3", reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'"
-)
+pytest.importorskip("torch", reason="pip install 'windwrench[rl]'")
+pytest.importorskip("stable_baselines3", reason="pip install 'windwrench[rl]'")
 import stable_baselines3 as sb3
 import torch
 from stable_baselines3.common.vec_env import DummyVecEnv
@@ -30,23 +29,15 @@ from windwrench.training.training_envs import make_training_envs
 from windwrench.training.vec_env import FeatureVecEnv
 
 LEARNERS = ["sac", "td3", "ppo", "recurrent-ppo"]
-_OFF_POLICY = ["steps=240", "environments=2", "learner.learning_starts=40", "learner.batch_size=16"]
-_ON_POLICY = ["steps=240", "environments=2", "learner.n_steps=30", "learner.batch_size=20"]
-TINY = {
-    "sac": _OFF_POLICY,
-    "td3": _OFF_POLICY,
-    "ppo": [*_ON_POLICY, "learner.n_epochs=2"],
-    "recurrent-ppo": [*_ON_POLICY, "learner.n_epochs=2", "lstm=4"],
-}
-SHORT = ["net=[8]", "validation.every=120", "validation.episodes=1"]
+_ROLLOUTS = ["learner.n_steps=30", "learner.batch_size=20", "learner.n_epochs=2"]
+_ON_POLICY = [one for one in TINY if not one.startswith("learner.")] + _ROLLOUTS
+SETTINGS = {"ppo": _ON_POLICY, "recurrent-ppo": [*_ON_POLICY, "lstm=4"]}
 
 
 def tiny(algorithm, *more):
     if algorithm == "recurrent-ppo":
-        pytest.importorskip(
-            "sb3_contrib", reason="sb3_contrib is not installed: pip install 'windwrench[rl]'"
-        )
-    return load_config(algorithm, [*SHORT, *TINY[algorithm], "checkpoint=60", *more])
+        pytest.importorskip("sb3_contrib", reason="pip install 'windwrench[rl]'")
+    return load_config(algorithm, [*SETTINGS.get(algorithm, TINY), *more])
 
 
 def make_env(config, seed=0):
@@ -124,20 +115,15 @@ def test_the_fast_update_is_that_of_stable_baselines3(make_env):
     )  # something was learned
 
 
-def test_a_checkpoint_of_another_configuration_is_refused(tmp_path):
-    train(tiny("sac"), "base", 0, tmp_path)
+def test_a_run_says_beside_the_policy_what_it_was_and_another_is_refused(tmp_path):
+    path = train(tiny("sac", "learner.gamma=0.9"), "base", 2, tmp_path)
     other = tiny("sac", "net=[9]")
     env = make_env(other)
     with pytest.raises(InputError, match="not a checkpoint of this configuration"):
         load_checkpoint(make_learner(other, env, 0), env, tmp_path / "checkpoint.pt")
-    with pytest.raises(InputError, match="another configuration, scenario or seed"):
-        train(other, "base", 0, tmp_path)
-    with pytest.raises(InputError, match="another configuration, scenario or seed"):
-        train(tiny("sac"), "fast", 0, tmp_path)
-
-
-def test_a_run_says_beside_the_policy_what_it_was(tmp_path):
-    path = train(tiny("sac", "learner.gamma=0.9"), "base", 2, tmp_path)
+    for config, scenario in ((tiny("sac"), "base"), (tiny("sac", "learner.gamma=0.9"), "fast")):
+        with pytest.raises(InputError, match="another configuration, scenario or seed"):
+            train(config, scenario, 2, tmp_path)
     card = load_policy(path).card
     assert (card["algorithm"], card["scenario"], card["seed"]) == ("sac", "base", 2)
     assert card["config"]["learner"]["gamma"] == 0.9
@@ -149,17 +135,9 @@ def test_a_run_says_beside_the_policy_what_it_was(tmp_path):
 
 
 def test_imitation_learns_the_oracle_s_commands(tmp_path):
-    config = load_config(
-        "imitation",
-        [
-            "steps=3000",
-            "rounds=3",
-            "epochs=15",
-            "net=[32]",
-            "validation.every=1000",
-            "validation.episodes=3",
-        ],
-    )
+    short = ["steps=3000", "rounds=3", "epochs=15", "net=[32]"]
+    short += ["validation.every=1000", "validation.episodes=3"]
+    config = load_config("imitation", short)
     train(config, "base", 0, tmp_path)
     progress = read_progress(tmp_path)
     assert progress.steps[-1] >= 3000
@@ -173,13 +151,10 @@ def test_every_key_can_be_overridden_and_no_other():
     for algorithm in ALGORITHMS:
         config = load_config(algorithm)
         for key, value in config.items():
-            if key == "algorithm":
-                continue
-            inner = value if isinstance(value, dict) else {None: value}
-            for name, old in inner.items():
-                text = key if name is None else f"{key}.{name}"
-                again = load_config(algorithm, [f"{text}={json.dumps(old)}"])
-                assert again == config
+            inner = value if isinstance(value, dict) else {"": value}
+            for name, old in inner.items() if key != "algorithm" else ():
+                text = f"{key}.{name}".rstrip(".")
+                assert load_config(algorithm, [f"{text}={json.dumps(old)}"]) == config
 
 
 def test_a_configuration_file_comes_before_single_settings(tmp_path):
@@ -187,13 +162,8 @@ def test_a_configuration_file_comes_before_single_settings(tmp_path):
         "learner: {gamma: 0.9, tau: 0.02}\nsteps: 99\n", encoding="utf-8"
     )
     config = load_config("sac", ["learner.gamma=0.8"], tmp_path / "mine.yaml")
-    assert (config["learner"]["gamma"], config["learner"]["tau"], config["steps"]) == (
-        0.8,
-        0.02,
-        99,
-    )
-    with pytest.raises(InputError, match=r"mine2.yaml: cannot be read"):
-        load_config("sac", [], tmp_path / "mine2.yaml")
+    learner = config["learner"]
+    assert (learner["gamma"], learner["tau"], config["steps"]) == (0.8, 0.02, 99)
 
 
 @pytest.mark.parametrize(

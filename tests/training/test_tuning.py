@@ -36,7 +36,7 @@ def test_every_search_begins_inside_its_ranges(task):
 
 
 def test_a_search_finds_gains_no_worse_than_the_default_and_keeps_the_others(tmp_path):
-    pytest.importorskip("optuna", reason="optuna is not installed: pip install 'windwrench[rl]'")
+    pytest.importorskip("optuna", reason="pip install 'windwrench[rl]'")
     other = tune("admittance", "base", trials=2, episodes=1, task="FanTracking2D")
     assert other["rmse_m"] <= other["default_rmse_m"]
     keep_gains(other, tmp_path / "tuned.yaml", "the command")

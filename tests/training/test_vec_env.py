@@ -11,9 +11,7 @@ from windwrench.envs.scenarios import SCENARIOS
 from windwrench.envs.vector import TaskVectorEnv
 from windwrench.training.training_envs import MixedFanTracking
 
-pytest.importorskip(
-    "stable_baselines3", reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'"
-)
+pytest.importorskip("stable_baselines3", reason="pip install 'windwrench[rl]'")
 from windwrench.training.vec_env import FeatureVecEnv
 
 FEATURES = Features(("torque_z", "force_x", "velocity_y", "command"), 3)

@@ -11,11 +11,7 @@ from tests.support.data_paths import excerpt
 from tests.support.flown import VEHICLE, recorded
 from windwrench.cli import app
 from windwrench.dynamics import InputError
-from windwrench.identification.comparison.change import (
-    NOWHERE,
-    SOMETHING_ELSE,
-    compare,
-)
+from windwrench.identification.comparison.change import NOWHERE, SOMETHING_ELSE, compare
 from windwrench.identification.comparison.sessions import SCATTER, difference
 from windwrench.identification.comparison.trim import Trim, trim_of, trim_of_log
 from windwrench.identification.comparison.words import change_headline, write_change

@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 
 from windwrench.dynamics import InputError
-from windwrench.identification.comparison.fault_channels import (
-    Channels,
-    channels_of_log,
-    sample,
-)
+from windwrench.identification.comparison.fault_channels import Channels, channels_of_log, sample
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.streams import Stream
 

@@ -3,10 +3,7 @@
 import pytest
 
 from tests.support.flown import VEHICLE, recorded
-from windwrench.identification.diagnosis.carrying_channels import (
-    ORDER,
-    carrying_channels,
-)
+from windwrench.identification.diagnosis.carrying_channels import ORDER, carrying_channels
 from windwrench.identification.diagnosis.regression import Flights
 
 CASES = {

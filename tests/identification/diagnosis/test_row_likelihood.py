@@ -82,16 +82,17 @@ def test_in_still_air_nothing_is_sure():
     assert found.after.force_rms < 1.2 * found.before.force_rms
 
 
-def test_a_drag_that_nobody_declared_is_sure():
+@pytest.mark.parametrize("seeds", [(1,), pytest.param((1, 2, 3), marks=pytest.mark.slow)])
+def test_a_drag_that_nobody_declared_is_sure(seeds):
     """On five of six flights; on one the gust looks like a part that swings."""
     bare, sure = replace(VEHICLE, effects=()), 0
-    for seed in (1, 2, 3):
+    for seed in seeds:
         found = diagnose([flown(seed=seed)], bare)
         drags = [e for e in found.effects if e.name in ("body_drag", "rotor_drag")]
         assert drags
         sure += any(not e.tentative for e in drags)
         assert found.after.force_rms < 0.5 * found.before.force_rms
-    assert sure >= 2
+    assert sure > len(seeds) / 2
 
 
 def test_a_short_flight_names_nothing_surely():

@@ -5,13 +5,7 @@ installed, and synthetic flights.
 import numpy as np
 import pytest
 
-from tests.support.autopilot_flight import (
-    assert_inertial,
-    assert_motion,
-    inertial,
-    motion,
-    ned,
-)
+from tests.support.autopilot_flight import assert_inertial, assert_motion, inertial, motion, ned
 from tests.support.data_paths import data_file
 from tests.support.dataflash_writer import (
     COMMAND,

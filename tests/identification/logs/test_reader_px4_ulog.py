@@ -26,7 +26,7 @@ from windwrench.identification.logs.reading import read_log
 
 VEHICLE = load_vehicle("ardrone2")
 
-pytest.importorskip("pyulog", reason="pyulog is not installed: pip install 'windwrench[logs]'")
+pytest.importorskip("pyulog", reason="pip install 'windwrench[logs]'")
 
 
 T = 0.01 * np.arange(200)

@@ -25,7 +25,7 @@ from windwrench.identification.logs.readers import rosbag, unpacking
 from windwrench.identification.logs.reading import read_log
 from windwrench.runtime.file_limits import LIMITS
 
-pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'windwrench[logs]'")
+pytest.importorskip("rosbags", reason="pip install 'windwrench[logs]'")
 
 from rosbags import rosbag1, rosbag2
 from rosbags.rosbag1 import reader

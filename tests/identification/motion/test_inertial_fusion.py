@@ -60,9 +60,7 @@ def test_an_imu_alone_keeps_the_vertical(motion):
     assert (fused.std[:, 3:6] > 4.0).all()
 
 
-def test_ten_positions_a_second_show_heading_velocity_and_biases(
-    motion,
-):
+def test_ten_positions_a_second_show_heading_velocity_and_biases(motion):
     """All within a few of the standard deviations that it states."""
     every = slice(None, None, 20)
     placed = motion["position"][every] + 0.002 * motion["noise"][every]

@@ -5,9 +5,7 @@ import pytest
 
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import compile_effects
-from windwrench.identification.motion.residual import (
-    residual_wrench,
-)
+from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals
 from windwrench.studies.trials.practice_flights import fly_practice
 

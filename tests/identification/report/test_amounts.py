@@ -6,12 +6,7 @@ import pytest
 from tests.support.diagnoses import made_diagnosis, made_trace
 from windwrench.dynamics import effects, load_vehicle
 from windwrench.identification.findings import NamedEffect
-from windwrench.identification.report.amounts import (
-    amount,
-    steady_wrench,
-    title,
-    with_amounts,
-)
+from windwrench.identification.report.amounts import amount, steady_wrench, title, with_amounts
 from windwrench.identification.report.headline import headline
 
 VEHICLE = load_vehicle("crazyflie")

@@ -37,11 +37,7 @@ class Measured:
 
 
 def object_size(exported, folder):
-    """Return the bytes of the filter's object on a Cortex-M4F.
-
-    Raises:
-        RuntimeError: it does not compile.
-    """
+    """Return the bytes of the filter's object on a Cortex-M4F."""
     write(exported, folder)
     options = ("-std=c99", "-Os", "-fno-math-errno", "-Wall", "-Wextra", "-Werror", *_CPU)
     run(TOOLS[0], *options, "-c", "windwrench_filter.c", "-o", "filter.o", cwd=folder)
@@ -49,11 +45,7 @@ def object_size(exported, folder):
 
 
 def fly(exported, flight, folder):
-    """Fly a filter along a flight on the board, at most some thousand steps.
-
-    Raises:
-        RuntimeError: a tool fails, or the program on the board does.
-    """
+    """Fly a filter along a flight on the board, at most some thousand steps."""
     code = object_size(exported, folder)
     columns = [np.atleast_2d(flight[name].T).T for name in _COLUMNS if name in flight]
     rows = np.concatenate(columns, axis=1)

@@ -36,25 +36,27 @@ def hostile(vehicle, seed):
     return {name: values.astype(np.float32).astype(np.float64) for name, values in flown.items()}
 
 
-def befall(kind, when, x, q, W, rng):
+def befall(kind, when, x, q, W, rng, size=None):
     """Let something happen to positions (n, 3), quaternions (n, 4) or rotor speeds (n, 4); return
-    how far positions jump (3,), where they do.
+    how far positions jump (3,), where they do: by ``size`` m, or at random; as many rad is a tilt.
     """
     count = when.stop - when.start
     away = rng.standard_normal(3)
-    away *= 10.0 ** rng.uniform(-2.0, 1.5) / np.linalg.norm(away)
+    away *= (10.0 ** rng.uniform(-2.0, 1.5) if size is None else size) / np.linalg.norm(away)
     if kind in ("gap", "attitude only"):
         x[when] = np.nan
     if kind in ("gap", "position only"):
         q[when] = np.nan
     if kind in ("jump", "jump for good", "burst"):
         x[{"jump": when.start, "burst": when}.get(kind, slice(when.start, None))] += away
+    elif kind == "back and forth":
+        x[when][1::2] += away
     elif kind in ("inverted", "tilted"):
-        half = 0.5 * (np.pi if kind == "inverted" else rng.uniform(0.0, np.pi))
+        half = 0.5 * (np.pi if kind == "inverted" else size or rng.uniform(0.0, np.pi))
         q[when] = np.cos(half), np.sin(half), 0.0, 0.0
     elif kind in ("random attitudes", "random poses"):
         q[when] = rng.standard_normal((count, 4))
-        x[when] += (kind == "random poses") * rng.standard_normal((count, 3))
+        x[when] += (kind == "random poses") * (size or 1.0) * rng.standard_normal((count, 3))
     elif kind == "frozen":
         x[when], q[when] = x[when.start], q[when.start]
     elif kind == "not a number":
