@@ -172,7 +172,9 @@ def main() -> None:
     parser.add_argument("--kind", choices=["gru", "sac"], default="gru")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--rounds", type=int, default=4, help="of DAgger")
-    parser.add_argument("--scenario", default="wide", help="of the wind, or a mix of them: wide")
+    parser.add_argument(
+        "--scenario", default="wide", help="of the wind, or a mix of them: wide, wide-late"
+    )
     parser.add_argument("--episodes", type=int, default=128, help="of each round")
     parser.add_argument("--epochs", type=int, default=6, help="of each round; the last, thrice")
     parser.add_argument("--steps", type=int, default=20_000, help="decisions of SAC")
