@@ -9,6 +9,11 @@ Where commands or poses are late, so are the motors of the model: what follows f
 is no disturbance, and would be answered twice.
 The mean of that command, given what can be seen at the time, is the best command there is
 (certainty equivalence), and it is what a network learns that is fitted to it.
+
+What is taught is limited as commands are. On ``lqg``'s flights of WindHover that binds up to 7 %
+of it along x and y on ``base``, 22 % in ``turbulent`` and 40 % in ``noisy``. A limit four times as
+large was tried on WindTrajectory (one seed, ``wide-late``, 96 validation episodes, RMSE against
+``lqg``): ``noisy`` -12 % in place of -11 %, ``turbulent`` +0 % in place of -2 %.
 """
 
 from dataclasses import replace
