@@ -108,7 +108,7 @@ class TaskLanes(TaskVectorEnv):
         and that of the pose.
         """
         plant = self._flying.loops["plant"]
-        ticks = plant["actuator_late"] + plant["pose_late"]
+        ticks: Array = plant["actuator_late"] + plant["pose_late"]
         return TICK * ticks.ravel()[: self.num_envs]
 
     def __getstate__(self) -> dict[str, Any]:
