@@ -59,7 +59,7 @@ def _models(oracle: WindOracle, late: float) -> list[tuple[Array, ...]]:
     """Return of each axis A (n, n) and B (n,) of a decision where commands are ``late`` by so many
     s, and the gains of ``preview``.
     """
-    found = []
+    found: list[tuple[Array, ...]] = []
     for axis in axis_models(oracle.vehicle, lag=MOTOR_LAG + late):
         A, B, _ = axis.held(WIND_PERIOD)
         found.append((A, B[:, 0], *preview(A, B, np.eye(len(A)), oracle.effort, AHEAD)))
