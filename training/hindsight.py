@@ -5,36 +5,65 @@ a flight did beside it, from one decision to the next, is a disturbance, whateve
 wind, a vehicle that is not the declared one, errors of the estimate that the flight loop flies by,
 a reference that turns. Once flown it is known, and the linear-quadratic regulator with preview
 (``controllers.preview``) says of each decision what would have been best in view of all that came.
+Where commands or poses are late, so are the motors of the model: what follows from a late command
+is no disturbance, and would be answered twice.
 The mean of that command, given what can be seen at the time, is the best command there is
 (certainty equivalence), and it is what a network learns that is fitted to it.
 """
 
+from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..controllers import make_controller
+from ..controllers.axis_models import MOTOR_LAG, axis_models
 from ..controllers.preview import WindOracle, preview
 from ..controllers.wind_observation import LAST_ACTION, MAX_ACCELERATION, WIND_PERIOD
 from ..envs.lanes.vector import TaskLanes
+from ..envs.wind_scenarios import WIND_SCENARIOS, WindVariation
 from ..evaluation.tasks import TASKS
 
 Array = NDArray[np.float64]
 Frames = NDArray[np.float32]
 
 AHEAD = 14  # decisions, of which a command knows the disturbances
-# a mix: scenarios, and how many of eight episodes each has
-_MIXES = {
-    "wide": {"base": 2}
-    | dict.fromkeys(("turbulent", "noisy", "varied", "gusts", "wash", "fan-wall"), 1)
-}
+LATE = "late"
+_LATE = replace(
+    WIND_SCENARIOS["varied"],
+    summary="varied, with delays and lost poses drawn anew",
+    variation=WindVariation(
+        actuator_delay=(0.0, 0.02),
+        pose_delay=(0.0, 0.02),
+        imu_delay=(0.0, 0.02),
+        dropout=(0.0, 0.1),
+    ),
+)
+MIX = "wide-late"
+# of its sixteen episodes so many fly in each scenario
+_PARTS = {"base": 2, "turbulent": 3, "noisy": 5, LATE: 2} | dict.fromkeys(
+    ("varied", "gusts", "wash", "fan-wall"), 1
+)
 
 
 def mix_of(name: str, episodes: int) -> dict[str, int]:
-    """Return how many of ``episodes`` fly in each scenario of a mix, or in the one scenario."""
-    parts = _MIXES.get(name, {name: 1})
+    """Return how many of ``episodes`` fly in each scenario of ``MIX``, or in the one scenario."""
+    parts = _PARTS if name == MIX else {name: 1}
     return {each: episodes * part // sum(parts.values()) for each, part in parts.items()}
+
+
+@lru_cache(maxsize=32)
+def _models(oracle: WindOracle, late: float) -> list[tuple[Array, ...]]:
+    """Return of each axis A (n, n) and B (n,) of a decision where commands are ``late`` by so many
+    s, and the gains of ``preview``.
+    """
+    found: list[tuple[Array, ...]] = []
+    for axis in axis_models(oracle.vehicle, lag=MOTOR_LAG + late):
+        A, B, _ = axis.held(WIND_PERIOD)
+        found.append((A, B[:, 0], *preview(A, B, np.eye(len(A)), oracle.effort, AHEAD)))
+    return found
 
 
 class WindLesson:
@@ -45,22 +74,32 @@ class WindLesson:
 
     decisions, period, largest = 250, WIND_PERIOD, MAX_ACCELERATION
 
-    def __init__(self, task: str) -> None:
-        self._task, self._oracle = task, WindOracle()
+    def __init__(self, task: str, limit: float = 1.5) -> None:
+        """Take a task.
+
+        Args:
+            task: WindHover or WindTrajectory.
+            limit: on what is taught, in largest actions. The mean of limited commands is not the
+                mean, limited, and where it is noisy many are beyond 1 (to 40 % along x and y
+                of ``lqg`` in WindHover, to 7 % on ``base``); yet few that are far beyond would
+                rule the fit. Tried with one seed, RMSE against ``lqg`` on 96 validation episodes at
+                1, 1.5 and 4: WindHover's ``noisy`` -7, -10 and -8 %, WindTrajectory's ``noisy``
+                -11, -12 and -12 % and ``turbulent`` -2, 0 and 0 %; ``base`` the same within 1 %.
+        """
+        self._task, self._oracle, self._limit = task, WindOracle(), limit * self.largest
         self.scale = np.array(TASKS[task].environment.scales, dtype=np.float32)
-        self._models = []
-        for A, B, _ in self._oracle.steps(self._oracle.vehicle):
-            gains = preview(A, B, np.eye(len(A)), self._oracle.effort, AHEAD)
-            self._models.append((A, B[:, 0], *gains))
 
     def environments(self, scenarios: dict[str, int]) -> list[TaskLanes]:
         """Return so many environments of each scenario."""
-        kind = TASKS[self._task].environment
-        return [TaskLanes(count, task=kind, scenario=name) for name, count in scenarios.items()]
+        kind, own = TASKS[self._task].environment, {LATE: _LATE}
+        return [
+            TaskLanes(count, task=kind, scenario=own.get(name, name))
+            for name, count in scenarios.items()
+        ]
 
     def begin(self, envs: TaskLanes, leads: bool) -> None:
         """Start an episode in each of ``envs``; ``leads``: ``lqg`` flies."""
-        self._envs = envs
+        self._envs, self._late = envs, envs.late()
         self._commands: list[Array] = []
         self._states: list[list[Array]] = []  # of each axis (n, its states)
         self._laws = [make_controller("lqg", self._task) for _ in range(envs.num_envs * leads)]
@@ -77,14 +116,17 @@ class WindLesson:
         """Return what would have been best (decisions, n, 3), and what counts (decisions, n):
         decisions after which the vehicle was seen to fly on for ``AHEAD`` more.
         """
-        best, given = [], np.array(self._commands[1:])
-        for i, (A, B, gain, ahead) in enumerate(self._models):
-            x = np.array([states[i] for states in self._states])
-            came = x[1:] - x[:-1] @ A.T - given[..., i : i + 1] * B
-            wanted = x[:-1] @ gain
-            for k, share in enumerate(ahead):
-                wanted[: len(came) - k] += came[k:] @ share
-            best.append(-wanted)
+        given = np.array(self._commands[1:])
+        best = np.empty_like(given)
+        for late in np.unique(self._late):
+            some = self._late == late
+            for i, (A, B, gain, ahead) in enumerate(_models(self._oracle, late)):
+                x = np.array([states[i][some] for states in self._states])
+                came = x[1:] - x[:-1] @ A.T - given[:, some, i, None] * B
+                wanted = x[:-1] @ gain
+                for k, share in enumerate(ahead):
+                    wanted[: len(came) - k] += came[k:] @ share
+                best[:, some, i] = -wanted
         counts = np.zeros_like(kept[1:])
         counts[: 1 - AHEAD] = kept[AHEAD:]
-        return np.clip(np.stack(best, axis=-1), -self.largest, self.largest), counts
+        return np.clip(best, -self._limit, self._limit), counts

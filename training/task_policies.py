@@ -27,7 +27,7 @@ from ..evaluation.tasks import TASKS
 from .belief_network import BeliefNetwork
 from .configuration import load_config
 from .flown_sequences import Flights
-from .hindsight import WindLesson, mix_of
+from .hindsight import MIX, WindLesson, mix_of
 from .imitation import rounds as taught_in_rounds
 from .learners import make_learner, weights_of
 from .run import origin, validate
@@ -172,9 +172,9 @@ def main() -> None:
     parser.add_argument("--kind", choices=["gru", "sac"], default="gru")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--rounds", type=int, default=4, help="of DAgger")
-    parser.add_argument("--scenario", default="wide", help="of the wind, or a mix of them: wide")
-    parser.add_argument("--episodes", type=int, default=128, help="of each round")
-    parser.add_argument("--epochs", type=int, default=6, help="of each round; the last, thrice")
+    parser.add_argument("--scenario", default=MIX, help=f"of the wind, or a mix of them: {MIX}")
+    parser.add_argument("--episodes", type=int, default=256, help="of each round")
+    parser.add_argument("--epochs", type=int, default=4, help="of each round; the last, thrice")
     parser.add_argument("--steps", type=int, default=20_000, help="decisions of SAC")
     parser.add_argument("--out", type=Path, default=Path("training/policies/tasks"))
     given = parser.parse_args()

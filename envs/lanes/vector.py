@@ -18,6 +18,7 @@ from ..closed_loop import ClosedLoop
 from ..fan_tracking import FanTrackingEnv
 from ..fan_tracking_2d import FanTracking2DEnv
 from ..observing import Flags, Motion
+from ..plant import TICK
 from ..task import SETTLE_TICKS, Task
 from ..vector import TaskVectorEnv
 from ..wind.field import Sum
@@ -101,6 +102,14 @@ class TaskLanes(TaskVectorEnv):
             "lift": thrust * up[:, 2] / vehicle.mass - vehicle.gravity,
             "integral": integral,
         }
+
+    def late(self) -> Array:
+        """Return by how much (n,) s an answer of the flight loop is late: that of the actuators
+        and that of the pose.
+        """
+        plant = self._flying.loops["plant"]
+        ticks: Array = plant["actuator_late"] + plant["pose_late"]
+        return TICK * ticks.ravel()[: self.num_envs]
 
     def __getstate__(self) -> dict[str, Any]:
         state = super().__getstate__()

@@ -7,12 +7,15 @@ pytest.importorskip("torch", reason="pip install 'windwrench[rl]'")
 
 import torch
 
+from windwrench.controllers.axis_models import axis_models
 from windwrench.controllers.preview import WindOracle, preview
 from windwrench.controllers.trained_policy import TaskPolicy
+from windwrench.controllers.wind_observation import WIND_PERIOD
 from windwrench.envs.lanes.vector import TaskLanes
+from windwrench.envs.plant import PlantSettings
 from windwrench.evaluation.tasks import TASKS
 from windwrench.training.belief_network import BeliefNetwork
-from windwrench.training.hindsight import AHEAD, WindLesson, mix_of
+from windwrench.training.hindsight import AHEAD, LATE, MIX, WindLesson, mix_of
 from windwrench.training.run import validate
 from windwrench.training.task_policies import _card, sac, teach
 
@@ -31,14 +34,26 @@ def test_lanes_tell_the_truth_of_the_single_environment():
         np.testing.assert_allclose(values[1], info[name], rtol=1e-6, atol=1e-9)
 
 
-def test_hindsight_knows_what_came_beside_the_model():
+def test_lanes_tell_how_late_their_answers_are():
+    lanes = TaskLanes(3, task=HOVER, settings=PlantSettings(actuator_delay=0.01, pose_delay=0.015))
+    lanes.reset(seed=0)
+    np.testing.assert_allclose(lanes.late(), 0.025)
+    (delayed,) = WindLesson("WindHover").environments({LATE: 8})
+    delayed.reset(seed=0)
+    assert len(set(delayed.late())) > 2
+    assert delayed.late().max() <= 0.04 + 1e-9
+
+
+@pytest.mark.parametrize("late", [0.0, 0.02])
+def test_hindsight_knows_what_came_beside_the_model(late):
     """Of a flight of the linear model itself with any commands and disturbances."""
     oracle, rng, count = WindOracle(), np.random.default_rng(0), 30
-    lesson = WindLesson("WindHover")
-    lesson.largest = np.inf
+    lesson = WindLesson("WindHover", limit=np.inf)
+    lesson._late = np.full(2, late)
     commands = rng.standard_normal((count + 1, 2, 3))
     states, wanted = [], []
-    for i, (A, B, _) in enumerate(oracle.steps(oracle.vehicle)):
+    for i, axis in enumerate(axis_models(oracle.vehicle, lag=0.04 + late)):
+        A, B, _ = axis.held(WIND_PERIOD)
         gain, ahead = preview(A, B, np.eye(len(A)), oracle.effort, AHEAD)
         x, came = [rng.standard_normal((2, len(A)))], rng.standard_normal((count, 2, len(A)))
         for k in range(count):
@@ -63,27 +78,26 @@ def test_a_policy_sees_what_its_network_saw_whitened():
     with torch.no_grad():
         said = network(torch.from_numpy(seen))[0].numpy()
     policy = TaskPolicy(
-        _card("WindHover", "gru", "wide", 0, 0), network.policy_weights(np.eye(3, dtype=np.float32))
+        _card("WindHover", "gru", MIX, 0, 0), network.policy_weights(np.eye(3, dtype=np.float32))
     )
     flown = [policy(frame * np.float32(HOVER.scales)) for frame in seen[:, 2]]
     np.testing.assert_allclose(flown, said[:, 2], atol=1e-4)
 
 
 def test_a_mix_has_all_of_its_scenarios():
-    assert mix_of("wide", 16) == {"base": 4} | dict.fromkeys(
-        ("turbulent", "noisy", "varied", "gusts", "wash", "fan-wall"), 2
-    )
+    rare = dict.fromkeys(("varied", "gusts", "wash", "fan-wall"), 1)
+    assert mix_of(MIX, 16) == {"base": 2, "turbulent": 3, "noisy": 5, LATE: 2} | rare
     assert mix_of("calm", 5) == {"calm": 5}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("task", ["WindHover", "FanTracking2D"])
 def test_a_taught_network_is_the_same_again(task):
-    scenario = "wide" if task == "WindHover" else "base"
-    one, other = (teach(task, scenario, 0, rounds=2, episodes=8, epochs=1) for _ in range(2))
+    scenario = MIX if task == "WindHover" else "base"
+    one, other = (teach(task, scenario, 0, rounds=2, episodes=16, epochs=1) for _ in range(2))
     for name, array in one.weights.items():
         np.testing.assert_array_equal(array, other.weights[name])
-    assert one.card["steps"] == 4000
+    assert one.card["steps"] == 8000
 
 
 @pytest.mark.slow
