@@ -4,12 +4,14 @@ Specific force and angular velocity come from the IMU where the log has one, and
 derivatives where it has none. Rotors come as measured speeds, or as motor commands.
 """
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import welch
 from scipy.spatial.transform import Rotation
 
 from ...runtime.errors import InputError
@@ -135,6 +137,19 @@ def rounding_step(logs: Sequence[FlightLog]) -> float:
     if len(kept) < 3 or len(kept) > CHANNELS.few_values * len(values):
         return 0.0
     return float(np.median(np.diff(kept)))
+
+
+def speed_noise(pieces: Sequence[MotionPiece]) -> float:
+    """Return the standard deviation (rad/s) of the white noise of rotor speeds, their rounding
+    included: what is left of their spectrum in the highest quarter of its frequencies, where no
+    rotor follows its command.
+    """
+    powers = []
+    for piece in pieces:
+        if piece.rotor_speeds is not None:
+            _, power = welch(piece.rotor_speeds, 1.0 / piece.period, nperseg=256, axis=0)
+            powers.append(power[-len(power) // 4 :].mean(axis=0) / (2.0 * piece.period))
+    return math.sqrt(float(np.median(powers))) if powers else 0.0
 
 
 def pieces_of(

@@ -20,7 +20,7 @@ from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from ..prediction import PredictionErrors
 from .assemble import advice_of, vehicle_of
-from .channels import MotionPiece, Sources, pieces_of, rounding_step
+from .channels import MotionPiece, Sources, pieces_of, rounding_step, speed_noise
 from .columns import ANSWERED_HZ, Drive
 from .effect_settings import effect_of
 from .estimates import Estimates, Intervals, thrust_of
@@ -84,7 +84,7 @@ def identify(
     voltage = _voltage(pieces)
     commands = sources.rotors == "commands"
     step = 0.0 if commands else rounding_step(logs)
-    reference, noise = voltage if commands else 0.0, step / math.sqrt(12.0)
+    reference, noise = voltage if commands else 0.0, 0.0 if commands else speed_noise(pieces)
     drive = Drive(
         geometry.positions, SPIN, geometry.known, commands, voltage_ref=reference, speed_noise=noise
     )

@@ -97,6 +97,19 @@ def test_a_vehicle_of_rounded_speeds_reads_the_log_that_it_comes_from(crazyflie)
     assert np.abs(np.mean(force[len(force) // 2 :], axis=0)).max() < 0.02 * again.weight
 
 
+def test_noise_of_rotor_speeds_is_no_torque(crazyflie):
+    """Of 2 % of the speed, which makes more torque than the flight: inertia came out double."""
+    rng = np.random.default_rng(4)
+    logs = [recorded(name, 40.0, vehicle=crazyflie) for name in ("excite", "shake")]
+    shaken = [1.0 + 0.02 * rng.standard_normal(log.rotor_speeds.shape) for log in logs]
+    logs = [
+        replace(log, rotor_speeds=log.rotor_speeds * x) for log, x in zip(logs, shaken, strict=True)
+    ]
+    found = identify(logs, crazyflie.mass, parse_geometry(str(crazyflie.arm_l)))
+    check(found, "Jxx", crazyflie.inertia[0, 0], 0.05)
+    check(found, "Jyy", crazyflie.inertia[1, 1], 0.05)
+
+
 def test_lift_at_the_rotors_is_not_taken_for_a_gyroscopic_torque():
     """Its moment goes with forward velocity times yaw rate, and took 7 % off Jzz and p/k."""
     bird = load_vehicle("hummingbird")
