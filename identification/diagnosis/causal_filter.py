@@ -96,6 +96,7 @@ def _run(
     p, v, w, d = position[0].copy(), begun[:3].copy(), begun[3:].copy(), np.zeros(6)
     q, q2, r = quaternion[0].copy(), np.empty(4), np.empty((3, 3))
     step, mid, both = np.empty(3), np.empty(3), np.empty(4)
+    v2, w2, before = np.empty(3), np.empty(3), np.zeros(6)
     half = 0.5 * period
     for k in range(len(speeds)):
         # what the last sample's rotors said
@@ -131,8 +132,9 @@ def _run(
             w[i] += gain[3 + i, 1] * e
             d[3 + i] += gain[3 + i, 2] * e
         _turn(q, step, q2)
-        # half a step on, where the model is asked
+        # half a step on, where the model is asked; the acceleration is that of the step before
         for i in range(3):
+            v2[i], w2[i] = v[i] + half * before[i], w[i] + half * before[3 + i]
             mid[i] = p[i] + half * v[i]
             step[i] = half * w[i]
         _turn(q2, step, q)
@@ -140,21 +142,29 @@ def _run(
         for i in range(4):
             both[i] = 0.5 * (speeds[k, i] + speeds[min(k + 1, len(speeds) - 1), i])
         drive(f, both, period, voltage[k])
-        apply_effects(f, mid, r, v, w)
+        apply_effects(f, mid, r, v2, w2)
         f.time += period
         u, g = f.rotor_wrench, f.effect_wrench
         turn = (r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2])
         thrust, effects = (u[0], u[1], u[2], u[3]), (g[0], g[1], g[2], g[3], g[4], g[5])
-        omega, a = (w[0], w[1], w[2]), acting[k]
+        a = acting[k]
+        x, y, z = angular_acceleration_of(b, turn, (w[0], w[1], w[2]), thrust, nothing, effects)
+        # of gyroscopic torque the rate half a step on counts, of this step's own acceleration
+        w2[0], w2[1], w2[2] = (
+            w[0] + half * (x + d[3]),
+            w[1] + half * (y + d[4]),
+            w[2] + half * (z + d[5]),
+        )
+        omega = (w2[0], w2[1], w2[2])
         x, y, z = angular_acceleration_of(b, turn, omega, thrust, nothing, effects)
         model[k, 3], model[k, 4], model[k, 5] = x, y, z
         turning = (x + d[3], y + d[4], z + d[5])
         x, y, z = acceleration_of(b, turn, omega, turning, thrust, nothing, effects)
         model[k, 0], model[k, 1], model[k, 2] = x, y, z
         for i in range(6):
-            a[i] = model[k, i] + d[i]
+            a[i] = before[i] = model[k, i] + d[i]
         for i in range(3):
-            at_position[k, i], at_velocity[k, i], at_rate[k, i] = mid[i], v[i], w[i]
+            at_position[k, i], at_velocity[k, i], at_rate[k, i] = mid[i], v2[i], w2[i]
             for j in range(3):
                 at_rotation[k, i, j] = r[i, j]
         for i in range(4):

@@ -391,7 +391,7 @@ class Likelihood:
         moved = self._posed[ATTITUDE_TIME_OFFSET] = []
         for track in self.tracks:
             # the rate before the sample is read: after it, it knows that sample's noise
-            rate = track.angular_velocity + self.period * track.acceleration[:, 3:]
+            rate = track.angular_velocity + 0.5 * self.period * track.acceleration[:, 3:]
             rate = np.vstack([track.angular_velocity[:1], rate[:-1]])
             moved.append(np.column_stack([np.zeros_like(rate), -rate]))
 
