@@ -33,6 +33,7 @@ EDGE = 1.5  # s after the rotors start and before they stop: taking off and land
 NEAR = 0.1  # of the median thrust: further off, the vehicle climbs, sinks or pulls
 _SMOOTH = 0.25  # s
 BATCH = 1.5  # s: the loop's answer to a gust is over
+_MIX = np.array([[1.0, 1.0, -1.0, -1.0], [1.0, -1.0, -1.0, 1.0], [1.0, -1.0, 1.0, -1.0]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,17 +57,17 @@ class Trim:
         return float(self.thrust.sum())
 
     @property
-    def shares(self) -> Array:
-        """Difference of left and right, front and rear, and of the two diagonals (1 and 3 less 2
-        and 4), (3,), each in parts of the total.
-        """
-        a, b, c, d = self.thrust / self.total
-        return np.array([a + b - c - d, a + d - b - c, a + c - b - d])
-
-    @property
     def features(self) -> Array:
-        """The shares and the logarithm of the total, (4,)."""
-        return np.append(self.shares, math.log(self.total))
+        """The four numbers, see ``features_of``."""
+        return features_of(self.thrust)
+
+
+def features_of(thrust: Array) -> Array:
+    """Return of thrusts (4,) the difference of left and right, front and rear, and of the two
+    diagonals (1 and 3 less 2 and 4), each in parts of the total, and the logarithm of the total.
+    """
+    total = thrust.sum()
+    return np.append(_MIX @ thrust / total, math.log(total))
 
 
 def trim_of(
@@ -114,7 +115,7 @@ def _noise(t: Array, thrust: Array, steady: NDArray[np.bool_], step: Array) -> A
         mean = thrust[inside].mean(axis=0) if inside.any() else np.zeros(4)
         # the last batch may be a short one
         if step[inside].sum() > 0.5 * BATCH and mean.min() > 0.0:
-            rows.append(Trim("", mean, 0.0).features)
+            rows.append(features_of(mean))
     if len(rows) < 2:
         return np.zeros((4, 4))
     covariance: Array = np.cov(np.array(rows), rowvar=False) / len(rows)

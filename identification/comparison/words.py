@@ -135,8 +135,7 @@ def _draw_change(change: Change) -> Any:
         (change.after, AFTER, "after"),
     ):
         # as seen from above, front up: what lies to the left is drawn to the left
-        x = [-100 * trim.shares[0] for trim in trims]
-        y = [100 * trim.shares[1] for trim in trims]
+        x, y = np.transpose([[-100.0, 100.0] * trim.features[:2] for trim in trims])
         left.plot(x, y, "o", color=colour, label=label, ms=7, alpha=0.8)
     left.axhline(0.0, color=PALE, lw=1)
     left.axvline(0.0, color=PALE, lw=1)
