@@ -180,7 +180,7 @@ def _jump(
     k = int(np.argmax(at_once))
     around = np.arange(rows[max(k - 2, 0)], rows[min(k + 2, len(rows) - 1)] + 1)
     logs = _steps(balance, channels, around)
-    j, k = np.unravel_index(int(np.argmax(logs)), logs.shape)
+    j, k = divmod(int(np.argmax(logs)), len(around))
     return float(logs[j, k]), int(around[k]), _BEGINS[j]
 
 

@@ -59,17 +59,16 @@ def headline(fleet: Fleet) -> str:
     """Return the first sentence."""
     logs = sum(sum(c.values()) for c in fleet.individuals.values())
     refused = sum(c["refused"] for c in fleet.individuals.values())
-    found = changes(fleet)
-    who = list(dict.fromkeys(one.of.id if isinstance(one, Trend) else one.id for one in found))
-    vehicles = len(fleet.individuals)
-    text = f"{_count(logs, 'log')} of {_count(vehicles, 'vehicle')}"
-    text += f", {refused} refused" if refused else ""
+    every = [one.of.id if isinstance(one, Trend) else one.id for one in changes(fleet)]
+    who = list(dict.fromkeys(every))
+    text = f"{_count(logs, 'log')} of {_count(len(fleet.individuals), 'vehicle')}"
+    text += f", {refused} refused: " if refused else ": "
     if logs == refused:
-        return f"{text}: none could be diagnosed."
-    if not found:
-        return f"{text}: no effect changed from flight to flight as far as these flights can tell."
+        return f"{text}none could be diagnosed."
+    if not who:
+        return f"{text}no effect changed from flight to flight as far as these flights can tell."
     shown = in_words(who if len(who) <= 3 else [*who[:3], f"{len(who) - 3} more"])
-    return f"{text}: effects changed from flight to flight on {shown}."
+    return f"{text}effects changed from flight to flight on {shown}."
 
 
 def _count(number: int, word: str) -> str:

@@ -101,10 +101,8 @@ def _absolute(log: FleetLog) -> FleetLog:
     def file(name: str | None) -> str | None:
         return os.path.abspath(name) if name and name.endswith((".yaml", ".yml")) else name
 
-    reader = log.reader
-    if reader is not None and ":" in reader:
-        name, _, option = reader.partition(":")
-        reader = f"{name}:{os.path.abspath(option)}"
+    name, colon, option = (log.reader or "").partition(":")
+    reader = f"{name}:{os.path.abspath(option)}" if colon else log.reader
     path = os.path.abspath(log.path)
     return replace(log, path=path, vehicle=file(log.vehicle), reader=reader, map=file(log.map))
 
@@ -130,8 +128,6 @@ def rows(done: Sequence[FleetLog], outcomes: Outcomes) -> list[dict[str, Any]]:
     for name, log in sorted(named, key=place):
         flights[name] += 1
         known = {"id": as_text(name), "flight": flights[name], "log": as_text(log.name)}
-        known |= {"time": log.time, "session": as_text(log.session)}
-        found.append({**known, **outcomes[log.key]})
-        for key in ("key", "limit_s"):
-            found[-1].pop(key, None)
+        known |= {"time": log.time, "session": as_text(log.session)} | outcomes[log.key]
+        found.append({key: x for key, x in known.items() if key not in ("key", "limit_s")})
     return found

@@ -131,8 +131,8 @@ def error_sentences(diagnosis: Diagnosis) -> list[str]:
         sentence = f"The {what} error{'' if told else ' on held-out data'} "
         sentence += f"{way} from {start} to {end}" if way else f"is {end}"
         if math.isfinite(floor):
-            known = f"not known (at least {least})" if diagnosis.floor_is_bound else least
-            sentence += f"; the noise floor is {known}"
+            floor_is = f"not known (at least {least})" if diagnosis.floor_is_bound else least
+            sentence += f"; the noise floor is {floor_is}"
         told.append(f"{sentence}.")
     return told
 
