@@ -255,9 +255,9 @@ def fleet_of(rows: Iterable[Mapping[str, Any]]) -> Fleet:
     ]
     told = {(of.id, of.effect) for of in points}
     appearances = [
-        one
+        found
         for (who, name), flights in named.items()
-        if (who, name) in told and (one := appearance_of(who, name, flights, diagnosed[who]))
+        if (who, name) in told and (found := appearance_of(who, name, flights, diagnosed[who]))
     ]
     tests = [one for one in (*trends, *appearances) if one.p is not None]
     adjusted = false_discovery_control([one.p for one in tests]) if tests else ()
