@@ -8,6 +8,7 @@ by a window that would smear the time of a fault.
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,14 +109,12 @@ def read_channels(
         log = log or read_log(path, reader, vehicle, log_map)
         return channels_of_log(log), log.notes
     recording = px4_ulog.channels(path, has_ranges=False)
-    found = {part: readable(recording.streams.get(part)) for part in _CHANNELS}
-    gyro, accelerometer, command = found.values()
+    found: dict[str, Any] = {part: readable(recording.streams.get(part)) for part in _CHANNELS}
     if missing := [part for part, stream in found.items() if stream is None]:
         raise InputError(f"{path}: no {' and no '.join(missing)}; expected all of them")
-    assert gyro and accelerometer and command and recording.log_map.commands
+    assert recording.log_map.commands is not None
     names = tuple(f"PX4 motor {i}" for i in recording.log_map.commands.order)
-    streams = Channels(str(path), gyro, accelerometer, command, motor_names=names)
-    return streams, tuple(recording.notes)
+    return Channels(str(path), *found.values(), motor_names=names), tuple(recording.notes)
 
 
 def channels_of_log(log: FlightLog) -> Channels:

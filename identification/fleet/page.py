@@ -11,6 +11,7 @@ import numpy as np
 from ... import __version__
 from ...runtime.page_files import page_template
 from ...runtime.plain_values import as_text
+from ..report.page import page_file
 from ..report.words import MISSING, coefficient_meaning, in_words, with_std
 from .drift import DRIFT, Appearance, Fleet, Trend
 
@@ -45,6 +46,7 @@ def fleet_page(fleet: Fleet, rows: Sequence[Mapping[str, Any]], command: str) ->
         coefficients=_coefficients,
         settings=DRIFT,
         command=as_text(command),
+        shared_style=page_file("page.css"),
         version=__version__,
     )
 
