@@ -70,7 +70,7 @@ class RotorFault:
     samples: Samples  # of the flight
     # of "nothing", rotors "1" to "4", "all rotors" and "another force or torque"; they sum to one
     probabilities: dict[str, float]
-    # of the likeliest rotor: median and the ends of a 95 % interval
+    # of the likeliest rotor: median (of the thrust, mean) and the ends of a 95 % interval
     rotor: int
     onset: tuple[float, float, float]  # s, of the log's clock
     remaining: tuple[float, float, float]  # share of its thrust that is left
@@ -111,12 +111,13 @@ def find_fault(channels: Channels) -> RotorFault:
     every = np.append(whole, happened + logs - logsumexp(logs))
     chances = np.exp(every - logsumexp(every))
     rotor = int(np.argmax(logs[:4]))
+    _, least, most = _quantiles(shares, weights[rotor], 0.5 * float(shares[1] - shares[0]))
     return RotorFault(
         samples,
         dict(zip([NOTHING, "1", "2", "3", "4", ALL, OTHER], chances.tolist(), strict=True)),
         1 + rotor,
         _quantiles(starts, start_weights, STEP),
-        _remaining(shares, weights[rotor]),
+        (1.0 - float(weights[rotor] @ shares), max(0.0, 1.0 - most), min(1.0, 1.0 - least)),
     )
 
 
@@ -244,12 +245,6 @@ def _rows(count: int) -> Index:
         step = math.ceil(len(early) / (0.75 * most))
         rows = np.concatenate([early[::step], rows[-most // 4 :]])
     return rows
-
-
-def _remaining(shares: Array, weight: Array) -> tuple[float, float, float]:
-    """Return the share of thrust that is left: mean and the ends of a 95 % interval."""
-    _, low, high = _quantiles(shares, weight, 0.5 * float(shares[1] - shares[0]))
-    return 1.0 - float(weight @ shares), max(0.0, 1.0 - high), min(1.0, 1.0 - low)
 
 
 def _quantiles(values: Array, weight: Array, margin: float) -> tuple[float, float, float]:

@@ -205,13 +205,10 @@ def natural(name: str) -> tuple[tuple[int, int, str], ...]:
     )
 
 
-def _is_log(path: Path) -> bool:
-    """Return whether a file is a table by its name, or begins as a reader's logs do."""
-    return path.name.lower().endswith(_TABLES) or reader_by_content(path) is not None
-
-
 def _logs_in(root: Path, without: Path | None) -> Iterator[Path]:
-    """Yield the logs that a path stands for."""
+    """Yield the logs that a path stands for: tables by their names, files that begin as a reader's
+    logs do, and bags.
+    """
     if not root.exists():
         raise InputError(f"{root}: no such file or folder")
     if not root.is_dir() or (root / _BAG_FOLDER).is_file():
@@ -227,8 +224,8 @@ def _logs_in(root: Path, without: Path | None) -> Iterator[Path]:
         bags = [name for name in folders if Path(folder, name, _BAG_FOLDER).is_file()]
         folders[:] = [name for name in folders if name not in bags]
         yield from (Path(folder, name) for name in bags)
-        for name in sorted(files):
-            if not name.startswith(".") and _is_log(path := Path(folder, name)):
+        for path in (Path(folder, name) for name in sorted(files) if not name.startswith(".")):
+            if path.name.lower().endswith(_TABLES) or reader_by_content(path) is not None:
                 yield path
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from ... import __version__
 from ...runtime.page_files import page_template
 from ...runtime.plain_values import as_text
-from ..report.page import page_file
+from ..report.page import TONES, page_file
 from ..report.words import MISSING, coefficient_meaning, in_words, with_std
 from .drift import DRIFT, Appearance, Fleet, Trend
 
@@ -22,7 +22,6 @@ _KINDS = {
     "died": "its process died",
     "error": "an error of this program",
 }
-_TONES = {"explained": "good", "nothing to explain": "good", "unexplained": "bad"}
 _MINUS = "−"
 _WIDTH, _HEIGHT, _EDGE = 132.0, 34.0, 4.0  # of a small picture, pixels
 
@@ -36,7 +35,7 @@ def fleet_page(fleet: Fleet, rows: Sequence[Mapping[str, Any]], command: str) ->
         flights=[row for row in rows if row["status"] == "diagnosed"],
         refusals=[row for row in rows if row["status"] == "refused"],
         kinds=_KINDS,
-        tones=_TONES,
+        tones=TONES,
         missing=MISSING,
         short=short,
         slope=_slope,

@@ -72,11 +72,14 @@ def run_fleet(
             done.append(replace(log, key=key))
             if unread is not None:
                 keep(key, refusal("input", unread))
-            elif key in outcomes and not _again(outcomes[key], limit_s):
+            elif key not in outcomes or (
+                outcomes[key].get("kind") in ("time", "died")
+                and limit_s > outcomes[key].get("limit_s", limit_s)
+            ):
+                yield done[-1] if cluster is None else _absolute(done[-1])
+            else:
                 counts["kept"] += 1
                 report(counts)
-            else:
-                yield done[-1] if cluster is None else _absolute(done[-1])
 
     work = partial(diagnose_one, without=without)
     for log, result in each(work, pending(), limit_s, jobs, cluster):
@@ -84,10 +87,6 @@ def run_fleet(
             result = refusal(result.kind, f"{log.path}: {result.words}") | {"limit_s": limit_s}
         keep(log.key, result)
     return done
-
-
-def _again(outcome: Outcome, limit_s: float) -> bool:
-    return outcome.get("kind") in ("time", "died") and limit_s > outcome.get("limit_s", limit_s)
 
 
 def _key_of_name(log: FleetLog) -> str:

@@ -99,7 +99,8 @@ def check_log(
         warnings.simplefilter("ignore", UserWarning)  # the notes say the same
         if log_map is not None:
             log = read_log(path, reader, vehicle, log_map, piece)
-            read_by, text = f"the map {log_map}", _map_text(log_map)
+            shipped = MAPS / f"{log_map}.yaml" if log_map in map_names() else Path(log_map)
+            read_by, text = f"the map {log_map}", shipped.read_text(encoding="utf-8-sig")
         elif reader is None and (table := unknown_table(path)) is not None:
             log, guess = _guessed(table, vehicle, piece)
             read_by, text = "a map that was guessed", map_yaml(guess)
@@ -117,11 +118,6 @@ def check_log(
         doubts.append(f"the log does not show that anything flew: {by}")
     doubts += _doubts(log, vehicle)
     return LogCheck(log, read_by, log_channels(log), tuple(doubts), guess, text)
-
-
-def _map_text(name: str) -> str:
-    path = MAPS / f"{name}.yaml" if name in map_names() else Path(name)
-    return path.read_text(encoding="utf-8-sig")
 
 
 def _guessed(table: Table, vehicle: Vehicle | None, piece: int | None) -> tuple[FlightLog, Guess]:

@@ -21,7 +21,7 @@ from .headline import headline
 from .plot_numbers import candidate_bars, page_plots
 from .still_picture import still_picture
 
-_TONES = {
+TONES = {
     "explained": "good",
     "nothing to explain": "good",
     "partly explained": "warn",
@@ -42,7 +42,7 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
         words=words,
         amounts=amounts,
         headline=headline(diagnosis),
-        tone=_TONES.get(diagnosis.verdict, "warn"),
+        tone=TONES[diagnosis.verdict],
         stated=diagnosis.probabilities,
         table=error_table(diagnosis),
         missing=words.MISSING,
@@ -52,7 +52,8 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
         bars=bars,
         more_candidates=[c for c in diagnosis.candidates if c.name not in shown],
         policy=_policy((library, script) if data else ()),
-        data=_in_script(json.dumps(data, separators=(",", ":"), allow_nan=False)) if data else "",
+        # as it may stand in a page's script element: no tag can begin in it
+        data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c") if data else "",
         library=library,
         shared_style=page_file("page.css"),
         library_style=page_file("uplot/uPlot.min.css"),
@@ -61,11 +62,6 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
         command=command,
         version=__version__,
     )
-
-
-def _in_script(text: str) -> str:
-    """Return JSON as it may stand in a page's script element: no tag can begin in it."""
-    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
 @cache
