@@ -114,7 +114,8 @@ def read_channels(
         raise InputError(f"{path}: no {' and no '.join(missing)}; expected all of them")
     assert recording.log_map.commands is not None
     names = tuple(f"PX4 motor {i}" for i in recording.log_map.commands.order)
-    return Channels(str(path), *found.values(), motor_names=names), tuple(recording.notes)
+    gyro, accelerometer, command = found.values()
+    return Channels(str(path), gyro, accelerometer, command, False, names), tuple(recording.notes)
 
 
 def channels_of_log(log: FlightLog) -> Channels:

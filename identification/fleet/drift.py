@@ -13,8 +13,9 @@ discovery rate (Benjamini and Hochberg 1995).
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -199,7 +200,7 @@ def trend_of(
 
 
 def appearance_of(
-    name: str, effect: str, named: Sequence[int], diagnosed: Sequence[int]
+    name: str, effect: str, named: Sequence[int], diagnosed: Collection[float]
 ) -> Appearance | None:
     """Return whether flights that name an effect are later than those that do not; None where
     there are too few of either.
@@ -212,45 +213,36 @@ def appearance_of(
     return Appearance(name, effect, tuple(named), len(diagnosed), later, p=float(test.pvalue))
 
 
-def fleet_of(rows: Iterable[Mapping[str, Any]]) -> Fleet:
+def fleet_of(rows: Sequence[Mapping[str, Any]]) -> Fleet:
     """Return what all flights say together.
 
     Args:
         rows: as ``running.rows`` returns them.
     """
+    individuals = {row["id"]: {"diagnosed": 0, "refused": 0} for row in rows}
+    for row in rows:
+        individuals[row["id"]][row["status"]] += 1
+    refused = Counter(row["kind"] for row in rows if row["status"] == "refused")
+    flown = [row for row in rows if row["status"] == "diagnosed"]
+    # sessions by flights
+    diagnosed: dict[str, dict[float, str]] = {who: {} for who in individuals}
     points: defaultdict[Coefficient, list[tuple[float, ...]]] = defaultdict(list)
     named: defaultdict[tuple[str, str], list[int]] = defaultdict(list)
-    diagnosed: defaultdict[str, list[int]] = defaultdict(list)
-    sessions: defaultdict[str, dict[float, str]] = defaultdict(dict)
-    individuals: defaultdict[str, dict[str, int]] = defaultdict(
-        lambda: {"diagnosed": 0, "refused": 0}
-    )
-    refused: Counter[str] = Counter()
-    verdicts: Counter[str] = Counter()
-    for row in rows:
-        who, flight = row["id"], row["flight"]
-        individuals[who][row["status"]] += 1
-        if row["status"] == "refused":
-            refused[row["kind"]] += 1
-            continue
-        verdicts[row["verdict"]] += 1
-        diagnosed[who].append(flight)
-        sessions[who][flight] = row.get("session", "")
-        possible: set[str] = set()
-        for effect in row["effects"]:
-            name, rivals = effect["name"], effect["indistinguishable_from"]
-            possible |= {name, *rivals}
-            sure = not effect["tentative"] and not rivals
+    for row in flown:
+        who, flight, effects = row["id"], row["flight"], row["effects"]
+        diagnosed[who][flight] = row.get("session", "")
+        for effect in effects:
+            sure = not (effect["tentative"] or effect["indistinguishable_from"])
             for coefficient, value in effect["coefficients"].items():
-                of = Coefficient(who, name, coefficient, effect["units"].get(coefficient, ""))
-                known = (
-                    math.nan if x is None else x for x in (value, effect["std"].get(coefficient))
-                )
+                unit, std = (effect[key].get(coefficient) for key in ("units", "std"))
+                known = (math.nan if x is None else x for x in (value, std))
+                of = Coefficient(who, effect["name"], coefficient, unit or "")
                 points[of].append((flight, *known, sure))
-        for name in possible:
+        possible = ((effect["name"], *effect["indistinguishable_from"]) for effect in effects)
+        for name in dict.fromkeys(chain.from_iterable(possible)):
             named[who, name].append(flight)
     trends = [
-        trend_of(of, np.array(p, float), len(diagnosed[of.id]), sessions[of.id])
+        trend_of(of, np.array(p, float), len(diagnosed[of.id]), diagnosed[of.id])
         for of, p in points.items()
     ]
     told = {(of.id, of.effect) for of in points}
@@ -265,4 +257,5 @@ def fleet_of(rows: Iterable[Mapping[str, Any]]) -> Fleet:
         one.adjusted_p = float(p)
     trends.sort(key=lambda one: not one.told)
     appearances.sort(key=lambda one: not one.told)
+    verdicts = Counter(row["verdict"] for row in flown)
     return Fleet(trends, appearances, individuals, refused, verdicts)
