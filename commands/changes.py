@@ -1,8 +1,8 @@
 """Two sets of flights of one vehicle, compared."""
 
-from collections.abc import Iterator, Sequence
+import os
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from .flight_logs import AS_THEY_ARE, Reading, log_notes, read_flights
 from .terminal import console, results_folder, say, show_table
 
 _AGAINST = "--against"
+_FLOWN = Path(__file__).parent.parent / "identification" / "comparison" / "example"
 _EXAMPLE = """A Crazyflie 2.1 flies 26 s with a propeller of the rear left rotor that was cut from \
 47 to 39 mm, and three times before with whole ones (CrazyPAD, Masalimov and others, Data 2024, 9, \
 79; MIT licence, beside the logs). The logs hold motor commands and the battery's voltage alone."""
@@ -31,33 +32,24 @@ def compare(
 
     Example: windwrench compare today.csv --against yesterday.csv --vehicle my_drone.yaml
     """
-    if example:
-        if logs or against:
-            raise InputError(f"--example: has logs of its own; expected it without {_AGAINST}")
-        console.print(_EXAMPLE)
-        with resources.as_file(
-            resources.files("windwrench.identification.comparison") / "example"
-        ) as flown:
-            normal = sorted(flown.glob("normal-*.csv.gz"))
-            return _compare([flown / "cut.csv.gz"], normal, AS_THEY_ARE, by_folder, out)
-    if not logs or not against:
-        raise InputError(
-            f"compare: expected logs after the change and {_AGAINST} logs before it, or --example"
-        )
-    return _compare(logs, against, reading, by_folder, out)
-
-
-def _compare(
-    logs: Sequence[Path], against: Sequence[Path], reading: Reading, by_folder: bool, out: Path
-) -> dict[str, Any]:
-    """Compare two sets of flights; write the result."""
     from ..identification.comparison.change import compare as find_change
     from ..identification.comparison.trim import trim_of_log
     from ..identification.comparison.words import change_data, change_headline, write_change
 
+    if example:
+        if logs or against:
+            raise InputError(f"--example: has logs of its own; expected it without {_AGAINST}")
+        console.print(_EXAMPLE)
+        logs, reading = [_FLOWN / "cut.csv.gz"], AS_THEY_ARE
+        against = sorted(_FLOWN.glob("normal-*.csv.gz"))
+    if not logs or not against:
+        raise InputError(
+            f"compare: expected logs after the change and {_AGAINST} logs before it, or --example"
+        )
     paths = [*logs, *against]
     every, model = read_flights(paths, reading)
-    sessions = [str(path.resolve().parent) if by_folder else "" for path in paths]
+    # a folder by the name that was given: links to flights may lie in folders by session
+    sessions = [os.path.dirname(os.path.abspath(path)) if by_folder else "" for path in paths]
     folder = results_folder(out)
     trims = [
         replace(trim_of_log(log, model), session=session)
@@ -67,6 +59,11 @@ def _compare(
     written = write_change(change, folder)
     log_notes(text for log in every for text in log.notes)
     console.print(f"vehicle: {model.name}")
+    for session in dict.fromkeys(sessions) if by_folder else ():
+        after, before = (
+            part.count(session) for part in (sessions[: len(logs)], sessions[len(logs) :])
+        )
+        console.print(f"session {session}: {after} after, {before} before")
     console.print(change_headline(change))
     places = sorted(change.places.items(), key=lambda item: -item[1])
     rows = [(name, f"{chance:.3f}") for name, chance in places]
@@ -76,23 +73,29 @@ def _compare(
 
 
 class LogsAgainstLogs(TyperCommand):
-    """A command in which ``--against`` takes every log up to the next option."""
+    """A command in which ``--against`` takes every log up to the next option, where logs stand
+    before it too; where they come behind it alone, one log.
+    """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Return what is left of the words of a command line."""
-        return super().parse_args(ctx, list(_each_against(args)))
+        options = (one for one in self.params if not getattr(one, "is_flag", True))
+        valued = {name for one in options for name in one.opts}
+        return super().parse_args(ctx, list(_each_against(args, valued)))
 
 
-def _each_against(words: Sequence[str]) -> Iterator[str]:
-    """Yield the words with ``--against`` before each log of its list."""
-    # where logs come behind the list alone, the list is one log long
-    ends = not words or words[0].startswith("-")
-    logs = -1
+def _each_against(words: Sequence[str], valued: Collection[str]) -> Iterator[str]:
+    """Yield the words with ``--against`` before each log of its list; ``valued`` options have a
+    value.
+    """
+    found, in_list, option = False, False, ""
     for word in words:
-        if word.startswith("-"):
-            logs = 0 if word == _AGAINST and not ends else -1
-        elif logs >= 0:
-            logs += 1
-            if logs > 1:
-                yield _AGAINST
+        if option:  # its value
+            in_list, option = found and option == _AGAINST, ""
+        elif word.startswith("-"):
+            in_list, option = False, word if word in valued else ""
+        elif in_list:
+            yield _AGAINST
+        else:
+            found = True
         yield word

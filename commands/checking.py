@@ -49,16 +49,12 @@ def check(
         raise InputError(
             f"--write-map {write_map}: {log} is read by {found.read_by} and needs no map"
         )
-    written, said = [], ""
-    if write is not None:
-        said = _write(found.log, log, write)
-        written.append(write)
+    flight = found.log
+    said = "" if write is None else _write(flight, log, write)
     folder = results_folder(out)
-    written.append(plot_channels(found.log.name, found.channels, folder / "check.png"))
+    picture = plot_channels(flight.name, found.channels, folder / "check.png")
     if write_map is not None:
         write_text(found.map_text, write_map)
-        written.append(write_map)
-    flight = found.log
     console.print(f"{flight.name}: {found.sentence()}")
     show_table(("what flew", "", "by"), found.what_flew())
     show_table(
@@ -93,7 +89,7 @@ def check(
         note(f"warning: {text.removeprefix('warning: ')}")
     if said:
         note(said)
-    say(*written)
+    say(*(path for path in (write, picture, write_map) if path is not None))
     return found.as_dict()
 
 

@@ -1,6 +1,7 @@
 """The demonstration."""
 
 import time
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -36,37 +37,31 @@ def demo(
         "compiles.",
     )
     with working("loading"):
-        from ..demo import steps as pages
-        from ..demo import story
+        from ..demo.steps import Step, write_page
+        from ..demo.story import LAWS, Story
         from ..dynamics.vehicle_file import load_vehicle
         from ..evaluation.tasks import task_of
 
         model = load_vehicle(vehicle)
-        request = story.Request(
-            model, vehicle, parse_setting(effect, model), seed, episodes, folder
-        )
-    with working("flying in the jet") as progress:
-        steps = story.fly_and_feel(request, progress)
-    _tell(1, steps[0])
-    _tell(2, steps[1])
-    with working("recording a flight") as progress:
-        recorded, log = story.record(request, progress)
-    _tell(3, recorded)
-    with working("looking at the logs") as progress:
-        diagnosed, found, reports = story.find(request, log, staged(progress))
-    _tell(4, diagnosed)
-    with working("flying with both models") as progress:
-        better = story.fly_better(request, found, progress)
-    _tell(5, better)
-    laws, worlds, board = story.LAWS, list(task_of("FanTracking").defaults), folder / "leaderboard"
-    with working("comparing controllers", len(laws) * len(worlds) * episodes) as progress:
-        rows, _ = write_board(board, laws, worlds, episodes, seed, progress, jobs=1)
-    compared = story.compare(request, rows, board)
-    _tell(6, compared)
-    steps += recorded, diagnosed, better, compared
+        story = Story(model, vehicle, parse_setting(effect, model), seed, episodes, folder)
+    steps: list[Step] = []
+    parts: tuple[tuple[str, Callable[[Callable[..., None]], list[Step]]], ...] = (
+        ("flying in the jet", story.fly_and_feel),
+        ("recording a flight", story.record),
+        ("looking at the logs", lambda progress: story.find(staged(progress))),
+        ("flying with both models", story.fly_better),
+    )
+    for text, part in parts:
+        with working(text) as progress:
+            new = part(progress)
+        _tell(steps, new)
+    worlds, board = list(task_of("FanTracking").defaults), folder / "leaderboard"
+    with working("comparing controllers", len(LAWS) * len(worlds) * episodes) as progress:
+        rows, _ = write_board(board, LAWS, worlds, episodes, seed, progress, jobs=1)
+    _tell(steps, story.compare(rows, board))
     page = folder / "demo.html"
     seconds = time.monotonic() - begun
-    pages.write_page(
+    write_page(
         "A vehicle that feels the wind",
         "It flies, feels, is diagnosed, and flies better. All of it was computed on this machine "
         f"in {seconds:.0f} s.",
@@ -75,13 +70,13 @@ def demo(
         command_line(),
         page,
     )
-    say(*reports, *(s.picture for s in steps if s.picture is not None), page)
+    say(*story.reports, *(s.picture for s in steps if s.picture is not None), page)
     console.print(f"{seconds:.0f} s in all")
     show_page(page, not no_open)
     return {
-        "effect": request.effect_words,
-        "found": [e.name for e in found.effects],
-        "verdict": found.verdict,
+        "effect": story.effect_words,
+        "found": [e.name for e in story.found.effects],
+        "verdict": story.found.verdict,
         "steps": [
             {"title": s.title, "sentences": s.sentences, "command": s.command} for s in steps
         ],
@@ -90,6 +85,9 @@ def demo(
     }
 
 
-def _tell(number: int, step: Any) -> None:
-    words = " ".join(step.sentences[1:])
-    console.print(f"{number} of {_COUNT}: {step.title}. {words}", soft_wrap=True)
+def _tell(steps: list[Any], new: Iterable[Any]) -> None:
+    """Add steps to those that were told, and tell them."""
+    for step in new:
+        steps.append(step)
+        words = " ".join(step.sentences[1:])
+        console.print(f"{len(steps)} of {_COUNT}: {step.title}. {words}", soft_wrap=True)

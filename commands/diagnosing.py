@@ -47,15 +47,10 @@ def diagnose(
         from ..identification.logs.example import example_flight
         from .example import conclude, introduce
 
-        how = {"--vehicle": reading.vehicle, "--reader": reading.reader, "--map": reading.map}
-        for option, value in {
-            "LOGS": logs,
-            **how,
-            "--test": test,
-            "--rotor-faults": rotor_faults,
-        }.items():
-            if value:
-                raise InputError(f"--example: has a log of its own; expected it without {option}")
+        given = {"LOGS": logs, **{f"--{name}": x for name, x in vars(reading).items()}}
+        given |= {"--test": test, "--rotor-faults": rotor_faults}
+        if unwanted := [name for name, value in given.items() if value]:
+            raise InputError(f"--example: has a log of its own; expected it without {unwanted[0]}")
         with example_flight() as flight:
             introduce(flight)
             read = read_flights([flight.log], Reading(vehicle=flight.vehicle))
@@ -67,8 +62,8 @@ def diagnose(
         raise InputError("diagnose: expected at least one flight log, or --example")
     if rotor_faults:
         if test or reading.piece:
-            unwanted = "--test" if test else "--piece"
-            raise InputError(f"--rotor-faults: expected no {unwanted} with it")
+            option = "--test" if test else "--piece"
+            raise InputError(f"--rotor-faults: expected no {option} with it")
         return _rotor_faults(logs, reading, out)
     read = read_flights([*logs, *(test or [])], reading)
     return _diagnose(read, logs, without, out)
@@ -96,13 +91,7 @@ def _diagnose(
     (every, model), count = read, len(paths)
     folder = results_folder(out)
     with working("looking at the logs") as progress:
-        found = run(
-            every[:count],
-            model,
-            every[count:],
-            without or (),
-            staged(progress),
-        )
+        found = run(every[:count], model, every[count:], without or (), staged(progress))
     found = _with_rotor_faults(found, paths, every[:count])
     # before a word is said: a reader who has read enough (a pipe to head) must not cost the results
     written = write_report(found, folder, command_line())

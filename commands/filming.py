@@ -1,8 +1,8 @@
 """Films of a flight: what each picture says, and where it goes."""
 
-from collections.abc import Callable, Iterator, Mapping
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,33 +14,18 @@ from ..envs.video import FPS, Film, save_picture
 SIZE = 960, 540  # pixels
 
 
-@dataclass
-class Tally:
-    """Errors and rewards of a flight so far, for the corner of its film."""
-
-    squares: list[float] = field(default_factory=list)  # m2
-    rewards: list[float] = field(default_factory=list)  # at most 1
-
-    def add(self, info: Mapping[str, Any]) -> None:
-        """Count a decision."""
-        self.squares.append(float(info.get("error", info.get("offset"))) ** 2)
-        self.rewards.append(float(info["reward_tracking"]))
-
-    def lines(self) -> tuple[str, ...]:
-        """Return the lines of text for now."""
-        return (
-            f"error {np.sqrt(self.squares[-1]):.2f} m",
-            f"RMSE so far {np.sqrt(np.mean(self.squares)):.2f} m",
-            f"score {np.mean(self.rewards):.2f} (mean reward, best 1)",
-        )
-
-
-def caption_of(
-    loop: Any, viewer: Any, title: str, info: Mapping[str, Any], tally: Tally
-) -> Caption:
-    """Return the caption of a picture of a task's closed loop."""
-    state, external, wind = loop.state, loop.external, info.get("wind")
-    lines = () if wind is None else (f"wind {np.linalg.norm(wind):.1f} m/s",)
+def caption_of(loop: Any, viewer: Any, title: str, flown: Sequence[Mapping[str, Any]]) -> Caption:
+    """Return the caption of a picture of a task's closed loop, after its decisions so far."""
+    state, external, info = loop.state, loop.external, flown[-1]
+    errors = np.abs([each.get("error", each.get("offset")) for each in flown])
+    score = np.mean([each["reward_tracking"] for each in flown])
+    lines = [
+        f"error {errors[-1]:.2f} m",
+        f"RMSE so far {np.sqrt(np.mean(errors**2)):.2f} m",
+        f"score {score:.2f} (mean reward, best 1)",
+    ]
+    if (wind := info.get("wind")) is not None:
+        lines.append(f"wind {np.linalg.norm(wind):.1f} m/s")
     return Caption(
         title,
         float(info["time"]),
@@ -48,7 +33,7 @@ def caption_of(
         float(state[15]),
         external[:3].copy(),
         float(external[5]),
-        (*tally.lines(), *lines),
+        tuple(lines),
         viewer.pixels_per_metre(loop.position),
         viewer.scales,
     )
@@ -79,23 +64,20 @@ def films(
     """
     every *= 2 if kinds == ["gif"] else 1
     fps /= every
-    last: list[Any] = []
-    count = 0
+    last, counts = None, itertools.count(1)
     paths = [folder / f"{name}.{kind}" for kind in kinds]
     scene = folder / f"{name}.{still}"
     with ExitStack() as stack:
         made = [stack.enter_context(Film(path, *SIZE, fps, seconds)) for path in paths]
 
         def add(draw: Callable[[], Any], caption: Callable[[], Caption]) -> None:
-            nonlocal count
-            count += 1
+            nonlocal last
             wanted = [film for film in made if not film.is_full]
-            if wanted and count % every == 0:
-                picture = with_caption(draw(), caption())
-                last[:] = [picture]
+            if next(counts) % every == 0 and wanted:
+                last = with_caption(draw(), caption())
                 for film in wanted:
-                    film.add(picture)
+                    film.add(last)
 
         yield add, [*paths, scene] if paths else []
-    if last:
-        save_picture(last[0], scene)
+    if last is not None:
+        save_picture(last, scene)

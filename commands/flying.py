@@ -42,7 +42,7 @@ def fly(
     from ..evaluation.episodes import fly_episode, time_series
     from ..evaluation.pictures import draw_episode
     from ..evaluation.tasks import make_pilot, short_names, task_of
-    from .filming import SIZE, Tally, caption_of, films
+    from .filming import SIZE, caption_of, films
 
     kinds = film_kinds(view, video, gif)
     effects = [parse_setting(e) for e in effect or []]
@@ -63,7 +63,7 @@ def fly(
     title = f"{task}, {scenario}: {shown}"
     rate = known.decisions / EPISODE_SECONDS
     every = max(1, round(rate / FPS))
-    tally = Tally()
+    flown: list[dict[str, Any]] = []
     with (
         working("flying", known.decisions) as progress,
         films(folder, "fly", kinds, film_seconds, every, rate) as (film, filmed),
@@ -72,8 +72,8 @@ def fly(
         def each(info: dict[str, Any]) -> None:
             progress(more=1)
             if kinds:
-                tally.add(info)
-                film(env.render, lambda: caption_of(env.loop, env.viewer, title, info, tally))
+                flown.append(dict(info))
+                film(env.render, lambda: caption_of(env.loop, env.viewer, title, flown))
 
         episode = fly_episode(env, make_pilot(controller, task), seed, each, known.decisions)
     env.close()

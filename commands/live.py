@@ -190,7 +190,7 @@ def _summary(session: "Session") -> dict[str, Any]:
         lines.append(f"the filter restarted {restarts} time(s): after gaps or jumps")
     if tallies.consistency.seconds:
         lines.append(f"tuning: {tuning_words(tallies.consistency)}")
-    if median == median:
+    if not np.isnan(median):
         lines.append(f"latency: median {median:.2f} ms, 99 % within {most:.2f} ms")
     force, torque = (" ".join(f"{x:+.4g}" for x in part) for part in (mean[:3], mean[3:]))
     lines.append(f"mean force {force} N, mean torque {torque} Nm")

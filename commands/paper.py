@@ -47,12 +47,8 @@ def reproduce(
     result: dict[str, Any] = {}
     for name in names:
         kept = read_json(folder / f"{name}.json", "a figure's results")
-        result[name] = {
-            "title": kept["title"],
-            "figures": kept["figures"],
-            "comparison": kept["comparison"],
-            "kept": not fresh[name],
-        }
+        result[name] = {key: kept[key] for key in ("title", "figures", "comparison")}
+        result[name]["kept"] = not fresh[name]
         console.print(
             f"\n{kept['title']}" + ("" if fresh[name] else " (finished in an earlier run)"),
             style="bold",

@@ -7,6 +7,7 @@ import inspect
 import json
 import platform
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from importlib import metadata
 from pathlib import Path
@@ -148,10 +149,8 @@ def write_run(path: Path, name: str, options: Mapping[str, Any]) -> None:
         kept = {}
     packages = {}
     for package in _PACKAGES:
-        try:
+        with suppress(metadata.PackageNotFoundError):
             packages[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            continue
     entry = {
         "command": command_line(),
         "seed": options.get("seed"),

@@ -10,7 +10,7 @@ standard deviations.
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_discrete_are
+from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 from scipy.spatial.transform import Rotation
 
 from ..dynamics.vehicle import Vehicle
@@ -32,12 +32,7 @@ from ..estimator.estimate import (
 )
 from ..estimator.model_uncertainty import LOAD, factors_of, variances_along
 from .logs.flight_log import FlightLog
-from .motion.inertial_signals import (
-    InertialSignals,
-    imu_noise,
-    inertial_signals,
-    pose_rate,
-)
+from .motion.inertial_signals import InertialSignals, imu_noise, inertial_signals, pose_rate
 from .motion.residual import acting_wrench, needed_wrench
 from .motion.smoothing import continuous, resampled
 
@@ -101,11 +96,8 @@ def _piece(
     needed = needed_wrench(s, body)
     steps = s.period / period  # a walk of one step of the log, in one of the signals
     walk_force, walk_torque, miss_force, miss_torque = (
-        np.broadcast_to(np.asarray(x, dtype=np.float64), 3)
-        for x in (
-            *(tuning.force_walk, tuning.torque_walk),
-            *(tuning.thrust_noise, tuning.motor_torque_noise),
-        )
+        np.broadcast_to(np.asarray(getattr(tuning, name), dtype=np.float64), 3)
+        for name in ("force_walk", "torque_walk", "thrust_noise", "motor_torque_noise")
     )
     pushes, turns = _loads(s, body, needed)
     needs = np.stack([needed[:, :3] - acting[:, :3], *pushes], axis=2)
@@ -189,13 +181,7 @@ def _two_sided(
     gain = (P @ H.T / (P[0, 0] + variance))[:, 0]
     after = P - np.outer(gain, P[0])
     back = np.linalg.solve(P, model @ after).T
-    smoothed = after.copy()
-    for _ in range(10_000):
-        then = after + back @ (smoothed - P) @ back.T
-        done = np.allclose(then, smoothed, rtol=1e-9, atol=0.0)
-        smoothed = then
-        if done:
-            break
+    smoothed = solve_discrete_lyapunov(back, after - back @ P @ back.T)
     predicted, filtered = np.empty_like(drive), np.empty_like(drive)
     x = np.zeros(drive.shape[1:])
     x[0] = np.mean(y[: max(1, len(y) // 200)], axis=0)

@@ -27,10 +27,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import softmax
 
 from ...runtime.errors import InputError
 from .sessions import difference
-from .trim import Trim
+from .trim import Trim, features_of
 
 Array = NDArray[np.float64]
 
@@ -44,6 +45,12 @@ _ROTORS = {
     "rotor 4 (front-right)": (-1.0, 1.0),
 }
 _SIDES = {"left": (1.0, 0.0), "rear": (0.0, -1.0), "right": (-1.0, 0.0), "front": (0.0, 1.0)}
+# what may have changed at each place
+_KINDS = {
+    **dict.fromkeys(_ROTORS, ("weaker", "carries more")),
+    **dict.fromkeys((*_SIDES, "all rotors"), ("carries more",)),
+    SOMETHING_ELSE: ("",),
+}
 
 _AMOUNTS = 80  # of a change, over which its evidence is summed
 
@@ -128,45 +135,39 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     amounts = np.linspace(0.02, 4.0, _AMOUNTS) * use.amount
     prior = -0.5 * np.square(amounts / use.amount)
     prior -= np.logaddexp.reduce(prior)
-    evidence: dict[str, dict[str, float]] = {}  # logarithms, by place and kind
-    sizes: dict[tuple[str, str], tuple[float, float]] = {}  # mean and standard deviation
-    for place, kind in _hypotheses():
+    nothing = float(logs_of(np.zeros((1, 4)), np.zeros((1, 4)))[0])
+    # by place and kind: the logarithm of how likely it is; mean and deviation of the amount
+    logs = {(NOWHERE, ""): nothing + math.log(use.unchanged)}
+    sizes = {(NOWHERE, ""): (0.0, 0.0)}
+    for place, kind in ((place, kind) for place, kinds in _KINDS.items() for kind in kinds):
         if place == SOMETHING_ELSE:
             means, spread = np.zeros((_AMOUNTS, 4)), np.repeat(amounts[:, None], 4, axis=1)
         else:
             means = np.array([_moved(place, kind, amount, shares) for amount in amounts])
             spread = np.linalg.norm(means, axis=1)[:, None] * np.array(use.bend)
-        logs = logs_of(means, spread) + prior
-        total = float(np.logaddexp.reduce(logs))
-        weights = np.exp(logs - total)
+        every = logs_of(means, spread) + prior
+        total = float(np.logaddexp.reduce(every))
+        weights = np.exp(every - total)
         middle = float(amounts @ weights)
-        evidence.setdefault(place, {})[kind] = total
         sizes[place, kind] = middle, math.sqrt(float(np.square(amounts - middle) @ weights))
-
-    # each place is as likely as the other beforehand
-    nothing = float(logs_of(np.zeros((1, 4)), np.zeros((1, 4)))[0])
-    chances = {NOWHERE: nothing + math.log(use.unchanged)}
-    for place, kinds in evidence.items():
-        each = math.log((1.0 - use.unchanged) / (len(evidence) * len(kinds)))
-        chances[place] = float(np.logaddexp.reduce(list(kinds.values()))) + each
-    whole = np.logaddexp.reduce(list(chances.values()))
-    places = {place: math.exp(log - whole) for place, log in chances.items()}
+        # each place is as likely as the other beforehand
+        logs[place, kind] = total + math.log(
+            (1.0 - use.unchanged) / (len(_KINDS) * len(_KINDS[place]))
+        )
+    chances = dict(zip(logs, softmax(list(logs.values())).tolist(), strict=True))
+    places = {place: sum(p for (at, _), p in chances.items() if at == place) for place, _ in logs}
     likeliest = max(places, key=places.__getitem__)
-    kinds = evidence.get(likeliest, {"": 0.0})
-    total = np.logaddexp.reduce(list(kinds.values()))
-    best = max(kinds, key=kinds.__getitem__)
-    amount, amount_std = sizes[likeliest, best] if best else (0.0, 0.0)
-    shares_of_ways = np.exp(found.log)
+    kinds = {kind: p / places[likeliest] for (at, kind), p in chances.items() if at == likeliest}
+    share = np.exp(found.log)
     return Change(
         tuple(before),
         tuple(after),
-        shares_of_ways @ found.mean,
-        np.sqrt(shares_of_ways @ unchanged),
+        share @ found.mean,
+        np.sqrt(share @ unchanged),
         places,
-        math.exp(kinds.get("weaker", -math.inf) - total),
-        math.exp(kinds.get("carries more", -math.inf) - total),
-        amount,
-        amount_std,
+        kinds.get("weaker", 0.0),
+        kinds.get("carries more", 0.0),
+        *sizes[likeliest, max(kinds, key=kinds.__getitem__)],
     )
 
 
@@ -185,20 +186,13 @@ def _voltage_ratio(after: Sequence[Trim], before: Sequence[Trim]) -> float:
     return means[0] - means[1]
 
 
-def _hypotheses() -> list[tuple[str, str]]:
-    """Return every place and kind of change."""
-    weaker = [(place, "weaker") for place in _ROTORS]
-    heavier = [(place, "carries more") for place in (*_ROTORS, *_SIDES)]
-    return [*weaker, *heavier, ("all rotors", "carries more"), (SOMETHING_ELSE, "")]
-
-
 def _moved(place: str, kind: str, amount: float, shares: Array) -> Array:
     """Return how the four numbers move if something changed by ``amount``."""
     if kind == "weaker":
         rotor = list(_ROTORS).index(place)
         thrust = shares.copy()
         thrust[rotor] /= 1.0 - min(amount, 0.9)
-        return Trim("", thrust, 0.0).features - Trim("", shares, 0.0).features
+        return features_of(thrust) - features_of(shares)
     if place == "all rotors":
         return np.array([0.0, 0.0, 0.0, math.log1p(amount)])
     left, front = {**_ROTORS, **_SIDES}[place]

@@ -8,6 +8,7 @@ by a window that would smear the time of a fault.
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ from ..motion.smoothing import lagged, resampled, runs_of
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+_PX4 = "px4_ulog"  # the reader
 _CHANNELS = ("gyro", "accelerometer", "commands")  # of a PX4 log that are needed
 STEP = 0.02  # s, of the grid: a rotor takes about that long to follow
 FINE = 0.004  # s, on which commands are filtered by the rotors' lag
@@ -102,27 +104,18 @@ def read_channels(
     Raises:
         InputError: the file cannot be read, or lacks one of the three.
     """
-    if log_map is None and reader in (None, "px4_ulog") and (found := _of_ulog(path)):
-        return found
-    log = log or read_log(path, reader, vehicle, log_map)
-    return channels_of_log(log), log.notes
-
-
-def _of_ulog(path: Path) -> tuple[Channels, tuple[str, ...]] | None:
-    """Return the streams of a PX4 log, and notes; None of another file."""
-    reader = reader_by_content(path)
-    if reader is None or reader.name != "px4_ulog":
-        return None
+    by_content = reader_by_content(path) if log_map is None and reader in (None, _PX4) else None
+    if by_content is None or by_content.name != _PX4:
+        log = log or read_log(path, reader, vehicle, log_map)
+        return channels_of_log(log), log.notes
     recording = px4_ulog.channels(path, has_ranges=False)
-    streams = [readable(recording.streams.get(part)) for part in _CHANNELS]
-    gyro, accelerometer, command = streams
-    if gyro is None or accelerometer is None or command is None:
-        missing = [part for part, stream in zip(_CHANNELS, streams, strict=True) if stream is None]
+    found: dict[str, Any] = {part: readable(recording.streams.get(part)) for part in _CHANNELS}
+    if missing := [part for part, stream in found.items() if stream is None]:
         raise InputError(f"{path}: no {' and no '.join(missing)}; expected all of them")
     assert recording.log_map.commands is not None
     names = tuple(f"PX4 motor {i}" for i in recording.log_map.commands.order)
-    found = Channels(str(path), gyro, accelerometer, command, motor_names=names)
-    return found, tuple(recording.notes)
+    gyro, accelerometer, command = found.values()
+    return Channels(str(path), gyro, accelerometer, command, False, names), tuple(recording.notes)
 
 
 def channels_of_log(log: FlightLog) -> Channels:
@@ -132,18 +125,15 @@ def channels_of_log(log: FlightLog) -> Channels:
     Raises:
         InputError: gyro, accelerometer, or both commands and rotor speeds are missing.
     """
-    name = log.source or log.name
+    name, known = log.source or log.name, log.command is None
     if log.gyro is None or log.accelerometer is None:
         raise InputError(
             f"{name}: no gyro or no accelerometer; expected gx, gy, gz and ax, ay, az, to look for "
             "a rotor that lost thrust"
         )
-    if log.command is not None:
-        command, known = log.command, False
-    elif log.has_rotor_speeds:
-        command, known = np.square(log.rotor_speeds), True
-    else:
+    if known and not log.has_rotor_speeds:
         raise InputError(f"{name}: no motor commands and no rotor speeds; expected one of them")
+    command = np.square(log.rotor_speeds) if log.command is None else log.command
     # a command that is held between two of its own samples says so by its changes
     new = np.any(np.diff(command, axis=0, prepend=np.nan) != 0.0, axis=1)
     new[-1] = True
@@ -215,8 +205,7 @@ def _between(c: Channels, t: Array) -> Array:
     change = np.abs(command[after] - command[after - 1]).mean(axis=1)
     usual = np.median(np.interp(t, at, command.mean(axis=1)))
     coarse = end - start > 1.5 * STEP
-    found: Array = np.where(coarse, change / usual * np.sqrt(part * (1.0 - part)), 0.0)
-    return found
+    return np.where(coarse, change / usual * np.sqrt(part * (1.0 - part)), 0.0)
 
 
 def _means(times: Array, values: Array, middles: Array) -> Array:

@@ -12,18 +12,20 @@ each quadrant is all that is assumed. Two questions are asked apart:
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 from scipy.stats import norm
 
-from .fault_balance import AT_ONCE, Begin, FaultBalance
+from .fault_balance import BalanceChannel, Begin, FaultBalance
 from .fault_channels import STEP, Channels, Samples, sample
-from .fault_noise import Noise
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 NOTHING, ALL, OTHER = "nothing", "all rotors", "another force or torque"
 
@@ -58,6 +60,7 @@ class FaultSettings:
 
 
 FAULTS = FaultSettings()
+_BEGINS = [Begin(part, lagged) for lagged in (False, True) for part in FAULTS.parts]
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +70,7 @@ class RotorFault:
     samples: Samples  # of the flight
     # of "nothing", rotors "1" to "4", "all rotors" and "another force or torque"; they sum to one
     probabilities: dict[str, float]
-    # of the likeliest rotor: median and the ends of a 95 % interval
+    # of the likeliest rotor: median (of the thrust, mean) and the ends of a 95 % interval
     rotor: int
     onset: tuple[float, float, float]  # s, of the log's clock
     remaining: tuple[float, float, float]  # share of its thrust that is left
@@ -95,32 +98,109 @@ def find_fault(channels: Channels) -> RotorFault:
         InputError: too little flight.
     """
     use, samples = FAULTS, sample(channels)
-    search = _Search(samples, _rows(len(samples.t)))
-    search.find_curve(channels.thrust_known)
-    best = search.tried[search.likeliest()]
-    evidence, starts, start_weights = search.onsets(best)
-    names = ["1", "2", "3", "4", ALL, OTHER]
+    tried = _search(samples, channels.thrust_known)
+    best = max(tried, key=lambda one: one.log)
+    evidence, starts, start_weights = _onsets(samples, best)
     each, shares, weights = _patterns(best)
     prior = np.array([*[use.prior[1] / 4] * 4, use.prior[2], use.prior[3]])
     logs = np.log(prior) + each
     # the prior of an event of some kind is in ``prior``; how likely it is that there was one, with
     # sizes left free, is the search's
-    whole = np.array([math.log(use.prior[0]) + search.nothing()])
-    shape = logs - logsumexp(logs)
+    whole = math.log(use.prior[0]) + max(one.nothing for one in tried)
     happened = evidence + math.log(float(prior.sum()))
-    every = np.concatenate([whole, happened + shape])
+    every = np.append(whole, happened + logs - logsumexp(logs))
     chances = np.exp(every - logsumexp(every))
-    rotor = 1 + int(np.argmax(logs[:4]))
+    rotor = int(np.argmax(logs[:4]))
+    _, least, most = _quantiles(shares, weights[rotor], 0.5 * float(shares[1] - shares[0]))
     return RotorFault(
         samples,
-        dict(zip([NOTHING, *names], chances.tolist(), strict=True)),
-        rotor,
+        dict(zip([NOTHING, "1", "2", "3", "4", ALL, OTHER], chances.tolist(), strict=True)),
+        1 + rotor,
         _quantiles(starts, start_weights, STEP),
-        _remaining(shares, weights[rotor - 1]),
+        (1.0 - float(weights[rotor] @ shares), max(0.0, 1.0 - most), min(1.0, 1.0 - least)),
     )
 
 
-def _patterns(best: "_Tried") -> tuple[Array, Array, Array]:
+class _Tried(NamedTuple):
+    """One lag and curve: the channels with the noise that fits them best, the likeliest jump with
+    that, and the log-likelihood of none.
+    """
+
+    balance: FaultBalance
+    channels: list[BalanceChannel]
+    nothing: float
+    log: float
+    row: int
+    begin: Begin
+
+
+def _search(samples: Samples, thrust_known: bool) -> list[_Tried]:
+    """Return what was tried: lags, and then curves, each from the best so far."""
+    rows, tried = _rows(len(samples.t)), dict[tuple[float, float, float], _Tried]()
+
+    def best_of(keys: Iterable[tuple[float, float, float]]) -> tuple[float, float, float]:
+        for key in keys:
+            if key not in tried:
+                tried[key] = _fitted(FaultBalance(samples, samples.thrust(*key), key[0]), rows)
+        return max(tried, key=lambda key: tried[key].log)
+
+    curves = FAULTS.curves[:1] if thrust_known else FAULTS.curves
+    middle = FAULTS.lags[len(FAULTS.lags) // 2]
+    _, *curve = best_of((middle, *curve) for curve in curves)
+    lag, *_ = best_of((lag, curve[0], curve[1]) for lag in FAULTS.lags)
+    best_of((lag, *curve) for curve in curves)
+    return list(tried.values())
+
+
+def _fitted(balance: FaultBalance, rows: Index) -> _Tried:
+    """Return a lag and curve with its noise, which is fitted beside the likeliest jump."""
+    channels = balance.channels()
+    nothing = sum(channel.nothing() for channel in channels)
+    for _ in range(FAULTS.rounds):
+        _, row, begin = _jump(balance, channels, rows)
+        channels = balance.channels(balance.share(row, begin))
+    nothing = max(nothing, sum(channel.nothing() for channel in channels))
+    return _Tried(balance, channels, nothing, *_jump(balance, channels, rows))
+
+
+def _steps(balance: FaultBalance, channels: list[BalanceChannel], rows: Index) -> Array:
+    """Return the log-likelihoods (J, K) of a jump of each kind of ``_BEGINS`` at each of some
+    rows.
+    """
+    ramps = [balance.ramp(begin) for begin in _BEGINS]
+    return np.array([np.sum([c.steps(rows, ramp) for c in channels], axis=0) for ramp in ramps])
+
+
+def _jump(
+    balance: FaultBalance, channels: list[BalanceChannel], rows: Index
+) -> tuple[float, int, Begin]:
+    """Return the log-likelihood, the row and the kind of the likeliest jump, also at rows that are
+    left out between ``rows``.
+    """
+    at_once = np.sum([c.steps(rows, balance.ramp(_BEGINS[0])) for c in channels], axis=0)
+    k = int(np.argmax(at_once))
+    around = np.arange(rows[max(k - 2, 0)], rows[min(k + 2, len(rows) - 1)] + 1)
+    logs = _steps(balance, channels, around)
+    j, k = divmod(int(np.argmax(logs)), len(around))
+    return float(logs[j, k]), int(around[k]), _BEGINS[j]
+
+
+def _onsets(samples: Samples, best: _Tried) -> tuple[float, Array, Array]:
+    """Return the log-evidence of a jump, when it may have begun (T,) in s, and how likely each time
+    is (T,).
+    """
+    every = _rows(len(samples.t))
+    rows = np.arange(max(best.row - 5, FAULTS.before), min(best.row + 6, every[-1] + 1))
+    logs, fine = (_steps(best.balance, best.channels, some) for some in (every, rows))
+    parts = np.array([begin.part for begin in _BEGINS])
+    starts = samples.t[rows] + STEP * (parts[:, None] - 0.5)
+    evidence = max(float(logsumexp(logs)), float(logsumexp(fine)))
+    weights = np.exp(fine - logsumexp(fine))
+    places = len(_BEGINS) * len(samples.t)
+    return evidence - math.log(places), starts.ravel(), weights.ravel()
+
+
+def _patterns(best: _Tried) -> tuple[Array, Array, Array]:
     """Return the log-evidence (6,) of rotors 1 to 4, of all rotors and of another force and torque
     from what the channels say; shares (E,) that may be lost, and how likely each is by each rotor
     (4, E).
@@ -128,12 +208,20 @@ def _patterns(best: "_Tried") -> tuple[Array, Array, Array]:
     use = FAULTS
     shares = np.linspace(*use.losses, use.steps)
     lost = shares[shares <= use.all_lose, None]
-    jumps = best.balance.jumps(best.noise, best.row, best.begin)
+    share = best.balance.share(best.row, best.begin)
+
+    def seen(columns: Array) -> Array:
+        """Return the part (4,) of a column that each channel sees, and its deviation (4,)."""
+        pairs = zip(best.channels, columns.T, strict=True)
+        return np.array([channel.part(column) for channel, column in pairs]).T
+
     # what each channel sees, its standard deviation, and by the hypothesis: means and their spread
     tried: list[tuple[Array, Array, Array, Array]] = []
     for rotor in range(4):
-        loss = best.balance.losses(best.noise, rotor, best.row, best.begin)
+        loss = seen(best.balance.lost(rotor, share))
         tried.append((*loss, shares[:, None] * np.ones(4), use.error * shares[:, None]))
+    # a jump of each channel, in parts of what one rotor's usual thrust does there
+    jumps = seen(np.repeat(share[:, None], 4, axis=1))
     means, spread = lost * [0.0, 0.0, 0.0, 4.0], use.error * lost * [2.0, 2.0, 2.0, 4.0]
     tried.append((*jumps, means, spread))
     tried.append((*jumps, np.zeros((1, 4)), np.array([use.other])))
@@ -147,7 +235,7 @@ def _patterns(best: "_Tried") -> tuple[Array, Array, Array]:
     return evidence, shares, np.array([np.exp(log - logsumexp(log)) for log in logs[:4]])
 
 
-def _rows(count: int) -> NDArray[np.int64]:
+def _rows(count: int) -> Index:
     """Return where a fault may begin: everywhere, or in a long flight evenly spread and everywhere
     near the end, where little is left to see it by.
     """
@@ -157,95 +245,6 @@ def _rows(count: int) -> NDArray[np.int64]:
         step = math.ceil(len(early) / (0.75 * most))
         rows = np.concatenate([early[::step], rows[-most // 4 :]])
     return rows
-
-
-@dataclass(frozen=True, eq=False)
-class _Tried:
-    """One lag and curve: the noise that fits it best, and the likeliest jump with that."""
-
-    balance: FaultBalance
-    usual: list[Noise]  # if nothing happened
-    noise: list[Noise]  # with the jump
-    log: float
-    row: int
-    begin: Begin
-
-
-class _Search:
-    """The likeliest jump, with the lags and curves that were tried."""
-
-    def __init__(self, samples: Samples, rows: NDArray[np.int64]) -> None:
-        self.samples, self.rows = samples, rows
-        self.begins = [Begin(part, lagged) for lagged in (False, True) for part in FAULTS.parts]
-        self.tried: dict[tuple[float, float, float], _Tried] = {}
-
-    def find_curve(self, thrust_known: bool) -> None:
-        """Try lags, and then curves, each from the best so far."""
-        middle = FAULTS.lags[len(FAULTS.lags) // 2]
-        curves = FAULTS.curves[:1] if thrust_known else FAULTS.curves
-        for curve in curves:
-            self._try((middle, *curve))
-        _, bend, dead = self.likeliest()
-        for lag in FAULTS.lags:
-            self._try((lag, bend, dead))
-        lag = self.likeliest()[0]
-        for curve in curves:
-            self._try((lag, *curve))
-
-    def likeliest(self) -> tuple[float, float, float]:
-        """Return the lag and the curve with the likeliest jump."""
-        return max(self.tried, key=lambda key: self.tried[key].log)
-
-    def _try(self, key: tuple[float, float, float]) -> None:
-        if key in self.tried:
-            return
-        one = FaultBalance(self.samples, self.samples.thrust(*key), key[0])
-        usual = one.noises()
-        noise = usual
-        for _ in range(FAULTS.rounds):
-            _, row, begin = self._jump(one, noise)
-            noise = one.noises(row, begin)
-        self.tried[key] = _Tried(one, usual, noise, *self._jump(one, noise))
-
-    def _jump(self, one: FaultBalance, noise: list[Noise]) -> tuple[float, int, Begin]:
-        """Return the log-likelihood, the row and the kind of the likeliest jump."""
-        rows_around = self._rows_around(one.steps(noise, self.rows, AT_ONCE))
-        logs = np.array([one.steps(noise, rows_around, begin) for begin in self.begins])
-        j, k = np.unravel_index(int(np.argmax(logs)), logs.shape)
-        return float(logs[j, k]), int(rows_around[k]), self.begins[j]
-
-    def _rows_around(self, log: Array) -> NDArray[np.int64]:
-        """Return the rows around the likeliest of ``rows``, also those left out between them."""
-        k = int(np.argmax(log))
-        low, high = self.rows[max(k - 2, 0)], self.rows[min(k + 2, len(log) - 1)]
-        return np.arange(low, high + 1)
-
-    def nothing(self) -> float:
-        """Return the log-likelihood of no jump."""
-        return max(
-            max(one.balance.nothing(one.usual), one.balance.nothing(one.noise))
-            for one in self.tried.values()
-        )
-
-    def onsets(self, best: _Tried) -> tuple[float, Array, Array]:
-        """Return the log-evidence of a jump, when it may have begun (T,) in s, and how likely each
-        time is (T,).
-        """
-        logs = np.array([best.balance.steps(best.noise, self.rows, b) for b in self.begins])
-        rows = np.arange(max(best.row - 5, FAULTS.before), min(best.row + 6, self.rows[-1] + 1))
-        fine = np.array([best.balance.steps(best.noise, rows, begin) for begin in self.begins])
-        parts = np.array([begin.part for begin in self.begins])
-        starts = self.samples.t[rows][None] + STEP * (parts[:, None] - 0.5)
-        evidence = max(float(logsumexp(logs)), float(logsumexp(fine)))
-        places = len(self.begins) * len(self.samples.t)
-        weights = np.exp(fine - logsumexp(fine))
-        return evidence - math.log(places), starts.ravel(), weights.ravel()
-
-
-def _remaining(shares: Array, weight: Array) -> tuple[float, float, float]:
-    """Return the share of thrust that is left: mean and the ends of a 95 % interval."""
-    _, low, high = _quantiles(shares, weight, 0.5 * float(shares[1] - shares[0]))
-    return 1.0 - float(weight @ shares), max(0.0, 1.0 - high), min(1.0, 1.0 - low)
 
 
 def _quantiles(values: Array, weight: Array, margin: float) -> tuple[float, float, float]:

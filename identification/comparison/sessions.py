@@ -73,8 +73,8 @@ def difference(after: Sequence[Trim], before: Sequence[Trim]) -> Difference:
     trims, later = [trim for trim, _ in every], np.array([which for _, which in every])
     x = np.array([trim.features for trim in trims])
     noise = np.array([np.diagonal(trim.noise) for trim in trims])
-    parts = [_of_cut(x, later, noise, cut, log) for cut, log in _cuts(trims, later, x)]
-    mean, variance, log = (np.concatenate(part) for part in zip(*parts, strict=True))
+    parts = (_of_cut(x, later, noise, cut, log) for cut, log in _cuts(trims, later, x))
+    mean, variance, log = map(np.concatenate, zip(*parts, strict=True))
     log -= np.logaddexp.reduce(log)
     keep = log > log.max() + SCATTER.least_log
     return Difference(mean[keep], variance[keep], log[keep])

@@ -33,6 +33,7 @@ EDGE = 1.5  # s after the rotors start and before they stop: taking off and land
 NEAR = 0.1  # of the median thrust: further off, the vehicle climbs, sinks or pulls
 _SMOOTH = 0.25  # s
 BATCH = 1.5  # s: the loop's answer to a gust is over
+_MIX = np.array([[1.0, 1.0, -1.0, -1.0], [1.0, -1.0, -1.0, 1.0], [1.0, -1.0, 1.0, -1.0]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,17 +57,17 @@ class Trim:
         return float(self.thrust.sum())
 
     @property
-    def shares(self) -> Array:
-        """Difference of left and right, front and rear, and of the two diagonals (1 and 3 less 2
-        and 4), (3,), each in parts of the total.
-        """
-        a, b, c, d = self.thrust / self.total
-        return np.array([a + b - c - d, a + d - b - c, a + c - b - d])
-
-    @property
     def features(self) -> Array:
-        """The shares and the logarithm of the total, (4,)."""
-        return np.append(self.shares, math.log(self.total))
+        """The four numbers, see ``features_of``."""
+        return features_of(self.thrust)
+
+
+def features_of(thrust: Array) -> Array:
+    """Return of thrusts (4,) the difference of left and right, front and rear, and of the two
+    diagonals (1 and 3 less 2 and 4), each in parts of the total, and the logarithm of the total.
+    """
+    total = thrust.sum()
+    return np.append(_MIX @ thrust / total, math.log(total))
 
 
 def trim_of(
@@ -108,17 +109,13 @@ def trim_of(
 def _noise(t: Array, thrust: Array, steady: NDArray[np.bool_], step: Array) -> Array:
     """Return the covariance (4, 4) of the four numbers of a flight, from the means of batches."""
     batch = np.floor(np.cumsum(np.where(steady, step, 0.0)) / BATCH).astype(np.int64)
-    rows = []
-    for number in range(int(batch[-1]) + 1):
-        inside = steady & (batch == number)
-        mean = thrust[inside].mean(axis=0) if inside.any() else np.zeros(4)
-        # the last batch may be a short one
-        if step[inside].sum() > 0.5 * BATCH and mean.min() > 0.0:
-            rows.append(Trim("", mean, 0.0).features)
-    if len(rows) < 2:
+    batches = (steady & (batch == number) for number in range(int(batch[-1]) + 1))
+    # the last batch may be a short one
+    means = (thrust[rows].mean(axis=0) for rows in batches if step[rows].sum() > 0.5 * BATCH)
+    numbers = [features_of(mean) for mean in means if mean.min() > 0.0]
+    if len(numbers) < 2:
         return np.zeros((4, 4))
-    covariance: Array = np.cov(np.array(rows), rowvar=False) / len(rows)
-    return covariance
+    return np.asarray(np.cov(numbers, rowvar=False) / len(numbers))
 
 
 def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
@@ -128,7 +125,7 @@ def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
     Raises:
         InputError: too little calm flight, or neither rotor speeds nor commands.
     """
-    name = log.source or log.name
+    name, t = log.source or log.name, log.t
     if log.has_rotor_speeds:
         thrust = np.square(log.rotor_speeds) * vehicle.k
     elif log.command is None:
@@ -138,20 +135,16 @@ def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
     else:
         thrust = log.command
     if not log.has_pose:
-        return trim_of(name, log.t, thrust, carrying(log.t, thrust.sum(axis=1)), log.voltage)
-    seen = np.flatnonzero(log.valid)
-    if len(seen) < 3:
-        raise InputError(f"{log.source or log.name}: fewer than three poses; expected a flight")
-    height = np.interp(log.t, log.t[seen], log.position[seen, 2])
-    steady = np.zeros(len(log.t), dtype=np.bool_)
+        return trim_of(name, t, thrust, carrying(t, thrust.sum(axis=1)), log.voltage)
+    at, place = t[log.valid], log.position[log.valid]
+    if len(at) < 3:
+        raise InputError(f"{name}: fewer than three poses; expected a flight")
     speeds = log.rotor_speeds if log.has_rotor_speeds else _scaled_speeds(thrust, vehicle)
-    for phase in flight_phases(log.t, height, speeds, vehicle):
-        if phase.name == FLIGHT:
-            steady |= (log.t >= phase.start) & (log.t <= phase.end)
-    velocity = np.gradient(log.position[seen], log.t[seen], axis=0)
-    speed = _smooth(np.linalg.norm(velocity, axis=1), log.t[seen])
-    steady &= np.interp(log.t, log.t[seen], speed) < CALM
-    return trim_of(name, log.t, thrust, steady, log.voltage)
+    phases = flight_phases(t, np.interp(t, at, place[:, 2]), speeds, vehicle)
+    flown = [(t >= phase.start) & (t <= phase.end) for phase in phases if phase.name == FLIGHT]
+    speed = _smooth(np.linalg.norm(np.gradient(place, at, axis=0), axis=1), at)
+    steady = np.any(flown, axis=0) & (np.interp(t, at, speed) < CALM)
+    return trim_of(name, t, thrust, steady, log.voltage)
 
 
 def carrying(t: Array, total: Array) -> NDArray[np.bool_]:

@@ -27,6 +27,7 @@ from .trim import Trim
 
 _PLACES = ("front-left", "rear-left", "rear-right", "front-right")
 _NAMED = 0.05  # probability from which a rival is mentioned
+_SAID = ("place", "sure", "weaker", "carries_more", "amount", "amount_std")
 
 
 def _cannot_tell(chances: Mapping[str, float], likeliest: str, name: Callable[[str], str]) -> str:
@@ -46,9 +47,7 @@ def change_headline(change: Change) -> str:
     if place == NOWHERE:
         if change.sure:
             return f"Nothing changed (probability {chance:.2f})."
-        other = max(
-            (name for name in change.places if name != NOWHERE), key=change.places.__getitem__
-        )
+        other = max(change.places, key=lambda name: (name != NOWHERE, change.places[name]))
         return (
             f"Cannot tell whether anything changed: nothing with probability {chance:.2f}; if "
             f"something did, it is likeliest at {other} ({change.places[other]:.2f})."
@@ -98,13 +97,8 @@ def change_data(change: Change) -> dict[str, Any]:
     data: dict[str, Any] = plain(
         {
             "headline": change_headline(change),
-            "place": change.place,
-            "sure": change.sure,
             "probabilities": change.places,
-            "weaker": change.weaker,
-            "carries_more": change.carries_more,
-            "amount": change.amount,
-            "amount_std": change.amount_std,
+            **{key: getattr(change, key) for key in _SAID},
             "difference": dict(zip(names, change.difference, strict=True)),
             "difference_std_if_unchanged": dict(zip(names, change.std, strict=True)),
             "before": flights(change.before),
@@ -135,8 +129,7 @@ def _draw_change(change: Change) -> Any:
         (change.after, AFTER, "after"),
     ):
         # as seen from above, front up: what lies to the left is drawn to the left
-        x = [-100 * trim.shares[0] for trim in trims]
-        y = [100 * trim.shares[1] for trim in trims]
+        x, y = np.transpose([[-100.0, 100.0] * trim.features[:2] for trim in trims])
         left.plot(x, y, "o", color=colour, label=label, ms=7, alpha=0.8)
     left.axhline(0.0, color=PALE, lw=1)
     left.axvline(0.0, color=PALE, lw=1)

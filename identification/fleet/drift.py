@@ -13,8 +13,9 @@ discovery rate (Benjamini and Hochberg 1995).
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -109,18 +110,18 @@ class Fleet:
 
 def meta_regression(
     design: Array, values: Array, stds: Array, at_least_stds: bool
-) -> tuple[Array, Array, float]:
+) -> tuple[list[float], list[float], float]:
     """Fit values with known standard deviations, between which there is a further variance.
 
     Args:
         design: (n, k) regressors, k < n.
         values: (n,).
         stds: (n,) standard deviation of each value, positive.
-        at_least_stds: whether values that agree better than ``stds`` says leave the covariance as
-            ``stds`` has it.
+        at_least_stds: whether values that agree better than ``stds`` says leave the deviations as
+            ``stds`` has them.
 
     Returns:
-        coefficients (k,), their covariance (k, k), and the standard deviation between values.
+        coefficients (k,), their standard deviations (k,), and that between values.
     """
     freedom = len(values) - design.shape[1]
     # numbers of any unit: the search below is for a ratio
@@ -140,9 +141,9 @@ def meta_regression(
     if most > 0.0:
         variance = float(brentq(lambda v: fit(v)[2] - freedom, 0.0, most, xtol=1e-9 * most))
     coefficients, covariance, deviance = fit(variance)
-    inflation = deviance / freedom
-    spread: Array = scale**2 * max(inflation, float(at_least_stds)) * covariance
-    return scale * coefficients, spread, scale * math.sqrt(variance)
+    inflation = max(deviance / freedom, float(at_least_stds))
+    errors: Array = scale * np.sqrt(inflation * np.diagonal(covariance))
+    return (scale * coefficients).tolist(), errors.tolist(), scale * math.sqrt(variance)
 
 
 def _by_session(
@@ -153,10 +154,11 @@ def _by_session(
     pooled = []
     for name in dict.fromkeys(names.tolist()):
         (of,) = np.nonzero(names == name)
-        value, deviation = y[of[0]], s[of[0]]
-        if len(of) > 1:
-            (value,), covariance, _ = meta_regression(np.ones((len(of), 1)), y[of], s[of], True)
-            deviation = math.sqrt(covariance[0, 0])
+        (value,), (deviation,), _ = (
+            meta_regression(np.ones((len(of), 1)), y[of], s[of], True)
+            if len(of) > 1
+            else (y[of], s[of], None)
+        )
         pooled.append((x[of].mean(), value, deviation))
     number, value, deviation = np.array(pooled).reshape(-1, 3).T
     return number, value, deviation
@@ -177,96 +179,83 @@ def trend_of(
     if sessions:
         x, y, s = _by_session(x, y, s, sessions)
     if len(y) < 2:
-        pooled, between = float(np.median(points[:, 1])), None
+        mean, between = float(np.median(points[:, 1])), None
         half = 1.96 * float(s[0]) if len(y) else math.nan
     else:
-        (mean,), covariance, between = meta_regression(np.ones((len(y), 1)), y, s, True)
-        pooled = float(mean)
-        half = float(t.ppf(0.975, len(y) - 1) * math.sqrt(covariance[0, 0]))
-    trend = Trend(of, points, among, pooled, (pooled - half, pooled + half), between)
+        (mean,), (error,), between = meta_regression(np.ones((len(y), 1)), y, s, True)
+        half = float(t.ppf(0.975, len(y) - 1)) * error
+    trend = Trend(of, points, among, mean, (mean - half, mean + half), between)
     trend.tentative = not sure.all()
-    if len(y) < DRIFT.least_flights:
-        return trend
-    middle = float(np.mean(x))
-    design = np.column_stack([np.ones(len(y)), x - middle])
-    (level, slope), covariance, _ = meta_regression(design, y, s, False)
-    error = math.sqrt(covariance[1, 1])
-    half = float(t.ppf(0.975, len(y) - 2) * error)
-    trend.per_flight = float(slope)
-    trend.per_flight_ci95 = (float(slope) - half, float(slope) + half)
-    trend.p = float(2.0 * t.sf(abs(slope) / error, len(y) - 2)) if error > 0.0 else 1.0
-    trend.tentative = few_sure
-    first, last = level + slope * (points[[0, -1], 0] - middle)
-    trend.ends = float(first), float(last)
+    if len(y) >= DRIFT.least_flights:
+        middle = float(np.mean(x))
+        design = np.column_stack([np.ones(len(y)), x - middle])
+        (level, slope), (_, error), _ = meta_regression(design, y, s, False)
+        half = float(t.ppf(0.975, len(y) - 2)) * error
+        trend.per_flight, trend.per_flight_ci95 = slope, (slope - half, slope + half)
+        trend.p = float(2.0 * t.sf(abs(slope) / error, len(y) - 2)) if error > 0.0 else 1.0
+        trend.tentative = few_sure
+        first, last = (level + slope * (points[[0, -1], 0] - middle)).tolist()
+        trend.ends = first, last
     return trend
 
 
 def appearance_of(
-    name: str, effect: str, named: Sequence[int], diagnosed: Sequence[int]
+    name: str, effect: str, named: Sequence[int], diagnosed: Collection[float]
 ) -> Appearance | None:
     """Return whether flights that name an effect are later than those that do not; None where
     there are too few of either.
     """
-    without = sorted(set(diagnosed) - set(named))
+    without = set(diagnosed) - set(named)
     if min(len(named), len(without)) < DRIFT.least_each:
         return None
-    test = mannwhitneyu(named, without)
+    test = mannwhitneyu(named, sorted(without))
     later = bool(test.statistic > 0.5 * len(named) * len(without))
     return Appearance(name, effect, tuple(named), len(diagnosed), later, p=float(test.pvalue))
 
 
-def fleet_of(rows: Iterable[Mapping[str, Any]]) -> Fleet:
+def fleet_of(rows: Sequence[Mapping[str, Any]]) -> Fleet:
     """Return what all flights say together.
 
     Args:
         rows: as ``running.rows`` returns them.
     """
+    individuals = {row["id"]: {"diagnosed": 0, "refused": 0} for row in rows}
+    for row in rows:
+        individuals[row["id"]][row["status"]] += 1
+    refused = Counter(row["kind"] for row in rows if row["status"] == "refused")
+    flown = [row for row in rows if row["status"] == "diagnosed"]
+    # sessions by flights
+    diagnosed: dict[str, dict[float, str]] = {who: {} for who in individuals}
     points: defaultdict[Coefficient, list[tuple[float, ...]]] = defaultdict(list)
     named: defaultdict[tuple[str, str], list[int]] = defaultdict(list)
-    diagnosed: defaultdict[str, list[int]] = defaultdict(list)
-    sessions: defaultdict[str, dict[float, str]] = defaultdict(dict)
-    individuals: defaultdict[str, dict[str, int]] = defaultdict(
-        lambda: {"diagnosed": 0, "refused": 0}
-    )
-    refused: Counter[str] = Counter()
-    verdicts: Counter[str] = Counter()
-    for row in rows:
-        who, flight = row["id"], row["flight"]
-        individuals[who][row["status"]] += 1
-        if row["status"] == "refused":
-            refused[row["kind"]] += 1
-            continue
-        verdicts[row["verdict"]] += 1
-        diagnosed[who].append(flight)
-        sessions[who][flight] = row.get("session", "")
-        possible: set[str] = set()
-        for effect in row["effects"]:
-            name, rivals = effect["name"], effect["indistinguishable_from"]
-            possible |= {name, *rivals}
-            sure = not effect["tentative"] and not rivals
+    for row in flown:
+        who, flight, effects = row["id"], row["flight"], row["effects"]
+        diagnosed[who][flight] = row.get("session", "")
+        for effect in effects:
+            sure = not (effect["tentative"] or effect["indistinguishable_from"])
             for coefficient, value in effect["coefficients"].items():
-                of = Coefficient(who, name, coefficient, effect["units"].get(coefficient, ""))
-                known = (
-                    math.nan if x is None else x for x in (value, effect["std"].get(coefficient))
-                )
+                unit, std = (effect[key].get(coefficient) for key in ("units", "std"))
+                known = (math.nan if x is None else x for x in (value, std))
+                of = Coefficient(who, effect["name"], coefficient, unit or "")
                 points[of].append((flight, *known, sure))
-        for name in possible:
+        possible = ((effect["name"], *effect["indistinguishable_from"]) for effect in effects)
+        for name in dict.fromkeys(chain.from_iterable(possible)):
             named[who, name].append(flight)
     trends = [
-        trend_of(of, np.array(p, float), len(diagnosed[of.id]), sessions[of.id])
+        trend_of(of, np.array(p, float), len(diagnosed[of.id]), diagnosed[of.id])
         for of, p in points.items()
     ]
     told = {(of.id, of.effect) for of in points}
-    tried = (
-        appearance_of(who, name, flights, diagnosed[who])
+    appearances = [
+        found
         for (who, name), flights in named.items()
-        if (who, name) in told
-    )
-    appearances = [one for one in tried if one is not None]
+        if (who, name) in told and (found := appearance_of(who, name, flights, diagnosed[who]))
+    ]
     tests = [one for one in (*trends, *appearances) if one.p is not None]
     adjusted = false_discovery_control([one.p for one in tests]) if tests else ()
     for one, p in zip(tests, adjusted, strict=True):
         one.adjusted_p = float(p)
     trends.sort(key=lambda one: not one.told)
     appearances.sort(key=lambda one: not one.told)
+    verdicts = Counter(row["verdict"] for row in flown)
     return Fleet(trends, appearances, individuals, refused, verdicts)

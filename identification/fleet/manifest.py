@@ -26,6 +26,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from fnmatch import fnmatchcase
+from itertools import takewhile
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -165,7 +166,7 @@ def find_logs(
     manifest = manifest or next((path for path in beside if path.is_file()), None)
     said = Manifest(()) if manifest is None else read_manifest(manifest)
     above = Path() if manifest is None else manifest.parent
-    used: set[str] = set()
+    unused = {entry.log: None for entry in said.logs}
     logs: dict[str, FleetLog] = {}
     for root in given:
         for path in _logs_in(root, without):
@@ -179,25 +180,19 @@ def find_logs(
                 **how,
             )
             name = os.path.relpath(path, above).replace(os.sep, "/")
-            for entry in said.logs:
-                if fnmatchcase(name, entry.log):
-                    used.add(entry.log)
-                    log = _with_entry(log, entry)
-                    break
+            fits = next((entry for entry in said.logs if fnmatchcase(name, entry.log)), None)
+            if fits is not None:
+                unused.pop(fits.log, None)
+                log = _with_entry(log, fits)
             logs.setdefault(os.path.realpath(path), log)
     if not logs:
         raise InputError(
             f"{', '.join(map(str, given))}: no flight log found; expected tables "
-            f"({', '.join(_TABLES)}), or files that a reader knows: "
-            f"{binary_logs()}"
+            f"({', '.join(_TABLES)}), or files that a reader knows: {binary_logs()}"
         )
     for named in dict.fromkeys(log.vehicle for log in logs.values() if log.vehicle):
         load_vehicle(named)  # a mistake in the vehicle is no log's
-    doubts = [
-        f"warning: the manifest's entry {entry.log!r} fits no log"
-        for entry in said.logs
-        if entry.log not in used
-    ]
+    doubts = [f"warning: the manifest's entry {pattern!r} fits no log" for pattern in unused]
     return sorted(logs.values(), key=lambda log: natural(log.name)), doubts
 
 
@@ -210,13 +205,10 @@ def natural(name: str) -> tuple[tuple[int, int, str], ...]:
     )
 
 
-def _is_log(path: Path) -> bool:
-    """Return whether a file is a table by its name, or begins as a reader's logs do."""
-    return path.name.lower().endswith(_TABLES) or reader_by_content(path) is not None
-
-
 def _logs_in(root: Path, without: Path | None) -> Iterator[Path]:
-    """Yield the logs that a path stands for."""
+    """Yield the logs that a path stands for: tables by their names, files that begin as a reader's
+    logs do, and bags.
+    """
     if not root.exists():
         raise InputError(f"{root}: no such file or folder")
     if not root.is_dir() or (root / _BAG_FOLDER).is_file():
@@ -232,21 +224,16 @@ def _logs_in(root: Path, without: Path | None) -> Iterator[Path]:
         bags = [name for name in folders if Path(folder, name, _BAG_FOLDER).is_file()]
         folders[:] = [name for name in folders if name not in bags]
         yield from (Path(folder, name) for name in bags)
-        for name in sorted(files):
-            if not name.startswith(".") and _is_log(path := Path(folder, name)):
+        for path in (Path(folder, name) for name in sorted(files) if not name.startswith(".")):
+            if path.name.lower().endswith(_TABLES) or reader_by_content(path) is not None:
                 yield path
 
 
 def _vehicle_beside(path: Path, root: Path) -> str | None:
     """Return the nearest ``vehicle.yaml`` beside a log or above it, no higher than the root."""
-    if not root.is_dir():
-        return None
-    for folder in path.parents:
-        if (folder / VEHICLE_FILE).is_file():
-            return str(folder / VEHICLE_FILE)
-        if folder == root:
-            return None
-    return None
+    above = takewhile(lambda folder: folder != root.parent, path.parents)
+    files = (folder / VEHICLE_FILE for folder in above)
+    return next((str(file) for file in files if file.is_file()), None)
 
 
 def _with_entry(log: FleetLog, entry: ManifestEntry) -> FleetLog:

@@ -11,6 +11,7 @@ import numpy as np
 from ... import __version__
 from ...runtime.page_files import page_template
 from ...runtime.plain_values import as_text
+from ..report.page import TONES, page_file
 from ..report.words import MISSING, coefficient_meaning, in_words, with_std
 from .drift import DRIFT, Appearance, Fleet, Trend
 
@@ -21,7 +22,6 @@ _KINDS = {
     "died": "its process died",
     "error": "an error of this program",
 }
-_TONES = {"explained": "good", "nothing to explain": "good", "unexplained": "bad"}
 _MINUS = "−"
 _WIDTH, _HEIGHT, _EDGE = 132.0, 34.0, 4.0  # of a small picture, pixels
 
@@ -35,7 +35,7 @@ def fleet_page(fleet: Fleet, rows: Sequence[Mapping[str, Any]], command: str) ->
         flights=[row for row in rows if row["status"] == "diagnosed"],
         refusals=[row for row in rows if row["status"] == "refused"],
         kinds=_KINDS,
-        tones=_TONES,
+        tones=TONES,
         missing=MISSING,
         short=short,
         slope=_slope,
@@ -45,6 +45,7 @@ def fleet_page(fleet: Fleet, rows: Sequence[Mapping[str, Any]], command: str) ->
         coefficients=_coefficients,
         settings=DRIFT,
         command=as_text(command),
+        shared_style=page_file("page.css"),
         version=__version__,
     )
 
@@ -59,17 +60,16 @@ def headline(fleet: Fleet) -> str:
     """Return the first sentence."""
     logs = sum(sum(c.values()) for c in fleet.individuals.values())
     refused = sum(c["refused"] for c in fleet.individuals.values())
-    found = changes(fleet)
-    who = list(dict.fromkeys(one.of.id if isinstance(one, Trend) else one.id for one in found))
-    vehicles = len(fleet.individuals)
-    text = f"{_count(logs, 'log')} of {_count(vehicles, 'vehicle')}"
-    text += f", {refused} refused" if refused else ""
+    every = [one.of.id if isinstance(one, Trend) else one.id for one in changes(fleet)]
+    who = list(dict.fromkeys(every))
+    text = f"{_count(logs, 'log')} of {_count(len(fleet.individuals), 'vehicle')}"
+    text += f", {refused} refused: " if refused else ": "
     if logs == refused:
-        return f"{text}: none could be diagnosed."
-    if not found:
-        return f"{text}: no effect changed from flight to flight as far as these flights can tell."
+        return f"{text}none could be diagnosed."
+    if not who:
+        return f"{text}no effect changed from flight to flight as far as these flights can tell."
     shown = in_words(who if len(who) <= 3 else [*who[:3], f"{len(who) - 3} more"])
-    return f"{text}: effects changed from flight to flight on {shown}."
+    return f"{text}effects changed from flight to flight on {shown}."
 
 
 def _count(number: int, word: str) -> str:

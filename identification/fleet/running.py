@@ -72,11 +72,14 @@ def run_fleet(
             done.append(replace(log, key=key))
             if unread is not None:
                 keep(key, refusal("input", unread))
-            elif key in outcomes and not _again(outcomes[key], limit_s):
+            elif key not in outcomes or (
+                outcomes[key].get("kind") in ("time", "died")
+                and limit_s > outcomes[key].get("limit_s", limit_s)
+            ):
+                yield done[-1] if cluster is None else _absolute(done[-1])
+            else:
                 counts["kept"] += 1
                 report(counts)
-            else:
-                yield done[-1] if cluster is None else _absolute(done[-1])
 
     work = partial(diagnose_one, without=without)
     for log, result in each(work, pending(), limit_s, jobs, cluster):
@@ -84,10 +87,6 @@ def run_fleet(
             result = refusal(result.kind, f"{log.path}: {result.words}") | {"limit_s": limit_s}
         keep(log.key, result)
     return done
-
-
-def _again(outcome: Outcome, limit_s: float) -> bool:
-    return outcome.get("kind") in ("time", "died") and limit_s > outcome.get("limit_s", limit_s)
 
 
 def _key_of_name(log: FleetLog) -> str:
@@ -101,10 +100,8 @@ def _absolute(log: FleetLog) -> FleetLog:
     def file(name: str | None) -> str | None:
         return os.path.abspath(name) if name and name.endswith((".yaml", ".yml")) else name
 
-    reader = log.reader
-    if reader is not None and ":" in reader:
-        name, _, option = reader.partition(":")
-        reader = f"{name}:{os.path.abspath(option)}"
+    name, colon, option = (log.reader or "").partition(":")
+    reader = f"{name}:{os.path.abspath(option)}" if colon else log.reader
     path = os.path.abspath(log.path)
     return replace(log, path=path, vehicle=file(log.vehicle), reader=reader, map=file(log.map))
 
@@ -130,8 +127,6 @@ def rows(done: Sequence[FleetLog], outcomes: Outcomes) -> list[dict[str, Any]]:
     for name, log in sorted(named, key=place):
         flights[name] += 1
         known = {"id": as_text(name), "flight": flights[name], "log": as_text(log.name)}
-        known |= {"time": log.time, "session": as_text(log.session)}
-        found.append({**known, **outcomes[log.key]})
-        for key in ("key", "limit_s"):
-            found[-1].pop(key, None)
+        known |= {"time": log.time, "session": as_text(log.session)} | outcomes[log.key]
+        found.append({key: x for key, x in known.items() if key not in ("key", "limit_s")})
     return found

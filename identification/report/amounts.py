@@ -13,7 +13,7 @@ import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ..findings import CHANNELS, Diagnosis, NamedEffect
-from .words import SPACE, coefficient_meaning, effect_summary, in_words, with_std
+from .words import SPACE, coefficient_meaning, effect_summary, in_words, scale_of, with_std
 
 _ROTORS = 4
 _SMALL = 0.5
@@ -27,6 +27,13 @@ _SMALL_UNITS = {
     "Nm": (1e3, "mNm"),
 }
 _MILLI = 0.1  # the same of N and Nm
+# of a coefficient's unit: what it does at which speed
+_AT = {
+    "N/(m/s)": ("N", "at 1 m/s"),
+    "N/(m/s)^2": ("N", "at 1 m/s"),
+    "Nm/(rad/s)": ("Nm", "at 1 rad/s"),
+}
+_RELATIVE = {"1": (100.0, "%"), "1/s": (6000.0, "% a minute")}
 _PLACE = re.compile(r"(along|about) (body|world) ([xyz])|(rotor \d)$")
 _SIDES = {"x": ("forward", "backward"), "y": ("left", "right"), "z": ("up", "down")}
 _KNOWN = 2.0  # standard deviations, from which a coefficient is worth a word
@@ -55,8 +62,8 @@ class Amount:
 
     def __str__(self) -> str:
         """Return ``0.31 ± 0.01 N along x``."""
-        parts = [with_std(self.value, self.std) + (f"{SPACE}{self.unit}" if self.unit else "")]
-        return " ".join([*parts, *([self.where] if self.where else [])])
+        number = with_std(self.value, self.std) + (f"{SPACE}{self.unit}" if self.unit else "")
+        return f"{number} {self.where}".rstrip()
 
 
 def title(name: str) -> str:
@@ -73,14 +80,10 @@ def amount(effect: NamedEffect, coefficient: str, vehicle: Vehicle) -> Amount:
     factor, when = float(_ROTORS) if "per rotor" in meaning else 1.0, ""
     if unit.endswith("/(rad/s m/s)"):
         factor, unit, when = factor * vehicle.hover_rate, unit.split("/")[0], "at 1 m/s"
-    elif unit in ("N/(m/s)", "N/(m/s)^2"):
-        unit, when = "N", "at 1 m/s"
-    elif unit == "Nm/(rad/s)":
-        unit, when = "Nm", "at 1 rad/s"
-    elif unit == "1" and "relative" in meaning:
-        factor, unit = 100.0, "%"
-    elif unit == "1/s" and "relative" in meaning:
-        factor, unit = 6000.0, "% a minute"
+    elif unit in _AT:
+        unit, when = _AT[unit]
+    elif unit in _RELATIVE and "relative" in meaning:
+        factor, unit = _RELATIVE[unit]
     value, std = factor * value, factor * std
     where = ""
     if place := _PLACE.search(meaning):
@@ -117,26 +120,21 @@ def steady_wrench(diagnosis: Diagnosis) -> str:
 
     The mean of a block of 3 s is one number; all blocks together say how sure their mean is.
     """
-    blocks = [
-        part.mean(axis=0)
-        for trace in diagnosis.traces
-        for part in np.array_split(
-            trace.after, max(1, round(len(trace.after) * trace.period / _BLOCK))
-        )
-    ]
+    counts = (max(1, round(len(x.after) * x.period / _BLOCK)) for x in diagnosis.traces)
+    pieces = map(np.array_split, (x.after for x in diagnosis.traces), counts)
+    blocks = [part.mean(axis=0) for parts in pieces for part in parts]
     if len(blocks) < _LEAST_BLOCKS:
         return ""
     mean = np.mean(blocks, axis=0)
     error = np.std(blocks, axis=0, ddof=1) / math.sqrt(len(blocks))
     told = []
-    for what, unit, channels in (("force", "N", slice(0, 3)), ("torque", "Nm", slice(3, 6))):
-        i = channels.start + int(np.argmax(np.abs(mean[channels])))
-        floor = diagnosis.floor_force_rms if unit == "N" else diagnosis.floor_torque_rms
+    for what, unit, way, first, floor in (
+        ("force", "N", "along", 0, diagnosis.floor_force_rms),
+        ("torque", "Nm", "about", 3, diagnosis.floor_torque_rms),
+    ):
+        i = first + int(np.argmax(np.abs(mean[first : first + 3])))
         if abs(mean[i]) > _STEADY * error[i] and not abs(mean[i]) < floor:
-            factor, small = _SMALL_UNITS[unit] if abs(mean[i]) < _MILLI else (1.0, unit)
+            factor, small = scale_of([mean[i]], unit)
             size = with_std(factor * float(mean[i]), factor * float(error[i]))
-            axis = CHANNELS[i][-1]
-            told.append(
-                f"a {what} of {size}{SPACE}{small} {'along' if unit == 'N' else 'about'} {axis}"
-            )
+            told.append(f"a {what} of {size}{SPACE}{small} {way} {CHANNELS[i][-1]}")
     return in_words(told)

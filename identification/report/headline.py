@@ -10,20 +10,19 @@ from .words import in_words, tried
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in plain words, as sure as its least sure part."""
     undecided = [e for e in diagnosis.effects if e.indistinguishable_from]
-    sure = [e for e in diagnosis.effects if e not in undecided and not e.tentative]
-    unsure = [e for e in diagnosis.effects if e not in undecided and e.tentative]
+    rest = [e for e in diagnosis.effects if e not in undecided]
+    sure, unsure = ([e for e in rest if e.tentative == told] for told in (False, True))
     if diagnosis.verdict == "nothing to explain":
         return "The model explains these logs: nothing needs to be added to it."
     if diagnosis.verdict == "unexplained" or not diagnosis.effects:
-        rest = "looks random" if diagnosis.remainder == "random" else "has structure"
+        random, none = diagnosis.remainder == "random", f"no effect {tried(diagnosis)} explains"
         if steady := steady_wrench(diagnosis):
             return (
-                f"On average {steady} acts that the model lacks. What changes of its error {rest}, "
-                f"and no effect {tried(diagnosis)} explains it."
+                f"On average {steady} acts that the model lacks. What changes of its error "
+                f"{'looks random' if random else 'has structure'}, and {none} it."
             )
-        joint = ": no effect" if rest == "looks random" else " that no effect"
-        it = " it" if rest == "looks random" else ""
-        return f"The model's error {rest}{joint} {tried(diagnosis)} explains{it}."
+        how = f"looks random: {none} it" if random else f"has structure that {none}"
+        return f"The model's error {how}."
     told = []
     if sure:
         told.append(
@@ -74,13 +73,10 @@ def _lacked(
     ]
     if before and not changed:
         return in_words([with_amounts(e, diagnosis.declared) for e in effects])
-    lacked = in_words(
-        [with_amounts(e, diagnosis.declared) for e in effects if e.name not in changed]
-    )
+    new = in_words([with_amounts(e, diagnosis.declared) for e in effects if e.name not in changed])
     other = in_words([title(e.name) for e in effects if e.name in changed])
-    return in_words(
-        [
-            *([f"lacked {lacked}"] if lacked else []),
-            *([f"declares {other} with wrong coefficients"] if other else []),
-        ]
-    )
+    told = [
+        f"lacked {new}" if new else "",
+        f"declares {other} with wrong coefficients" if other else "",
+    ]
+    return in_words([*filter(None, told)])

@@ -52,6 +52,10 @@ class LogCheck:
         """Return it as plain values."""
         log = self.log
         reasons = self.guess.reasons if self.guess else ()
+        fields = (
+            {"field": f"{r.section}.{r.field}".rstrip("."), "certain": r.certain, "why": r.why}
+            for r in reasons
+        )
         return {
             "log": log.name,
             "read_by": self.read_by,
@@ -66,14 +70,7 @@ class LogCheck:
             "notes": list(log.notes),
             "doubts": list(self.doubts),
             "map": self.map_text or None,
-            "fields": [
-                {
-                    "field": f"{r.section}.{r.field}" if r.field else r.section,
-                    "certain": r.certain,
-                    "why": r.why,
-                }
-                for r in reasons
-            ],
+            "fields": list(fields),
         }
 
 
@@ -102,37 +99,25 @@ def check_log(
         warnings.simplefilter("ignore", UserWarning)  # the notes say the same
         if log_map is not None:
             log = read_log(path, reader, vehicle, log_map, piece)
-            read_by, text = f"the map {log_map}", _map_text(log_map)
+            shipped = MAPS / f"{log_map}.yaml" if log_map in map_names() else Path(log_map)
+            read_by, text = f"the map {log_map}", shipped.read_text(encoding="utf-8-sig")
         elif reader is None and (table := unknown_table(path)) is not None:
             log, guess = _guessed(table, vehicle, piece)
             read_by, text = "a map that was guessed", map_yaml(guess)
         else:
             log = read_log(path, reader, vehicle, piece=piece)
-            read_by, text = _read_by(path, log)
+            named = re.search(r"\(reader ([^()]+)\)$", log.source)
+            read_by = f"the reader {named[1]}" if named else "this kit's own format"
     if vehicle is None and log.vehicle in preset_names():
         vehicle = load_vehicle(log.vehicle)
-    doubts = [
-        f"guessed: {r.section}{f' {r.field}' if r.field else ''}: {r.why}"
-        for r in (guess.doubts if guess else ())
-    ]
+    guesses = guess.doubts if guess else ()
+    doubts = [f"guessed: {f'{r.section} {r.field}'.rstrip()}: {r.why}" for r in guesses]
     doubts += [note for note in log.notes if note.startswith("warning")]
     answer, by = flew(log)
     if answer in ("no", "not shown"):
         doubts.append(f"the log does not show that anything flew: {by}")
     doubts += _doubts(log, vehicle)
     return LogCheck(log, read_by, log_channels(log), tuple(doubts), guess, text)
-
-
-def _map_text(name: str) -> str:
-    path = MAPS / f"{name}.yaml" if name in map_names() else Path(name)
-    return path.read_text(encoding="utf-8-sig")
-
-
-def _read_by(path: Path, log: FlightLog) -> tuple[str, str]:
-    """Return in words what read a log, and the text of the map where that was one."""
-    if named := re.search(r"\(reader ([^()]+)\)$", log.source):
-        return f"the reader {named[1]}", ""
-    return "this kit's own format", ""
 
 
 def _guessed(table: Table, vehicle: Vehicle | None, piece: int | None) -> tuple[FlightLog, Guess]:

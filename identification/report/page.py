@@ -21,7 +21,7 @@ from .headline import headline
 from .plot_numbers import candidate_bars, page_plots
 from .still_picture import still_picture
 
-_TONES = {
+TONES = {
     "explained": "good",
     "nothing to explain": "good",
     "partly explained": "warn",
@@ -35,14 +35,14 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
     """
     plots, bars = page_plots(diagnosis), candidate_bars(diagnosis)
     data, drawn = plots.data, [*plots.time, *plots.frequency, *plots.signatures]
-    library, script = _library(), _file("page.js")
+    library, script = _library(), page_file("page.js")
     shown = {bar.name for bar in bars}
     return page_template(__package__, "page.html.j2").render(
         found=diagnosis,
         words=words,
         amounts=amounts,
         headline=headline(diagnosis),
-        tone=_TONES.get(diagnosis.verdict, "warn"),
+        tone=TONES[diagnosis.verdict],
         stated=diagnosis.probabilities,
         table=error_table(diagnosis),
         missing=words.MISSING,
@@ -52,9 +52,11 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
         bars=bars,
         more_candidates=[c for c in diagnosis.candidates if c.name not in shown],
         policy=_policy((library, script) if data else ()),
-        data=_in_script(json.dumps(data, separators=(",", ":"), allow_nan=False)) if data else "",
+        # as it may stand in a page's script element: no tag can begin in it
+        data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c") if data else "",
         library=library,
-        library_style=_file("uplot/uPlot.min.css"),
+        shared_style=page_file("page.css"),
+        library_style=page_file("uplot/uPlot.min.css"),
         script=script,
         toggles=data["time"]["effects"] if "time" in data else [],
         command=command,
@@ -62,13 +64,8 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
     )
 
 
-def _in_script(text: str) -> str:
-    """Return JSON as it may stand in a page's script element: no tag can begin in it."""
-    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
-
-
 @cache
-def _file(name: str) -> str:
+def page_file(name: str) -> str:
     """Return a text that stands beside this module."""
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
 
@@ -76,7 +73,10 @@ def _file(name: str) -> str:
 @cache
 def _library() -> str:
     """Return the plotting library with the licence that must go with it."""
-    return f"/*\n{_file('uplot/LICENSE').strip()}\n*/\n{_file('uplot/uPlot.iife.min.js').strip()}"
+    licence, code = (
+        page_file(f"uplot/{name}").strip() for name in ("LICENSE", "uPlot.iife.min.js")
+    )
+    return f"/*\n{licence}\n*/\n{code}"
 
 
 def _policy(scripts: Iterable[str]) -> str:

@@ -7,7 +7,7 @@ after: peaks stay, and every value is one of the log.
 """
 
 import base64
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
+from ...runtime.plain_values import plain
 from ..findings import CHANNELS, Diagnosis, NamedEffect, Signature, Trace
 from ..motion.smoothing import runs_of
 from .words import percent, rounded, scale_of
@@ -104,9 +105,10 @@ class _Joined:
             for i in range(group.start, group.stop)
         ]
 
-    def kept(self, i: int, columns: int) -> list[Index]:
-        """Return the samples of each piece that stand for channel ``i`` in a window's columns."""
-        share = columns / len(self.x)
+    def kept(self, i: int) -> list[Index]:
+        """Return the samples of each piece that stand for channel ``i``."""
+        a_sample = _BASE64 * 2.0 * (3 + len(self.parts)) * len(CHANNELS)
+        share = max(int(PLOTS.most_bytes / a_sample / 4), PLOTS.least_columns) / len(self.x)
         return [
             first + telling_samples(trace, i, max(round(share * len(trace.t)), 1))
             for first, trace in zip(self.first_rows, self.traces, strict=True)
@@ -150,7 +152,7 @@ def page_plots(diagnosis: Diagnosis) -> PagePlots:
                 for trace, start in zip(joined.traces, joined.starts, strict=True)
             ],
             "end": joined.end,
-            "held": [[_digit(a, 9), _digit(b, 9)] for a, b in joined.held_out()],
+            "held": joined.held_out(),
             "channels": [plot.packed for plot in time],
         }
     if long := [trace for trace in diagnosis.traces if len(trace.t) >= 16]:
@@ -164,25 +166,46 @@ def page_plots(diagnosis: Diagnosis) -> PagePlots:
     for name, plots in (("frequency", frequency), ("signatures", signatures)):
         if plots:
             data[name] = [plot.packed for plot in plots]
-    return PagePlots(time, frequency, signatures, data)
+    return PagePlots(time, frequency, signatures, plain(data, 8))
 
 
 def _plot_over_time(joined: _Joined, i: int) -> Plot:
-    traces = joined.traces
+    """Return a channel's plot; ``packed`` holds its series as ``page.js`` unpacks them.
+
+    ``products`` are mean products of ``after`` and the effects' parts: the mean square of
+    ``after`` with any choice of parts added is a sum of them.
+    """
     group = slice(0, 3) if i < 3 else slice(3, 6)  # with the same axis
-    sides = {"before": joined.before, "after": joined.after}
-    largest = max(float(np.abs(x[:, group]).max(initial=0.0)) for x in sides.values())
+    largest = float(np.abs([joined.before[:, group], joined.after[:, group]]).max(initial=0.0))
     factor, unit = scale_of([largest], "N" if i < 3 else "Nm")
-    limit = factor * (1.08 * largest or 1.0 / factor)
-    before, after = (rounded(factor * _rms(x[:, i]), 2) for x in sides.values())
-    change = f"rms {before} → {after}"
-    kept = np.concatenate(joined.kept(i, PLOTS.least_columns))
+    before, after, *parts = (
+        factor * x[:, i] for x in (joined.before, joined.after, *joined.parts.values())
+    )
+    change = f"rms {rounded(_rms(before), 2)} → {rounded(_rms(after), 2)}"
+    kept = joined.kept(i)
+    rows = np.concatenate(kept)
+    times = [joined.x[k] - joined.x[k[0]] for k in kept]
+    tick = max(PLOTS.tick, max(np.diff(t, prepend=0.0).max() for t in times) / PLOTS.steps)
+    steps = np.concatenate([np.diff(np.rint(t / tick), prepend=0.0) for t in times])
     return Plot(
-        _packed_channel(joined, i, factor, unit, limit),
-        {name: (joined.x[kept], factor * x[kept, i]) for name, x in sides.items()},
-        _table_over_time(traces, i, factor, unit),
+        {
+            "key": f"time-{CHANNELS[i]}",
+            "symbol": _SYMBOLS[i],
+            "unit": unit,
+            "limit": factor * (1.08 * largest or 1.0 / factor),
+            "counts": [len(k) for k in kept],
+            "tick": tick,
+            "steps": _base64(steps, "<u2"),
+            "before": packed_series(before[rows]),
+            "after": packed_series(after[rows]),
+            "parts": [packed_series(part[rows]) for part in parts],
+            "products": [[np.mean(x * y) for y in (after, *parts)] for x in (after, *parts)],
+            "rms": _rms(before),
+        },
+        {name: (joined.x[rows], x[rows]) for name, x in (("before", before), ("after", after))},
+        _table_over_time(joined.traces, i, factor, unit),
         f"{_SYMBOLS[i]} ({unit})",
-        "time (s)" if len(traces) == 1 else "pieces of flight, side by side (s)",
+        "time (s)" if len(kept) == 1 else "pieces of flight, side by side (s)",
         f"Residual {_SYMBOLS[i]} in {unit} over time, before and after: {change}. Held-out blocks "
         "are shaded.",
         readout=f"{change} {unit}",
@@ -203,10 +226,10 @@ def _plot_of_spectrum(
     return Plot(
         {
             "key": f"frequency-{what}",
-            "x": _digits(x),
+            "x": x,
             "unit": f"{unit}/√Hz",
-            "before": _digits(before),
-            "after": _digits(after),
+            "before": before,
+            "after": after,
         },
         {"before": (x, before), "after": (x, after)},
         PlotTable(
@@ -227,15 +250,11 @@ def _spectrum(traces: Sequence[Trace], side: str, group: slice, grid: Array) -> 
     """
     total, weight = np.zeros(len(grid)), 0.0
     for trace in traces:
-        x = getattr(trace, side)[:, group]
-        f, power = welch(
-            x,
-            1.0 / trace.period,
-            nperseg=min(len(x), round(PLOTS.spectrum_seconds / trace.period)),
-            axis=0,
-        )
-        total += len(x) * trace.period * np.interp(grid, f, power.sum(axis=1))
-        weight += len(x) * trace.period
+        x, rate = getattr(trace, side)[:, group], 1.0 / trace.period
+        longest = min(len(x), round(PLOTS.spectrum_seconds * rate))
+        f, power = welch(x, rate, nperseg=longest, axis=0)
+        total += len(x) / rate * np.interp(grid, f, power.sum(axis=1))
+        weight += len(x) / rate
     return np.asarray(np.sqrt(total / weight), dtype=np.float64)
 
 
@@ -261,11 +280,11 @@ def _plot_of_signature(signature: Signature, number: int) -> Plot:
             "unit": unit,
             "effect": signature.effect,
             "regressor": signature.regressor,
-            "x": _digits(x[kept]),
+            "x": x[kept],
             "residual": packed_series(residual[kept]),
             "fitted": packed_series(fitted[kept]),
-            "middle": _digits(middle),
-            "mean": _digits(mean),
+            "middle": middle,
+            "mean": mean,
         },
         {
             "before": (x[kept], residual[kept]),
@@ -295,44 +314,6 @@ def binned(x: Array, y: Array, count: int = 14) -> tuple[Array, Array]:
         return np.empty(0), np.empty(0)
     parts = np.array_split(np.argsort(x, kind="stable"), count)
     return np.array([x[p].mean() for p in parts]), np.array([y[p].mean() for p in parts])
-
-
-def _packed_channel(
-    joined: _Joined, i: int, factor: float, unit: str, limit: float
-) -> dict[str, Any]:
-    """Return a channel's series over time as ``page.js`` unpacks them.
-
-    ``products`` are mean products of ``after`` and the effects' parts: the mean square of
-    ``after`` with any choice of parts added is a sum of them.
-    """
-    a_sample = _BASE64 * 2.0 * (3 + len(joined.parts)) * len(CHANNELS)
-    columns = max(int(PLOTS.most_bytes / a_sample / 4), PLOTS.least_columns)
-    kept = joined.kept(i, columns)
-    before, after, *parts = (
-        factor * x[:, i] for x in (joined.before, joined.after, *joined.parts.values())
-    )
-    rows = np.concatenate(kept)
-    times = [joined.x[k] - joined.x[k[0]] for k in kept]
-    longest = max(float(np.diff(t, prepend=0.0).max()) for t in times)
-    tick = max(PLOTS.tick, longest / PLOTS.steps)
-    return {
-        "key": f"time-{CHANNELS[i]}",
-        "symbol": _SYMBOLS[i],
-        "unit": unit,
-        "limit": limit,
-        "counts": [len(k) for k in kept],
-        "tick": tick,
-        "steps": _base64(
-            np.concatenate([np.diff(np.rint(t / tick), prepend=0.0) for t in times]), "<u2"
-        ),
-        "before": packed_series(before[rows]),
-        "after": packed_series(after[rows]),
-        "parts": [packed_series(part[rows]) for part in parts],
-        "products": [
-            [_digit(float(np.mean(x * y))) for y in (after, *parts)] for x in (after, *parts)
-        ],
-        "rms": _digit(_rms(before)),
-    }
 
 
 def telling_samples(trace: Trace, i: int, columns: int) -> Index:
@@ -422,7 +403,7 @@ def packed_series(x: Array) -> dict[str, Any] | None:
     if largest < 1e-12:
         return None
     scale = largest / PLOTS.steps
-    return {"scale": _digit(scale, 9), "data": _base64(np.rint(x / scale), "<i2")}
+    return {"scale": scale, "data": _base64(np.rint(x / scale), "<i2")}
 
 
 def _rms(x: Array) -> float:
@@ -431,11 +412,3 @@ def _rms(x: Array) -> float:
 
 def _base64(x: Array, kind: str) -> str:
     return base64.b64encode(x.astype(kind).tobytes()).decode()
-
-
-def _digit(x: float, digits: int = 5) -> float:
-    return float(f"{x:.{digits}g}")
-
-
-def _digits(x: Iterable[float]) -> list[float]:
-    return [_digit(float(v)) for v in x]

@@ -43,9 +43,9 @@ def with_std(value: float, std: float) -> str:
     else:
         text = rounded(scaled)
     text = text.replace("-", "−")
-    if power == 0:
-        return text
-    return f"{f'({text})' if known else text} × 10{str(power).translate(_SUPERSCRIPT)}"
+    if power:
+        text = f"{f'({text})' if known else text} × 10{str(power).translate(_SUPERSCRIPT)}"
+    return text
 
 
 def scale_of(values: Iterable[float], unit: str) -> tuple[float, str]:
@@ -58,23 +58,23 @@ def scale_of(values: Iterable[float], unit: str) -> tuple[float, str]:
 
 def in_words(names: Sequence[str], last: str = "and") -> str:
     """Return ``a, b and c``."""
-    return (
-        names[0]
-        if len(names) == 1
-        else f"{', '.join(names[:-1])} {last} {names[-1]}"
-        if names
-        else ""
-    )
+    *first, end = names or [""]
+    return f"{', '.join(first)} {last} {end}" if first else end
+
+
+def in_unit(value: float, unit: str, digits: int = 2) -> str:
+    """Return a number with its unit, plain or milli."""
+    factor, unit = scale_of([value], unit)
+    return f"{rounded(factor * value, digits)}{SPACE}{unit}"
 
 
 def percent(share: float) -> str:
     """Return a share in per cent, with a digit behind the point below 10 %."""
     if not math.isfinite(share):
         return MISSING
-    number = f"{100.0 * share:.{0 if abs(share) >= 0.0995 or abs(share) < 0.0005 else 1}f}"
-    return (
-        f"{number.replace('-0', '0') if abs(share) < 0.0005 else number.replace('-', '−')}{SPACE}%"
-    )
+    share = 0.0 if abs(share) < 0.0005 else share
+    number = f"{100.0 * share:.{0 if abs(share) >= 0.0995 or not share else 1}f}"
+    return f"{number.replace('-', '−')}{SPACE}%"
 
 
 def chance(probability: float) -> str:
@@ -127,17 +127,13 @@ def error_sentences(diagnosis: Diagnosis) -> list[str]:
     for what, old, new, floor, unit in telling:
         factor, unit = scale_of((old, new, floor), unit)
         start, end, least = (f"{rounded(factor * x, 2)}{SPACE}{unit}" for x in (old, new, floor))
-        where = f"The {what} error" if told else f"The {what} error on held-out data"
-        change = f"falls from {start} to {end}" if new < 0.98 * old else f"is {end}"
-        if new > 1.02 * old:
-            change = f"rises from {start} to {end}"
-        told.append(
-            f"{where} {change}; the noise floor is not known (at least {least})."
-            if diagnosis.floor_is_bound and math.isfinite(floor)
-            else f"{where} {change}; the noise floor is {least}."
-            if math.isfinite(floor)
-            else f"{where} {change}."
-        )
+        way = "falls" if new < 0.98 * old else "rises" if new > 1.02 * old else ""
+        sentence = f"The {what} error{'' if told else ' on held-out data'} "
+        sentence += f"{way} from {start} to {end}" if way else f"is {end}"
+        if math.isfinite(floor):
+            floor_is = f"not known (at least {least})" if diagnosis.floor_is_bound else least
+            sentence += f"; the noise floor is {floor_is}"
+        told.append(f"{sentence}.")
     return told
 
 
@@ -171,20 +167,16 @@ def _disturbances(diagnosis: Diagnosis) -> str:
         own = [gusts for gusts in diagnosis.gusts if gusts.channel in channels]
         if own:
             largest = max(own, key=lambda gusts: gusts.rms)
-            factor, unit = scale_of([largest.rms], unit)
-            stated.append(
-                f"{rounded(factor * largest.rms, 2)}{SPACE}{unit} rms (correlation time "
-                f"{rounded(largest.time, 2)}{SPACE}s)"
-            )
+            time = f"correlation time {rounded(largest.time, 2)}{SPACE}s"
+            stated.append(f"{in_unit(largest.rms, unit)} rms ({time})")
     return f", with disturbances of up to {in_words(stated)}" if stated else ""
 
 
 def _transient(diagnosis: Diagnosis) -> str:
     """Return when the clearest transient disturbance was, and how strong."""
     largest = diagnosis.pushes[0]
-    factor, unit = scale_of([largest.peak], "Nm" if largest.channel.startswith("tau") else "N")
+    size = in_unit(largest.peak, "Nm" if largest.channel.startswith("tau") else "N")
     where = f" of {largest.log}" if len(diagnosis.logs) + len(diagnosis.test_logs) > 1 else ""
-    size = f"{rounded(factor * largest.peak, 2)}{SPACE}{unit}"
     return f"{size} in {largest.channel} at {rounded(largest.t)}{SPACE}s{where}"
 
 
@@ -220,21 +212,16 @@ def ranking_sentences(diagnosis: Diagnosis) -> list[str]:
 
 def name_in_words(effect: NamedEffect) -> str:
     """Return an effect's name with what it may be instead, and whether it is tentative."""
-    others = f" (or {in_words(effect.indistinguishable_from, 'or')})"
-    return (
-        effect.name
-        + (others if effect.indistinguishable_from else "")
-        + (" (tentative)" if effect.tentative else "")
-    )
+    others = in_words(effect.indistinguishable_from, "or")
+    tentative = " (tentative)" if effect.tentative else ""
+    return f"{effect.name}{f' (or {others})' if others else ''}{tentative}"
 
 
 def confusion(effect: NamedEffect) -> str:
     """Return which other effects would explain these logs as well as this one."""
-    return (
-        f"These logs cannot distinguish {effect.name} from "
-        f"{in_words(effect.indistinguishable_from, 'or')}, which explain "
-        "them equally well."
-    )
+    others = in_words(effect.indistinguishable_from, "or")
+    told = f"These logs cannot distinguish {effect.name} from {others}"
+    return f"{told}, which explain them equally well."
 
 
 def sureness_sentences(diagnosis: Diagnosis) -> list[str]:

@@ -177,13 +177,20 @@ def test_a_measured_weight_is_named_from_the_requests_alone(tmp_path):
     normal = [str(path) for path in sorted(folder.glob("normal*.csv.gz"))]
     weight = str(folder / "add_weight_W3_near_M3__E9_log00.csv.gz")
     options = ["--reader", "crazypad", "--out", str(tmp_path)]
-    against = [word for path in normal for word in ("--against", path)]
-    result = CliRunner().invoke(app, ["compare", weight, *against, *options])
+    result = CliRunner().invoke(app, ["compare", *options, weight, "--against", *normal])
     assert result.exit_code == 0, result.output
     found = json.loads((tmp_path / "change.json").read_text(encoding="utf-8"))
     assert found["place"] == ROTORS[1]
-    # as flights of one session, whose scatter is smaller
-    options = ["--by-folder", *options]
-    result = CliRunner().invoke(app, ["compare", normal[0], "--against", normal[1], *options])
+    assert (len(found["after"]), len(found["before"])) == (1, len(normal))
+    # as flights of two sessions, by the folders of links to them
+    paths = []
+    for day, log in (("mon", normal[0]), ("tue", normal[1])):
+        (tmp_path / day).mkdir()
+        paths.append(tmp_path / day / "log.csv.gz")
+        paths[-1].symlink_to(log)
+    after, before = map(str, paths)
+    words = ["compare", "--by-folder", after, "--against", before, *options]
+    result = CliRunner().invoke(app, words)
     assert result.exit_code == 0, result.output
+    assert f"session {tmp_path}/tue: 0 after, 1 before" in "".join(result.output.splitlines())
     assert json.loads((tmp_path / "change.json").read_text("utf-8"))["place"] == NOWHERE

@@ -54,11 +54,11 @@ def test_the_variance_between_values_is_that_of_paule_and_mandel():
     rng = np.random.default_rng(1)
     s = 10 ** rng.uniform(-4.5, -3.5, 15)
     y = 3e-4 + s * rng.standard_normal(15) + 4e-4 * rng.standard_normal(15)
-    (mean,), covariance, between = meta_regression(np.ones((15, 1)), y, s, True)
+    (mean,), (error,), between = meta_regression(np.ones((15, 1)), y, s, True)
     weight = 1.0 / (s**2 + between**2)
     assert weight @ (y - mean) ** 2 == pytest.approx(14.0, rel=1e-6)
     assert mean == pytest.approx(weight @ y / weight.sum())
-    assert covariance[0, 0] == pytest.approx(1.0 / weight.sum())
+    assert error**2 == pytest.approx(1.0 / weight.sum())
 
 
 @pytest.mark.parametrize("between", [0.0, 2.0])
