@@ -22,7 +22,7 @@ diagnosis goes by these words and not by the name. It computes from the flights 
 `indistinguishable_from` in a report.
 
 Of each coefficient stand its typical sizes for vehicles of 0.45 kg and of 0.03 kg, and its range. `central` is the same in all
-effects that act rotor by rotor. {CENTRAL[:1].upper()}{CENTRAL[1:]}.
+effects that act rotor by rotor. {CENTRAL.meaning}.
 
 """
 
@@ -40,7 +40,7 @@ def effects_page() -> str:
         effect = get(name)
         model = model_in_words(name).replace("``", "`")
         parts.append(f"\n## {name}\n\n{model}\n\n")
-        parts += [_line(c) for c in effect.coefficients if c.meaning != CENTRAL]
+        parts += [_line(c) for c in effect.coefficients if c != CENTRAL]
         parts.append(
             f"\n{_declarations(effect)} Source: {effect.source}.\n\n"
             f"Distinguished by: {effect.excitation}.\n"
@@ -60,7 +60,7 @@ def _declarations(effect: Effect) -> str:
     parts = [f"Kind: {effect.kind}"]
     if effect.role is not None:
         parts.append(f"Role: {effect.role}")
-    if any(c.meaning == CENTRAL for c in effect.coefficients):
+    if CENTRAL in effect.coefficients:
         parts.append("Has `central`")
     if effect.needs:
         parts.append(f"Needs: {', '.join(effect.needs)}")
