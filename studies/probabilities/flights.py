@@ -160,9 +160,9 @@ def _own(kind: str, number: int, imu: bool) -> Flown:
                 10 * number + attempt,
                 60.0,
                 turbulence,
-                imu,
-                gust_time,
-                seen,
+                imu=imu,
+                gust_time=gust_time,
+                seen=seen,
             )
         except InputError:
             continue
