@@ -79,20 +79,11 @@ def fly_points(points: Array, seed: int) -> Hovers:
         loop.run(rng.standard_normal((round(SETTLE / TICK), NOISE)))
         for i in range(ticks):
             loop.run(rng.standard_normal((1, NOISE)))
-            row = kept[k, i]
-            row[:3], row[3:6], row[6:9] = loop.state[16:19], loop.state[13:16], loop.external[:3]
-            row[9:12], row[12:18], row[18:] = loop.external[3:], jet, loop.position
-    mean = kept.mean(axis=1)
+            estimate = *loop.state[16:19], *loop.state[13:16]
+            kept[k, i] = *estimate, *loop.external, *jet, *loop.position
     traces = np.stack([kept[:, :, [0, 6]], kept[:, :, [5, 11]]], axis=1).transpose(0, 1, 3, 2)
-    return Hovers(
-        points,
-        mean[:, 18:],
-        mean[:, :6],
-        mean[:, 6:12],
-        mean[:, 12:18],
-        kept[:, :, :6].std(axis=1),
-        traces,
-    )
+    *wrenches, position = np.split(kept.mean(axis=1), [6, 12, 18], axis=1)
+    return Hovers(points, position, *wrenches, kept[:, :, :6].std(axis=1), traces)
 
 
 def grid_points() -> Array:
