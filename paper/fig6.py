@@ -67,7 +67,7 @@ def fly_points(points: Array, seed: int) -> Hovers:
     rng = np.random.default_rng([6, seed])
     loop.reset(rng, np.array([*points[0], fan.height]), math.pi)
     ticks, n = round(HOVER / TICK), len(points)
-    jet = loop.record[0]["plant"]["jet"]
+    felt = loop.record[0]["plant"]["jet"]
     kept = np.empty((n, ticks, 21))
     for k in range(n):
         # a set point that moves, not one that jumps: a jump of 0.5 m would tilt the vehicle by 11
@@ -79,11 +79,11 @@ def fly_points(points: Array, seed: int) -> Hovers:
         loop.run(rng.standard_normal((round(SETTLE / TICK), NOISE)))
         for i in range(ticks):
             loop.run(rng.standard_normal((1, NOISE)))
-            estimate = *loop.state[16:19], *loop.state[13:16]
-            kept[k, i] = *estimate, *loop.external, *jet, *loop.position
+            kept[k, i, :3], kept[k, i, 3:6] = loop.state[16:19], loop.state[13:16]
+            kept[k, i, 6:] = *loop.external, *felt, *loop.position
     traces = np.stack([kept[:, :, [0, 6]], kept[:, :, [5, 11]]], axis=1).transpose(0, 1, 3, 2)
-    *wrenches, position = np.split(kept.mean(axis=1), [6, 12, 18], axis=1)
-    return Hovers(points, position, *wrenches, kept[:, :, :6].std(axis=1), traces)
+    estimate, truth, jet, position = np.split(kept.mean(axis=1), [6, 12, 18], axis=1)
+    return Hovers(points, position, estimate, truth, jet, kept[:, :, :6].std(axis=1), traces)
 
 
 def grid_points() -> Array:

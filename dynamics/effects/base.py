@@ -33,9 +33,12 @@ from typing import Any
 
 import numpy as np
 from numba import cfunc, types
+from numpy.typing import NDArray
 
-from ..vehicle import Array, Vehicle
+from ..vehicle import Vehicle
 from .declaration import Family, Implausible, Need, Role, StartingPoints, check_role, check_words
+
+Array = NDArray[np.float64]
 
 _POINTER = types.CPointer(types.float64)
 EFFECT_MODEL = types.void(_POINTER, _POINTER, _POINTER, _POINTER)  # of the C function
