@@ -50,8 +50,7 @@ class Hover:
     """
 
     time: Array  # (n,) s
-    force: Array  # (n, 3) estimated
-    torque: Array  # (n, 3) estimated
+    wrench: Array  # (n, 6) force and torque, estimated
     pull: Array  # (n, 6) force and torque of the thread, as they really are
     actuator: Array  # (n, 6) of the unmodelled actuator noise, as they really are
 
@@ -114,7 +113,7 @@ def hover(
     for vectors in (whole.reshape(count, 2, 3) for whole in (wrench, actuator, pull)):
         level = (vectors[..., 0] + 1j * vectors[..., 1]) * heading[:, None].conj()
         vectors[..., 0], vectors[..., 1] = level.real, level.imag
-    return Hover(time, wrench[:, :3], wrench[:, 3:], pull, actuator)
+    return Hover(time, wrench, pull, actuator)
 
 
 def _heading(q: Array) -> complex:
