@@ -92,7 +92,10 @@ $(VENV)-lowest/.lowest: pyproject.toml .ci/lowest.py
 
 # one line on each log of FOLDER: read, or refused and why
 foreign: $(VENV)/.tested
-	$(BIN)/python -m windwrench.studies.foreign_logs $(FOLDER)
+	@find $(FOLDER) -type f | sort | while read -r log; do \
+	  if said=$$($(BIN)/windwrench check "$$log" 2>&1); then echo "$$log: read"; \
+	  else echo "$$said" | tail -1; fi; \
+	done
 
 clean:
 	rm -rf $(VENV) $(VENV)-* build dist results site *.egg-info

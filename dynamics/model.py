@@ -22,17 +22,16 @@ from .effects.base import (
     VEHICLE_SIZE,
     Array,
 )
-from .effects.call import advance, deliver, report
-from .motion import BODY, body_record, effect_wrench, fill_state, rotor_wrench
+from .effects.call import add_wrenches, advance, deliver, report
+from .motion import BODY, body_record, fill_state, rotor_wrench
 from .vehicle import Vehicle
 
 MAX_EFFECTS = 16  # of a kind
 MAX_SENSING = 4
 MEMORY = 112  # numbers that a rotor-input or sensing effect may keep
 _SENSING_ROW = MAX_EFFECTS  # first row of the sensing effects' memory
-_OWN_ROW = (
-    MAX_EFFECTS + MAX_SENSING
-)  # the model's: whether it has delivered rotor speeds yet, and those
+# the model's: whether it has delivered rotor speeds yet, and those
+_OWN_ROW = MAX_EFFECTS + MAX_SENSING
 
 # fields that hold addresses of compiled effects
 _ADDRESSES = ("wrench_models", "wrench_hooks", "rotor_models", "sensing_models")
@@ -77,8 +76,7 @@ def load_model(record: np.void, vehicle: Vehicle) -> Vehicle:
     ):
         raise InputError(
             f"{vehicle.name}: effects: a model holds at most {MAX_EFFECTS} of a kind, and "
-            f"{MAX_SENSING} of "
-            "sensing"
+            f"{MAX_SENSING} of sensing"
         )
     assert max(bundle.rotor_memory, bundle.sensing_memory) <= MEMORY
     record["body"] = body_record(bundle.vehicle)[0]
@@ -157,31 +155,8 @@ def apply_effects(
     the state itself, not at a sigma point.
     """
     if f.wrench_count > 0:
-        if f.waiting > 0:
-            f.waiting = 0
-            fill_state(
-                f.body,
-                position,
-                rotation,
-                velocity,
-                omega,
-                f.rotors,
-                f.wind,
-                f.voltage,
-                f.time,
-                f.effect_state,
-            )
-            advance(
-                f.wrench_hooks[: f.wrench_count],
-                f.wrench_coefficients,
-                f.constants,
-                f.effect_state,
-                f.rotors,
-            )
-        effect_wrench(
-            f.wrench_models[: f.wrench_count],
-            f.wrench_coefficients,
-            f.constants,
+        count = f.wrench_count
+        fill_state(
             f.body,
             position,
             rotation,
@@ -191,6 +166,23 @@ def apply_effects(
             f.wind,
             f.voltage,
             f.time,
+            f.effect_state,
+        )
+        if f.waiting > 0:
+            f.waiting = 0
+            advance(
+                f.wrench_hooks[:count],
+                f.wrench_coefficients,
+                f.constants,
+                f.effect_state,
+                f.rotors,
+            )
+        for i in range(6):
+            f.effect_wrench[i] = 0.0
+        add_wrenches(
+            f.wrench_models[:count],
+            f.wrench_coefficients,
+            f.constants,
             f.effect_state,
             f.effect_wrench,
         )

@@ -156,22 +156,11 @@ def quaternion_from_mrp(rho: Array, out: Array) -> None:
 
 
 @compiled
-def mrp_from_quaternion(q: Array, out: Array) -> None:
-    """Write the modified Rodrigues parameters (3,) of a unit quaternion (4,) into ``out``, (16).
-
-    A quaternion and its negative are one attitude: the one with a non-negative scalar part is
-    taken, so that the result never exceeds 1 in length (half a turn).
-    """
-    sign = 1.0 if q[0] >= 0.0 else -1.0
-    scale = sign / (1.0 + sign * q[0])
-    for i in range(3):
-        out[i] = q[1 + i] * scale
-
-
-@compiled
 def attitude_error(q: Array, reference: Array, out: Array) -> None:
     """Write the world-frame MRP (3,) that takes ``reference`` to ``q`` into ``out``:
-    ``q * conj(reference)``, (25).
+    ``q * conj(reference)``, (16), (25).
+
+    A quaternion and its negative are one attitude: the MRP never exceeds 1 in length, half a turn.
     """
     r = reference
     out[0], out[1], out[2] = mrp_between(q[0], q[1], q[2], q[3], r[0], r[1], r[2], r[3])

@@ -9,9 +9,9 @@ IROS 2016.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,18 +32,20 @@ _SPIN = np.array([-1.0, 1.0, -1.0, 1.0])
 _MOST_POWERS = 6  # coefficients of a motor curve
 
 
-def _positive(value: Array) -> Array:
-    if np.any(value <= 0):
-        raise ValueError(f"must be four positive numbers, got {value.tolist()}")
-    return value
+def _must(hold: Callable[[Any], bool], words: str) -> AfterValidator:
+    """Return a validator of an array that refuses what does not hold."""
+
+    def check(value: Array) -> Array:
+        if not hold(value):
+            raise ValueError(f"must be {words}, got {value.tolist()}")
+        return value
+
+    return AfterValidator(check)
 
 
-def _sense(value: Array) -> Array:
-    if not np.all(np.isin(value, (-1.0, 1.0))):
-        raise ValueError(
-            f"must be four times 1 or -1 (turning sense about body +z), got {value.tolist()}"
-        )
-    return value
+def _is_definite(x: Array) -> bool:
+    symmetric = np.allclose(x, x.T, rtol=1e-9, atol=0.0)
+    return bool(symmetric and np.all(np.linalg.eigvalsh(x) > 0))
 
 
 def _full_thrust(value: tuple[float, ...]) -> tuple[float, ...]:
@@ -76,22 +78,25 @@ def _list_of_effects(value: object) -> object:
     return value
 
 
-def _definite(value: Array) -> Array:
-    symmetric = np.allclose(value, value.T, rtol=1e-9, atol=0.0)
-    if not symmetric or np.any(np.linalg.eigvalsh(value) <= 0):
-        raise ValueError(
-            "must be symmetric and positive definite (3 principal values or 3 x 3), got "
-            f"{value.tolist()}"
-        )
-    return value
-
-
 _Coefficients = Annotated[
     Mapping[str, Number], BeforeValidator(lambda given: {} if given is None else given)
 ]
 # Arrays of numbers as a vehicle file states them
-PerRotor = Annotated[Array, numbers(4), AfterValidator(_positive)]
-InertiaMatrix = Annotated[Array, numbers(3, 3), BeforeValidator(_matrix), AfterValidator(_definite)]
+PerRotor = Annotated[Array, numbers(4), _must(lambda x: np.all(x > 0), "four positive numbers")]
+InertiaMatrix = Annotated[
+    Array,
+    numbers(3, 3),
+    BeforeValidator(_matrix),
+    _must(_is_definite, "symmetric and positive definite (3 principal values or 3 x 3)"),
+]
+TurningSense = Annotated[
+    Array,
+    numbers(4),
+    _must(
+        lambda x: np.all(np.isin(x, (-1.0, 1.0))),
+        "four times 1 or -1 (turning sense about body +z)",
+    ),
+]
 NotNegative = Annotated[Number, Field(ge=0.0), expected("a number that is not negative")]
 Share = Annotated[Number, Field(ge=0.0, lt=1.0), expected("a share, from 0 to below 1")]
 
@@ -229,14 +234,11 @@ class Vehicle:
     omega_source: Literal["measured", "commanded"] = "measured"
     voltage_ref: NotNegative = 0.0
     gravity: Positive = 9.81
-    spin: Annotated[Array, numbers(4), AfterValidator(_sense)] = field(default_factory=_SPIN.copy)
+    spin: TurningSense = field(default_factory=_SPIN.copy)
     rotor_positions: Annotated[Array, numbers(4, 3)] | None = None
     com: Annotated[Array, numbers(3)] = field(default_factory=lambda: np.zeros(3))
     mocap: Mocap = Mocap()
-    effects: Annotated[
-        tuple[EffectSetting, ...],
-        BeforeValidator(_list_of_effects),
-    ] = ()
+    effects: Annotated[tuple[EffectSetting, ...], BeforeValidator(_list_of_effects)] = ()
     motor_curve: MotorCurve | None = None
     floor_z: Number = -math.inf
     ceiling_z: Number = math.inf

@@ -136,9 +136,7 @@ def fly_loads(
             for seed in range(seeds)
         ]
         counted = flights[0].between(_SETTLED, end)
-        estimates.append(
-            [np.stack([f.force[:, 2], f.torque[:, 1]], axis=1)[counted] for f in flights]
-        )
+        estimates.append([f.wrench[counted][:, [2, 4]] for f in flights])
         added.append(np.mean([f.actuator[counted][:, [2, 4]] for f in flights], axis=(0, 1)))
     return np.array(estimates), np.array(added)
 

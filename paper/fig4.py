@@ -116,49 +116,43 @@ def fly_step(
     settings = PlantSettings() if actuator else CALM
     seen = replace(vehicle.mocap, sigma_pos_m=noise[0], sigma_att_rad=noise[1])
     flier = replace(vehicle, mocap=seen)
-    hung, bare = (
+    hung, left = (
         [hover(flier, load, _END, HANG, seed, tuned, settings, _EVERY) for seed in range(seeds)]
         for load in (ROTOR_LOAD, None)
     )
-    time = hung[0].time
-    force, torque = np.array([f.force for f in hung]), np.array([f.torque for f in hung])
-    bare_force, bare_torque = np.array([f.force for f in bare]), np.array([f.torque for f in bare])
-    response, response_torque = force - bare_force, torque - bare_torque
-    pull: Array = np.array([f.pull for f in hung]).mean(axis=0)
-    true = np.stack([pull[:, 2], pull[:, 4], _size(pull)], axis=1)
-    settled, transient = time >= 3.0, (time >= HANG) & (time < HANG + TRANSIENT)
-    force_rise, force_rise_error = _with_error(lambda x: rise_time(time, x), response[..., 2])
-    torque_rise, torque_rise_error = _with_error(
-        lambda x: rise_time(time, x), response_torque[..., 1]
-    )
-    lateral, lateral_error = _with_error(
-        lambda mean: float(_size(mean)[transient].max()), response[..., :2]
-    )
+    time, pull = hung[0].time, np.mean([f.pull for f in hung], axis=0)
+    loaded, bare = (np.array([f.wrench for f in flown]) for flown in (hung, left))
+    response = loaded - bare  # (seeds, n, 6)
     mean = response.mean(axis=0)
-    made_up = mean[:, :2] - as_shown(time, mean[:, 2], pull[:, :2])
-    merits = {
+    settled, transient = time >= 3.0, (time >= HANG) & (time < HANG + TRANSIENT)
+    merits: dict[str, Any] = {
         "position_noise_m": noise[0],
         "attitude_noise_rad": noise[1],
         "actuator_noise": actuator,
         "tuned_rise_s": tuned,
-        "force_rise_s": force_rise,
-        "force_rise_error_s": force_rise_error,
-        "torque_rise_s": torque_rise,
-        "torque_rise_error_s": torque_rise_error,
+    }
+    for name, unit, axis in (("force", "N", 2), ("torque", "Nm", 4)):
+        rise, error = _with_error(lambda x: rise_time(time, x), response[..., axis])
+        merits |= {f"{name}_rise_s": rise, f"{name}_rise_error_s": error}
         # of a hover without the mass
-        "force_std_N": float(bare_force[:, settled, 2].std()),
-        "torque_std_Nm": float(bare_torque[:, settled, 1].std()),
+        merits[f"{name}_std_{unit}"] = float(bare[:, settled, axis].std())
+    lateral, lateral_error = _with_error(lambda x: float(_size(x)[transient].max()), response)
+    made_up = mean[:, :2] - as_shown(time, mean[:, 2], pull[:, :2])
+    merits |= {
         "lateral_N": lateral,
         "lateral_error_N": lateral_error,
         # of the mean of the flights with the mass, with the rest of their noise
-        "unpaired_lateral_N": float(_size(force.mean(axis=0))[transient].max()),
+        "unpaired_lateral_N": float(_size(loaded.mean(axis=0))[transient].max()),
         # beyond the thread's true pull as the filter would show it
         "made_up_lateral_N": float(_size(made_up)[transient].max()),
-        "true_lateral_N": float(true[time >= HANG, 2].max()),
-        "worst_flight_lateral_N": float(_size(force)[:, transient].max()),
-        "worst_flight_lateral_without_mass_N": float(_size(bare_force)[:, transient].max()),
+        "true_lateral_N": float(_size(pull)[time >= HANG].max()),
+        "worst_flight_lateral_N": float(_size(loaded)[:, transient].max()),
+        "worst_flight_lateral_without_mass_N": float(_size(bare)[:, transient].max()),
     }
-    shown = np.stack([force[..., 2].mean(axis=0), torque[..., 1].mean(axis=0), _size(mean)], axis=1)
+    shown, true = (
+        np.stack([wrench[:, 2], wrench[:, 4], _size(level)], axis=1)
+        for wrench, level in ((loaded.mean(axis=0), mean), (pull, pull))
+    )
     return Step(noise, actuator, tuned, time, shown, true, merits)
 
 

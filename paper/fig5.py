@@ -10,7 +10,7 @@ The paper's comparison;
 * ``anew``: the optimiser's for each noise level.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -18,15 +18,7 @@ import numpy as np
 
 from ..envs.plant import TICK
 from ..estimator import UKFTuning, WrenchEKF, WrenchUKF
-from .fig5_estimators import (
-    ERRORS,
-    UKF_TUNED,
-    Runner,
-    runner,
-    score,
-    tune_observer,
-    tune_ukf,
-)
+from .fig5_estimators import ERRORS, UKF_TUNED, Runner, runner, score, tune
 from .fig5_flights import FLIGHTS, NOISES, PLANTS, Array, Flight, fly, vehicle_at
 from .fig5_picture import draw
 from .observer import NonlinearObserver, ObserverTuning
@@ -47,8 +39,13 @@ PAIRS = (
 _TUNING_SEEDS = (10_001, 10_002)
 _RESAMPLES = 4000
 
+_CASE = ("plant", "flight", "noise")
 # (plant, flight, noise, estimator) -> one row (seeds, 5) of the four errors and the NIS
 Scores = dict[tuple[str, str, str, str], Array]
+# (plant, flight, noise, label of the pair, error) -> ratio and interval
+Ratios = dict[tuple[str, str, str, str, str], tuple[float, float, float]]
+# (plant, noise) -> the optimiser's
+Tunings = dict[tuple[str, str], tuple[UKFTuning, ObserverTuning]]
 
 
 def run(seeds: int, progress: Progress, evaluations: int = 120) -> Result:
@@ -60,15 +57,11 @@ def run(seeds: int, progress: Progress, evaluations: int = 120) -> Result:
         evaluations: of the cost for each tuning; 0 leaves "low" and "anew" at their starts.
     """
     flights: dict[tuple[str, str, str], list[Flight]] = {}
-    tunings: dict[tuple[str, str], tuple[UKFTuning, ObserverTuning]] = {}
+    tunings: Tunings = {}
     cases = [(plant, noise) for plant in PLANTS for noise in NOISES]
     for i, (plant, noise) in enumerate(cases):
         own = [f for flight in FLIGHTS for f in fly(flight, noise, plant, _TUNING_SEEDS)]
-        vehicle = vehicle_at(noise)
-        tunings[plant, noise] = (
-            tune_ukf(vehicle, own, evaluations),
-            tune_observer(vehicle, own, evaluations),
-        )
+        tunings[plant, noise] = tune(vehicle_at(noise), own, evaluations)
         for flight in FLIGHTS:
             flights[plant, flight, noise] = fly(flight, noise, plant, range(seeds))
         progress(0.5 * (i + 1) / len(cases))
@@ -98,29 +91,22 @@ def run(seeds: int, progress: Progress, evaluations: int = 120) -> Result:
     )
 
 
-def _runners(
-    plant: str, noise: str, tunings: Mapping[tuple[str, str], tuple[UKFTuning, ObserverTuning]]
-) -> dict[str, Runner]:
+def _runners(plant: str, noise: str, tunings: Tunings) -> dict[str, Runner]:
     """Return all our estimators, by name, for flights of a plant at a noise level."""
     vehicle = vehicle_at(noise)
     base = UKFTuning.for_vehicle(vehicle, TICK)
-    (ukf_low, observer_low), (ukf_anew, observer_anew) = (
-        tunings[plant, "low"],
-        tunings[plant, noise],
-    )
+    low, observer_low = tunings[plant, "low"]
     # a filter is told how noisy its measurements are: that is no tuning
-    ukf_low = replace(
-        ukf_low, position_noise=base.position_noise, attitude_noise=base.attitude_noise
-    )
-    return {
-        "UKF 1 s": runner(WrenchUKF(vehicle, base, TICK)),
-        "EKF 1 s": runner(WrenchEKF(vehicle, base, TICK)),
-        "observer 1 s": runner(NonlinearObserver(vehicle, ObserverTuning(), TICK)),
-        "UKF low": runner(WrenchUKF(vehicle, ukf_low, TICK)),
-        "observer low": runner(NonlinearObserver(vehicle, observer_low, TICK)),
-        "UKF anew": runner(WrenchUKF(vehicle, ukf_anew, TICK)),
-        "observer anew": runner(NonlinearObserver(vehicle, observer_anew, TICK)),
-    }
+    low = replace(low, position_noise=base.position_noise, attitude_noise=base.attitude_noise)
+    runners = {"EKF 1 s": runner(WrenchEKF(vehicle, base, TICK))}
+    for way, (ukf, observer) in {
+        "1 s": (base, ObserverTuning()),
+        "low": (low, observer_low),
+        "anew": tunings[plant, noise],
+    }.items():
+        runners[f"UKF {way}"] = runner(WrenchUKF(vehicle, ukf, TICK))
+        runners[f"observer {way}"] = runner(NonlinearObserver(vehicle, observer, TICK))
+    return runners
 
 
 def ratio(rows: Array, rival: Array) -> tuple[float, float, float]:
@@ -130,10 +116,6 @@ def ratio(rows: Array, rival: Array) -> tuple[float, float, float]:
     pick = np.random.default_rng(0).integers(len(rows), size=(_RESAMPLES, len(rows)))
     low, high = np.quantile(rows[pick].mean(axis=1) / rival[pick].mean(axis=1), [0.025, 0.975])
     return float(rows.mean() / rival.mean()), float(low), float(high)
-
-
-# (plant, flight, noise, label of the pair, error) -> ratio and interval
-Ratios = dict[tuple[str, str, str, str, str], tuple[float, float, float]]
 
 
 def _ratios(scores: Scores) -> Ratios:
@@ -146,49 +128,33 @@ def _ratios(scores: Scores) -> Ratios:
     return out
 
 
-def _round(value: float) -> float | None:
-    return float(f"{value:.4g}") if np.isfinite(value) else None
+def _round(value: Any) -> float | None:
+    return float(f"{float(value):.4g}") if np.isfinite(value) else None
 
 
-def _figures(
-    scores: Scores,
-    ratios: Ratios,
-    tunings: Mapping[tuple[str, str], tuple[UKFTuning, ObserverTuning]],
-    seeds: int,
-) -> dict[str, Any]:
+def _named(key: Sequence[str], *more: str) -> dict[str, str]:
+    return dict(zip((*_CASE, *more), key, strict=True))
+
+
+def _figures(scores: Scores, ratios: Ratios, tunings: Tunings, seeds: int) -> dict[str, Any]:
     return {
         "seeds": seeds,
         "rmse_ratio": [
-            {
-                "plant": plant,
-                "flight": flight,
-                "noise": noise,
-                "pair": label,
-                "error": error,
-                "ratio": _round(value[0]),
-                "ci95": [_round(value[1]), _round(value[2])],
-            }
-            for (plant, flight, noise, label, error), value in ratios.items()
+            _named(key, "pair", "error")
+            | {"ratio": _round(value), "ci95": [_round(low), _round(high)]}
+            for key, (value, low, high) in ratios.items()
         ],
         "rmse": [
-            {
-                "plant": plant,
-                "flight": flight,
-                "noise": noise,
-                "estimator": name,
-                **{
-                    error: _round(v)
-                    for error, v in zip((*ERRORS, "nis"), rows.mean(axis=0), strict=True)
-                },
-            }
-            for (plant, flight, noise, name), rows in scores.items()
+            _named(key, "estimator")
+            | dict(zip((*ERRORS, "nis"), map(_round, rows.mean(axis=0)), strict=True))
+            for key, rows in scores.items()
         ],
         "tuning": [
             {
                 "plant": plant,
                 "noise": noise,
-                "UKF": {k: _round(float(np.asarray(getattr(ukf, k)))) for k in UKF_TUNED},
-                "observer": {k: _round(float(np.asarray(v))) for k, v in asdict(observer).items()},
+                "UKF": {k: _round(getattr(ukf, k)) for k in UKF_TUNED},
+                "observer": {k: _round(v) for k, v in asdict(observer).items()},
             }
             for (plant, noise), (ukf, observer) in tunings.items()
         ],
@@ -201,7 +167,7 @@ def _columns(scores: Scores) -> Columns:
     return table(
         [
             {
-                **dict(zip(("plant", "flight", "noise", "estimator"), key, strict=True)),
+                **_named(key, "estimator"),
                 "seed": np.arange(len(rows)),
                 **dict(zip(names, rows.T, strict=True)),
             }

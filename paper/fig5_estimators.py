@@ -4,7 +4,6 @@ own.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
@@ -72,47 +71,45 @@ def cost(run: Runner, flights: Sequence[Flight]) -> float:
     return total / len(flights) if np.isfinite(total) else _WORST
 
 
-def tune_observer(vehicle: Vehicle, flights: Sequence[Flight], evaluations: int) -> ObserverTuning:
-    """Return the gains and cutoffs that err least on ``flights``, by Nelder and Mead on their
-    logarithms.
+def tune(
+    vehicle: Vehicle, flights: Sequence[Flight], evaluations: int
+) -> tuple[UKFTuning, ObserverTuning]:
+    """Return the filter's process noise, and the observer's gains and cutoffs, that err least on
+    ``flights``, by Nelder and Mead on their logarithms. What is measured is as noisy as it is.
 
-    Other starts, a budget of 600 and differential evolution all led to the same tuning.
+    For the observer other starts, a budget of 600 and differential evolution all led to the same
+    tuning.
     """
+    base = UKFTuning.for_vehicle(vehicle, TICK)
+    default = np.array([float(np.asarray(getattr(base, name))) for name in UKF_TUNED])
 
-    def build(p: Array) -> ObserverTuning:
-        return ObserverTuning(*(float(v) for v in p))
+    def of_ukf(p: Array) -> UKFTuning:
+        return replace(base, **dict(zip(UKF_TUNED, p.tolist(), strict=True)))
 
-    # much faster than the default: from there the optimum is a walk along one valley, slower pose
-    # against faster gain
-    p = _best(
-        lambda p: runner(NonlinearObserver(vehicle, build(p), TICK)),
-        (3.0, 6.0, 10.0, 10.0),
+    def of_observer(p: Array) -> ObserverTuning:
+        return ObserverTuning(*p.tolist())
+
+    # the default believes the rotors too little for any of these flights
+    ukf = _best(
+        lambda p: WrenchUKF(vehicle, of_ukf(p), TICK),
+        default * [0.1, 2.0, 0.1, 2.0],
         flights,
         evaluations,
     )
-    return build(p)
-
-
-def tune_ukf(vehicle: Vehicle, flights: Sequence[Flight], evaluations: int) -> UKFTuning:
-    """Return the process noise that errs least on ``flights``, likewise; what is measured is as
-    noisy as it is.
-    """
-    base = UKFTuning.for_vehicle(vehicle, TICK)
-    default = [float(np.asarray(getattr(base, name))) for name in UKF_TUNED]
-
-    def build(p: Array) -> UKFTuning:
-        return replace(base, **{name: float(v) for name, v in zip(UKF_TUNED, p, strict=True)})
-
-    # the default believes the rotors too little for any of these flights
-    start = (0.1 * default[0], 2.0 * default[1], 0.1 * default[2], 2.0 * default[3])
-    return build(
-        _best(lambda p: runner(WrenchUKF(vehicle, build(p), TICK)), start, flights, evaluations)
+    # much faster than the default: from there the optimum is a walk along one valley, slower pose
+    # against faster gain
+    observer = _best(
+        lambda p: NonlinearObserver(vehicle, of_observer(p), TICK),
+        np.array([3.0, 6.0, 10.0, 10.0]),
+        flights,
+        evaluations,
     )
+    return of_ukf(ukf), of_observer(observer)
 
 
 def _best(
-    build: Callable[[Array], Runner],
-    start: Sequence[float],
+    build: Callable[[Array], WrenchUKF],
+    start: Array,
     flights: Sequence[Flight],
     evaluations: int,
 ) -> Array:
@@ -121,17 +118,21 @@ def _best(
 
     The limit matters on the exact plant, where the best white noise of the rotors is zero.
     """
-    centre = np.log(np.asarray(start))
+    centre = np.log(start)
 
     def parameters(offset: Array) -> Array:
         return np.asarray(np.exp(centre + np.clip(offset, -_REACH, _REACH)))
 
     simplex = np.vstack([np.zeros_like(centre), np.log(_FACTOR) * np.eye(len(centre))])
-    options: Any = {"initial_simplex": simplex, "maxfev": evaluations, "xatol": 0.01, "fatol": 1e-5}
     result = minimize(
-        lambda offset: cost(build(parameters(offset)), flights),
+        lambda offset: cost(runner(build(parameters(offset))), flights),
         np.zeros(len(centre)),
         method="Nelder-Mead",
-        options=options,
+        options={
+            "initial_simplex": simplex,
+            "maxfev": evaluations,
+            "xatol": 0.01,
+            "fatol": 1e-5,
+        },
     )
     return parameters(result.x)

@@ -67,7 +67,7 @@ def fly_points(points: Array, seed: int) -> Hovers:
     rng = np.random.default_rng([6, seed])
     loop.reset(rng, np.array([*points[0], fan.height]), math.pi)
     ticks, n = round(HOVER / TICK), len(points)
-    jet = loop.record[0]["plant"]["jet"]
+    felt = loop.record[0]["plant"]["jet"]
     kept = np.empty((n, ticks, 21))
     for k in range(n):
         # a set point that moves, not one that jumps: a jump of 0.5 m would tilt the vehicle by 11
@@ -79,20 +79,11 @@ def fly_points(points: Array, seed: int) -> Hovers:
         loop.run(rng.standard_normal((round(SETTLE / TICK), NOISE)))
         for i in range(ticks):
             loop.run(rng.standard_normal((1, NOISE)))
-            row = kept[k, i]
-            row[:3], row[3:6], row[6:9] = loop.state[16:19], loop.state[13:16], loop.external[:3]
-            row[9:12], row[12:18], row[18:] = loop.external[3:], jet, loop.position
-    mean = kept.mean(axis=1)
+            kept[k, i, :3], kept[k, i, 3:6] = loop.state[16:19], loop.state[13:16]
+            kept[k, i, 6:] = *loop.external, *felt, *loop.position
     traces = np.stack([kept[:, :, [0, 6]], kept[:, :, [5, 11]]], axis=1).transpose(0, 1, 3, 2)
-    return Hovers(
-        points,
-        mean[:, 18:],
-        mean[:, :6],
-        mean[:, 6:12],
-        mean[:, 12:18],
-        kept[:, :, :6].std(axis=1),
-        traces,
-    )
+    estimate, truth, jet, position = np.split(kept.mean(axis=1), [6, 12, 18], axis=1)
+    return Hovers(points, position, estimate, truth, jet, kept[:, :, :6].std(axis=1), traces)
 
 
 def grid_points() -> Array:

@@ -9,6 +9,7 @@ the bound: a command ``gain * torque`` is at most ``gain * tau_max``.
 import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +51,7 @@ NOISE_GAIN = 24.0  # at which each of them is let in alone
 
 Array = NDArray[np.float64]
 Path = Callable[[Array], Array]
+Flights = dict[float, dict[float, list[Episode]]]  # by rise time or fan speed, and by gain
 
 
 @dataclass(frozen=True)
@@ -212,19 +214,44 @@ def capture_time(episode: Episode) -> float:
     return float(episode.time[int(np.argmax(inside))])
 
 
-def _capture_figures(
-    gain: float, rise_time: float, episodes: list[Episode]
-) -> dict[str, float | None]:
+def _capture_figures(episodes: Sequence[Episode]) -> dict[str, float | None]:
     times = np.array([capture_time(e) for e in episodes])
     caught = np.isfinite(times)
+    late = np.array([e.offset[DECISIONS // 2 :] for e in episodes])
     return {
-        "gain": gain,
-        "rise_time_s": rise_time,
         "captured": float(caught.mean()),
         "median_time_s": float(np.median(times[caught])) if caught.any() else None,
-        "rmse_last_10_s_m": float(
-            np.sqrt(np.mean([e.offset[DECISIONS // 2 :] ** 2 for e in episodes]))
-        ),
+        "rmse_last_10_s_m": float(np.sqrt(np.mean(late**2))),
+    }
+
+
+def _tracking_figures(episodes: Sequence[Episode]) -> dict[str, float]:
+    return {
+        "rmse_m": float(np.mean([e.rmse for e in episodes])),
+        "share_within_fan_radius": float(np.mean([e.offset < Fan().radius for e in episodes])),
+        "lost": float(np.mean([e.lost for e in episodes])),
+    }
+
+
+def _fastest_figures(f: Fastest) -> dict[str, Any]:
+    return {
+        "gain": f.gain,
+        "rise_time_s": f.rise_time,
+        "bound_m_s": f.bound,
+        "held_m_s": f.held,
+        "held_share_of_bound": f.held / f.bound,
+        "held_share_of_bound_ci95": [end / f.bound for end in f.held_interval],
+        "held_m_s_by_search": f.searches,
+        "calm_m_s": f.calm,
+        "calm_sudden_m_s": f.sudden,
+    }
+
+
+def _flown(env: FanTrackingEnv, seeds: int) -> dict[float, list[Episode]]:
+    """Return one episode for each seed under the law of each of ``SHOWN_GAINS``."""
+    return {
+        gain: [fly_episode(env, Admittance(gain), seed) for seed in range(seeds)]
+        for gain in SHOWN_GAINS
     }
 
 
@@ -237,28 +264,18 @@ def run(seeds: int, progress: Progress) -> Result:
     if seeds < 1:
         raise InputError(f"fig7: needs at least one seed, got {seeds}")
     largest, at = strongest_torque(Fan(), load_vehicle("ardrone2"), DISTANCE)
-    captures: dict[tuple[float, float], list[Episode]] = {}
+    captures: Flights = {}
     for rise_time in RISE_TIMES:
-        static = SCENARIOS["static"]
-        env = FanTrackingEnv(
-            Scenario(
-                static.summary, motions=static.motions, offset=static.offset, rise_time=rise_time
-            )
+        captures[rise_time] = _flown(
+            FanTrackingEnv(replace(SCENARIOS["static"], rise_time=rise_time)), seeds
         )
-        for gain in SHOWN_GAINS:
-            captures[rise_time, gain] = [
-                fly_episode(env, Admittance(gain), seed) for seed in range(seeds)
-            ]
-            progress(0.15 * len(captures) / (len(RISE_TIMES) * len(SHOWN_GAINS)))
-    tracks: dict[tuple[float, float], list[Episode]] = {}
+        progress(0.15 * len(captures) / len(RISE_TIMES))
+    tracks: Flights = {}
     env = make_env(RISE_TIMES[0])
     for speed in FAN_SPEEDS:
         env.fan_path = triangle(speed)
-        for gain in SHOWN_GAINS:
-            tracks[speed, gain] = [
-                fly_episode(env, Admittance(gain), seed) for seed in range(seeds)
-            ]
-            progress(0.15 + 0.2 * len(tracks) / (len(FAN_SPEEDS) * len(SHOWN_GAINS)))
+        tracks[speed] = _flown(env, seeds)
+        progress(0.15 + 0.2 * len(tracks) / len(FAN_SPEEDS))
     fastest = sweep(seeds, largest, lambda share: progress(0.35 + 0.55 * share))
     bound = min(NOISE_GAIN * largest, MAX_COMMAND)
     alone = {
@@ -270,32 +287,14 @@ def run(seeds: int, progress: Progress) -> Result:
     }
     progress(1.0)
     capture_rows = [
-        _capture_figures(gain, rise_time, episodes)
-        for (rise_time, gain), episodes in captures.items()
+        {"gain": gain, "rise_time_s": rise_time, **_capture_figures(episodes)}
+        for rise_time, flown in captures.items()
+        for gain, episodes in flown.items()
     ]
     track_rows = [
-        {
-            "fan_speed_m_s": speed,
-            "gain": gain,
-            "rmse_m": float(np.mean([e.rmse for e in episodes])),
-            "share_within_fan_radius": float(np.mean([e.offset < Fan().radius for e in episodes])),
-            "lost": float(np.mean([e.lost for e in episodes])),
-        }
-        for (speed, gain), episodes in tracks.items()
-    ]
-    fastest_rows = [
-        {
-            "gain": f.gain,
-            "rise_time_s": f.rise_time,
-            "bound_m_s": f.bound,
-            "held_m_s": f.held,
-            "held_share_of_bound": f.held / f.bound,
-            "held_share_of_bound_ci95": [end / f.bound for end in f.held_interval],
-            "held_m_s_by_search": f.searches,
-            "calm_m_s": f.calm,
-            "calm_sudden_m_s": f.sudden,
-        }
-        for f in fastest
+        {"fan_speed_m_s": speed, "gain": gain, **_tracking_figures(episodes)}
+        for speed, flown in tracks.items()
+        for gain, episodes in flown.items()
     ]
     figures = {
         "seeds": seeds,
@@ -306,7 +305,7 @@ def run(seeds: int, progress: Progress) -> Result:
         "speed_step_share_of_bound": (BRACKET[1] - BRACKET[0]) / 2**HALVINGS,
         "capture": capture_rows,
         "tracking": track_rows,
-        "fastest": fastest_rows,
+        "fastest": [_fastest_figures(f) for f in fastest],
         "searches": REPEATS,
         "held_share_of_bound_with_one_noise": {
             noise: float(np.mean(shares)) for noise, shares in alone.items()
@@ -344,15 +343,10 @@ def _share(row: Fastest) -> str:
     return f"{row.held / row.bound:.0%} [{low / row.bound:.0%}, {high / row.bound:.0%}]"
 
 
-def _traces(
-    captures: dict[tuple[float, float], list[Episode]],
-    tracks: dict[tuple[float, float], list[Episode]],
-) -> Columns:
+def _traces(captures: Flights, tracks: Flights) -> Columns:
     """Return every flown sample of capture and tracking, a row a decision."""
-    flights = [("capture", 0.0, *key, some) for key, some in captures.items()]
-    flights += [
-        ("tracking", speed, RISE_TIMES[0], gain, some) for (speed, gain), some in tracks.items()
-    ]
+    flights = [("capture", 0.0, *one) for one in captures.items()]
+    flights += [("tracking", speed, RISE_TIMES[0], some) for speed, some in tracks.items()]
     return table(
         [
             {
@@ -370,7 +364,8 @@ def _traces(
                 "tz_estimate": e.observation[:, 5],
                 "tz_true": e.torque[:, 2],
             }
-            for part, speed, rise_time, gain, some in flights
+            for part, speed, rise_time, flown in flights
+            for gain, some in flown.items()
             for e in some
         ]
     )

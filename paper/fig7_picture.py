@@ -25,8 +25,8 @@ _HELD = (
 
 @styled()
 def draw_tracking(
-    captures: Mapping[tuple[float, float], list[Episode]],
-    tracks: Mapping[tuple[float, float], list[Episode]],
+    captures: Mapping[float, Mapping[float, list[Episode]]],
+    tracks: Mapping[float, Mapping[float, list[Episode]]],
     fastest: Sequence[Any],
     largest: float,
     at: float,
@@ -35,8 +35,8 @@ def draw_tracking(
     """Draw the three experiments.
 
     Args:
-        captures: flights for each (rise time s, gain), from 0.8 m off a fan that stands still.
-        tracks: flights for each (fan speed m/s, gain), behind a fan that moves to and fro.
+        captures: flights by rise time (s) and gain, from 0.8 m off a fan that stands still.
+        tracks: flights by fan speed (m/s) and gain, behind a fan that moves to and fro.
         fastest: rows ``Fastest`` of the search for the fastest fan.
         largest: the jet's largest torque, Nm.
         at: the offset where it acts, m.
@@ -44,21 +44,20 @@ def draw_tracking(
     """
     figure = new_figure(11.6)
     grid = figure.add_gridspec(4, 3, height_ratios=[1, 1.15, 0.75, 1.4])
-    rise_times = sorted({rise for rise, _ in captures})
-    first = None
+    rise_times, first = sorted(captures), None
     for column, rise_time in enumerate(rise_times):
         first = axes = figure.add_subplot(grid[0, column], sharey=first)
-        _capture(axes, {gain: some for (rise, gain), some in captures.items() if rise == rise_time})
+        _capture(axes, captures[rise_time])
         axes.set_title(f"from 0.8 m off, rise time {rise_time:g} s")
     # all of every trace, and the legend above them
-    offsets = np.concatenate([_signed_offset(e) for some in captures.values() for e in some])
+    flown = [e for one in captures.values() for some in one.values() for e in some]
+    offsets = np.concatenate([_signed_offset(e) for e in flown])
     axes.set_ylim(min(offsets.min(), -_RADIUS) - 0.1, max(offsets.max(), _RADIUS) + 0.35)
     axes = figure.add_subplot(grid[0, 2])
-    _torque(axes, captures[rise_times[0], 18.0][0], largest)
+    _torque(axes, captures[rise_times[0]][18.0][0], largest)
     axes.set_title(f"its torque, rise time {rise_times[0]:g} s")
     first = second = None
-    for column, speed in enumerate(sorted({speed for speed, _ in tracks})):
-        flights = {gain: some for (fan, gain), some in tracks.items() if fan == speed}
+    for column, (speed, flights) in enumerate(sorted(tracks.items())):
         first = axes = figure.add_subplot(grid[1, column], sharey=first)
         _follow(axes, flights)
         axes.set_title(f"fan at {speed:g} m/s, rise time {rise_times[0]:g} s")

@@ -7,7 +7,6 @@ y to its left, both level): the vehicle holds yaw 0, but unmodelled actuator tor
 by up to 0.1 rad, and the load with it.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,8 +50,7 @@ class Hover:
     """
 
     time: Array  # (n,) s
-    force: Array  # (n, 3) estimated
-    torque: Array  # (n, 3) estimated
+    wrench: Array  # (n, 6) force and torque, estimated
     pull: Array  # (n, 6) force and torque of the thread, as they really are
     actuator: Array  # (n, 6) of the unmodelled actuator noise, as they really are
 
@@ -96,7 +94,7 @@ def hover(
     rng = np.random.default_rng(seed)
     loop.reset(rng, _START)
     count, hang_tick = round(seconds / TICK / every), round(hang_at / TICK / every)
-    time, heading = np.empty(count), np.empty((count, 2))
+    time, heading = np.empty(count), np.empty(count, dtype=np.complex128)
     wrench, actuator, pull = np.empty((count, 6)), np.empty((count, 6)), np.zeros((count, 6))
     for k in range(count):
         if k == hang_tick and load is not None:
@@ -112,21 +110,13 @@ def hover(
             pull[k] = loop.load_pull()
     if not loop.healthy() or loop.position[2] < 0.0:
         raise InputError(f"{vehicle.name} cannot hover with {MASS * 1e3:.0f} g on a thread")
-    for vectors in (
-        whole[:, part] for whole in (wrench, actuator, pull) for part in (slice(0, 3), slice(3, 6))
-    ):
-        x, y = vectors[:, 0].copy(), vectors[:, 1].copy()
-        vectors[:, 0], vectors[:, 1] = (
-            heading[:, 0] * x + heading[:, 1] * y,
-            heading[:, 0] * y - heading[:, 1] * x,
-        )
-    return Hover(time, wrench[:, :3], wrench[:, 3:], pull, actuator)
+    for vectors in (whole.reshape(count, 2, 3) for whole in (wrench, actuator, pull)):
+        level = (vectors[..., 0] + 1j * vectors[..., 1]) * heading[:, None].conj()
+        vectors[..., 0], vectors[..., 1] = level.real, level.imag
+    return Hover(time, wrench, pull, actuator)
 
 
-def _heading(q: Array) -> Array:
-    """Return where the nose of an attitude (4,) points, (2,) of length 1, seen from above."""
-    nose: Array = np.array(
-        [1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3]), 2.0 * (q[1] * q[2] + q[0] * q[3])]
-    )
-    nose /= math.hypot(nose[0], nose[1])
-    return nose
+def _heading(q: Array) -> complex:
+    """Return where the nose of an attitude (4,) points, x + iy of length 1, seen from above."""
+    nose = complex(1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3]), 2.0 * (q[1] * q[2] + q[0] * q[3]))
+    return nose / abs(nose)

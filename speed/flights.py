@@ -74,6 +74,9 @@ def alone(task: str, scenario: str, period: float, **more: Any) -> Callable[[], 
 
 
 def _stepping(env: Any, period: float, steps: int) -> Callable[[], float]:
+    """Return a run of ``steps`` decisions of an environment or of several, ``period`` s of flight
+    each, over all of them.
+    """
     action = np.zeros(env.action_space.shape, dtype=np.float32)
 
     def run() -> float:
@@ -88,38 +91,21 @@ def _stepping(env: Any, period: float, steps: int) -> Callable[[], float]:
 
 
 def together(count: int, threads: int = 1) -> Callable[[], float]:
-    """Return a run of ``count`` environments that step together."""
+    """Return a run of ``count`` environments that step together; their fans stand still and leave
+    no vehicle behind, so that no reset falls into a run.
+    """
     from ..envs.vector import TaskVectorEnv
 
     envs = TaskVectorEnv(count, max_episode_steps=10**9, threads=threads, scenario="static")
-    return _all_stepping(envs, max(2, _TOGETHER // count))
+    return _stepping(envs, 0.08 * count, max(2, _TOGETHER // count))
 
 
 def in_lanes(count: int, threads: int = 1) -> Callable[[], float]:
-    """Return a run of ``count`` environments in the lanes of a vector unit."""
+    """Return the same in the lanes of a vector unit."""
     from ..envs.lanes.vector import TaskLanes
 
     envs = TaskLanes(count, 10**9, threads, scenario="static")
-    return _all_stepping(envs, max(2, _IN_LANES // count))
-
-
-def _all_stepping(envs: Any, steps: int) -> Callable[[], float]:
-    """The fan stands still and never leaves the vehicle behind: no reset falls into a run."""
-    from ..envs.fan_tracking import DECISION_TICKS
-    from ..envs.plant import TICK
-
-    actions = np.zeros((envs.num_envs, 1), dtype=np.float32)
-    envs.reset(seed=0)
-
-    def run() -> float:
-        begin = time.perf_counter()
-        for _ in range(steps):
-            envs.step(actions)
-        flown = envs.num_envs * steps * DECISION_TICKS * TICK
-        return float(flown / (time.perf_counter() - begin))
-
-    run()  # compiles
-    return run
+    return _stepping(envs, 0.08 * count, max(2, _IN_LANES // count))
 
 
 def _rotorpy() -> Contender:

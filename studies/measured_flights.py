@@ -86,23 +86,23 @@ def motion(log: FlightLog, vehicle: Vehicle) -> Signals:
     return max(pieces, key=lambda s: len(s.t))
 
 
+def slow(x: Array, period: float) -> Array:
+    """Return signals (n, ...) behind the low-pass, without the edges."""
+    edge = round(_EDGE / period)
+    return low_pass(x, CUTOFF_HZ, period)[edge:-edge]
+
+
 def acceleration_residual(log: FlightLog, vehicle: Vehicle, mass: float) -> Array:
-    """Return the residual force (n, 3) by ``mass`` in m/s2, world, low-passed,
-    without the edges.
-    """
+    """Return the residual force (n, 3) by ``mass`` in m/s2, world, slow."""
     s = motion(log, vehicle)
-    edge = round(_EDGE / s.period)
-    return low_pass(residual_wrench(s, vehicle)[:, :3] / mass, CUTOFF_HZ, s.period)[edge:-edge]
+    return slow(residual_wrench(s, vehicle)[:, :3] / mass, s.period)
 
 
 def constant_thrust(log: FlightLog, vehicle: Vehicle) -> Array:
     """Return what (n, 3) m/s2 is left if thrust is taken to be the weight all the time."""
     s = motion(log, replace(vehicle, effects=()))
-    edge = round(_EDGE / s.period)
     up = np.array([0.0, 0.0, vehicle.gravity])
-    return low_pass(
-        s.acceleration + up - vehicle.gravity * s.rotation[:, :, 2], CUTOFF_HZ, s.period
-    )[edge:-edge]
+    return slow(s.acceleration + up - vehicle.gravity * s.rotation[:, :, 2], s.period)
 
 
 def level(x: Array) -> list[float]:
@@ -117,21 +117,13 @@ def spread(x: Array) -> list[float]:
 
 def compare(log: FlightLog, diagnosis: Diagnosis) -> dict[str, Any]:
     """Return how far a test flight is from the declared vehicle and from the amended one."""
-    declared, amended = diagnosis.declared, diagnosis.amended
-    before = acceleration_residual(log, declared, declared.mass)
-    after = acceleration_residual(log, amended, declared.mass)
-    constant = constant_thrust(log, declared)
-    return {
-        "flight": log.name,
-        "before_rms": level(before),
-        "after_rms": level(after),
-        "before_std": spread(before),
-        "after_std": spread(after),
-        "constant_thrust_std": spread(constant),
-        "norm_before": float(np.sqrt(np.mean(np.sum(before**2, axis=1)))),
-        "norm_after": float(np.sqrt(np.mean(np.sum(after**2, axis=1)))),
-        "drag_N_per_mps": linear_drag(diagnosis),
-    }
+    found: dict[str, Any] = {"flight": log.name, "drag_N_per_mps": linear_drag(diagnosis)}
+    mass = diagnosis.declared.mass
+    for when, vehicle in (("before", diagnosis.declared), ("after", diagnosis.amended)):
+        x = acceleration_residual(log, vehicle, mass)
+        found |= {f"{when}_rms": level(x), f"{when}_std": spread(x)}
+        found[f"norm_{when}"] = float(np.sqrt(np.mean(np.sum(x**2, axis=1))))
+    return found | {"constant_thrust_std": spread(constant_thrust(log, diagnosis.declared))}
 
 
 def linear_drag(diagnosis: Diagnosis) -> list[float]:
@@ -161,14 +153,11 @@ def imu_check(path: Path, log: FlightLog, diagnosis: Diagnosis) -> dict[str, flo
         effects=tuple(e for e in diagnosis.amended.effects if get(e.name).kind != "sensing"),
     )
     model = felt - residual_wrench(s, amended)[:, :3] / amended.mass
-    edge = round(_EDGE / s.period)
 
     def along(x: Array) -> Array:
-        return low_pass(np.einsum("ni,ni->n", x, s.rotation[:, :, 2]), CUTOFF_HZ, s.period)[
-            edge:-edge
-        ]
+        return slow(np.einsum("ni,ni->n", x, s.rotation[:, :, 2]), s.period)
 
-    imu = low_pass(measured, CUTOFF_HZ, s.period)[edge:-edge]
+    imu = slow(measured, s.period)
     return {
         "model_std": float((imu - along(model)).std()),
         "motion_capture_std": float((imu - along(felt)).std()),
@@ -190,35 +179,6 @@ def names_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     ]
 
 
-def nanobench_flights(folder: Path, vehicle: Vehicle) -> dict[str, tuple[Path, FlightLog, int]]:
-    """Return the NanoBench flights of a folder: path, log and day of recording.
-
-    Raises:
-        InputError: there are fewer than three.
-    """
-    paths = sorted(folder.glob("*.csv"))
-    if len(paths) < 3:
-        raise InputError(
-            f"{folder}: {len(paths)} CSV file(s); expected at least three NanoBench flights"
-        )
-    return {
-        p.stem: (
-            p,
-            read_log(p, "nanobench", vehicle),
-            int(open_table(p).read(["t"])["t"][0] // _DAY),
-        )
-        for p in paths
-    }
-
-
-def nanobench_fold(
-    logs: Sequence[FlightLog], test: Sequence[FlightLog], vehicle: Vehicle
-) -> tuple[Diagnosis, list[dict[str, Any]]]:
-    """Return the diagnosis of some flights and how it does on others."""
-    diagnosis = diagnose(logs, vehicle, test)
-    return diagnosis, [compare(log, diagnosis) for log in test]
-
-
 def payload_vehicle(mass: float) -> Vehicle:
     """Return a Crazyflie of this mass whose file states a cable of 0.5 m and leaves load and
     damping open.
@@ -228,11 +188,6 @@ def payload_vehicle(mass: float) -> Vehicle:
         mass=mass,
         effects=(EffectSetting("slung_payload", {"l": CABLE}),),
     )
-
-
-def payload_logs(folder: Path, numbers: Sequence[str], vehicle: Vehicle) -> list[FlightLog]:
-    """Return crazyswarm2 logs by number."""
-    return [read_log(folder / f"log{n}.csv", "crazyswarm2", vehicle) for n in numbers]
 
 
 def swing(log: FlightLog, diagnosis: Diagnosis) -> dict[str, list[float]] | None:
@@ -392,23 +347,29 @@ def nanobench(folder: Path, picture: Path) -> list[dict[str, Any]]:
     Raises:
         InputError: there are fewer than three flights.
     """
-    vehicle = load_vehicle("crazyflie")
-    flights = nanobench_flights(folder, vehicle)
+    vehicle, paths = load_vehicle("crazyflie"), sorted(folder.glob("*.csv"))
+    if len(paths) < 3:
+        raise InputError(
+            f"{folder}: {len(paths)} CSV file(s); expected at least three NanoBench flights"
+        )
+    logs = {p.stem: read_log(p, "nanobench", vehicle) for p in paths}
+    days = {p.stem: open_table(p).read(["t"])["t"][0] // _DAY for p in paths}
     folds: list[dict[str, Any]] = []
     drawn: dict[str, tuple[FlightLog, Diagnosis]] = {}
-    for test, (path, log, day) in flights.items():
-        groups = {"all others": [n for n in flights if n != test]}
-        same = [n for n in groups["all others"] if flights[n][2] == day]
+    for path in paths:
+        test, log = path.stem, logs[path.stem]
+        groups = {"all others": [n for n in logs if n != test]}
+        same = [n for n in groups["all others"] if days[n] == days[test]]
         if 2 <= len(same) < len(groups["all others"]):
             groups["the same day"] = same
         for words, names in groups.items():
             print(f"NanoBench: {test} from {words}", flush=True)
-            diagnosis, (row,) = nanobench_fold([flights[n][1] for n in names], [log], vehicle)
+            diagnosis = diagnose([logs[n] for n in names], vehicle, [log])
             folds.append(
                 {
                     "fitted_on": words,
                     "flights": names,
-                    **row,
+                    **compare(log, diagnosis),
                     "effects": names_of(diagnosis),
                     "verdict": diagnosis.verdict,
                     "remainder": diagnosis.remainder,
@@ -432,7 +393,7 @@ def slung_payload(folder: Path) -> list[dict[str, Any]]:
             continue
         print(f"slung payload: {', '.join(numbers)}", flush=True)
         carrier = payload_vehicle(mass)
-        logs = payload_logs(folder, numbers, carrier)
+        logs = [read_log(folder / f"log{n}.csv", "crazyswarm2", carrier) for n in numbers]
         diagnosis = diagnose(logs, carrier)
         loads.append(
             {

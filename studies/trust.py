@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from windwrench.studies import closed_loop, measured_flights, peers
+from windwrench.studies import measured_flights
 from windwrench.studies.kept_results import kept
 from windwrench.studies.probabilities import calibration
 
@@ -11,8 +11,6 @@ def page() -> dict[str, Any]:
     """Return what the page shows."""
     return {
         "benchmark": kept("identify/nanodrone.json"),
-        "closed_loop": closed_loop.shown(),
         "flights": measured_flights.shown(),
-        "peers": peers.shown(),
         "probabilities": calibration.shown(),
     }

@@ -34,7 +34,6 @@ __all__ = [
     "check_setting",
     "compile_effects",
     "get",
-    "law_in_words",
     "model_in_words",
     "names",
     "needing",
@@ -59,21 +58,11 @@ def add_folder(folder: str | Path) -> tuple[str, ...]:
     Raises:
         InputError: there is no such folder, or a file has the name of an effect that is there.
     """
-    folders = [
-        *filter(None, os.environ.get(_FOLDERS, "").split(os.pathsep)),
-        str(Path(folder).resolve()),
-    ]
-    before = os.environ.get(_FOLDERS)
-    os.environ[_FOLDERS] = os.pathsep.join(dict.fromkeys(folders))
-    _files.cache_clear()
-    names.cache_clear()
-    try:
-        _files()
-    except InputError:
-        os.environ.pop(_FOLDERS)
-        if before is not None:
-            os.environ[_FOLDERS] = before
-        raise
+    folders = tuple(dict.fromkeys((*_folders(), str(Path(folder).resolve()))))
+    for known in (_files_in, names):
+        known.cache_clear()
+    _files_in(folders)
+    os.environ[_FOLDERS] = os.pathsep.join(folders)
     return tuple(sorted(path.stem for path in _effects_in(Path(folder))))
 
 
@@ -85,19 +74,25 @@ def _effects_in(folder: Path) -> list[Path]:
     ]
 
 
-@cache
+def _folders() -> tuple[str, ...]:
+    return tuple(filter(None, os.environ.get(_FOLDERS, "").split(os.pathsep)))
+
+
 def _files() -> dict[str, Path]:
     """Return the file of each effect; those of the kit's own first."""
-    own = Path(__file__).parent
-    found = {path.stem: path for path in _effects_in(own)}
-    for text in filter(None, os.environ.get(_FOLDERS, "").split(os.pathsep)):
-        folder = Path(text).resolve()
+    return _files_in(_folders())
+
+
+@cache
+def _files_in(folders: tuple[str, ...]) -> dict[str, Path]:
+    found = {path.stem: path for path in _effects_in(Path(__file__).parent)}
+    for folder in map(Path, folders):
         if not folder.is_dir():
             raise InputError(
-                f"{_FOLDERS}: {text} is no folder; expected folders of effects, with {os.pathsep} "
-                f"between them"
+                f"{_FOLDERS}: {folder} is no folder; expected folders of effects, with "
+                f"{os.pathsep} between them"
             )
-        for path in _effects_in(folder):
+        for path in _effects_in(folder.resolve()):
             if found.setdefault(path.stem, path) != path:
                 raise InputError(
                     f"{path}: an effect {path.stem} is there already ({found[path.stem]}); "
@@ -163,9 +158,6 @@ def needing(*needs: Need) -> frozenset[str]:
 def model_in_words(name: str) -> str:
     """Return what an effect's file says of its equation: its docstring."""
     return (_module(name).__doc__ or "").strip()
-
-
-law_in_words = model_in_words  # its older name
 
 
 def _module(name: str) -> ModuleType:
@@ -239,9 +231,7 @@ class Bundle:
     constants: Array  # (VEHICLE_SIZE,) what effect models may know of it
     wrench_models: np.ndarray  # (n,) int64 addresses
     wrench_coefficients: Array  # (n, ROW_SIZE)
-    wrench_hooks: (
-        np.ndarray
-    )  # (n,) int64 addresses of what carries an effect's own state on; 0: it has none
+    wrench_hooks: np.ndarray  # (n,) int64 addresses of what carries a state on; 0: it has none
     rotor_models: np.ndarray  # (m,) int64 addresses
     rotor_coefficients: Array  # (m, 8)
     rotor_memory: int  # columns of the memory (m, rotor_memory) that the rotor models need
@@ -261,21 +251,11 @@ def compile_effects(vehicle: Vehicle) -> Bundle:
         if effect.model is not None:
             rows[effect.kind].append((effect, effect.vector(setting.coefficients)))
     rows["wrench"].sort(key=lambda row: not row[0].sets_wind)
-    constants = np.concatenate(
+    v = amended
+    constants = np.hstack(
         [
-            [
-                amended.mass,
-                amended.gravity,
-                amended.rotor_radius,
-                amended.floor_z,
-                amended.ceiling_z,
-                amended.voltage_ref,
-                amended.hover_rate,
-            ],
-            amended.com,
-            amended.positions.ravel(),
-            amended.spin,
-            amended.p,
+            *(v.mass, v.gravity, v.rotor_radius, v.floor_z, v.ceiling_z, v.voltage_ref),
+            *(v.hover_rate, v.com, v.positions.ravel(), v.spin, v.p),
         ]
     )
     assert constants.size == VEHICLE_SIZE

@@ -7,14 +7,12 @@ axis, the angle is reported as (1 + g) times what it is, axis and turn as they a
 
 import math
 
-from numba import cfunc
-
-from .base import DIRECTION, EFFECT_MODEL, HAS_QUATERNION, SAMPLE_QUATERNION, Coefficient, Effect
+from .base import DIRECTION, HAS_QUATERNION, SAMPLE_QUATERNION, Coefficient, Effect, compiled_model
 from .declaration import Family
 from .parts import turn_attitude
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, sample, memory):  # type: ignore[no-untyped-def]
     if sample[HAS_QUATERNION] > 0.0:
         q = SAMPLE_QUATERNION
@@ -37,8 +35,7 @@ EFFECT = Effect(
         ),
     ),
     source="definition; attitude from an onboard filter that trusts an accelerometer in flight "
-    "reads tilt by a few per cent "
-    "wrong",
+    "reads tilt by a few per cent wrong",
     excitation="horizontal accelerations of 2 m/s2 and more: its force goes with the tilt, that of "
     "drag with the velocity",
     model=effect_model,

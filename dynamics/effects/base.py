@@ -29,29 +29,20 @@ none of them. There are four kinds:
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numba import types
+from numba import cfunc, types
 from numpy.typing import NDArray
 
-from .declaration import (
-    Family,
-    Implausible,
-    Need,
-    Role,
-    StartingPoints,
-    check_role,
-    check_words,
-)
-
-if TYPE_CHECKING:
-    from ..vehicle import Vehicle
+from ..vehicle import Vehicle
+from .declaration import Family, Implausible, Need, Role, StartingPoints, check_role, check_words
 
 Array = NDArray[np.float64]
 
 _POINTER = types.CPointer(types.float64)
 EFFECT_MODEL = types.void(_POINTER, _POINTER, _POINTER, _POINTER)  # of the C function
+compiled_model: Any = cfunc(EFFECT_MODEL, cache=True)  # the decorator of an effect model
 
 # vehicle: what a model may know of it
 MASS, GRAVITY, ROTOR_RADIUS, FLOOR, CEILING, VOLTAGE_REF, HOVER_RATE = range(7)
@@ -86,22 +77,14 @@ SAMPLE_SPEED = 0  # 4, rad/s
 SAMPLE_POSITION = 4  # 3, m, world
 SAMPLE_QUATERNION = 7  # 4, body to world
 SAMPLE_STEP = 11  # s, since the model was last called
-HAS_SPEED, HAS_POSITION, HAS_QUATERNION = (
-    12,
-    13,
-    14,
-)  # 1 where that part is there; a quaternion is always readable
+# 1 where that part is there; a quaternion is always readable
+HAS_SPEED, HAS_POSITION, HAS_QUATERNION = 12, 13, 14
 DIRECTION = 15  # +1: from truth to report, -1: back
 SAMPLE_SIZE = 16
 
 PARAMETERS = 8  # coefficients that an effect may have
 HIDDEN = 8  # where a wrench effect's own state starts in ``c``
 ROW_SIZE = 16  # of ``c`` of a wrench effect
-
-
-# what the coefficient ``central`` means in effects that act rotor by rotor: it draws the rotors
-# towards the centre
-CENTRAL = "0: it acts at the rotors, and so with a moment; 1: as a whole at the geometric centre"
 
 
 @dataclass(frozen=True)
@@ -131,6 +114,32 @@ class Coefficient:
     minimum: float = -np.inf
     maximum: float = np.inf
     plausible: float = np.inf
+
+
+# of effects that act rotor by rotor: draws the rotors towards the centre
+CENTRAL = Coefficient(
+    "central",
+    "1",
+    (0.0, 0.0),
+    "0: it acts at the rotors, and so with a moment; 1: as a whole at the geometric centre",
+    minimum=0.0,
+    maximum=1.0,
+)
+
+
+def along(
+    name: str,
+    unit: str,
+    typical: tuple[float, float],
+    meaning: str,
+    axes: str = "xyz",
+    **bounds: float,
+) -> tuple[Coefficient, ...]:
+    """Return one coefficient for each axis, which stands for ``{}`` in name and meaning."""
+    return tuple(
+        Coefficient(name.format(axis), unit, typical, meaning.format(axis), **bounds)
+        for axis in axes
+    )
 
 
 @dataclass(frozen=True)
@@ -178,14 +187,14 @@ class Effect:
     advance: Any = None
     memory: int = 0
     sets_wind: bool = False
-    amend: "Callable[[Vehicle, Mapping[str, float]], Vehicle] | None" = None
+    amend: Callable[[Vehicle, Mapping[str, float]], Vehicle] | None = None
     family: Family = Family.OTHER
     role: Role | None = None
     needs: tuple[Need, ...] = ()
     any_size: bool = False
     scales_noise: bool = False
     starting_points: StartingPoints | None = None
-    possible: "Callable[[Mapping[str, float], Vehicle], bool] | None" = None
+    possible: Callable[[Mapping[str, float], Vehicle], bool] | None = None
     implausible: Implausible | None = None
 
     def __post_init__(self) -> None:

@@ -5,13 +5,11 @@ voltage_ref)^(n/2). It applies where the rotor speeds are commands, or worked ou
 the reference voltage. Nothing changes where the voltage is not known.
 """
 
-from numba import cfunc
-
-from .base import EFFECT_MODEL, ROTOR_VOLTAGE, VOLTAGE_REF, Coefficient, Effect
+from .base import ROTOR_VOLTAGE, VOLTAGE_REF, Coefficient, Effect, compiled_model
 from .declaration import Family, Role
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
     if rotors[ROTOR_VOLTAGE] > 0.0 and vehicle[VOLTAGE_REF] > 0.0:
         scale = (rotors[ROTOR_VOLTAGE] / vehicle[VOLTAGE_REF]) ** (0.5 * c[0])

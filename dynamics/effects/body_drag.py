@@ -8,9 +8,8 @@ body axes. The quadratic part is the parasitic drag of RotorPy, c_Dx, c_Dy, c_Dz
 import math
 
 import numpy as np
-from numba import cfunc
 
-from .base import EFFECT_MODEL, Coefficient, Effect
+from .base import Effect, along, compiled_model
 from .declaration import Family, Found, Role
 from .parts import add_force_at, air_velocity
 
@@ -21,7 +20,7 @@ _LEAST_SHARE_OF_LARGEST = 0.15
 _SIGNIFICANCE = 2.0  # standard deviations by which it is less
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     x, y, z = air_velocity(state, 0.0, 0.0, 0.0)
     speed = math.sqrt(x * x + y * y + z * z)
@@ -40,15 +39,10 @@ def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
 
 def implausible(found: Found) -> str:
     """Return why a found drag is none: at the flights' speed it is small along one axis."""
-    value, std, speed = found.coefficients, found.std, found.speed
-    size = [value.get(f"d{axis}", 0.0) + speed * value.get(f"c{axis}", 0.0) for axis in "xyz"]
-    errors = [
-        np.hypot(std.get(f"d{axis}", 0.0), speed * std.get(f"c{axis}", 0.0)) for axis in "xyz"
-    ]
-    if not any(
-        one + _SIGNIFICANCE * error < _LEAST_SHARE_OF_LARGEST * max(size)
-        for one, error in zip(size, errors, strict=True)
-    ):
+    value, std, speed = EFFECT.vector(found.coefficients), EFFECT.vector(found.std), found.speed
+    size = value[:3] + speed * value[3:]
+    error = np.hypot(std[:3], speed * std[3:])
+    if np.all(size + _SIGNIFICANCE * error >= _LEAST_SHARE_OF_LARGEST * size.max()):
         return ""
     return "acts along some axes alone, but air drags a body along every axis"
 
@@ -57,30 +51,14 @@ EFFECT = Effect(
     name="body_drag",
     kind="wrench",
     coefficients=(
-        *(
-            Coefficient(
-                f"d{axis}", "N/(m/s)", (0.06, 0.002), f"linear, along body {axis}", minimum=0.0
-            )
-            for axis in "xyz"
-        ),
-        *(
-            Coefficient(
-                f"c{axis}",
-                "N/(m/s)^2",
-                (0.02, 0.0005),
-                f"quadratic, along body {axis}",
-                minimum=0.0,
-            )
-            for axis in "xyz"
-        ),
+        *along("d{}", "N/(m/s)", (0.06, 0.002), "linear, along body {}", minimum=0.0),
+        *along("c{}", "N/(m/s)^2", (0.02, 0.0005), "quadratic, along body {}", minimum=0.0),
     ),
     source="Hoerner, Fluid-Dynamic Drag, 1965; quadratic part as in Folk, Paulos and Kumar, "
-    "RotorPy, 2023 "
-    "(0.005 to 0.01 N/(m/s)^2 for 0.5 kg); sizes: 0.5 * 1.2 kg/m3 * C_d A with C_d A = 0.03 m2, 8 "
-    "cm2",
+    "RotorPy, 2023 (0.005 to 0.01 N/(m/s)^2 for 0.5 kg); sizes: 0.5 * 1.2 kg/m3 * C_d A with C_d A "
+    "= 0.03 m2, 8 cm2",
     excitation="several speeds up to 2 m/s and more for the quadratic part, at several loads "
-    "(climbs, hard turns) to tell "
-    "it from rotor drag, whose force grows with the rotor speeds",
+    "(climbs, hard turns) to tell it from rotor drag, whose force grows with the rotor speeds",
     model=effect_model,
     family=Family.DRAG,
     role=Role.BODY_DRAG,

@@ -14,9 +14,7 @@ from .base import (
     HAS_QUATERNION,
     HAS_SPEED,
     ROTOR_VOLTAGE,
-    ROTORS_SIZE,
     SAMPLE_STEP,
-    SPEED,
     STEP,
     Array,
 )
@@ -38,6 +36,12 @@ def _call(typing_context: Any, address: Any, a: Any, b: Any, c: Record, d: Any) 
 
 
 @compiled
+def _ask(address: int, c: Array, vehicle: Array, third: Array, fourth: Array) -> None:
+    """Call the effect model at an address with its four arrays."""
+    _call(address, c.ctypes.data, vehicle.ctypes.data, third.ctypes.data, fourth.ctypes.data)
+
+
+@compiled
 def add_wrenches(
     models: np.ndarray, coefficients: Array, vehicle: Array, state: Array, wrench: Array
 ) -> None:
@@ -45,13 +49,7 @@ def add_wrenches(
     in the body frame.
     """
     for i in range(len(models)):
-        _call(
-            models[i],
-            coefficients[i].ctypes.data,
-            vehicle.ctypes.data,
-            state.ctypes.data,
-            wrench.ctypes.data,
-        )
+        _ask(models[i], coefficients[i], vehicle, state, wrench)
 
 
 @compiled
@@ -71,13 +69,7 @@ def deliver(
     rotors[STEP] = dt
     rotors[ROTOR_VOLTAGE] = voltage
     for i in range(len(models)):
-        _call(
-            models[i],
-            coefficients[i].ctypes.data,
-            vehicle.ctypes.data,
-            rotors.ctypes.data,
-            memory[i].ctypes.data,
-        )
+        _ask(models[i], coefficients[i], vehicle, rotors, memory[i])
 
 
 @compiled
@@ -89,13 +81,7 @@ def advance(
     """
     for i in range(len(hooks)):
         if hooks[i] != 0:
-            _call(
-                hooks[i],
-                coefficients[i].ctypes.data,
-                vehicle.ctypes.data,
-                state.ctypes.data,
-                rotors.ctypes.data,
-            )
+            _ask(hooks[i], coefficients[i], vehicle, state, rotors)
 
 
 @compiled
@@ -120,13 +106,4 @@ def report(
     sample[HAS_SPEED] = 1.0 if parts & 4 != 0 else 0.0
     for n in range(len(models)):
         i = n if direction > 0.0 else len(models) - 1 - n
-        _call(
-            models[i],
-            coefficients[i].ctypes.data,
-            vehicle.ctypes.data,
-            sample.ctypes.data,
-            memory[i].ctypes.data,
-        )
-
-
-__all__ = ["ROTORS_SIZE", "SPEED", "add_wrenches", "advance", "deliver", "report"]
+        _ask(models[i], coefficients[i], vehicle, sample, memory[i])

@@ -6,47 +6,15 @@ torque. The distance is taken as no less than where the factor reaches 2. Nothin
 vehicle states no ceiling.
 """
 
-from numba import cfunc
-
-from .base import (
-    CEILING,
-    CENTRAL,
-    EFFECT_MODEL,
-    POSITION,
-    ROTATION,
-    ROTOR_POSITION,
-    ROTOR_RADIUS,
-    ROTOR_THRUST,
-    Coefficient,
-    Effect,
-)
+from .base import CEILING, CENTRAL, Coefficient, Effect, compiled_model
 from .declaration import Family
-from .parts import add_force_at
+from .parts import lift_near_plane
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
-    if not vehicle[CEILING] < 1e6:
-        return
-    scale = c[0] * (0.25 * vehicle[ROTOR_RADIUS]) ** 2
-    for i in range(4):
-        x = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i]
-        y = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i + 1]
-        z = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i + 2]
-        distance = vehicle[CEILING] - state[POSITION + 2]
-        distance -= state[ROTATION + 6] * x + state[ROTATION + 7] * y + state[ROTATION + 8] * z
-        ratio = min(scale / (distance * distance), 0.5) if distance > 1e-3 else 0.5
-        add_force_at(
-            vehicle,
-            state,
-            wrench,
-            x,
-            y,
-            z,
-            0.0,
-            0.0,
-            state[ROTOR_THRUST + i] * ratio / (1.0 - ratio),
-        )
+    if vehicle[CEILING] < 1e6:
+        lift_near_plane(c, vehicle, state, wrench, vehicle[CEILING], -1.0)
 
 
 EFFECT = Effect(
@@ -54,12 +22,11 @@ EFFECT = Effect(
     kind="wrench",
     coefficients=(
         Coefficient("rho", "1", (3.0, 3.0), "strength", minimum=0.0, maximum=20.0),
-        Coefficient("central", "1", (0.0, 0.0), CENTRAL, minimum=0.0, maximum=1.0),
+        CENTRAL,
     ),
     source="form: the ground effect's (Cheeseman and Bennett, ARC R&M 3021, 1955) mirrored; a "
-    "ceiling raises thrust too: "
-    "Sanchez-Cuevas, Heredia and Ollero, Int. J. Aerospace Eng. 2017; size assumed as near the "
-    "ground",
+    "ceiling raises thrust too: Sanchez-Cuevas, Heredia and Ollero, Int. J. Aerospace Eng. 2017; "
+    "size assumed as near the ground",
     excitation="several distances from the ceiling, the nearest of one to two rotor diameters",
     model=effect_model,
     family=Family.SURROUNDINGS,

@@ -5,11 +5,8 @@ those of -dt earlier than the pose. Between samples by a cubic. An estimator tha
 the other of the two, and so estimates the flight of dt ago.
 """
 
-from numba import cfunc
-
 from .base import (
     DIRECTION,
-    EFFECT_MODEL,
     HAS_POSITION,
     HAS_QUATERNION,
     HAS_SPEED,
@@ -19,6 +16,7 @@ from .base import (
     SAMPLE_STEP,
     Coefficient,
     Effect,
+    compiled_model,
 )
 from .declaration import Family, Need, Role
 from .parts import delay
@@ -27,7 +25,7 @@ _POSES = 13  # kept, 0.06 s at 200 Hz
 _SPEEDS = 22
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, sample, memory):  # type: ignore[no-untyped-def]
     wanted = c[0] * sample[DIRECTION]
     memory[1] += sample[SAMPLE_STEP]

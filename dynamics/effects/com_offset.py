@@ -4,39 +4,25 @@ Thrust then makes a torque about it, and the pose, which is that of the geometri
 about it.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-import numpy as np
-
-from .base import Coefficient, Effect
-from .declaration import Family, Need, Role
-
-if TYPE_CHECKING:
-    from ..vehicle import Vehicle
+from ..vehicle import Vehicle
+from .base import Effect, along
+from .declaration import Coefficients, Family, Need, Role
 
 
-def amend(vehicle: "Vehicle", coefficients: Mapping[str, float]) -> "Vehicle":
+def amend(vehicle: Vehicle, coefficients: Coefficients) -> Vehicle:
     """Return the vehicle with its centre of mass moved by (cx, cy, cz) m."""
-    return replace(
-        vehicle, com=vehicle.com + np.array([coefficients.get(f"c{axis}", 0.0) for axis in "xyz"])
-    )
+    return replace(vehicle, com=vehicle.com + EFFECT.vector(coefficients))
 
 
 EFFECT = Effect(
     name="com_offset",
     kind="body",
-    coefficients=tuple(
-        Coefficient(
-            f"c{axis}", "m", (0.005, 0.001), f"along body {axis}", minimum=-1.0, maximum=1.0
-        )
-        for axis in "xyz"
-    ),
+    coefficients=along("c{}", "m", (0.005, 0.001), "along body {}", minimum=-1.0, maximum=1.0),
     source="rigid-body mechanics",
     excitation="climbs and drops for cx and cy, since their torque grows with thrust; quick roll "
-    "and pitch (trajectory shake) "
-    "for cz",
+    "and pitch (trajectory shake) for cz",
     amend=amend,
     family=Family.RIGID_BODY,
     role=Role.CENTRE_OF_MASS,

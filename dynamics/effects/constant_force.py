@@ -1,12 +1,10 @@
 """Constant force: a steady force, fixed in the world frame, at the centre of mass."""
 
-from numba import cfunc
-
-from .base import EFFECT_MODEL, Coefficient, Effect
+from .base import Effect, along, compiled_model
 from .declaration import Family, Role
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     for i in range(3):
         wrench[i] += c[i]
@@ -15,13 +13,10 @@ def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="constant_force",
     kind="wrench",
-    coefficients=tuple(
-        Coefficient(f"f{axis}", "N", (0.2, 0.015), f"along world {axis}") for axis in "xyz"
-    ),
+    coefficients=along("f{}", "N", (0.2, 0.015), "along world {}"),
     source="definition",
     excitation="yaw through half a turn and more, and vertical accelerations of 1 m/s2 and more; "
-    "in hover fz is a mass or a "
-    "thrust scale",
+    "in hover fz is a mass or a thrust scale",
     model=effect_model,
     family=Family.STEADY,
     role=Role.STEADY_FORCE,

@@ -2,13 +2,11 @@
 propellers).
 """
 
-from numba import cfunc
-
-from .base import EFFECT_MODEL, Coefficient, Effect
+from .base import Effect, along, compiled_model
 from .declaration import Family, Need
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     for i in range(3):
         wrench[3 + i] += c[i]
@@ -17,9 +15,7 @@ def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="constant_torque",
     kind="wrench",
-    coefficients=tuple(
-        Coefficient(f"t{axis}", "Nm", (0.01, 1e-4), f"about body {axis}") for axis in "xyz"
-    ),
+    coefficients=along("t{}", "Nm", (0.01, 1e-4), "about body {}"),
     source="definition",
     excitation="climbs and drops: the torque of an offset centre of mass or a weak rotor grows "
     "with thrust",

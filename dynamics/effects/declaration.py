@@ -9,17 +9,10 @@ takes the same part.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING
-
-import numpy as np
-from numpy.typing import NDArray
 
 from ...runtime.errors import InputError, unknown_name
+from ..vehicle import Array, Vehicle
 
-if TYPE_CHECKING:
-    from ..vehicle import Vehicle
-
-Array = NDArray[np.float64]
 Coefficients = Mapping[str, float]
 
 
@@ -48,58 +41,41 @@ class Role(StrEnum):
     understood by it.
 
     A role is a contract: an effect that declares it has, first of all and in this order, the
-    coefficients that are stated here. *Relative* ones are of unit 1.
+    coefficients whose units stand behind its word. *Relative* ones are of unit 1.
     """
 
-    MASS = "mass"  # added mass, kg or relative
-    INERTIA = "inertia"  # relative change of the moments of inertia about x, y and z
-    CENTRE_OF_MASS = "centre of mass"  # its place along x, y and z, m
-    MARKER = "marker"  # the place of the point whose position is logged, along x, y and z, m
-    SUSPENDED_LOAD = "suspended load"  # its mass, kg
-    THRUST = "thrust"  # relative change of what all rotors deliver
-    ROTOR_THRUSTS = "thrust of each rotor"  # relative change of each rotor's, 1 to 4
-    THRUST_CURVE = "thrust curve"  # how much it differs from the square of the rotor speed
-    THRUST_OVER_TIME = "thrust over time"  # its relative loss, 1/s
-    THRUST_OVER_VOLTAGE = "thrust over voltage"  # how it goes with the battery's voltage
-    THRUST_AXIS = "thrust axis"  # its turn against the body's, rad about x and y
-    STEADY_FORCE = "steady force"  # along world x, y and z, N
-    LAG = "lag"  # the time constant (s) behind which rotors follow
-    # the time (s) by which rotors act later than the log has their rotor speeds, or seem to. It
+    units: tuple[str, ...]
+
+    def __new__(cls, word: str, *units: str) -> "Role":
+        """Make a role of its word and of its coefficients' units."""
+        role = str.__new__(cls, word)
+        role._value_, role.units = word, units
+        return role
+
+    MASS = "mass", "kg or 1"  # added mass, or relative
+    INERTIA = "inertia", "1", "1", "1"  # relative change of the moments about x, y and z
+    CENTRE_OF_MASS = "centre of mass", "m", "m", "m"  # its place along x, y and z
+    MARKER = "marker", "m", "m", "m"  # the place of the point whose position is logged
+    SUSPENDED_LOAD = "suspended load", "kg"  # its mass
+    THRUST = "thrust", "1"  # relative change of what all rotors deliver
+    ROTOR_THRUSTS = "thrust of each rotor", "1", "1", "1", "1"  # relative change of 1 to 4
+    THRUST_CURVE = "thrust curve", "1"  # how much it differs from the square of the rotor speed
+    THRUST_OVER_TIME = "thrust over time", "1/s"  # its relative loss
+    THRUST_OVER_VOLTAGE = ("thrust over voltage",)  # how it goes with the battery's voltage
+    THRUST_AXIS = "thrust axis", "rad", "rad"  # its turn against the body's, about x and y
+    STEADY_FORCE = "steady force", "N", "N", "N"  # along world x, y and z
+    LAG = "lag", "s"  # the time constant behind which rotors follow
+    # the time by which rotors act later than the log has their rotor speeds, or seem to. It
     # contains the offset of the two clocks that any log may have, in whose place it is fitted. Of
     # kind rotor input it delays the rotors, of kind sensing one of the log's two parts
-    DELAY = "delay"
-    ROTOR_DRAG = "rotor drag"  # of each rotor along x and y, N/(rad/s m/s)
-    BODY_DRAG = "body drag"  # linear along x, y and z, N/(m/s), then quadratic, N/(m/s)^2
-    INFLOW_THRUST = "inflow thrust"  # lost by each rotor that climbs, N/(rad/s m/s)
-    TRANSLATIONAL_LIFT = "translational lift"  # of each rotor, N/(m/s)^2
-    RATE_DAMPING = "rate damping"  # about x, y and z, Nm/(rad/s)
-    FLAPPING_MOMENT = "flapping moment"  # of each rotor, Nm/(rad/s m/s)
-
-
-_RELATIVE = ("1",)
-# units of the coefficients that a role has, one after the other
-_UNITS: dict[Role, tuple[tuple[str, ...], ...]] = {
-    Role.MASS: (("kg", "1"),),
-    Role.INERTIA: (_RELATIVE,) * 3,
-    Role.CENTRE_OF_MASS: (("m",),) * 3,
-    Role.MARKER: (("m",),) * 3,
-    Role.SUSPENDED_LOAD: (("kg",),),
-    Role.THRUST: (_RELATIVE,),
-    Role.ROTOR_THRUSTS: (_RELATIVE,) * 4,
-    Role.THRUST_CURVE: (_RELATIVE,),
-    Role.THRUST_OVER_TIME: (("1/s",),),
-    Role.THRUST_OVER_VOLTAGE: (),
-    Role.THRUST_AXIS: (("rad",),) * 2,
-    Role.STEADY_FORCE: (("N",),) * 3,
-    Role.LAG: (("s",),),
-    Role.DELAY: (("s",),),
-    Role.ROTOR_DRAG: (("N/(rad/s m/s)",),) * 2,
-    Role.BODY_DRAG: (("N/(m/s)",),) * 3 + (("N/(m/s)^2",),) * 3,
-    Role.INFLOW_THRUST: (("N/(rad/s m/s)",),),
-    Role.TRANSLATIONAL_LIFT: (("N/(m/s)^2",),),
-    Role.RATE_DAMPING: (("Nm/(rad/s)",),) * 3,
-    Role.FLAPPING_MOMENT: (("Nm/(rad/s m/s)",),),
-}
+    DELAY = "delay", "s"
+    ROTOR_DRAG = "rotor drag", *("N/(rad/s m/s)",) * 2  # of each rotor along x and y
+    # linear along x, y and z, then quadratic
+    BODY_DRAG = "body drag", *("N/(m/s)",) * 3, *("N/(m/s)^2",) * 3
+    INFLOW_THRUST = "inflow thrust", "N/(rad/s m/s)"  # lost by each rotor that climbs
+    TRANSLATIONAL_LIFT = "translational lift", "N/(m/s)^2"  # of each rotor
+    RATE_DAMPING = "rate damping", *("Nm/(rad/s)",) * 3  # about x, y and z
+    FLAPPING_MOMENT = "flapping moment", "Nm/(rad/s m/s)"  # of each rotor
 
 
 class Need(StrEnum):
@@ -120,7 +96,7 @@ class Need(StrEnum):
 class Unexplained:
     """What a model leaves unexplained of flights, as starting points are chosen from it."""
 
-    vehicle: "Vehicle"  # as it is declared
+    vehicle: Vehicle  # as it is declared
     typical: Coefficients  # typical sizes of the effect's coefficients for this vehicle
     fixed: Coefficients  # coefficients of the effect that the vehicle's file states already
     centre: Array  # (3,) m, world, about which the vehicle flew
@@ -170,9 +146,10 @@ def check_role(effect: str, role: Role, units: Sequence[str]) -> None:
     Raises:
         InputError: it lacks one, or one has another unit.
     """
-    for i, allowed in enumerate(_UNITS[role]):
-        if i >= len(units) or units[i] not in allowed:
+    for i, allowed in enumerate(Role(role).units):
+        unit = units[i] if i < len(units) else "none"
+        if unit not in allowed.split(" or "):
             raise InputError(
-                f"effect {effect}: role {role!s}: expected coefficient {i + 1} in "
-                f"{' or '.join(allowed)}, got {units[i] if i < len(units) else 'none'}"
+                f"effect {effect}: role {role!s}: expected coefficient {i + 1} in {allowed}, "
+                f"got {unit}"
             )

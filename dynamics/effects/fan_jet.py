@@ -13,21 +13,19 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numba import cfunc
 
 from ..mean_jet import AIR_DENSITY, FIRST_X, HULL_RADIUS, HULL_STATIONS, STEP_R, STEP_X, jet_table
 from .base import (
-    EFFECT_MODEL,
     POSITION,
     RATE,
     ROTATION,
-    ROTOR_POSITION,
     VELOCITY,
     Coefficient,
     Effect,
+    compiled_model,
 )
 from .declaration import Coefficients, Family, Found, Unexplained
-from .parts import add_force_at
+from .parts import add_force_at, rotor_place
 
 _AXIAL, _RADIAL = jet_table(0.45, 0.10)
 _ROWS, _COLUMNS = _AXIAL.shape
@@ -41,16 +39,14 @@ _HEADINGS = tuple(2 * math.pi * k / 8 for k in range(8))
 _DISTANCES, _ACROSS = (1.5, 2.5, 3.5), (-0.6, 0.0, 0.6)
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     cosine, sine = math.cos(c[4]), math.sin(c[4])
     hull = 0.5 * AIR_DENSITY * c[6] / HULL_STATIONS
     R = ROTATION
     for n in range(4 + HULL_STATIONS):
         if n < 4:
-            sx = vehicle[ROTOR_POSITION + 3 * n]
-            sy = vehicle[ROTOR_POSITION + 3 * n + 1]
-            sz = vehicle[ROTOR_POSITION + 3 * n + 2]
+            sx, sy, sz = rotor_place(vehicle, n, 0.0)
         else:
             sx, sy, sz = _RING_X[n - 4], _RING_Y[n - 4], 0.0
         # the station as seen from the fan: distance along its axis, and offset across it
@@ -91,17 +87,8 @@ def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
     for heading, distance, across in itertools.product(_HEADINGS, _DISTANCES, _ACROSS):
         along = np.array([math.cos(heading), math.sin(heading)])
         x, y = centre[:2] - distance * along + across * np.array([-along[1], along[0]])
-        found.append(
-            {
-                "u0": flights.typical["u0"],
-                "x": float(x),
-                "y": float(y),
-                "z": float(centre[2]),
-                "heading": heading,
-                "kd": flights.typical["kd"],
-                "area": flights.typical["area"],
-            }
-        )
+        place = {"x": float(x), "y": float(y), "z": float(centre[2]), "heading": heading}
+        found.append({**flights.typical, **place})
     return found
 
 
@@ -136,11 +123,9 @@ EFFECT = Effect(
         Coefficient("area", "m2", (0.06, 0.0016), "drag area of the whole hull", minimum=0.0),
     ),
     source="momentum of a jet still in its shear layer, Pope, Turbulent Flows, 2000; sizes: the "
-    "wrench that McKinnon and "
-    "Schoellig, IROS 2016, measured in the jet of a drum fan",
+    "wrench that McKinnon and Schoellig, IROS 2016, measured in the jet of a drum fan",
     excitation="flight across the jet and out of it: force and torque depend on the place; its "
-    "still-air drag is like "
-    "rotor and body drag",
+    "still-air drag is like rotor and body drag",
     model=effect_model,
     family=Family.SURROUNDINGS,
     starting_points=starting_points,

@@ -5,19 +5,15 @@ At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: the torque -kflap
 body axes. It is the k_flap of RotorPy. The force that goes with flapping is ``rotor_drag``.
 """
 
-from numba import cfunc
-
-from .base import EFFECT_MODEL, ROTOR_POSITION, ROTOR_SPEED, Coefficient, Effect
+from .base import ROTOR_SPEED, Coefficient, Effect, compiled_model
 from .declaration import Family, Need, Role
-from .parts import air_velocity
+from .parts import air_velocity, rotor_place
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     for i in range(4):
-        x = vehicle[ROTOR_POSITION + 3 * i]
-        y = vehicle[ROTOR_POSITION + 3 * i + 1]
-        z = vehicle[ROTOR_POSITION + 3 * i + 2]
+        x, y, z = rotor_place(vehicle, i, 0.0)
         ux, uy, _ = air_velocity(state, x, y, z)
         wrench[3] -= c[0] * state[ROTOR_SPEED + i] * uy
         wrench[4] += c[0] * state[ROTOR_SPEED + i] * ux
@@ -28,8 +24,7 @@ EFFECT = Effect(
     kind="wrench",
     coefficients=(Coefficient("kflap", "Nm/(rad/s m/s)", (4e-6, 1.5e-9), "per rotor"),),
     source="Hoffmann, Huang, Waslander and Tomlin, AIAA GNC 2007; form as in Folk, Paulos and "
-    "Kumar, RotorPy, 2023; "
-    "sizes: a thirtieth of the typical rotor drag times the arm's length",
+    "Kumar, RotorPy, 2023; sizes: a thirtieth of the typical rotor drag times the arm's length",
     excitation="speeds of 1 m/s and more along both body axes: its torque follows the velocity and "
     "changes sign with it",
     model=effect_model,

@@ -6,44 +6,15 @@ Applied rotor by rotor, so a tilted vehicle feels a torque. The height is taken 
 where the factor reaches 2, as the equation has a pole below it.
 """
 
-from numba import cfunc
-
-from .base import (
-    CENTRAL,
-    COM,
-    EFFECT_MODEL,
-    FLOOR,
-    POSITION,
-    ROTATION,
-    ROTOR_POSITION,
-    ROTOR_RADIUS,
-    ROTOR_THRUST,
-    Coefficient,
-    Effect,
-)
+from .base import CENTRAL, FLOOR, Coefficient, Effect, compiled_model
 from .declaration import Family
+from .parts import lift_near_plane
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
-    if not vehicle[FLOOR] > -1e6:
-        return
-    scale = c[0] * (0.25 * vehicle[ROTOR_RADIUS]) ** 2
-    total = 0.0
-    for i in range(4):
-        x = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i]
-        y = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i + 1]
-        z = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i + 2]
-        height = state[POSITION + 2] - vehicle[FLOOR]
-        height += state[ROTATION + 6] * x + state[ROTATION + 7] * y + state[ROTATION + 8] * z
-        ratio = scale / (height * height) if height > 1e-3 else 0.5
-        ratio = min(ratio, 0.5)
-        extra = state[ROTOR_THRUST + i] * ratio / (1.0 - ratio)
-        wrench[3] += (y - vehicle[COM + 1]) * extra
-        wrench[4] -= (x - vehicle[COM]) * extra
-        total += extra
-    for i in range(3):
-        wrench[i] += state[ROTATION + 3 * i + 2] * total
+    if vehicle[FLOOR] > -1e6:
+        lift_near_plane(c, vehicle, state, wrench, vehicle[FLOOR], 1.0)
 
 
 EFFECT = Effect(
@@ -58,7 +29,7 @@ EFFECT = Effect(
             minimum=0.0,
             maximum=20.0,
         ),
-        Coefficient("central", "1", (0.0, 0.0), CENTRAL, minimum=0.0, maximum=1.0),
+        CENTRAL,
     ),
     source="Cheeseman and Bennett, ARC R&M 3021, 1955; Sanchez-Cuevas, Heredia and Ollero, Int. J. "
     "Aerospace Eng. 2017",

@@ -2,23 +2,19 @@
 factors 1 + j.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...runtime.errors import InputError
-from .base import Coefficient, Effect
-from .declaration import Family, Need, Role
-
-if TYPE_CHECKING:
-    from ..vehicle import Vehicle
+from ..vehicle import Vehicle
+from .base import Effect, along
+from .declaration import Coefficients, Family, Need, Role
 
 
-def amend(vehicle: "Vehicle", coefficients: Mapping[str, float]) -> "Vehicle":
+def amend(vehicle: Vehicle, coefficients: Coefficients) -> Vehicle:
     """Return the vehicle with the diagonal of its inertia scaled by 1 + (jx, jy, jz)."""
-    changes = np.array([coefficients.get(f"j{axis}", 0.0) for axis in "xyz"])
+    changes = EFFECT.vector(coefficients)
     inertia = vehicle.inertia + np.diag(changes * np.diagonal(vehicle.inertia))
     if np.linalg.eigvalsh(inertia)[0] <= 0:
         raise InputError(
@@ -30,16 +26,8 @@ def amend(vehicle: "Vehicle", coefficients: Mapping[str, float]) -> "Vehicle":
 EFFECT = Effect(
     name="inertia",
     kind="body",
-    coefficients=tuple(
-        Coefficient(
-            f"j{axis}",
-            "1",
-            (0.2, 0.2),
-            f"relative change about body {axis}",
-            minimum=-0.9,
-            maximum=5.0,
-        )
-        for axis in "xyz"
+    coefficients=along(
+        "j{}", "1", (0.2, 0.2), "relative change about body {}", minimum=-0.9, maximum=5.0
     ),
     source="definition; moments from a CAD model or a bifilar pendulum are off by a tenth or two",
     excitation="quick roll, pitch and yaw: its torque follows the angular acceleration; in slow "

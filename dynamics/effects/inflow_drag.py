@@ -5,19 +5,15 @@ applied at the rotor. A rotor that climbs into its inflow drags more, one that s
 in proportion to the rotor speed is ``rotor_drag``.
 """
 
-from numba import cfunc
-
-from .base import EFFECT_MODEL, ROTOR_POSITION, Coefficient, Effect
+from .base import Coefficient, Effect, compiled_model
 from .declaration import Family
-from .parts import add_force_at, air_velocity
+from .parts import add_force_at, air_velocity, rotor_place
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     for i in range(4):
-        x = vehicle[ROTOR_POSITION + 3 * i]
-        y = vehicle[ROTOR_POSITION + 3 * i + 1]
-        z = vehicle[ROTOR_POSITION + 3 * i + 2]
+        x, y, z = rotor_place(vehicle, i, 0.0)
         ux, uy, uz = air_velocity(state, x, y, z)
         kl = c[0] * uz
         add_force_at(vehicle, state, wrench, x, y, z, -kl * ux, -kl * uy, 0.0)

@@ -5,19 +5,15 @@ At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = -kz W_i u_i
 applied at the rotor. Roll and pitch so feel a damping torque. It is the k_z of RotorPy.
 """
 
-from numba import cfunc
-
-from .base import CENTRAL, EFFECT_MODEL, ROTOR_POSITION, ROTOR_SPEED, Coefficient, Effect
+from .base import CENTRAL, ROTOR_SPEED, Coefficient, Effect, compiled_model
 from .declaration import Family, Role
-from .parts import add_force_at, air_velocity
+from .parts import add_force_at, air_velocity, rotor_place
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     for i in range(4):
-        x = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i]
-        y = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i + 1]
-        z = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i + 2]
+        x, y, z = rotor_place(vehicle, i, c[1])
         uz = air_velocity(state, x, y, z)[2]
         add_force_at(vehicle, state, wrench, x, y, z, 0.0, 0.0, -c[0] * state[ROTOR_SPEED + i] * uz)
 
@@ -27,11 +23,10 @@ EFFECT = Effect(
     kind="wrench",
     coefficients=(
         Coefficient("kz", "N/(rad/s m/s)", (2.3e-4, 7.6e-7), "per rotor", minimum=0.0),
-        Coefficient("central", "1", (0.0, 0.0), CENTRAL, minimum=0.0, maximum=1.0),
+        CENTRAL,
     ),
     source="blade-element theory; Hoffmann, Huang, Waslander and Tomlin, Quadrotor Helicopter "
-    "Flight Dynamics and Control, "
-    "AIAA GNC 2007; sizes: Folk, Paulos and Kumar, RotorPy, 2023",
+    "Flight Dynamics and Control, AIAA GNC 2007; sizes: Folk, Paulos and Kumar, RotorPy, 2023",
     excitation="climbs and descents of 0.5 m/s and more; quick roll and pitch for its damping "
     "torque",
     model=effect_model,

@@ -5,21 +5,19 @@ p' = p + R m with m = (mx, my, mz) in body axes. To undo it takes the attitude, 
 none was, estimated.
 """
 
-from numba import cfunc
-
 from .base import (
     DIRECTION,
-    EFFECT_MODEL,
     HAS_POSITION,
     SAMPLE_POSITION,
     SAMPLE_QUATERNION,
-    Coefficient,
     Effect,
+    along,
+    compiled_model,
 )
 from .declaration import Family, Role
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, sample, memory):  # type: ignore[no-untyped-def]
     if sample[HAS_POSITION] > 0.0:
         q = SAMPLE_QUATERNION
@@ -35,14 +33,11 @@ def effect_model(c, vehicle, sample, memory):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="marker_offset",
     kind="sensing",
-    coefficients=tuple(
-        Coefficient(f"m{axis}", "m", (0.01, 0.005), f"along body {axis}", minimum=-1.0, maximum=1.0)
-        for axis in "xyz"
-    ),
+    coefficients=along("m{}", "m", (0.01, 0.005), "along body {}", minimum=-1.0, maximum=1.0),
     source="definition; the centroid of the markers on a vehicle is seldom its centre",
     excitation="quick roll and pitch (trajectory shake) for mz and fast yaw for mx and my: the "
-    "point swings about "
-    "the centre. An offset centre of mass also makes a torque in hover; this does not",
+    "point swings about the centre. An offset centre of mass also makes a torque in hover; this "
+    "does not",
     model=effect_model,
     family=Family.RIGID_BODY,
     role=Role.MARKER,

@@ -2,19 +2,15 @@
 as they are.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from ...runtime.errors import InputError
+from ..vehicle import Vehicle
 from .base import Coefficient, Effect
-from .declaration import Family, Role
-
-if TYPE_CHECKING:
-    from ..vehicle import Vehicle
+from .declaration import Coefficients, Family, Role
 
 
-def amend(vehicle: "Vehicle", coefficients: Mapping[str, float]) -> "Vehicle":
+def amend(vehicle: Vehicle, coefficients: Coefficients) -> Vehicle:
     """Return the vehicle with ``dm`` kg added."""
     mass = vehicle.mass + coefficients.get("dm", 0.0)
     if not mass > 0:

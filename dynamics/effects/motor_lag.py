@@ -6,13 +6,11 @@ at the first W_logged.
 
 import math
 
-from numba import cfunc
-
-from .base import EFFECT_MODEL, STEP, Coefficient, Effect
+from .base import STEP, Coefficient, Effect, compiled_model
 from .declaration import Family, Need, Role
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
     # memory: 0 whether the rotors have started, 1-4 their rotor speeds
     blend = 1.0 - math.exp(-rotors[STEP] / c[0]) if c[0] > 0.0 and memory[0] > 0.0 else 1.0
@@ -28,8 +26,8 @@ EFFECT = Effect(
     coefficients=(
         Coefficient("tau", "s", (0.035, 0.05), "time constant", minimum=0.0, maximum=0.5),
     ),
-    source="Foerster, System Identification of the Crazyflie 2.0, ETH Zurich 2015; "
-    "Faessler et al., Thrust Mixing, Saturation, and Body-Rate Control, RA-L 2017",
+    source="Foerster, System Identification of the Crazyflie 2.0, ETH Zurich 2015; Faessler et "
+    "al., Thrust Mixing, Saturation, and Body-Rate Control, RA-L 2017",
     excitation="quick roll, pitch and climbs: a lag smooths what a latency only moves; slow flight "
     "shows neither",
     model=effect_model,

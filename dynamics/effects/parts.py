@@ -4,7 +4,18 @@ import math
 from typing import Any
 
 from ...runtime.compiled import compiled
-from .base import COM, RATE, ROTATION, SAMPLE_QUATERNION, VELOCITY, WIND
+from .base import (
+    COM,
+    POSITION,
+    RATE,
+    ROTATION,
+    ROTOR_POSITION,
+    ROTOR_RADIUS,
+    ROTOR_THRUST,
+    SAMPLE_QUATERNION,
+    VELOCITY,
+    WIND,
+)
 
 _SPACING = 0.0045  # s, least time between two kept entries of a delay line
 # the longest of three steps between entries over the shortest, up to which a cubic is drawn through
@@ -13,6 +24,13 @@ _EVEN = 2.5
 
 # An array of a C function, in the layout of base.py
 Pointer = Any
+
+
+@compiled
+def rotor_place(vehicle: Pointer, i: int, central: float) -> tuple[float, float, float]:
+    """Return where rotor ``i`` stands, m from the geometric centre; ``central`` draws it there."""
+    share, at = 1.0 - central, ROTOR_POSITION + 3 * i
+    return share * vehicle[at], share * vehicle[at + 1], share * vehicle[at + 2]
 
 
 @compiled
@@ -71,6 +89,29 @@ def add_force_at(
     wrench[3] += y * fz - z * fy
     wrench[4] += z * fx - x * fz
     wrench[5] += x * fy - y * fx
+
+
+@compiled
+def lift_near_plane(
+    c: Pointer, vehicle: Pointer, state: Pointer, wrench: Pointer, height: float, side: float
+) -> None:
+    """Add the thrust that rotors gain near a level plane at ``height`` m, with ``c`` (2,) its
+    strength and ``central``; ``side`` is +1 where they are above the plane and -1 below.
+    """
+    scale = c[0] * (0.25 * vehicle[ROTOR_RADIUS]) ** 2
+    total = 0.0
+    for i in range(4):
+        x, y, z = rotor_place(vehicle, i, c[1])
+        away = state[POSITION + 2] - height
+        away += state[ROTATION + 6] * x + state[ROTATION + 7] * y + state[ROTATION + 8] * z
+        away *= side
+        ratio = min(scale / (away * away), 0.5) if away > 1e-3 else 0.5
+        extra = state[ROTOR_THRUST + i] * ratio / (1.0 - ratio)
+        wrench[3] += (y - vehicle[COM + 1]) * extra
+        wrench[4] -= (x - vehicle[COM]) * extra
+        total += extra
+    for i in range(3):
+        wrench[i] += state[ROTATION + 3 * i + 2] * total
 
 
 @compiled

@@ -1,8 +1,6 @@
 """Rate damping: a torque against the body rate, tau = -diag(dx, dy, dz) omega in body axes."""
 
-from numba import cfunc
-
-from .base import EFFECT_MODEL, RATE, Coefficient, Effect
+from .base import RATE, Effect, along, compiled_model
 from .declaration import Family, Found, Need, Role
 
 # share of the damping about z that must act about x and y: rotors at the arms, which climb and
@@ -10,7 +8,7 @@ from .declaration import Family, Found, Need, Role
 _LEAST_SHARE_OF_YAW = 0.3
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     for i in range(3):
         wrench[3 + i] -= c[i] * state[RATE + i]
@@ -18,7 +16,7 @@ def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
 
 def implausible(found: Found) -> str:
     """Return why a found damping is none: it acts about z alone."""
-    dx, dy, dz = (found.coefficients.get(f"d{axis}", 0.0) for axis in "xyz")
+    dx, dy, dz = EFFECT.vector(found.coefficients)
     if 0.5 * (dx + dy) >= _LEAST_SHARE_OF_YAW * dz:
         return ""
     return "acts about z alone, but rotors damp the other axes more"
@@ -27,10 +25,7 @@ def implausible(found: Found) -> str:
 EFFECT = Effect(
     name="rate_damping",
     kind="wrench",
-    coefficients=tuple(
-        Coefficient(f"d{axis}", "Nm/(rad/s)", (5e-3, 3e-5), f"about body {axis}", minimum=0.0)
-        for axis in "xyz"
-    ),
+    coefficients=along("d{}", "Nm/(rad/s)", (5e-3, 3e-5), "about body {}", minimum=0.0),
     source="linear damping; sizes: what typical rotor drag and inflow make at the rotors' arms",
     excitation="steady yaw rates of 1 rad/s and more, and quick roll and pitch, with little "
     "translation",

@@ -5,25 +5,23 @@ At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = -W_i diag(k
 applied at the rotor.
 """
 
-from numba import cfunc
-
 from .base import (
     CENTRAL,
     COM,
-    EFFECT_MODEL,
     RATE,
     ROTATION,
-    ROTOR_POSITION,
     ROTOR_SPEED,
     VELOCITY,
     WIND,
     Coefficient,
     Effect,
+    compiled_model,
 )
 from .declaration import Family, Role
+from .parts import rotor_place
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     ax = state[VELOCITY] - state[WIND]
     ay = state[VELOCITY + 1] - state[WIND + 1]
@@ -34,9 +32,7 @@ def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     total_x = 0.0
     total_y = 0.0
     for i in range(4):
-        x = (1.0 - c[2]) * vehicle[ROTOR_POSITION + 3 * i]
-        y = (1.0 - c[2]) * vehicle[ROTOR_POSITION + 3 * i + 1]
-        z = (1.0 - c[2]) * vehicle[ROTOR_POSITION + 3 * i + 2]
+        x, y, z = rotor_place(vehicle, i, c[2])
         fx = -c[0] * state[ROTOR_SPEED + i] * (ux + wy * z - wz * y)
         fy = -c[1] * state[ROTOR_SPEED + i] * (uy + wz * x - wx * z)
         x -= vehicle[COM]
@@ -61,14 +57,12 @@ EFFECT = Effect(
         Coefficient(
             "kdy", "N/(rad/s m/s)", (1.2e-4, 1.8e-6), "per rotor, along body y", minimum=0.0
         ),
-        Coefficient("central", "1", (0.0, 0.0), CENTRAL, minimum=0.0, maximum=1.0),
+        CENTRAL,
     ),
     source="Martin and Salaun, The True Role of Accelerometer Feedback in Quadrotor Control, ICRA "
-    "2010; "
-    "sizes: Svacha et al., ICUAS 2017 (0.5 kg), Foerster, ETH Zurich 2015 (0.03 kg)",
+    "2010; sizes: Svacha et al., ICUAS 2017 (0.5 kg), Foerster, ETH Zurich 2015 (0.03 kg)",
     excitation="horizontal flight at 1 m/s and more along both body axes, at several loads "
-    "(climbs, hard turns): rotor drag "
-    "grows with the rotor speeds, body drag does not",
+    "(climbs, hard turns): rotor drag grows with the rotor speeds, body drag does not",
     model=effect_model,
     family=Family.DRAG,
     role=Role.ROTOR_DRAG,

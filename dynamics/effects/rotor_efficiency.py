@@ -6,13 +6,11 @@ e_i).
 
 import math
 
-from numba import cfunc
-
-from .base import EFFECT_MODEL, Coefficient, Effect
+from .base import Coefficient, Effect, compiled_model
 from .declaration import Family, Need, Role
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
     for i in range(4):
         rotors[i] *= math.sqrt(max(1.0 + c[i], 0.0))
@@ -36,8 +34,7 @@ EFFECT = Effect(
     ),
     source="definition; a chipped or badly seated propeller loses several per cent",
     excitation="climbs and hard manoeuvres: its torque grows with that rotor's thrust, a steady "
-    "torque stays, and an offset "
-    "centre of mass makes no yaw torque",
+    "torque stays, and an offset centre of mass makes no yaw torque",
     model=effect_model,
     family=Family.THRUST,
     role=Role.ROTOR_THRUSTS,

@@ -4,13 +4,11 @@ With the angular momentum h = jr sum spin_i W_i along body z: tau = -dh/dt e_z -
 body axes, W being delivered rotor speeds and dW/dt their mean over the step.
 """
 
-from numba import cfunc
-
-from .base import EFFECT_MODEL, RATE, ROTOR_ACCELERATION, ROTOR_SPEED, SPIN, Coefficient, Effect
+from .base import RATE, ROTOR_ACCELERATION, ROTOR_SPEED, SPIN, Coefficient, Effect, compiled_model
 from .declaration import Family, Need
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     momentum = 0.0
     for i in range(4):
@@ -27,8 +25,7 @@ EFFECT = Effect(
         Coefficient("jr", "kg m2", (2e-5, 7e-8), "of one rotor about its axis", minimum=0.0),
     ),
     source="rigid-body mechanics; sizes: a thin rod of the propeller's mass and span (4 g, 0.2 m "
-    "and a geared drive; 0.4 g, "
-    "0.046 m)",
+    "and a geared drive; 0.4 g, 0.046 m)",
     excitation="quick changes of yaw rate: rotors that speed up turn the body at once, before "
     "their drag does",
     model=effect_model,

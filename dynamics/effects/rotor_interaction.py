@@ -16,25 +16,22 @@ v sqrt(u_h^2 + w^2) = T / (2 rho A).
 
 import math
 
-from numba import cfunc
-
 from ..mean_jet import AIR_DENSITY
 from .base import (
-    EFFECT_MODEL,
-    ROTOR_POSITION,
     ROTOR_RADIUS,
     ROTOR_SPEED,
     ROTOR_THRUST,
     Coefficient,
     Effect,
+    compiled_model,
 )
 from .declaration import Family, Need
-from .parts import add_force_at, air_velocity
+from .parts import add_force_at, air_velocity, rotor_place
 
 _FOUR_ROTORS = 8.0 * AIR_DENSITY * math.pi  # 4 x 2 rho A over the square of the radius
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     ux, uy, uz = air_velocity(state, 0.0, 0.0, 0.0)
     along = ux * ux + uy * uy
@@ -55,8 +52,7 @@ def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
         lean = 2.0 * induced / max(math.sqrt(along + w * w) + w, hover)
     force = 0.0
     for i in range(4):
-        x = vehicle[ROTOR_POSITION + 3 * i]
-        y = vehicle[ROTOR_POSITION + 3 * i + 1]
+        x, y, _ = rotor_place(vehicle, i, 0.0)
         arm = math.sqrt(x * x + y * y)
         if arm > 0.0:
             leads = (x * ux + y * uy) / arm
@@ -73,8 +69,8 @@ EFFECT = Effect(
     ),
     source="form: rotors in tandem, Leishman, Principles of Helicopter Aerodynamics, 2006; inflow "
     "of a wake that is blown back, Coleman, Feingold and Stempin, NACA ARR L5E10, 1945; size: "
-    "least squares on a 0.77 kg racer at 3 to 14 m/s (docs/trust.md), as a share of thrust "
-    "at airspeed over induced velocity",
+    "least squares on a 0.77 kg racer at 3 to 14 m/s (docs/trust.md), as a share of thrust at "
+    "airspeed over induced velocity",
     excitation="flight at 5 m/s and more along both body axes, with turns that set the rotors "
     "apart; in hover it does nothing",
     model=effect_model,

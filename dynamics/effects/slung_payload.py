@@ -15,12 +15,9 @@ drifts out of phase with the equation, which then may explain less than ``mass``
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-from numba import cfunc
-
+from ..vehicle import Vehicle
 from .base import (
-    EFFECT_MODEL,
     HIDDEN,
     MASS,
     ROTATION,
@@ -30,12 +27,10 @@ from .base import (
     WIND,
     Coefficient,
     Effect,
+    compiled_model,
 )
 from .declaration import Coefficients, Family, Found, Role, Unexplained
 from .parts import add_force_at
-
-if TYPE_CHECKING:
-    from ..vehicle import Vehicle
 
 _LENGTHS = (0.15, 0.25, 0.4, 0.65, 1.0, 1.5)  # m, of cables from which a fit starts
 _DAMPINGS = (0.3, 2.0)  # 1/s, the same
@@ -45,7 +40,7 @@ _MOST_DAMPING_RATIO = 0.2  # of a load that swings in air
 _N, _RATE = HIDDEN + 1, HIDDEN + 4
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     if not (c[0] > 0.0 and c[1] > 0.0):
         return
@@ -69,7 +64,7 @@ def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     add_force_at(vehicle, state, wrench, 0.0, 0.0, 0.0, tension * bx, tension * by, tension * bz)
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def advance(c, vehicle, state, rotors):  # type: ignore[no-untyped-def]
     if not (c[0] > 0.0 and c[1] > 0.0):
         return
@@ -117,7 +112,7 @@ def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
     ]
 
 
-def possible(coefficients: Coefficients, vehicle: "Vehicle") -> bool:
+def possible(coefficients: Coefficients, vehicle: Vehicle) -> bool:
     """Return whether air damps a load so much: one that is damped more imitates a drag."""
     length = coefficients["l"]
     return not (
@@ -150,11 +145,9 @@ EFFECT = Effect(
         ),
     ),
     source="Sreenath, Michael and Kumar, Trajectory Generation and Control of a Quadrotor with a "
-    "Cable-Suspended Load, "
-    "ICRA 2013; sizes: a tenth of the vehicle's mass",
+    "Cable-Suspended Load, ICRA 2013; sizes: a tenth of the vehicle's mass",
     excitation="horizontal starts and stops, then hover: the load goes on swinging at its own "
-    "frequency, which gives the "
-    "cable's length",
+    "frequency, which gives the cable's length",
     model=effect_model,
     advance=advance,
     family=Family.LOAD,

@@ -7,23 +7,21 @@ about the geometric centre act as T Q e_z and Q tau: the differences to T e_z an
 
 import math
 
-from numba import cfunc
-
 from .base import (
-    EFFECT_MODEL,
     REACTION,
     ROTOR_POSITION,
     ROTOR_SPEED,
     ROTOR_THRUST,
     SPIN,
-    Coefficient,
     Effect,
+    along,
+    compiled_model,
 )
 from .declaration import Family, Role
 from .parts import add_force_at
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     angle = math.sqrt(c[0] * c[0] + c[1] * c[1])
     if angle < 1e-12:
@@ -49,16 +47,12 @@ def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="thrust_axis_tilt",
     kind="wrench",
-    coefficients=tuple(
-        Coefficient(
-            f"a{axis}", "rad", (0.02, 0.02), f"turn about body {axis}", minimum=-0.8, maximum=0.8
-        )
-        for axis in "xy"
+    coefficients=along(
+        "a{}", "rad", (0.02, 0.02), "turn about body {}", minimum=-0.8, maximum=0.8, axes="xy"
     ),
     source="definition; also markers put on the body at a small angle",
     excitation="yaw through half a turn and more: this force turns with the body, that of a tilted "
-    "world or a steady force "
-    "stays; vertical accelerations, with which it grows",
+    "world or a steady force stays; vertical accelerations, with which it grows",
     model=effect_model,
     family=Family.ALIGNMENT,
     role=Role.THRUST_AXIS,

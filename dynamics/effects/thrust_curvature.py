@@ -7,13 +7,11 @@ of that.
 
 import math
 
-from numba import cfunc
-
-from .base import EFFECT_MODEL, HOVER_RATE, Coefficient, Effect
+from .base import HOVER_RATE, Coefficient, Effect, compiled_model
 from .declaration import Family, Need, Role
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
     for i in range(4):
         ratio = rotors[i] / vehicle[HOVER_RATE]
@@ -34,8 +32,7 @@ EFFECT = Effect(
         ),
     ),
     source="a fit to second order about hover, as thrust stands of small propellers show: "
-    "Foerster, System Identification of "
-    "the Crazyflie 2.0, ETH Zurich 2015",
+    "Foerster, System Identification of the Crazyflie 2.0, ETH Zurich 2015",
     excitation="thrusts from half to one and a half times hover: fast climbs, drops and turns",
     model=effect_model,
     family=Family.THRUST,

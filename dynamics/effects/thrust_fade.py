@@ -8,13 +8,11 @@ W times the root of that. The time t runs from the start of the flight; in an es
 
 import math
 
-from numba import cfunc
-
-from .base import EFFECT_MODEL, ROTOR_TIME, Coefficient, Effect
+from .base import ROTOR_TIME, Coefficient, Effect, compiled_model
 from .declaration import Family, Role
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
     scale = math.sqrt(max(1.0 - c[0] * rotors[ROTOR_TIME], 0.1))
     for i in range(4):
@@ -31,8 +29,7 @@ EFFECT = Effect(
     ),
     source="definition; size: 6 % in a minute where the logged rates are commands",
     excitation="a minute and more of flight with the battery voltage logged: loads that come and "
-    "go move the voltage, and "
-    "with it sag, but not time",
+    "go move the voltage, and with it sag, but not time",
     model=effect_model,
     family=Family.THRUST,
     role=Role.THRUST_OVER_TIME,

@@ -5,13 +5,11 @@ Thrust and reaction torque scale by 1 + s: the delivered rotor speed is W sqrt(1
 
 import math
 
-from numba import cfunc
-
-from .base import EFFECT_MODEL, Coefficient, Effect
+from .base import Coefficient, Effect, compiled_model
 from .declaration import Family, Role
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
     scale = math.sqrt(max(1.0 + c[0], 0.0))
     for i in range(4):
@@ -26,8 +24,7 @@ EFFECT = Effect(
     ),
     source="definition; air density and propeller wear change thrust by several per cent",
     excitation="vertical accelerations of 1 m/s2 and more tell it from a mass (both cancel at "
-    "hover) and a steady force; "
-    "a whole battery tells it from sag",
+    "hover) and a steady force; a whole battery tells it from sag",
     model=effect_model,
     family=Family.THRUST,
     role=Role.THRUST,

@@ -11,9 +11,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numba import cfunc
 
-from .base import EFFECT_MODEL, VELOCITY, WIND, Coefficient, Effect
+from .base import VELOCITY, WIND, Coefficient, Effect, compiled_model
 from .declaration import Coefficients, Family, Found, Unexplained
 
 _LEAST_SPEED = 1e-9  # m/s, against a division by zero
@@ -22,7 +21,7 @@ _LEAST_SPEED = 1e-9  # m/s, against a division by zero
 _LEAST_DRAG = 0.1
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     air, ground = 0.0, 0.0
     for i in range(3):
@@ -83,8 +82,7 @@ EFFECT = Effect(
     source="quadratic drag, 0.5 * 1.2 kg/m3 * C_d A with C_d A = 0.06 m2, 16 cm2; wind of an open "
     "hangar door",
     excitation="flight with and against the wind at 1 m/s and more; in hover it is a constant "
-    "force. Declared drag makes it "
-    "identifiable",
+    "force. Declared drag makes it identifiable",
     model=effect_model,
     sets_wind=True,
     family=Family.SURROUNDINGS,

@@ -6,22 +6,20 @@ the rotation vector (ax, ay, 0) rad: p' = Q p, R' = Q R.
 
 import math
 
-from numba import cfunc
-
 from .base import (
     DIRECTION,
-    EFFECT_MODEL,
     HAS_POSITION,
     HAS_QUATERNION,
     SAMPLE_POSITION,
-    Coefficient,
     Effect,
+    along,
+    compiled_model,
 )
 from .declaration import Family
 from .parts import turn_attitude
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, sample, memory):  # type: ignore[no-untyped-def]
     ax, ay = sample[DIRECTION] * c[0], sample[DIRECTION] * c[1]
     if sample[HAS_POSITION] > 0.0:
@@ -41,17 +39,14 @@ def effect_model(c, vehicle, sample, memory):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="world_tilt",
     kind="sensing",
-    coefficients=tuple(
-        Coefficient(
-            f"a{axis}", "rad", (0.01, 0.01), f"about world {axis}", minimum=-0.8, maximum=0.8
-        )
-        for axis in "xy"
+    coefficients=along(
+        "a{}", "rad", (0.01, 0.01), "about world {}", minimum=-0.8, maximum=0.8, axes="xy"
     ),
     source="definition; the ground plane of a motion capture is set with a square on a floor that "
     "is level to some mrad",
     excitation="yaw through half a turn and more tells it from a tilted thrust axis; from a steady "
-    "force nothing does: a level "
-    "frame that is tilted leaves just a constant force, of the weight times the tilt",
+    "force nothing does: a level frame that is tilted leaves just a constant force, of the weight "
+    "times the tilt",
     model=effect_model,
     family=Family.ALIGNMENT,
 )

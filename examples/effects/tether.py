@@ -4,21 +4,19 @@ F = k (hook - x) in the world frame at the geometric centre, with the hook 2.5 m
 origin.
 """
 
-from numba import cfunc
-
 from windwrench.dynamics.effects.base import (
     COM,
-    EFFECT_MODEL,
     POSITION,
     ROTATION,
     Coefficient,
     Effect,
+    compiled_model,
 )
 
 HOOK = (0.0, 0.0, 2.5)  # m, world
 
 
-@cfunc(EFFECT_MODEL, cache=True)
+@compiled_model
 def effect_model(c, vehicle, state, wrench):
     """Add force (world) and torque (body, about the centre of mass) to ``wrench`` (6,)."""
     fx = c[0] * (HOOK[0] - state[POSITION])

@@ -15,7 +15,7 @@ from windwrench.studies.probabilities.flights import OF_TEN, WAYS_TO_LOG, record
 from windwrench.studies.runner import Jobs, Task, code_stamp, run_tasks, start
 
 _FIRST = {"first": (800_000, 3000), "later": (850_000, 5000), "other logs": (910_000, 170_000)}
-_MODULES = "logged_poses", "outsiders", "practice_flights", "rotorpy_flights"
+_MODULES = "logged_poses", "outsiders", "practice_flights"
 # the other simulator's flight i is this one of its catalogue, so that few flights hold many kinds
 _STRIDE, _CATALOGUE = 7, 33
 

@@ -1,5 +1,5 @@
-"""Flights whose truth is known, diagnosed and ranked: of this project's plant, of a simulator that
-was written apart from it and is read from its own file, and of RotorPy in wind.
+"""Flights whose truth is known, diagnosed and ranked: of this project's plant, and of a simulator
+that was written apart from it and is read from its own file.
 """
 
 import importlib.util
@@ -26,11 +26,6 @@ from windwrench.studies.scoring import EQUIVALENTS, STAND_INS
 from windwrench.studies.trials.logged_poses import FILTERS, LOGS
 from windwrench.studies.trials.outsiders import OUTSIDERS
 from windwrench.studies.trials.practice_flights import of_mass, practise, shown_in
-from windwrench.studies.trials.rotorpy_flights import (
-    hummingbird_aero,
-    hummingbird_vehicle,
-    rotorpy_flight,
-)
 
 # how a flight is logged: as measured, by its IMU, or behind one of the filters in turn
 WAYS_TO_LOG = ("pose", *LOGS, "filtered")
@@ -56,7 +51,6 @@ _MASSES = (0.1, 2.0)  # kg, between which a vehicle of half the flights lies
 _SEEN_BY_GYRO = 0.1
 _NOISES = ((1e-3, 0.3), (1e-3, 0.3), (0.5e-3, 0.15), (2e-3, 0.5))  # m and degrees, as its own
 _TURBULENCE = (0.015, 3e-4, 0.25)  # N, Nm and s, as its own
-_WINDS = (0.5, 3.0)  # m/s, of RotorPy's wind
 Flown = tuple[FlightLog, Vehicle, dict[str, Any], str, str]
 # what the other simulator calls no effect of a library, and this library has
 _KNOWN = {"pendulum payload 30 g on 0.5 m tether": "slung_payload"}
@@ -70,17 +64,14 @@ def recorded(simulator: str, kind: str, number: int, way: str = "pose") -> dict[
     refused, where it was.
 
     Args:
-        simulator: "own", "rotorpy", or the file of the other one.
-        kind: one of ``KINDS``; of the other simulator "catalogue" or "left out"; of RotorPy one of
-            ``envs.recording.TRAJECTORIES``.
+        simulator: "own", or the file of the other one.
+        kind: one of ``KINDS``; of the other simulator "catalogue" or "left out".
         number: the seed of a flight, or its place in the other simulator's catalogues, one seed
             after the other.
         way: one of ``WAYS_TO_LOG``; the other simulator has no IMU.
     """
     if simulator == "own":
         log, vehicle, truth, outsider, flown = _own(kind, number, way in LOGS)
-    elif simulator == "rotorpy":
-        log, vehicle, truth, outsider, flown = _rotorpy(kind, number)
     else:
         log, vehicle, truth, outsider, flown = _other(Path(simulator), number)
     if way in LOGS:
@@ -169,9 +160,9 @@ def _own(kind: str, number: int, imu: bool) -> Flown:
                 10 * number + attempt,
                 60.0,
                 turbulence,
-                imu,
-                gust_time,
-                seen,
+                imu=imu,
+                gust_time=gust_time,
+                seen=seen,
             )
         except InputError:
             continue
@@ -230,13 +221,3 @@ def _other(path: Path, number: int) -> tuple[FlightLog, Vehicle, dict[str, Any],
         # a law that its catalogue gives another form than the library's
         outsider = outsider or (effect.get("law", "") if what in ("", *_KNOWN) else what)
     return log, vehicle, truth, outsider, kind
-
-
-def _rotorpy(path: str, seed: int) -> Flown:
-    """Fly RotorPy's Hummingbird, its aerodynamics on, in a steady wind from any side."""
-    rng = np.random.default_rng(seed)
-    speed, heading = rng.uniform(*_WINDS), rng.uniform(0.0, 2.0 * np.pi)
-    wind = (speed * np.cos(heading), speed * np.sin(heading), 0.0)
-    truth: dict[str, Any] = {"wind": {"wx": wind[0], "wy": wind[1]}, **hummingbird_aero()}
-    log = rotorpy_flight(path, 60.0, seed, wind=wind)
-    return log, hummingbird_vehicle(), truth, "", f"{path}, wind of {speed:.1f} m/s"

@@ -67,6 +67,32 @@ def _thrust_change(vehicle: Vehicle, m: Moment, change: Array) -> Array:
     return np.concatenate([m.rotation[:, 2] * change.sum(), m.rotation @ torque])
 
 
+def _draught(vehicle: Vehicle, m: Moment, centre: Array, radius: float, most: float) -> Array:
+    """Return the wrench (6,) of a column of moving air about ``centre`` (2,) m, each rotor in its
+    own draught: ``most`` N on a rotor at the centre, positive up; the radius (m) is one sigma.
+    """
+    arms = (vehicle.positions - vehicle.com) @ m.rotation.T
+    away = m.position[:2] + arms[:, :2] - centre
+    lift = most * np.exp(-0.5 / radius**2 * (away * away).sum(axis=1))
+    return np.array([0.0, 0.0, lift.sum(), arms[:, 1] @ lift, -(arms[:, 0] @ lift), 0.0])
+
+
+def _resonance(frequency_hz: float) -> Callable[[float], float]:
+    """Return what a mass on a soft mount, s'' = -a - w^2 s - 2 zeta w s', pulls at its mount at
+    each tick, w^2 s + 2 zeta w s', where the mount accelerates by a; zeta is 0.05.
+    """
+    w, zeta, place, speed = 2.0 * math.pi * frequency_hz, 0.05, 0.0, 0.0
+
+    def pull(acceleration: float) -> float:
+        nonlocal place, speed
+        spring = w * w * place + 2.0 * zeta * w * speed
+        speed -= TICK * (spring + acceleration)
+        place += TICK * speed
+        return spring
+
+    return pull
+
+
 def contact_pushes(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """Irregular transient disturbances of 0.05 to 0.13 weights, 0.2 to 1 s long and 1.5 s apart in
     the mean, anywhere on the hull.
@@ -180,15 +206,8 @@ def thermal_column(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> W
     """A column of rising air, 0.35 m in radius (one sigma), lifts with up to 0.12 weights, each
     rotor in its own draught.
     """
-    centre, rotors = path[rng.integers(len(path)), :2], vehicle.positions - vehicle.com
-
-    def model(m: Moment) -> Array:
-        arms = rotors @ m.rotation.T
-        away = m.position[:2] + arms[:, :2] - centre
-        lift = 0.03 * vehicle.weight * np.exp(-0.5 / 0.35**2 * (away * away).sum(axis=1))
-        return np.array([0.0, 0.0, lift.sum(), arms[:, 1] @ lift, -(arms[:, 0] @ lift), 0.0])
-
-    return model
+    centre = path[rng.integers(len(path)), :2]
+    return lambda m: _draught(vehicle, m, centre, 0.35, 0.03 * vehicle.weight)
 
 
 def flywheel(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
@@ -208,22 +227,18 @@ def sloshing(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchM
     """A long level tank along the nose holds a tenth of the mass in liquid, already weighed, that
     sloshes at 1.2 Hz.
 
-    With s where the liquid is in the tank and a the vehicle's acceleration along it, s'' = -a - w^2
-    s - 2 zeta w s' and the tank feels m (w^2 s + 2 zeta w s') along itself, a third of an arm below
-    the centre; zeta is 0.05.
+    The liquid accelerates with the vehicle along the tank, which feels its pull a third of an arm
+    below the centre.
     """
-    mass, w, zeta = 0.1 * vehicle.mass, 2.0 * math.pi * 1.2, 0.05
-    place, speed, last = 0.0, 0.0, np.zeros(3)
+    mass, last, liquid = 0.1 * vehicle.mass, np.zeros(3), _resonance(1.2)
 
     def model(m: Moment) -> Array:
-        nonlocal place, speed, last
+        nonlocal last
         ahead = np.array([m.rotation[0, 0], m.rotation[1, 0], 0.0])
         ahead /= max(math.hypot(ahead[0], ahead[1]), 1e-6)
-        spring = w * w * place + 2.0 * zeta * w * speed
-        speed -= TICK * (spring + float((m.velocity - last) @ ahead) / TICK)
-        place += TICK * speed
+        pull = liquid(float((m.velocity - last) @ ahead) / TICK)
         last = m.velocity
-        return _at(mass * spring * ahead, m.rotation @ np.array([0.0, 0.0, -0.3 * vehicle.arm_l]))
+        return _at(mass * pull * ahead, m.rotation @ np.array([0.0, 0.0, -0.3 * vehicle.arm_l]))
 
     return model
 
@@ -322,21 +337,14 @@ def failing_cell(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Wre
 
 def loose_gimbal(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """A camera turns about the pitch axis on a soft mount of 2 Hz; it adds 0.3 of the vehicle's
-    inertia there.
-
-    With s its angle to the body and a the body's angular acceleration, s'' = -a - w^2 s - 2 zeta w
-    s', and the body feels the mount's torque, inertia (w^2 s + 2 zeta w s'); zeta is 0.05.
+    inertia there, and the body feels the mount's torque.
     """
-    inertia, w, zeta = 0.3 * float(vehicle.inertia[1, 1]), 2.0 * math.pi * 2.0, 0.05
-    angle, speed, last = 0.0, 0.0, 0.0
+    inertia, last, camera = 0.3 * float(vehicle.inertia[1, 1]), 0.0, _resonance(2.0)
 
     def model(m: Moment) -> Array:
-        nonlocal angle, speed, last
+        nonlocal last
         turning, last = (float(m.rate[1]) - last) / TICK, float(m.rate[1])
-        spring = w * w * angle + 2.0 * zeta * w * speed
-        speed -= TICK * (spring + turning)
-        angle += TICK * speed
-        return np.concatenate([np.zeros(3), inertia * spring * m.rotation[:, 1]])
+        return np.concatenate([np.zeros(3), inertia * camera(turning) * m.rotation[:, 1]])
 
     return model
 
@@ -365,7 +373,7 @@ def passing_wash(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Wre
     Each rotor is in a draught of its own. The other one passes within 0.3 m of where this one ought
     to be by then.
     """
-    rotors, speed = vehicle.positions - vehicle.com, 1.0
+    speed = 1.0
     when, through, along = -10.0, np.zeros(2), np.array([1.0, 0.0])
 
     def model(m: Moment) -> Array:
@@ -377,10 +385,7 @@ def passing_wash(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Wre
             heading = rng.uniform(-math.pi, math.pi)
             along = np.array([math.cos(heading), math.sin(heading)])
         centre = through + speed * (m.t - when) * along
-        arms = rotors @ m.rotation.T
-        away = m.position[:2] + arms[:, :2] - centre
-        push = -0.15 / 4.0 * vehicle.weight * np.exp(-0.5 / 0.3**2 * (away * away).sum(axis=1))
-        return np.array([0.0, 0.0, push.sum(), arms[:, 1] @ push, -(arms[:, 0] @ push), 0.0])
+        return _draught(vehicle, m, centre, 0.3, -0.15 / 4.0 * vehicle.weight)
 
     return model
 

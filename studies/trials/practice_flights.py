@@ -7,14 +7,15 @@ from another), and a disturbance outside the library. All are flown in MuJoCo an
 
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics.effects import get, names
-from windwrench.dynamics.vehicle import EffectSetting, Vehicle
+from windwrench.dynamics.vehicle import EffectSetting, Mocap, Vehicle
 from windwrench.envs.plant import TICK, is_a_body
 from windwrench.envs.recording import background, draw_trajectory, record_flight
 from windwrench.identification.diagnosis.regression import typical_size
@@ -113,26 +114,14 @@ _HOVERING = (
 _FASTER = ("inflow_drag", "rotor_interaction")
 
 
-@dataclass(frozen=True, eq=False)
-class Practice:
-    """One practice flight: what was done, and the log that a diagnosis gets of it."""
+class Practice(NamedTuple):
+    """One practice flight: the log that a diagnosis gets of it, and what was done."""
 
-    name: str
-    kind: str  # one of KINDS
-    size: str  # one of SIZES
-    trajectory: str
-    seed: int
-    effects: tuple[EffectSetting, ...]  # that the vehicle has and does not declare
-    outsider: str | None  # disturbance outside the library
-    turbulence: float  # factor on the plant's background turbulence
-    sensor: float  # factor on the declared noise of the pose
     log: FlightLog
     vehicle: Vehicle  # as declared
-
-    @property
-    def truth(self) -> tuple[str, ...]:
-        """Names of the effects that were added."""
-        return tuple(effect.name for effect in self.effects)
+    effects: tuple[EffectSetting, ...]  # that the vehicle has and does not declare
+    outsider: str | None  # disturbance outside the library
+    trajectory: str
 
 
 def fly_practice(
@@ -180,18 +169,10 @@ def fly_practice(
             raise InputError(
                 f"fly_practice: {what} must be a finite number of at least 0, got {value}"
             )
-    noise = vehicle.mocap
-    flown = replace(
-        vehicle,
-        mocap=replace(
-            noise,
-            sigma_pos_m=sensor * seen * noise.sigma_pos_m,
-            sigma_att_rad=sensor * seen * noise.sigma_att_rad,
-        ),
-    )
-    if sensor == 0.0:
-        # the filter that flies cannot believe in a perfect pose
-        flown = vehicle
+    noise, flown = vehicle.mocap, vehicle
+    if sensor > 0.0:  # the filter that flies cannot believe in a perfect pose
+        pose = sensor * seen * noise.sigma_pos_m, sensor * seen * noise.sigma_att_rad
+        flown = replace(vehicle, mocap=Mocap(noise.rate_hz, *pose))
     settings = replace(background(vehicle, turbulence), sensor_noise=sensor > 0.0)
     if gust_time is not None:
         settings = replace(settings, disturbance_time=gust_time)
@@ -305,9 +286,7 @@ def practise(
     seed: int = 0,
     seconds: float = 60.0,
     turbulence: float | None = None,
-    imu: bool = False,
-    gust_time: float | None = None,
-    seen: float = 1.0,
+    **more: Any,
 ) -> Practice:
     """Fly one practice flight.
 
@@ -321,9 +300,7 @@ def practise(
         seed: of everything random.
         seconds: length of the log.
         turbulence: factor on the background; default: 0 or 1 at random.
-        imu: as of ``fly_practice``.
-        gust_time: as of ``fly_practice``.
-        seen: as of ``fly_practice``.
+        more: as of ``fly_practice``.
 
     Raises:
         InputError: an unknown name, or a crash.
@@ -337,15 +314,9 @@ def practise(
     held_back = bool(added) and added[0] in HELD_BACK
     words = (*added, size) if held_back else (kind, *added, size)
     rng = np.random.default_rng((seed, zlib.crc32("+".join(words).encode())))
-    wanted = {"nothing": 0, "effect": 1, "pair": 2, "hover": 1, "outsider": 1}[kind]
-    pool = (
-        tuple(OUTSIDERS)
-        if kind == "outsider"
-        else _HOVERING
-        if kind == "hover"
-        else _in_the_open(names())
-    )
-    while len(added) < wanted:
+    pools = {"outsider": tuple(OUTSIDERS), "hover": _HOVERING}
+    pool = pools.get(kind) or _in_the_open(names())
+    while len(added) < {"nothing": 0, "pair": 2}.get(kind, 1):
         added = (*added, str(rng.choice([name for name in pool if name not in added])))
     outsider = added[0] if kind == "outsider" else None
     effects = () if outsider else tuple(draw_effect(name, vehicle, size, rng) for name in added)
@@ -354,7 +325,6 @@ def practise(
         both = [name for name in shown[0] if all(name in others for others in shown)]
         trajectory = "hover" if kind == "hover" else str(rng.choice(both or ["excite"]))
     turbulence = float(rng.integers(2)) if turbulence is None else turbulence
-    sensor = float(rng.choice([0.5, 1.0, 2.0]))
     log = fly_practice(
         vehicle,
         effects,
@@ -363,27 +333,12 @@ def practise(
         seed,
         outsider,
         turbulence,
-        sensor,
-        SIZES[size],
-        imu,
-        gust_time,
-        seen,
-        rng if held_back else None,
+        sensor=float(rng.choice([0.5, 1.0, 2.0])),
+        outsider_size=SIZES[size],
+        outsider_rng=rng if held_back else None,
+        **more,
     )
-    name = "_".join((kind, *added, size, trajectory, str(seed)))
-    return Practice(
-        name,
-        kind,
-        size,
-        trajectory,
-        seed,
-        effects,
-        outsider,
-        turbulence,
-        sensor,
-        replace(log, name=name),
-        vehicle,
-    )
+    return Practice(log, vehicle, effects, outsider, trajectory)
 
 
 def _in_the_open(effects: tuple[str, ...]) -> tuple[str, ...]:

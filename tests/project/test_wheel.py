@@ -81,6 +81,7 @@ def test_the_wheel_holds_code_and_data_and_nothing_else(installed):
         "envs/quadrotor.xml",
         "dynamics/vehicles/ardrone2.yaml",
         "dynamics/effects/rotor_drag.py",
+        "dynamics/effects/page.md.j2",
         "identification/logs/readers/px4_ulog.py",
         "identification/logs/maps/nanobench.yaml",
         "training/policies/tasks/WindHover-gru-0.npz",

@@ -14,11 +14,10 @@ HOSE = '''"""A pull that comes and goes."""
 
 import math
 
-from numba import cfunc
-from windwrench.dynamics.effects.base import EFFECT_MODEL, TIME, Coefficient, Effect
+from windwrench.dynamics.effects.base import TIME, Coefficient, Effect, compiled_model
 
 
-@cfunc(EFFECT_MODEL)
+@compiled_model
 def model(c, vehicle, state, wrench):
     wrench[0] += c[0] * math.sin(c[1] * state[TIME])
 
@@ -40,7 +39,7 @@ EFFECT = Effect(
 
 def forget():
     """Let the library be read anew."""
-    for known in (effects._files, effects.names, effects.get):
+    for known in (effects._files_in, effects.names, effects.get):
         if hasattr(known, "cache_clear"):
             known.cache_clear()
 
