@@ -92,8 +92,8 @@ def share(total: float, power: float, cross: float, gain: tuple[float, float]) -
 class Fit:
     """Shares of variance that a reading leaves unexplained, and its score."""
 
-    reading: Reading
-    horizontal: float  # of the horizontal specific force
+    reading: Any  # a Reading, or a SensorReading
+    horizontal: float  # of the horizontal specific force, or of what the sensor measures
     torques: tuple[float, ...]  # about x, y and, with a vehicle, z
     score: float  # log-likelihood less what the reading must make up for being less usual
 
@@ -401,7 +401,7 @@ class Ranking:
         return cls(sorted(fits, key=lambda fit: fit.score, reverse=True))
 
     @property
-    def best(self) -> Reading:
+    def best(self) -> Any:
         """The reading that is taken."""
         return self.ranked[0].reading
 

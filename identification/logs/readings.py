@@ -79,12 +79,14 @@ class SensorReading:
     says: str = ""  # what the columns look like, what was expected, and what to do
     turn: Array = field(default_factory=lambda: _I)  # (3, 3), multiplies the columns
     lacks_gravity: bool = False  # they hold an acceleration in place of the specific force
+    unit: str = ""  # of the columns, in a map
+    body: str = ""  # axes of the columns, in a map
 
 
 AS_DECLARED = SensorReading()
 
 
-def _sensor(says: str, scale: float = 1.0, axes: str = "x y z", **more: bool) -> SensorReading:
+def _sensor(says: str, scale: float = 1.0, axes: str = "x y z", **more: Any) -> SensorReading:
     return SensorReading(says, scale * _axes(axes), **more)
 
 

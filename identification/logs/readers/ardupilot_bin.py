@@ -37,7 +37,6 @@ from ..what_flew import (
     slots_of_motors,
 )
 from .dataflash import BEGINS as BEGINS
-from .dataflash import HOLDS as HOLDS
 from .dataflash import WHAT as WHAT
 from .dataflash import Messages, read_dataflash
 

@@ -45,8 +45,7 @@ from .ulog_counting import counting
 
 Fields = Mapping[str, Array]  # (N,) of an instance of a topic, by name
 
-BEGINS = (b"ULog\x01\x12\x35",)
-
+BEGINS = rb"ULog\x01\x12\x35"
 WHAT = "a PX4 log (ULog)"
 _FILTER, _STATUS = "vehicle_local_position", "vehicle_status"
 _SENSORS = (  # field of an inertial sensor, and that of what it gained over a time

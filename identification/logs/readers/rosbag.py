@@ -56,7 +56,7 @@ from .unpacking import check_bag_files, limited_unpacking
 WHAT = "a ROS bag (ROS 1, SQLite or MCAP)"
 SUFFIXES = (".bag", ".db3", ".mcap")
 _ROS1 = b"#ROSBAG V2.0"
-BEGINS = (_ROS1, b"\x89MCAP0\r\n", b"SQLite format 3\0")
+BEGINS = _ROS1 + rb"|\x89MCAP0\r\n|SQLite format 3\0"
 
 _Messages = Callable[[str], Iterator[tuple[int, Any]]]  # topic to (recorded at ns, message)
 
