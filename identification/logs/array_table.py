@@ -19,7 +19,7 @@ from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS
 from ...runtime.regular_files import read_bytes
 from ...runtime.workers import SINGLE_THREADED
-from .table import WHAT, Array, Table
+from .table import WHAT, Array, Table, one_line
 
 _MEMORY = 4  # times the bytes that a file may unpack to
 _SHOWN = 10  # arrays that a note lists
@@ -33,7 +33,7 @@ def open_arrays(path: Path) -> Table:
         InputError: unreadable, no arrays of numbers, or more than ``FileLimits`` allows.
     """
     data = read_bytes(path, WHAT, LIMITS.binary_log)
-    try:
+    with one_line(f"{path}: cannot be read as {WHAT}"):
         is_matlab = not path.name.lower().endswith(".npz")
         data = _matlab(path, data) if is_matlab else data
         check_archive(path, io.BytesIO(data), LIMITS.table_text, WHAT)
@@ -42,10 +42,6 @@ def open_arrays(path: Path) -> Table:
         for name, array in list(read.items()):
             read |= {f"{name}.{field}": array[field] for field in array.dtype.names or ()}
         arrays = {name: x.squeeze() for name, x in read.items() if x.dtype.kind in "biuf"}
-    except InputError:
-        raise
-    except Exception as error:  # whatever a parser makes of bytes that are none of its kind
-        raise InputError(f"{path}: cannot be read as {WHAT}: {error}") from error
     lengths = Counter(n for array in arrays.values() for n in set(array.shape) if n > 1)
     if not lengths:
         raise InputError(f"{path}: no arrays of numbers; expected a flight's, of one length")

@@ -70,16 +70,7 @@ class Reason:
     field: str
     certain: bool
     why: str
-
-
-@dataclass(frozen=True)
-class Missing:
-    """Columns that a person must choose: a section and its field are ``?`` in the map."""
-
-    section: str
-    field: str
-    why: str
-    candidates: tuple[str, ...] = ()  # the likeliest first
+    candidates: tuple[str, ...] = ()  # columns, the likeliest first, of which a person must choose
 
 
 @dataclass(frozen=True)
@@ -89,7 +80,7 @@ class Guess:
     log_map: LogMap
     reasons: tuple[Reason, ...]
     unused: tuple[str, ...] = ()  # columns
-    missing: tuple[Missing, ...] = ()  # without which the log cannot be read
+    missing: tuple[Reason, ...] = ()  # fields that are ``?``, without which the log is not read
 
     @property
     def lacks(self) -> str:
@@ -220,13 +211,13 @@ class _Guessing:
         """Return the columns (N, k) of a part."""
         return np.column_stack([self.data[name] for name in self.parts[part].columns])
 
-    def missing(self) -> list[Missing]:
+    def missing(self) -> list[Reason]:
         """Return what the map lacks for a flight log."""
         out = []
 
         def lack(part: str, section: str, why: str, field: str = "columns") -> None:
             found = self.ranked.get(part, [])[: PARTS.shown]
-            out.append(Missing(section, field, why, tuple(map(str, found))))
+            out.append(Reason(section, field, False, why, tuple(map(str, found))))
 
         if self.clock is None:
             why = "no column looks like a time; expected one such as t, time or timestamp"
@@ -309,14 +300,6 @@ class _Guessing:
         self.sections["time"] = TimeColumn(clock.column, unit, nanoseconds)
         return t
 
-    def by_motion(self, ranking: Ranking, prop: str, what: str) -> _Choice:
-        """Return what the motion says of a property of a reading."""
-        value, (other, lead) = getattr(ranking.best, prop), ranking.other(prop)
-        why = f"{ranking.fit.horizontal:.0%} of the {what}"
-        if other is not None and lead > 0.0:
-            why += f", and {other} is less likely by a log-likelihood ratio of {lead:.3g}"
-        return value, ranking.certain(prop), why
-
     def pose(self, place: Group, group: Group) -> None:
         """Find frames, units, order and sense of the pose."""
         attitude, is_quaternion = self.values("attitude"), len(group.columns) == 4
@@ -329,36 +312,26 @@ class _Guessing:
         readings = table_readings(
             orders if is_quaternion else (),
             units,
-            lengths=(place.unit,) if place.unit == "ft" else ("m", "cm", "mm"),
+            place.unit,
             hint="ned" if re.search("ned|down|d$", "".join(place.columns).lower()) else "",
         )
-        if place.unit in UNITS["position"]:
-            readings = [
-                replace(r, unlikely=r.unlikely + OTHER * (r.length != place.unit)) for r in readings
-            ]
         motors = [self.values(part) for part in _MOTORS if part in self.parts]
         thrusts = np.square(motors[0]) if motors else np.ones((len(self.t), 4))
         evidence = Evidence(self.t, thrusts, self.values("position"), attitude)
-        self.ranking = Ranking.of(evidence, readings, torques=False)
-        best = self.ranking.best
-
-        def told(prop: str) -> _Choice:
-            assert self.ranking is not None
-            left = "horizontal acceleration is left by the tilt"
-            return self.by_motion(self.ranking, prop, left)
-
-        length = self.unit("position", place.unit, told("length"))
+        self.ranking = ranking = Ranking.of(evidence, readings, torques=False)
+        best = ranking.best
+        length = self.unit("position", place.unit, ranking.says("length"))
         fields = [("world", "", "world"), ("body", "", "body"), ("attitude", "sense", "sense")]
         if not is_quaternion:
             beyond = best.unit, best.unit != group.unit, "angles beyond pi"
-            self.unit("attitude", group.unit, told("unit") if len(units) > 1 else beyond)
+            self.unit("attitude", group.unit, ranking.says("unit") if len(units) > 1 else beyond)
             fields += [("attitude", "euler", "euler"), ("attitude", "signs", "pitch_sign")]
         elif group.numbered:
             fields.append(("attitude", "order", "order"))
         else:
             self.say("attitude", "order", True, "by the columns' names")
         for section, name, prop in fields:
-            self.take(section, name, told(prop))
+            self.take(section, name, ranking.says(prop))
         position = Columns(place.columns, length)
         self.sections |= {"world": best.world, "body": best.body}
         self.sections |= {"position": position, "attitude": best.part(group.columns)}
@@ -403,7 +376,8 @@ class _Guessing:
             Fit(way, left, (), likelihood([left] * 3) - OTHER * (unit not in ("", way.unit)))
             for way, left in zip(_GYROS, shares, strict=False)
         ]
-        return Ranking(sorted(fits, key=lambda fit: -fit.score)) if fits else None
+        ranked = sorted(fits, key=lambda fit: -fit.score)
+        return Ranking(ranked, "attitude's rate is left unexplained") if fits else None
 
     def turns_alike(self, columns: Sequence[str]) -> tuple[float, str]:
         """Return how well three columns turn as the pose does, at most 1; 0 where they do not."""
@@ -416,9 +390,8 @@ class _Guessing:
         named = group.unit if group.unit in UNITS["gyro"] else ""
         ranking = self.gyro_fits(group.columns, named)
         if ranking is not None:
-            left = "attitude's rate is left unexplained"
-            guessed = self.by_motion(ranking, "unit", left)
-            axes, sure, why = self.by_motion(ranking, "body", left)
+            guessed = ranking.says("unit")
+            axes, sure, why = ranking.says("body")
             assert self.ranking is not None
             sure &= self.ranking.certain(*_TURNS)
             self.take("gyro", "body", (axes, sure, why))

@@ -77,12 +77,8 @@ def _column(path: Path, file: Any, name: str) -> Any:
     """
     import pyarrow
 
-    metadata = file.metadata
-    chunks = [
-        metadata.row_group(group).column(i)
-        for group in range(metadata.num_row_groups)
-        for i in range(metadata.num_columns)
-    ]
+    groups = map(file.metadata.row_group, range(file.metadata.num_row_groups))
+    chunks = [chunk for group in groups for chunk in map(group.column, range(group.num_columns))]
     chunks = [chunk for chunk in chunks if chunk.path_in_schema.split(".")[0] == name]
     size = sum(max(chunk.total_uncompressed_size, 0) for chunk in chunks)
     most = max((chunk.num_values for chunk in chunks), default=0)

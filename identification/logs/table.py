@@ -1,7 +1,8 @@
 """A table of numbers in a file: its columns by name, and where a row stands."""
 
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -76,6 +77,23 @@ class Table:
             return f"row {index + 1}"
         line = self.first_line + index + bisect_right(self.blank_before, index)
         return f"row {index + 1} (line {line})"
+
+
+@contextmanager
+def one_line(what: str, expected: str = "") -> Iterator[None]:
+    """Make an InputError of one line of whatever a parser raises of bytes that are none of its own.
+
+    Args:
+        what: cannot be read, for the error.
+        expected: in its place; empty: not said.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        words = f"{what}: {error or type(error).__name__}"
+        raise InputError(f"{words}; expected {expected}" if expected else words) from error
 
 
 def file_kind(path: Path) -> str:
