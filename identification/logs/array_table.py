@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -58,11 +58,10 @@ def open_arrays(path: Path) -> Table:
         columns |= dict(zip(names, flat.T, strict=True))
     notes = [f"arrays of other lengths than {rows} were left out: {', '.join(other[:_SHOWN])}"]
 
-    def fill(table: Table, where: Sequence[int], out: Array) -> None:
-        for i, column in zip(where, out, strict=True):
-            column[:] = columns[table.header[i]]
+    def load(_: Table, names: Sequence[str]) -> Iterator[Array]:
+        return (columns[name] for name in names)
 
-    return Table(path, tuple(columns), rows, fill, notes=tuple(notes if other else ()))
+    return Table(path, tuple(columns), rows, load, notes=tuple(notes if other else ()))
 
 
 def _matlab(path: Path, data: bytes) -> bytes:

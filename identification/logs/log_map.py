@@ -350,7 +350,13 @@ class LogMap:
     def with_ways(self, ways: Mapping[str, Sequence[Any]]) -> "LogMap":
         """Return the map with these ways to fill its sections; without those that have none."""
         first: dict[str, Any] = {name: found[0] if found else None for name, found in ways.items()}
-        return replace(self, **first, alternatives={name: tuple(w[1:]) for name, w in ways.items()})
+        others = {name: tuple(found[1:]) for name, found in ways.items()}
+        return replace(self, **first, alternatives={**self.alternatives, **others})
+
+    def with_order(self, order: Order) -> "LogMap":
+        """Return the map with this order of rotors and commands."""
+        motors = {name: self.ways(name) for name in ("rotors", "commands")}
+        return self.with_ways({n: [replace(w, order=order) for w in x] for n, x in motors.items()})
 
     @property
     def wanted(self) -> list[str]:

@@ -23,6 +23,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import numpy as np
+
 from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS, check_count
 from ...runtime.regular_files import open_regular
@@ -179,17 +181,18 @@ def open_text(path: Path) -> Table:
         rows -= 1
         notes.append("the last line was cut off, and left out")
 
-    def fill(table: Table, where: Sequence[int], columns: Array) -> None:
+    def load(table: Table, wanted: Sequence[str]) -> Array:
         lines: Iterator[str] = islice(_lines(path), first, None)
         if blank:
             lines = (line for line in lines if not layout.is_blank(line))
-        kept, done = islice(lines, rows), 0
+        columns, done, kept = np.empty((len(wanted), rows)), 0, islice(lines, rows)
         while block := list(islice(kept, _BLOCK)):
             part = columns[:, done : done + len(block)]
-            _fill(table, layout, block, done, where, part)
+            _fill(table, layout, block, done, wanted, part)
             done += len(block)
         if done != rows:
             raise InputError(f"{path}: changed while it was read; expected a whole file")
+        return columns
 
     units = tuple(layout.fields(between[0])) if len(between) == 1 and not layout.lists else ()
     seen = [layout.fields(line) for line in written[first:] if line.strip()]
@@ -200,7 +203,7 @@ def open_text(path: Path) -> Table:
         if all(layout.number(fields[i]) is not None for fields in seen)
     )
     lines = first + 1, tuple(blank)
-    return Table(path, tuple(names), rows, fill, *lines, units, tuple(notes), numeric)
+    return Table(path, tuple(names), rows, load, *lines, units, tuple(notes), numeric)
 
 
 def _lists(layout: TextLayout, lines: Sequence[str]) -> tuple[tuple[int, int], ...]:
@@ -368,10 +371,10 @@ def _fill(
     layout: TextLayout,
     lines: Sequence[str],
     first: int,
-    where: Sequence[int],
+    wanted: Sequence[str],
     out: Array,
 ) -> None:
-    """Put the numbers in the fields ``where`` of rows into ``out`` (len(where), n).
+    """Put the numbers in the columns ``wanted`` of rows into ``out`` (len(wanted), n).
 
     Raises:
         InputError: a field holds something else, or a row has more or fewer fields than the header.
@@ -388,8 +391,8 @@ def _fill(
                 f"{width}, as many as the header{hint}"
             )
     is_plain = layout.decimal == "." and not any("_" in line for line in lines)
-    texts = list(zip(*rows, strict=True))
-    for column, values in zip(where, out, strict=True):
+    texts = dict(zip(table.header, zip(*rows, strict=True), strict=True))
+    for column, values in zip(wanted, out, strict=True):
         with suppress(ValueError):
             if is_plain:  # as Python reads numbers, which is quick
                 values[:] = [float(text or "nan") for text in texts[column]]
@@ -398,7 +401,7 @@ def _fill(
         if None in numbers:
             i = numbers.index(None)
             raise InputError(
-                f"{table.path}: column {table.header[column]}, {table.row(first + i)}: "
+                f"{table.path}: column {column}, {table.row(first + i)}: "
                 f"{texts[column][i][:100]!r} is not a number; expected a decimal number"
             )
         values[:] = numbers
