@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS
 from ...runtime.regular_files import read_bytes
 from ...runtime.workers import SINGLE_THREADED
-from .table import WHAT, Array, Table
+from .table import WHAT, Array, Table, one_line
 
 _MEMORY = 4  # times the bytes that a file may unpack to
 _SHOWN = 10  # arrays that a note lists
@@ -33,7 +33,7 @@ def open_arrays(path: Path) -> Table:
         InputError: unreadable, no arrays of numbers, or more than ``FileLimits`` allows.
     """
     data = read_bytes(path, WHAT, LIMITS.binary_log)
-    try:
+    with one_line(f"{path}: cannot be read as {WHAT}"):
         is_matlab = not path.name.lower().endswith(".npz")
         data = _matlab(path, data) if is_matlab else data
         check_archive(path, io.BytesIO(data), LIMITS.table_text, WHAT)
@@ -42,10 +42,6 @@ def open_arrays(path: Path) -> Table:
         for name, array in list(read.items()):
             read |= {f"{name}.{field}": array[field] for field in array.dtype.names or ()}
         arrays = {name: x.squeeze() for name, x in read.items() if x.dtype.kind in "biuf"}
-    except InputError:
-        raise
-    except Exception as error:  # whatever a parser makes of bytes that are none of its kind
-        raise InputError(f"{path}: cannot be read as {WHAT}: {error}") from error
     lengths = Counter(n for array in arrays.values() for n in set(array.shape) if n > 1)
     if not lengths:
         raise InputError(f"{path}: no arrays of numbers; expected a flight's, of one length")
@@ -62,11 +58,10 @@ def open_arrays(path: Path) -> Table:
         columns |= dict(zip(names, flat.T, strict=True))
     notes = [f"arrays of other lengths than {rows} were left out: {', '.join(other[:_SHOWN])}"]
 
-    def fill(table: Table, where: Sequence[int], out: Array) -> None:
-        for i, column in zip(where, out, strict=True):
-            column[:] = columns[table.header[i]]
+    def load(_: Table, names: Sequence[str]) -> Iterator[Array]:
+        return (columns[name] for name in names)
 
-    return Table(path, tuple(columns), rows, fill, notes=tuple(notes if other else ()))
+    return Table(path, tuple(columns), rows, load, notes=tuple(notes if other else ()))
 
 
 def _matlab(path: Path, data: bytes) -> bytes:

@@ -5,7 +5,7 @@ With W from the log's world and B from its body axes to this kit's, positions be
 W R B' and what a sensor measures B v.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,9 +31,12 @@ class Samples:
     table: Table | None = None  # in which they stand
     rows: Rows | None = None  # (N,) of it
 
-    def read(self, names: Sequence[str]) -> dict[str, Array]:
-        """Return columns (N,) by their names."""
-        return {name: self.columns[name] for name in names}
+    @property
+    def beside(self) -> tuple[Sequence[str], Callable[[Sequence[str]], Mapping[str, Array]]]:
+        """The names of all columns of their table or message, and what reads some of these."""
+        if self.table is not None:
+            return self.table.numeric or self.table.header, self.table.read
+        return list(self.columns), lambda names: {name: self.columns[name] for name in names}
 
     def values(self, part: Columns) -> Array:
         """Return a section's columns (N, k), with their signs and scale; a constant such as ``=0``

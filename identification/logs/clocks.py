@@ -4,6 +4,7 @@ written late, a counter that rolls over, and a vehicle that was switched on twic
 Each group of columns has its stamps in the order in which they were written.
 """
 
+import math
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Sequence
@@ -47,16 +48,14 @@ def on_one_clock(
     Raises:
         InputError: there is no such piece.
     """
+    groups = []
+    for samples in recorded:
+        over = np.cumsum(np.abs(np.diff(samples.t, prepend=np.nan) + CLOCK.rollover) < CLOCK.jitter)
+        is_over = len(over) > 0 and over[-1] > 0
+        groups.append(replace(samples, t=samples.t + CLOCK.rollover * over) if is_over else samples)
     notes: list[str] = []
-    over = [np.abs(np.diff(s.t) + CLOCK.rollover) < CLOCK.jitter for s in recorded]
-    if any(map(np.any, over)):
+    if any(samples is not s for samples, s in zip(recorded, groups, strict=True)):
         notes.append("the clock of 32 bits rolled over in the log; later times go on behind it")
-    groups = [
-        replace(s, t=s.t + CLOCK.rollover * np.append(0, np.cumsum(x))[: len(s.t)])
-        if x.any()
-        else s
-        for s, x in zip(recorded, over, strict=True)
-    ]
     groups, said = _of_piece(path, groups, piece)
     notes += said
     out = []
@@ -164,24 +163,14 @@ def _longest_increase(t: Array) -> Rows:
     sorting; NaN is in none).
     """
     ends: list[float] = []  # the least last time of a sequence of each length
-    at: list[int] = []
-    before = np.full(len(t), -1, dtype=np.intp)
+    at: list[int] = []  # and its row
+    before: dict[int, int] = {}
     for i, x in enumerate(t.tolist()):
-        if not np.isfinite(x):
-            continue
-        if not ends or x > ends[-1]:
-            k = len(ends)
-            ends.append(x)
-            at.append(i)
-        else:
-            k = bisect_left(ends, x)
-            if ends[k] == x:  # of two samples at one time the first
-                continue
-            ends[k], at[k] = x, i
-        before[i] = at[k - 1] if k else -1
-    rows = []
-    i = at[-1] if at else -1
-    while i >= 0:
-        rows.append(i)
-        i = int(before[i])
-    return np.array(rows[::-1], dtype=np.intp)
+        k = bisect_left(ends, x)
+        if math.isfinite(x) and ends[k : k + 1] != [x]:  # of two samples at one time the first
+            before[i] = at[k - 1] if k else -1
+            ends[k : k + 1], at[k : k + 1] = [x], [i]
+    rows = at[-1:] or [-1]
+    while rows[-1] >= 0:
+        rows.append(before[rows[-1]])
+    return np.array(rows[-2::-1], dtype=np.intp)

@@ -92,8 +92,8 @@ def share(total: float, power: float, cross: float, gain: tuple[float, float]) -
 class Fit:
     """Shares of variance that a reading leaves unexplained, and its score."""
 
-    reading: Reading
-    horizontal: float  # of the horizontal specific force
+    reading: Any  # a Reading, or a SensorReading
+    horizontal: float  # of the horizontal specific force, or of what the sensor measures
     torques: tuple[float, ...]  # about x, y and, with a vehicle, z
     score: float  # log-likelihood less what the reading must make up for being less usual
 
@@ -390,6 +390,7 @@ class Ranking:
     """Fits of readings, the likeliest first."""
 
     ranked: Sequence[Fit]
+    left: str = "horizontal acceleration is left by the tilt"  # of what a reading leaves a share
 
     @classmethod
     def of(cls, evidence: Evidence, readings: Sequence[Reading], torques: bool = True) -> "Ranking":
@@ -401,7 +402,7 @@ class Ranking:
         return cls(sorted(fits, key=lambda fit: fit.score, reverse=True))
 
     @property
-    def best(self) -> Reading:
+    def best(self) -> Any:
         """The reading that is taken."""
         return self.ranked[0].reading
 
@@ -423,6 +424,14 @@ class Ranking:
     def certain(self, *names: str) -> bool:
         """Return whether every other value of properties explains the flight clearly less."""
         return all(self.other(name)[1] >= EVIDENCE.certain for name in names)
+
+    def says(self, name: str) -> tuple[Any, bool, str]:
+        """Return the best value of a property, whether it is certain, and why."""
+        other, lead = self.other(name)
+        why = f"{self.fit.horizontal:.0%} of the {self.left}"
+        if other is not None and lead > 0.0:
+            why += f", and {other} is less likely by a log-likelihood ratio of {lead:.3g}"
+        return getattr(self.best, name), self.certain(name), why
 
 
 def departures(evidence: Evidence) -> list[Reading]:

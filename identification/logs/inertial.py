@@ -20,6 +20,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from ..motion.smoothing import resampled
 from .evidence import EVIDENCE, likelihood
 from .flight_log import ACCELEROMETER, GYRO, FlightLog
+from .magnitudes import MAGNITUDES
 from .readings import ACCELEROMETER_READINGS, AS_DECLARED, GYRO_READINGS, OTHER, SensorReading
 from .table import Array
 
@@ -38,6 +39,7 @@ class InertialSettings:
 
 
 INERTIAL = InertialSettings()
+_BY_GRAVITY = [reading for reading in ACCELEROMETER_READINGS if not reading.lacks_gravity]
 
 
 def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, tuple[str, ...]]:
@@ -51,17 +53,19 @@ def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, tu
     seen = np.flatnonzero(log.valid)
     pose = log.t[seen], Rotation.from_quat(log.quaternion[seen], scalar_first=True)
     for field, names in (("gyro", GYRO), ("accelerometer", ACCELEROMETER)):
-        values = getattr(log, field)
-        if values is None:
+        values, columns = getattr(log, field), ", ".join(names)
+        if values is None or not (read := np.isfinite(values[:, 0])).any():
             continue
-        read = np.isfinite(values[:, 0])
         t, measured = log.t[read], values[read]
+        shares: list[float] | None = None
         if is_stuck(measured):
             doubt = f"never change: the {field} was not read"
         elif field == "gyro":
             turns = [reading.turn for reading in (AS_DECLARED, *GYRO_READINGS)]
             shares = gyro_shares(t, measured, *pose, turns)
             doubt = sensor_doubt(shares, GYRO_READINGS, "contradict the attitude's rate")
+            fast = np.quantile(np.abs(measured), 0.99) > MAGNITUDES.fastest_gyro
+            alone = GYRO_READINGS[0].says if fast else ""
         else:
             shares, turned = _force_shares(t, measured, *pose, log.position[seen], gravity)
             if turned is not None:
@@ -69,15 +73,18 @@ def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, tu
                 values[read] = turned
                 log = replace(log, accelerometer=values)
                 notes.append(
-                    f"{', '.join(names)} are an acceleration in world axes, by the position's own: "
-                    "they were turned into body axes by the attitude"
+                    f"{columns} are an acceleration in world axes, by the position's own: they "
+                    "were turned into body axes by the attitude"
                 )
             otherwise = "contradict the position's acceleration and gravity"
             doubt = sensor_doubt(shares, ACCELEROMETER_READINGS, otherwise)
+            alone = sensor_doubt(_gravity_shares(measured, gravity), _BY_GRAVITY, "")
         if doubt:
-            notes.append(f"{', '.join(names)} {doubt}. They were left out")
+            notes.append(f"{columns} {doubt}. They were left out")
             left_out: dict[str, Any] = {field: None}
             log = replace(log, **left_out)
+        elif shares is None and alone:  # no pose shows how wrong it is
+            notes.append(f"{columns} {alone}")
     return log, tuple(notes)
 
 
@@ -191,12 +198,7 @@ def _second_difference(middles: Array, times: Array, values: Array) -> Array:
 
 def gravity_doubt(force: Array, gravity: float) -> str:
     """Return what gravity says against the specific force (n, 3) of a flight, or nothing."""
-    middle, up = np.median(force, axis=0), np.array([0.0, 0.0, gravity])
-    readings = [reading for reading in ACCELEROMETER_READINGS if not reading.lacks_gravity]
-    shares = [
-        float(np.sum(np.square(up - reading.turn @ middle))) / gravity**2
-        for reading in (AS_DECLARED, *readings)
-    ]
+    middle = np.median(force, axis=0)
     size = float(np.linalg.norm(middle))
     otherwise = (
         f"are {size:.3g} m/s2 in the median of a flight, along a{'xyz'[np.argmax(np.abs(middle))]}"
@@ -205,7 +207,16 @@ def gravity_doubt(force: Array, gravity: float) -> str:
     )
     if size < 0.5 * gravity:
         otherwise += " (an acceleration without gravity is none)"
-    return sensor_doubt(shares, readings, otherwise)
+    return sensor_doubt(_gravity_shares(force, gravity), _BY_GRAVITY, otherwise)
+
+
+def _gravity_shares(force: Array, gravity: float) -> list[float]:
+    """Return which share of gravity the median of a specific force (n, 3) leaves, as declared and
+    by each reading of ``_BY_GRAVITY``.
+    """
+    middle, up = np.median(force, axis=0), np.array([0.0, 0.0, gravity])
+    readings = (AS_DECLARED, *_BY_GRAVITY)
+    return [float(np.sum(np.square(up - r.turn @ middle))) / gravity**2 for r in readings]
 
 
 def _middle(vectors: Array) -> float:

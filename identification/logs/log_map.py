@@ -47,7 +47,7 @@ columns the log has, with numbers in them.
 
 import math
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
@@ -186,9 +186,10 @@ class TimeColumn:
     offset: Number | None = None  # s, added; None: so that the flight begins at 0
     rate_hz: Positive = 0.0  # of rows, where there is no column
     note: str = ""
+    optional: ClassVar[bool] = False
 
     @property
-    def columns(self) -> tuple[str, ...]:
+    def named(self) -> tuple[str, ...]:
         """The columns that stand in the table."""
         return tuple(filter(None, (self.column, self.nanoseconds)))
 
@@ -346,12 +347,23 @@ class LogMap:
         first = getattr(self, section)
         return () if first is None else (first, *self.alternatives.get(section, ()))
 
+    def with_ways(self, ways: Mapping[str, Sequence[Any]]) -> "LogMap":
+        """Return the map with these ways to fill its sections; without those that have none."""
+        first: dict[str, Any] = {name: found[0] if found else None for name, found in ways.items()}
+        others = {name: tuple(found[1:]) for name, found in ways.items()}
+        return replace(self, **first, alternatives={**self.alternatives, **others})
+
+    def with_order(self, order: Order) -> "LogMap":
+        """Return the map with this order of rotors and commands."""
+        motors = {name: self.ways(name) for name in ("rotors", "commands")}
+        return self.with_ways({n: [replace(w, order=order) for w in x] for n, x in motors.items()})
+
     @property
     def wanted(self) -> list[str]:
         """The columns that the map asks for, each once."""
         parts = [way for section in self.sections for way in self.ways(section)]
         names = [name for part in (*parts, *self.extra.values()) for name in part.named]
-        return [name for name in dict.fromkeys([*names, *self.time.columns]) if name]
+        return [name for name in dict.fromkeys([*names, *self.time.named]) if name]
 
     @property
     def topics(self) -> set[str]:
@@ -438,11 +450,11 @@ def parse_map(value: object, where: str, name: str = "") -> LogMap:
     first = given | {key: listed[0] for key, listed in ways.items() if listed}
     found = checked(LogMap, first, where)
     others = {
-        key: tuple(getattr(checked(LogMap, first | {key: way}, where), key) for way in listed[1:])
+        key: [getattr(checked(LogMap, first | {key: way}, where), key) for way in listed]
         for key, listed in ways.items()
     }
     check_whole(found, where)
-    return replace(found, name=name or where, alternatives=others)
+    return replace(found, name=name or where).with_ways(others)
 
 
 def check_whole(found: LogMap, where: str) -> None:

@@ -207,20 +207,6 @@ def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
                 f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected "
                 f"metres"
             )
-    if log.accelerometer is not None:
-        size = float(np.nanmedian(np.linalg.norm(log.accelerometer, axis=1)))
-        if likely_unit("accelerometer", size) == ("g", True):
-            doubts.append(
-                f"ax, ay, az look like g: their median size is {size:.3g}; expected m/s2: "
-                f"multiply by {UNITS['accelerometer']['g']:g}"
-            )
-    if log.gyro is not None:
-        fast = float(np.nanquantile(np.abs(log.gyro), 0.99))
-        if fast > MAGNITUDES.fastest_gyro:
-            doubts.append(
-                f"gx, gy, gz look like degrees per second: a hundredth is above {fast:.3g}; "
-                f"expected rad/s: multiply by {UNITS['gyro']['deg/s']:.6g}"
-            )
     if vehicle is not None and log.has_rotor_speeds:
         doubts.append(rotor_doubt(thrust_by_weight(log.rotor_speeds, vehicle), vehicle))
     return [doubt for doubt in doubts if doubt]

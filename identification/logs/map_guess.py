@@ -11,7 +11,7 @@ unit in a name is taken unless the numbers contradict it.
 
 import re
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 from typing import Any
@@ -23,13 +23,8 @@ from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS
 from .channels import BODY_TURNS
 from .column_names import Group, Name, named_alone, take_apart, words
-from .column_parts import (
-    PARTS,
-    Numbers,
-    find_parts,
-    named_columns,
-)
-from .evidence import EVIDENCE, Evidence, Ranking, likelihood
+from .column_parts import PARTS, Candidate, Numbers, candidates, named_columns
+from .evidence import EVIDENCE, Evidence, Fit, Ranking, likelihood
 from .excerpt import LONGEST
 from .inertial import gyro_shares
 from .log_map import (
@@ -46,7 +41,7 @@ from .log_map import (
     TimeColumn,
 )
 from .magnitudes import MAGNITUDES, likely_unit, motor_unit, within
-from .readings import DECLARED, OTHER, ROTORS, rotations, table_readings
+from .readings import DECLARED, OTHER, ROTORS, SensorReading, rotations, table_readings
 from .rotor_orders import ORDERS, Order, order_names, order_words
 from .table import Array, Table
 from .what_flew import more_rotors
@@ -54,6 +49,11 @@ from .what_flew import more_rotors
 _Choice = tuple[str, bool, str]  # what is taken, whether it is certain, and why
 _G = UNITS["accelerometer"]["g"]
 _TURNS = ("world", "body", "sense", "order", "pitch_sign", "unit")  # what shows how a body turns
+_MOTORS = ("motors", "commands")
+_GYROS = [
+    SensorReading(turn=UNITS["gyro"][unit] * turn, unit=unit, body=body)
+    for unit, (body, turn) in product(("rad/s", "deg/s"), BODY_TURNS.items())
+]
 _EXAMPLES = {
     "position": "x, y, z",
     "attitude": "qw, qx, qy, qz or roll, pitch, yaw",
@@ -70,16 +70,7 @@ class Reason:
     field: str
     certain: bool
     why: str
-
-
-@dataclass(frozen=True)
-class Missing:
-    """Columns that a person must choose: a section and its field are ``?`` in the map."""
-
-    section: str
-    field: str
-    why: str
-    candidates: tuple[str, ...] = ()  # the likeliest first
+    candidates: tuple[str, ...] = ()  # columns, the likeliest first, of which a person must choose
 
 
 @dataclass(frozen=True)
@@ -89,7 +80,7 @@ class Guess:
     log_map: LogMap
     reasons: tuple[Reason, ...]
     unused: tuple[str, ...] = ()  # columns
-    missing: tuple[Missing, ...] = ()  # without which the log cannot be read
+    missing: tuple[Reason, ...] = ()  # fields that are ``?``, without which the log is not read
 
     @property
     def lacks(self) -> str:
@@ -114,13 +105,8 @@ def guess_map(table: Table, vehicle: Vehicle | None = None) -> Guess:
     """
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # columns that hold nothing, or the absurd
-        found = _Guessing(table, take_apart(table.header, table.units), vehicle)
-        steps = {"position": found.pose, "accelerometer": found.accelerometer, "gyro": found.gyro}
-        steps |= {"motors": found.motors, "commands": found.motors, "battery": found.battery}
-        for part, find in steps.items():
-            if part in found.parts:
-                find(part)
-    missing = tuple(found.missing())
+        found = _Guessing(table, vehicle)
+        missing = tuple(found.missing())
     parts = [part for part in found.sections.values() if isinstance(part, Columns)]
     used = {*found.time_columns, *(c for part in parts for c in part.columns)}
     unused = tuple(column for column in table.header if column not in used)
@@ -164,83 +150,88 @@ def _time_column(names: Sequence[Name], data: Mapping[str, Array]) -> Name | Non
 class _Guessing:
     """What was found so far: the columns of each part, the sections of the map, and reasons."""
 
-    def __init__(self, table: Table, names: list[Name], vehicle: Vehicle | None) -> None:
+    def __init__(self, table: Table, vehicle: Vehicle | None) -> None:
         self.table, self.vehicle = table, vehicle
         self.sections: dict[str, Any] = {}
         self.reasons: list[Reason] = []
+        self.ranked: dict[str, list[Candidate]] = {}  # of each part
+        self.parts: dict[str, Group] = {}  # the first of them, where one is likely
+        self.unnamed: set[str] = set()  # sections whose columns' names do not speak for them
+        self.further: dict[str, str] = {}  # what more than four motors say, by part
         self.ranking: Ranking | None = None  # of the pose
-        self.by_name: dict[str, bool] = {}  # whether the names of a part's columns speak for it
-        data = _numbers_of(table, names)
-        self.clock = _time_column(names, data)
+        names = take_apart(table.header, table.units)
+        self.data = _numbers_of(table, names)
+        self.clock = _time_column(names, self.data)
         self.t = np.asarray(0.01 * np.arange(table.rows), dtype=np.float64)
         if self.clock is not None:
             # a column of nanoseconds may stand beside a clock of whole seconds
             key = re.sub("(^|_)secs?$", "", self.clock.base)
             fine = {f"{key}_{word}".strip("_") for word in words()["nanoseconds"]}
             beside = next((name.column for name in names if name.base in fine), "")
-            self.t = self.time(self.clock, data, beside)
-        self.numbers = Numbers(self.t, data)
-        rest = [name for name in names if name.column not in self.time_columns]
-        self.ranked = find_parts(rest, self.numbers)
-        self.parts = {p: c[0].group for p, c in self.ranked.items() if c and c[0].score > 0.0}
-        volts = [name for name in named_alone(rest, "battery") if name.unit != "percent"]
-        if volts:
-            self.parts["battery"] = Group((volts[0].column,), volts[0].base, volts[0].unit)
-        if not {"position", "attitude"} <= set(self.parts):
-            self.parts = {k: v for k, v in self.parts.items() if k not in ("position", "attitude")}
-        self.parts = {p: g for p, g in self.parts.items() if set(g.columns) <= set(data)}
-        motors = {p: self.parts[p].columns for p in ("motors", "commands") if p in self.parts}
-        self.further = {
-            part: said
-            for part, four in motors.items()
-            if (said := more_rotors(four, table.numeric or table.header, table.read))
-        }
-        self.by_name = {
-            p: self.ranked[p][0].why.startswith("by") for p in self.parts if p in self.ranked
-        }
-        self.values = {
-            part: np.column_stack([data[name] for name in group.columns])
-            for part, group in self.parts.items()
-        }
-        for part in (part for part in _EXAMPLES if part in self.parts):
-            ranked = self.ranked[part]
-            least = max(0.0, ranked[0].score - PARTS.certain)
-            likely = [candidate for candidate in ranked if candidate.score > least]
-            if len(likely) > 1 or not self.by_name[part]:  # other columns may be it
-                field = "order" if len(ranked[0].group.columns) == 4 else "columns"
-                self.say(part, field, False, "; or ".join(map(str, likely[: PARTS.shown])))
+            self.t = self.time(self.clock, beside)
+        self.free = [name for name in names if name.column not in self.time_columns]
+        self.numbers = numbers = Numbers(self.t, self.data)
+        self.battery()
+        attitude = self.choose("attitude", numbers.quaternion)
+        force = self.choose("accelerometer", numbers.gravity)
+        if attitude and len(attitude.columns) == 4:
+            numbers.take_attitude(attitude.columns)
+        place = self.choose("position", numbers.follows_tilt)
+        numbers.feel(force.columns if force else (), place.columns if place else ())
+        motors = [part for part in _MOTORS if self.choose(part, numbers.moves_together)]
+        if attitude and place:
+            self.pose(place, attitude)
+        if force:
+            self.accelerometer(force)
+        if gyro := self.choose("gyro", self.turns_alike):
+            self.gyro(gyro)
+        for part in motors:
+            self.motors(part, self.parts[part])
 
-    def missing(self) -> list[Missing]:
+    def choose(
+        self, part: str, judge: Callable[[Sequence[str]], tuple[float, str]]
+    ) -> Group | None:
+        """Return the likeliest columns of a part, which are no later part's; None: there are none.
+        Other columns that may be it are a reason for doubt.
+        """
+        ranked = self.ranked[part] = candidates(part, self.free, self.numbers, judge)
+        if not ranked or ranked[0].score <= 0.0:
+            return None
+        group = self.parts[part] = ranked[0].group
+        self.free = [name for name in self.free if name.column not in group.columns]
+        if part != "commands" and not ranked[0].why.startswith("by"):
+            self.unnamed.add(part)
+        likely = [c for c in ranked if c.score > max(0.0, ranked[0].score - PARTS.certain)]
+        if part in _EXAMPLES and (len(likely) > 1 or part in self.unnamed):
+            field = "order" if len(group.columns) == 4 else "columns"
+            self.say(part, field, False, "; or ".join(map(str, likely[: PARTS.shown])))
+        return group
+
+    def values(self, part: str) -> Array:
+        """Return the columns (N, k) of a part."""
+        return np.column_stack([self.data[name] for name in self.parts[part].columns])
+
+    def missing(self) -> list[Reason]:
         """Return what the map lacks for a flight log."""
         out = []
 
         def lack(part: str, section: str, why: str, field: str = "columns") -> None:
             found = self.ranked.get(part, [])[: PARTS.shown]
-            out.append(Missing(section, field, why, tuple(map(str, found))))
+            out.append(Reason(section, field, False, why, tuple(map(str, found))))
 
         if self.clock is None:
             why = "no column looks like a time; expected one such as t, time or timestamp"
             lack("time", "time", why, "column")
         pose, imu, has = ("position", "attitude"), ("accelerometer", "gyro"), set(self.sections)
         if "position" not in has and not has.issuperset(imu):
-            likely = {p: c[0] for p in pose if (c := self.ranked.get(p)) and c[0].score > 0.0}
+            half = [part for part in pose if part in self.parts]
             # what is nearest to be whole: half a pose, half an IMU, else a pose
-            for part in pose if likely or not has.intersection(imu) else imu:
-                if part not in has and part not in likely:
+            for part in pose if half or not has.intersection(imu) else imu:
+                if part not in has and part not in half:
                     why = f"no columns look like one (such as {_EXAMPLES[part]})"
                     lack(part, part, why)
-            for part, first in likely.items():
-                self.say(part, "columns", False, first.why)
-                columns, unit = first.group.columns, first.group.unit
-                most = float(np.max(np.abs(self.numbers.some(columns)), initial=0.0))
-                made: Columns = Columns(columns, unit or "m")
-                if part == "attitude":
-                    euler = "zyx" if len(columns) == 3 else ""
-                    unit = euler and (unit or ("deg" if most > 2.0 * np.pi else "rad"))
-                    made = Attitude(columns, unit, euler=euler)
-                if made.unit:
-                    self.say(part, "unit", False, f"{made.unit}: values up to {most:.3g}")
-                self.sections[part] = made
+            for part in half:
+                self.half_pose(part)
         for part, why in self.further.items():
             lack(part, "rotors", why)
         if not {"rotors", "commands"} & set(self.sections) and not self.further:
@@ -248,10 +239,25 @@ class _Guessing:
             lack("motors", "rotors", why)
         return out
 
+    def half_pose(self, part: str) -> None:
+        """Keep a position without an attitude, or an attitude without a position, for a person to
+        complete.
+        """
+        columns, unit = self.parts[part].columns, self.parts[part].unit
+        most = float(np.max(np.abs(self.numbers.some(columns)), initial=0.0))
+        made: Columns = Columns(columns, unit or "m")
+        if part == "attitude":
+            euler = "zyx" if len(columns) == 3 else ""
+            unit = euler and (unit or ("deg" if most > 2.0 * np.pi else "rad"))
+            made = Attitude(columns, unit, euler=euler)
+        self.say(part, "columns", False, self.ranked[part][0].why)
+        if made.unit:
+            self.say(part, "unit", False, f"{made.unit}: values up to {most:.3g}")
+        self.sections[part] = made
+
     def say(self, section: str, name: str, certain: bool, why: str) -> None:
         """Keep why a field is what it is."""
-        part = "motors" if section in ("rotors", "commands") else section
-        certain = certain and self.by_name.get(part, True)
+        certain = certain and section not in self.unnamed
         self.reasons.append(Reason(section, name, certain, why))
 
     def take(self, section: str, name: str, choice: _Choice) -> str:
@@ -273,13 +279,13 @@ class _Guessing:
     @property
     def time_columns(self) -> tuple[str, ...]:
         """The columns of the time."""
-        return self.sections["time"].columns if "time" in self.sections else ()
+        return self.sections["time"].named if "time" in self.sections else ()
 
-    def time(self, clock: Name, data: Mapping[str, Array], nanoseconds: str) -> Array:
+    def time(self, clock: Name, nanoseconds: str) -> Array:
         """Find the unit of the time; return times (N,) in s of the middle of a long flight, NaN
         elsewhere.
         """
-        raw = TimeColumn(clock.column, nanoseconds=nanoseconds).raw(data)
+        raw = TimeColumn(clock.column, nanoseconds=nanoseconds).raw(self.data)
         steps = np.diff(raw[np.isfinite(raw)])
         step = float(np.median(steps[steps > 0.0]))
         guessed, sure = likely_unit("time", step)
@@ -294,20 +300,9 @@ class _Guessing:
         self.sections["time"] = TimeColumn(clock.column, unit, nanoseconds)
         return t
 
-    def by_motion(self, prop: str) -> _Choice:
-        """Return what the motion says of a property of a pose's reading."""
-        assert self.ranking is not None
-        value, (other, lead) = getattr(self.ranking.best, prop), self.ranking.other(prop)
-        left = self.ranking.fit.horizontal
-        why = f"{left:.0%} of the horizontal acceleration is left by the tilt"
-        if other is not None and lead > 0.0:
-            why += f", and {other} is less likely by a log-likelihood ratio of {lead:.3g}"
-        return value, self.ranking.certain(prop), why
-
-    def pose(self, part: str) -> None:
+    def pose(self, place: Group, group: Group) -> None:
         """Find frames, units, order and sense of the pose."""
-        place, group = self.parts[part], self.parts["attitude"]
-        attitude, is_quaternion = self.values["attitude"], len(group.columns) == 4
+        attitude, is_quaternion = self.values("attitude"), len(group.columns) == 4
         units: tuple[str, ...] = ("deg", "rad")
         if np.nanmax(np.abs(attitude[:, :2]), initial=0.0) > np.pi:
             units = ("deg",)
@@ -317,38 +312,33 @@ class _Guessing:
         readings = table_readings(
             orders if is_quaternion else (),
             units,
-            lengths=(place.unit,) if place.unit == "ft" else ("m", "cm", "mm"),
+            place.unit,
             hint="ned" if re.search("ned|down|d$", "".join(place.columns).lower()) else "",
         )
-        if place.unit in UNITS["position"]:
-            readings = [
-                replace(r, unlikely=r.unlikely + OTHER * (r.length != place.unit)) for r in readings
-            ]
-        motors = self.values.get("motors", self.values.get("commands"))
-        thrusts = np.ones((len(self.t), 4)) if motors is None else np.square(motors)
-        evidence = Evidence(self.t, thrusts, self.values[part], attitude)
-        self.ranking = Ranking.of(evidence, readings, torques=False)
-        best = self.ranking.best
-        length = self.unit("position", place.unit, self.by_motion("length"))
-        told = [("world", "", "world"), ("body", "", "body"), ("attitude", "sense", "sense")]
+        motors = [self.values(part) for part in _MOTORS if part in self.parts]
+        thrusts = np.square(motors[0]) if motors else np.ones((len(self.t), 4))
+        evidence = Evidence(self.t, thrusts, self.values("position"), attitude)
+        self.ranking = ranking = Ranking.of(evidence, readings, torques=False)
+        best = ranking.best
+        length = self.unit("position", place.unit, ranking.says("length"))
+        fields = [("world", "", "world"), ("body", "", "body"), ("attitude", "sense", "sense")]
         if not is_quaternion:
             beyond = best.unit, best.unit != group.unit, "angles beyond pi"
-            guessed = self.by_motion("unit") if len(units) > 1 else beyond
-            self.unit("attitude", group.unit, guessed)
-            told += [("attitude", "euler", "euler"), ("attitude", "signs", "pitch_sign")]
+            self.unit("attitude", group.unit, ranking.says("unit") if len(units) > 1 else beyond)
+            fields += [("attitude", "euler", "euler"), ("attitude", "signs", "pitch_sign")]
         elif group.numbered:
-            told.append(("attitude", "order", "order"))
+            fields.append(("attitude", "order", "order"))
         else:
             self.say("attitude", "order", True, "by the columns' names")
-        for section, name, prop in told:
-            self.take(section, name, self.by_motion(prop))
+        for section, name, prop in fields:
+            self.take(section, name, ranking.says(prop))
         position = Columns(place.columns, length)
         self.sections |= {"world": best.world, "body": best.body}
         self.sections |= {"position": position, "attitude": best.part(group.columns)}
 
-    def accelerometer(self, part: str) -> None:
+    def accelerometer(self, group: Group) -> None:
         """Find unit and axes of the accelerometer by gravity."""
-        group, values = self.parts[part], self.values[part]
+        values = self.values("accelerometer")
         size = float(np.nanmedian(np.linalg.norm(values, axis=1)))
         z = float(np.nanmean(values[:, 2])) / max(size, 1e-12)
         # without a pose, turned over may also be gravity in place of the specific force
@@ -370,48 +360,65 @@ class _Guessing:
         if self.ranking is None:
             self.sections["body"] = axes
 
-    def gyro(self, part: str) -> None:
-        """Find unit and axes of the gyro: by the pose's turns, or by size and accelerometer. A unit
-        that is named is kept where another one fits hardly better.
+    def gyro_fits(self, columns: Sequence[str], unit: str = "") -> Ranking | None:
+        """Return how well columns turn as the pose does, by each unit and body axes; None where
+        there is no pose, or too little of it. Another unit than a named one must make up for it.
         """
-        group, values = self.parts[part], self.values[part]
         if self.ranking is None:
+            return None
+        times, attitude = self.numbers.rows(self.parts["attitude"].columns)
+        times, first = np.unique(times, return_index=True)
+        good, rotation = rotations(attitude[first], self.ranking.best)
+        t, values = self.numbers.rows(columns)
+        turns = [way.turn for way in _GYROS]
+        shares = gyro_shares(t, values, times[good], rotation, turns) or []
+        fits = [
+            Fit(way, left, (), likelihood([left] * 3) - OTHER * (unit not in ("", way.unit)))
+            for way, left in zip(_GYROS, shares, strict=False)
+        ]
+        ranked = sorted(fits, key=lambda fit: -fit.score)
+        return Ranking(ranked, "attitude's rate is left unexplained") if fits else None
+
+    def turns_alike(self, columns: Sequence[str]) -> tuple[float, str]:
+        """Return how well three columns turn as the pose does, at most 1; 0 where they do not."""
+        ranking = self.gyro_fits(columns)
+        left = 1.0 if ranking is None else ranking.fit.horizontal
+        return (1.0 - left if left <= EVIDENCE.good else 0.0), "they turn as the attitude does"
+
+    def gyro(self, group: Group) -> None:
+        """Find unit and axes of the gyro: by the pose's turns, or by size and accelerometer."""
+        named = group.unit if group.unit in UNITS["gyro"] else ""
+        ranking = self.gyro_fits(group.columns, named)
+        if ranking is not None:
+            guessed = ranking.says("unit")
+            axes, sure, why = ranking.says("body")
+            assert self.ranking is not None
+            sure &= self.ranking.certain(*_TURNS)
+            self.take("gyro", "body", (axes, sure, why))
+        else:
             axes = self.sections.get("body", "flu")
             told = {(r.section, r.field) for r in self.reasons if r.certain}
-            self.say("gyro", "body", ("accelerometer", "body") in told, "as the accelerometer's")
-            high = float(np.nanquantile(np.abs(values), 0.995))
+            sure = self.ranking is None and ("accelerometer", "body") in told
+            self.say("gyro", "body", sure, "as the accelerometer's")
+            high = float(np.nanquantile(np.abs(self.values("gyro")), 0.995))
             unit = "deg/s" if high > MAGNITUDES.slow_gyro else "rad/s"
-            sure, why = high > MAGNITUDES.fast_gyro, f"its fast values are {high:.3g}"
-        else:
-            good, rotation = rotations(self.values["attitude"], self.ranking.best)
-            times, units = self.t[good], ("rad/s", "deg/s")
-            seen = np.isfinite(times)
-            ways = list(product(units, BODY_TURNS))
-            turns = [UNITS["gyro"][unit] * BODY_TURNS[body] for unit, body in ways]
-            shares = gyro_shares(self.t, values, times[seen], rotation[seen], turns)
-            (unit, axes), sure, why = ways[0], False, "the log is too short"
-            if shares is not None:
-                fits = dict(zip(ways, shares, strict=True))
-                kept = {way: left for way, left in fits.items() if way[0] == group.unit}
-                if kept and (min(kept.values()) <= EVIDENCE.good or min(shares) > EVIDENCE.good):
-                    fits = kept
-                first, second = sorted(fits, key=lambda way: fits[way])[:2]
-                (unit, axes), left = first, fits[first]
-                lead = likelihood([left] * 3) - likelihood([fits[second]] * 3)
-                sure = left <= EVIDENCE.good and lead >= EVIDENCE.certain
-                sure &= self.ranking.certain(*_TURNS)
-                why = f"{left:.0%} of the attitude's rate is left unexplained"
-            self.take("gyro", "body", (axes, sure, why))
-        unit = self.unit("gyro", group.unit, (unit, sure, why))
+            guessed = unit, high > MAGNITUDES.fast_gyro, f"its fast values are {high:.3g}"
+        unit = self.unit("gyro", group.unit, guessed)
         self.sections["gyro"] = Sensor(group.columns, unit, body=axes)
 
-    def motors(self, part: str) -> None:
+    def motors(self, part: str, group: Group) -> None:
         """Find unit and order of rotor speeds or commands, where the map has none of the kind."""
-        group, values = self.parts[part], self.values[part]
+        values = self.values(part)
         power = self.numbers.elasticity(values)
         kind, unit, sure, why = motor_unit(group, values, self.vehicle, power)
-        if kind in self.sections or part in self.further:
+        there = self.table.numeric or self.table.header
+        if more := more_rotors(group.columns, there, self.table.read):
+            self.further[part] = more
             return
+        if kind in self.sections:
+            return
+        if part in self.unnamed:
+            self.unnamed.add(kind)
         self.take(kind, "unit", (unit, sure, why))
         order, sure, why = self.order(group, values)
         self.say(kind, "order", sure, why)
@@ -439,11 +446,11 @@ class _Guessing:
         evidence, best = None, DECLARED
         if "gyro" in self.sections:
             sensor = self.sections["gyro"]
-            rates = self.values["gyro"] * UNITS["gyro"][sensor.unit] @ BODY_TURNS[sensor.body]
+            rates = self.values("gyro") * UNITS["gyro"][sensor.unit] @ BODY_TURNS[sensor.body].T
             evidence = Evidence(self.t, np.square(values), gyro=rates)
         elif self.ranking is not None and self.ranking.certain(*_TURNS):
             best = self.ranking.best
-            pose = self.values["position"], self.values["attitude"]
+            pose = self.values("position"), self.values("attitude")
             evidence = Evidence(self.t, np.square(values), *pose)
         if evidence is None or not evidence.enough:
             return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
@@ -463,13 +470,15 @@ class _Guessing:
             return order, False, why
         return ORDERS[hint], False, f"{hint}: no order is much likelier than all others"
 
-    def battery(self, part: str) -> None:
-        """Find the unit of the battery's voltage."""
-        values = self.values[part]
-        values = values[np.isfinite(values) & (values > 0.0)]
-        if not values.size:
+    def battery(self) -> None:
+        """Find the battery's voltage and its unit."""
+        named = [name for name in named_alone(self.free, "battery") if name.unit != "percent"]
+        if not named or (column := named[0].column) not in self.data:
             return
-        group, middle = self.parts[part], float(np.median(values))
-        guessed = *likely_unit("battery", middle), f"its median is {middle:.4g}"
-        unit = self.unit("battery", group.unit, guessed)
-        self.sections["battery"] = Battery(group.columns, unit)
+        values = self.data[column]
+        values = values[np.isfinite(values) & (values > 0.0)]
+        if values.size:
+            middle = float(np.median(values))
+            guessed = *likely_unit("battery", middle), f"its median is {middle:.4g}"
+            unit = self.unit("battery", named[0].unit, guessed)
+            self.sections["battery"] = Battery((column,), unit)

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -73,10 +72,6 @@ def map_table(
         log_map = replace(log_map, vehicle=vehicle_of_columns(table))
     vehicle = flown_vehicle(vehicle, log_map.vehicle)
     log_map = fitted(table, log_map, vehicle, reader)
-    for motors in filter(None, (log_map.rotors, log_map.commands)):
-        there = table.numeric or table.header
-        if said := more_rotors(motors.columns, there, table.read):
-            raise InputError(f"{table.path}: {said}")
     columns = table.read(log_map.wanted)
     if log_map.is_own and rows_apart(Samples(np.arange(float(table.rows)), columns), log_map):
         log_map = replace(log_map, rows="mixed")
@@ -129,8 +124,8 @@ def recording_of(
     for name, part in log_map.sections.items():
         samples = sources[name]
         if isinstance(part, Rotors | Commands) and not flown.airframe:
-            others, are_speeds = [*samples.columns], isinstance(part, Rotors)
-            if more := more_rotors(part.columns, others, samples.read, are_speeds):
+            are_speeds = isinstance(part, Rotors) and samples.table is None
+            if more := more_rotors(part.columns, *samples.beside, are_speeds):
                 raise InputError(f"{path}: {f'{part.topic}: ' if part.topic else ''}{more}")
         if name == "position":
             streams[name], words = _pose(path, log_map, samples, sources.get("attitude"))
@@ -309,30 +304,28 @@ def fitted(table: Table, log_map: LogMap, vehicle: Vehicle | None, reader: str) 
     """
     header = set(table.header)
     where = f"{table.path}: map {log_map.name}"
-    clocks: list[TimeColumn] = [c for c in log_map.ways("time") if header.issuperset(c.columns)]
-    missing = [] if clocks else [(log_map.time.column, "time")]
-    kept: dict[str, Any] = {"time": clocks[0] if clocks else log_map.time}
-    others: dict[str, tuple[Columns, ...]] = {}
-    for section, part in log_map.sections.items():
-        fitting = [way for way in log_map.ways(section) if set(way.named) <= header]
+    parts: dict[str, TimeColumn | Columns] = {"time": log_map.time, **log_map.sections}
+    fitting = {
+        section: [way for way in log_map.ways(section) if header.issuperset(way.named)]
+        for section in parts
+    }
+    missing = []
+    for section, part in parts.items():
         absent = [name for name in part.named if name not in header]
-        if fitting:
-            kept[section], others[section] = fitting[0], tuple(fitting[1:])
-        elif part.optional and (len(absent) == len(part.named) or reader):
-            kept[section] = None
-        else:
+        left_out = part.optional and (len(absent) == len(part.named) or reader)
+        if not fitting[section] and not left_out:
             whose = f"{section} (all or none)" if part.optional else section
             missing += [(name, whose) for name in absent]
     if missing:
-        lower, parts = {name.lower(): name for name in table.header}, []
+        lower, words = {name.lower(): name for name in table.header}, []
         for name, section in missing[:8]:
             near = get_close_matches(name.lower(), lower, n=2, cutoff=0.6)
             hint = f" (like {' or '.join(lower[x] for x in near)})" if near else ""
-            parts.append(f"{name!r} of {section}{hint}")
+            words.append(f"{name!r} of {section}{hint}")
         more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
         found = ", ".join(table.header[:_SHOWN]) + (", ..." if table.header[_SHOWN:] else "")
-        raise InputError(f"{where} does not fit: no column {', '.join(parts)}{more}; found {found}")
-    log_map = replace(log_map, **kept, alternatives=others)
+        raise InputError(f"{where} does not fit: no column {', '.join(words)}{more}; found {found}")
+    log_map = log_map.with_ways(fitting)
     check_whole(log_map, f"{where} does not fit")
     extra = {name: part for name, part in log_map.extra.items() if set(part.named) <= header}
     log_map = replace(log_map, extra=extra)
@@ -379,9 +372,10 @@ def chosen(recorded: Sequence[Samples], log_map: LogMap) -> tuple[LogMap, dict[s
     ]
     if pairs or not (log_map.is_own and places):
         usable["position"], usable["attitude"] = pairs[0] if pairs else ([], [])
-    found: dict[str, Any] = {name: ways[0][0] if ways else None for name, ways in usable.items()}
     samples = {section: ways[0][1] for section, ways in usable.items() if ways}
-    return replace(log_map, alternatives={}, **found), samples
+    return log_map.with_ways(
+        {n: [way for way, _ in ways[:1]] for n, ways in usable.items()}
+    ), samples
 
 
 def _is_measured(section: str, way: Columns, samples: Samples, rows: str) -> bool:

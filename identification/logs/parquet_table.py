@@ -47,9 +47,9 @@ def open_parquet(path: Path) -> Table:
     except (OSError, pyarrow.ArrowException) as error:
         raise InputError(f"{path}: cannot be read as Parquet: {error}") from error
 
-    def fill(table: Table, where: Sequence[int], out: Array) -> None:
-        for i, column in zip(where, out, strict=True):
-            name, values = columns[i]
+    def load(_: Table, names: Sequence[str]) -> Iterator[Array]:
+        for name in names:
+            values = dict(columns)[name]
             if not _is_numeric(values.type):
                 raise InputError(
                     f"{path}: column {name} cannot be read: it holds {values.type}; expected "
@@ -62,10 +62,10 @@ def open_parquet(path: Path) -> Table:
                     f"{path}: column {name} has {len(values)} rows; expected the {rows} that the "
                     "file claims"
                 )
-            column[:] = values.cast(pyarrow.float64()).to_numpy(zero_copy_only=False)
+            yield values.cast(pyarrow.float64()).to_numpy(zero_copy_only=False)
 
     numeric = tuple(name for name, column in columns if _is_numeric(column.type))
-    return Table(path, tuple(name for name, _ in columns), rows, fill, numeric=numeric)
+    return Table(path, tuple(name for name, _ in columns), rows, load, numeric=numeric)
 
 
 def _column(path: Path, file: Any, name: str) -> Any:
@@ -77,12 +77,8 @@ def _column(path: Path, file: Any, name: str) -> Any:
     """
     import pyarrow
 
-    metadata = file.metadata
-    chunks = [
-        metadata.row_group(group).column(i)
-        for group in range(metadata.num_row_groups)
-        for i in range(metadata.num_columns)
-    ]
+    groups = map(file.metadata.row_group, range(file.metadata.num_row_groups))
+    chunks = [chunk for group in groups for chunk in map(group.column, range(group.num_columns))]
     chunks = [chunk for chunk in chunks if chunk.path_in_schema.split(".")[0] == name]
     size = sum(max(chunk.total_uncompressed_size, 0) for chunk in chunks)
     most = max((chunk.num_values for chunk in chunks), default=0)

@@ -79,12 +79,14 @@ class SensorReading:
     says: str = ""  # what the columns look like, what was expected, and what to do
     turn: Array = field(default_factory=lambda: _I)  # (3, 3), multiplies the columns
     lacks_gravity: bool = False  # they hold an acceleration in place of the specific force
+    unit: str = ""  # of the columns, in a map
+    body: str = ""  # axes of the columns, in a map
 
 
 AS_DECLARED = SensorReading()
 
 
-def _sensor(says: str, scale: float = 1.0, axes: str = "x y z", **more: bool) -> SensorReading:
+def _sensor(says: str, scale: float = 1.0, axes: str = "x y z", **more: Any) -> SensorReading:
     return SensorReading(says, scale * _axes(axes), **more)
 
 
@@ -279,21 +281,25 @@ def log_readings(has_pose: bool) -> list[Reading]:
 
 
 def table_readings(
-    orders: Sequence[str], units: Sequence[str], lengths: Sequence[str], hint: str
+    orders: Sequence[str], units: Sequence[str], length: str, hint: str
 ) -> list[Reading]:
     """Return the readings of a table's pose that a map can express.
 
     Args:
         orders: of a quaternion's columns, the usual first; nothing where they hold angles.
         units: of angles.
-        lengths: units of the position.
+        length: unit of the position by the columns' names, for which another must make up.
         hint: the world that names speak for; empty: none.
     """
     attitudes: dict[str, Sequence[Any]] = {"order": orders}
     if not orders:
         attitudes = {"euler": ("zyx", "xyz"), "unit": units, "pitch_sign": (1, -1)}
+    lengths = ("ft",) if length == "ft" else ("m", "cm", "mm")
     found = _each(**attitudes, sense=SENSES, frames=MAP_FRAMES, length=lengths)
-    return _weighed(found, 0.0, hint or "enu")
+    return [
+        replace(r, unlikely=r.unlikely + OTHER * (length in lengths and r.length != length))
+        for r in _weighed(found, 0.0, hint or "enu")
+    ]
 
 
 def rotations(columns: Array, reading: Reading) -> tuple[Mask, Rotation]:

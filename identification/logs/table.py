@@ -1,7 +1,8 @@
 """A table of numbers in a file: its columns by name, and where a row stands."""
 
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -32,8 +33,7 @@ class Table:
     path: Path
     header: tuple[str, ...]
     rows: int
-    # puts columns, by their places in the header, into an array (columns, rows)
-    fill: Callable[["Table", Sequence[int], Array], None]
+    load: Callable[["Table", Sequence[str]], Iterable[Array]]  # gives columns (rows,) by names
     first_line: int = 0  # line of a text in which the first row stands; 0: rows have no lines
     blank_before: tuple[int, ...] = ()  # a row for each blank line before it, in their order
     units: tuple[str, ...] = ()  # of a line of units behind the header
@@ -63,11 +63,9 @@ class Table:
         new = [name for name in dict.fromkeys(names) if name not in self._columns]
         numbers = self.rows * (len(self._columns) + len(new))
         check_count(self.path, numbers, LIMITS.table_numbers, "numbers")
-        columns = np.empty((len(new), self.rows))
-        if new:
-            self.fill(self, [self.header.index(name) for name in new], columns)
-        columns.flags.writeable = False
-        self._columns.update(zip(new, columns, strict=True))
+        for name, column in zip(new, self.load(self, new) if new else (), strict=True):
+            self._columns[name] = np.asarray(column, dtype=np.float64).view()
+            self._columns[name].flags.writeable = False
         return {name: self._columns[name] for name in names}
 
     def row(self, index: int) -> str:
@@ -76,6 +74,23 @@ class Table:
             return f"row {index + 1}"
         line = self.first_line + index + bisect_right(self.blank_before, index)
         return f"row {index + 1} (line {line})"
+
+
+@contextmanager
+def one_line(what: str, expected: str = "") -> Iterator[None]:
+    """Make an InputError of one line of whatever a parser raises of bytes that are none of its own.
+
+    Args:
+        what: cannot be read, for the error.
+        expected: in its place; empty: not said.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        words = f"{what}: {error or type(error).__name__}"
+        raise InputError(f"{words}; expected {expected}" if expected else words) from error
 
 
 def file_kind(path: Path) -> str:

@@ -16,6 +16,7 @@ import re
 import zlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import date
 from itertools import islice
@@ -88,37 +89,27 @@ class TextLayout:
     separator: str = ","  # " ": any white space
     decimal: str = "."  # or ","
     lists: tuple[tuple[int, int], ...] = ()  # fields (from 0) that hold lists, and their lengths
-    moments: tuple[int, ...] = ()  # fields that hold dates or times of day
-
-    def opened(self, line: str) -> str:
-        """Return a line with the items of its lists as fields; as many empty ones of none."""
-        fields = self.fields(_LIST.sub(r'"\1"', line))
-        for i, count in self.lists:
-            if i < len(fields):
-                fields[i] = self.separator.join(_items(fields[i]) or [""] * count)
-        return self.separator.join(fields)
-
-    def timed(self, line: str) -> str:
-        """Return a line with its dates and times of day as seconds."""
-        fields = [] if '"' in line else self.fields(line)
-        for i in (i for i in self.moments if i < len(fields)):
-            if (seconds := _seconds(fields[i])) is not None:
-                fields[i] = repr(seconds).replace(".", self.decimal)
-        return self.separator.join(fields) if fields else line
 
     def fields(self, line: str) -> list[str]:
-        """Return the fields of a line, without the space around them; none where its quotation
-        marks are not those of CSV.
+        """Return the fields of a line, an item of a list each, without the space around them; none
+        where its quotation marks are not those of CSV.
         """
         if self.separator == " ":
             return line.split()
+        if self.lists:
+            line = _LIST.sub(r'"\1"', line)
         if '"' not in line:
-            return [field.strip() for field in line.split(self.separator)]
-        rows = csv.reader([line], delimiter=self.separator, skipinitialspace=True, strict=True)
-        try:
-            return [field.strip() for field in next(rows)]
-        except csv.Error:
-            return []
+            found = line.split(self.separator)
+        else:
+            rows = csv.reader([line], delimiter=self.separator, skipinitialspace=True, strict=True)
+            try:
+                found = next(rows)
+            except csv.Error:
+                return []
+        for i, count in reversed(self.lists):  # as many empty fields as an empty list has items
+            if i < len(found):
+                found[i : i + 1] = _items(found[i]) or [""] * count
+        return list(map(str.strip, found))
 
     def names(self, line: str) -> list[str]:
         """Return the columns' names of a header; a separator behind the last name, and the mark of
@@ -186,37 +177,33 @@ def open_text(path: Path) -> Table:
             blank.append(rows)
         else:
             rows, last = rows + 1, line
-    if rows > 1 and len(layout.fields(layout.opened(last))) < len(names):
+    if rows > 1 and len(layout.fields(last)) < len(names):
         rows -= 1
         notes.append("the last line was cut off, and left out")
 
-    def fill(table: Table, where: Sequence[int], columns: Array) -> None:
+    def load(table: Table, wanted: Sequence[str]) -> Array:
         lines: Iterator[str] = islice(_lines(path), first, None)
         if blank:
             lines = (line for line in lines if not layout.is_blank(line))
-        if layout.lists:
-            lines = map(layout.opened, lines)
-        if layout.moments:
-            lines = map(layout.timed, lines)
-        kept, done = islice(lines, rows), 0
+        columns, done, kept = np.empty((len(wanted), rows)), 0, islice(lines, rows)
         while block := list(islice(kept, _BLOCK)):
-            columns[:, done : done + len(block)] = _numbers(table, layout, block, done, where).T
+            part = columns[:, done : done + len(block)]
+            _fill(table, layout, block, done, wanted, part)
             done += len(block)
         if done != rows:
             raise InputError(f"{path}: changed while it was read; expected a whole file")
+        return columns
 
     units = tuple(layout.fields(between[0])) if len(between) == 1 and not layout.lists else ()
-    seen = [layout.fields(layout.opened(line)) for line in written[first:] if line.strip()]
+    seen = [layout.fields(line) for line in written[first:] if line.strip()]
     seen = [fields for fields in seen if len(fields) >= len(names)]
-    moments = [i for i, text in enumerate(seen[0] if seen else ()) if _seconds(text) is not None]
-    layout = replace(layout, moments=tuple(moments))
     numeric = tuple(
         name
         for i, name in enumerate(names)
         if all(layout.number(fields[i]) is not None for fields in seen)
     )
     lines = first + 1, tuple(blank)
-    return Table(path, tuple(names), rows, fill, *lines, units, tuple(notes), numeric)
+    return Table(path, tuple(names), rows, load, *lines, units, tuple(notes), numeric)
 
 
 def _lists(layout: TextLayout, lines: Sequence[str]) -> tuple[tuple[int, int], ...]:
@@ -379,26 +366,22 @@ def _header(path: Path, head: list[str], layout: TextLayout, full: int) -> tuple
     return header, first
 
 
-def _numbers(
-    table: Table, layout: TextLayout, lines: Sequence[str], first: int, where: Sequence[int]
-) -> Array:
-    """Return the numbers (n, len(where)) in the fields ``where`` of rows, of which the first is
-    the table's row ``first``: by numpy's parser where that takes them, else a field at a time.
+def _fill(
+    table: Table,
+    layout: TextLayout,
+    lines: Sequence[str],
+    first: int,
+    wanted: Sequence[str],
+    out: Array,
+) -> None:
+    """Put the numbers in the columns ``wanted`` of rows into ``out`` (len(wanted), n).
 
     Raises:
         InputError: a field holds something else, or a row has more or fewer fields than the header.
     """
     width = len(table.header)
-    plain = _plain_lines(layout, lines, width)
-    if plain:
-        separator = None if layout.separator == " " else layout.separator
-        try:
-            return np.loadtxt(plain, delimiter=separator, comments=None, usecols=where, ndmin=2)
-        except ValueError:
-            pass  # the first field that is no number is named below
-    values = np.empty((len(lines), len(where)))
-    for i, line in enumerate(lines):
-        fields = layout.fields(line)
+    rows = [layout.fields(line) for line in lines]
+    for i, fields in enumerate(rows):
         if len(fields) == width + 1 and not fields[-1]:  # a separator behind the last
             fields.pop()
         if len(fields) != width:
@@ -407,33 +390,18 @@ def _numbers(
                 f"{table.path}: {table.row(first + i)} has {len(fields)} field(s); expected "
                 f"{width}, as many as the header{hint}"
             )
-        for j, column in enumerate(where):
-            value = layout.number(fields[column])
-            if value is None:
-                raise InputError(
-                    f"{table.path}: column {table.header[column]}, {table.row(first + i)}: "
-                    f"{fields[column][:100]!r} is not a number; expected a decimal number"
-                )
-            values[i, j] = value
-    return values
-
-
-def _plain_lines(layout: TextLayout, lines: Sequence[str], width: int) -> Sequence[str]:
-    """Return rows as numpy's parser takes them, with decimal points and ``nan`` in empty fields;
-    none where a row has quotation marks or another number of fields than ``width``.
-    """
-    mark = layout.separator
-    if layout.decimal == ",":
-        lines = [line.translate(_POINTS) for line in lines]
-    if mark == " ":
-        return lines if all(len(line.split()) == width for line in lines) else []
-    if any(line.count(mark) != width - 1 or '"' in line for line in lines):
-        return []
-    gap, filled = mark + mark, f"{mark}nan{mark}"
-    # two passes, because neighbours share a separator
-    return [
-        f"{mark}{line}{mark}".replace(gap, filled).replace(gap, filled)[1:-1]
-        if gap in line or line[:1] == mark or line[-1:] == mark
-        else line
-        for line in lines
-    ]
+    is_plain = layout.decimal == "." and not any("_" in line for line in lines)
+    texts = dict(zip(table.header, zip(*rows, strict=True), strict=True))
+    for column, values in zip(wanted, out, strict=True):
+        with suppress(ValueError):
+            if is_plain:  # as Python reads numbers, which is quick
+                values[:] = [float(text or "nan") for text in texts[column]]
+                continue
+        numbers = [layout.number(text) for text in texts[column]]
+        if None in numbers:
+            i = numbers.index(None)
+            raise InputError(
+                f"{table.path}: column {column}, {table.row(first + i)}: "
+                f"{texts[column][i][:100]!r} is not a number; expected a decimal number"
+            )
+        values[:] = numbers

@@ -14,6 +14,7 @@ table. A file's name decides nothing but how a table is packed.
 """
 
 import os
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -47,12 +48,7 @@ class Reader:
     # where it takes one, of the option behind the name's colon
     read: Callable[..., FlightLog]
     signature: tuple[str, ...] = ()  # columns of a table
-    begins: tuple[bytes, ...] = ()  # first bytes of a file
-    holds: bytes = b""  # that stands among the first bytes of a file; empty: nothing
-
-    def knows(self, head: bytes) -> bool:
-        """Return whether a file that begins with some bytes is of its form."""
-        return head.startswith(self.begins) or (self.holds != b"" and self.holds in head)
+    begins: bytes = b""  # regular expression of a file's first bytes; empty: of a table
 
 
 # maps of tables that are known by their columns
@@ -73,7 +69,6 @@ READERS = {
         ("rosbag", rosbag),
     )
 }
-READERS["ardupilot_bin"] = replace(READERS["ardupilot_bin"], holds=ardupilot_bin.HOLDS)
 READERS["betaflight_csv"] = Reader(
     "betaflight_csv", "a blackbox_decode table", betaflight.read_table, betaflight.SIGNATURE
 )
@@ -114,7 +109,7 @@ def reader_by_content(path: Path) -> Reader | None:
             head = _head(path)
         except InputError:
             return None  # whoever reads it says what is wrong
-        return next((r for r in READERS.values() if r.knows(head)), None)
+        return next((r for r in READERS.values() if r.begins and re.match(r.begins, head)), None)
     try:
         names = sorted(entry.name for entry in path.iterdir())
     except OSError as error:

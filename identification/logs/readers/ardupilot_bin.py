@@ -37,7 +37,6 @@ from ..what_flew import (
     slots_of_motors,
 )
 from .dataflash import BEGINS as BEGINS
-from .dataflash import HOLDS as HOLDS
 from .dataflash import WHAT as WHAT
 from .dataflash import Messages, read_dataflash
 
@@ -209,12 +208,10 @@ def _with_parameters(
         least, most = 0.0, 1.0
     slots = slots_of_motors(_functions(parameters), _MOTOR1) or list(range(4))
     outputs = [slot + 1 for slot in slots]
-    assert log_map.rotors is not None
     assert log_map.commands is not None
     commands: Commands = replace(
         log_map.commands,
         columns=tuple(f"{letter}{output}" for output in outputs),
-        order=order,
         range=(low, high),
         thrust_factor=expo,
         thrust_span=(least, most),
@@ -222,10 +219,7 @@ def _with_parameters(
         f"outputs {', '.join(map(str, outputs))}. ArduPilot takes thrust as (1 - e) a + e a^2 "
         f"with e = {expo:g} (MOT_THST_EXPO) of a = 0 to 1 at the commands {least:g} to {most:g}",
     )
-    return replace(log_map, rotors=replace(log_map.rotors, order=order), commands=commands), [
-        *log_map.notes,
-        note,
-    ]
+    return replace(log_map, commands=commands).with_order(order), [*log_map.notes, note]
 
 
 def _telemetry(messages: Messages, parameters: Parameters) -> tuple[list[Samples], list[str]]:

@@ -28,10 +28,10 @@ from ..log_map import shipped_map
 from ..mapped_log import recording_of
 from ..streams import MOST_VOLTS
 from ..table import Array, Table
-from .blackbox import BEGINS as BEGINS
 from .blackbox import WHAT as WHAT
-from .blackbox import read_blackbox
+from .blackbox import read_blackbox, whole_number
 
+BEGINS = b"H Product:Blackbox"
 SIGNATURE = ("time (us)", "motor[0]", "motor[3]")
 
 # what a stated unit is in the map's: g, degrees per second, volts
@@ -166,9 +166,11 @@ def _range(path: Path, motors: list[Array], headers: Mapping[str, str]) -> tuple
                 f"{path}: header motorOutput: {stated[:60]!r}; expected two rising numbers"
             )
         return low, high, "motorOutput of the header"
-    ends = [headers.get(name, "") for name in ("minthrottle", "maxthrottle")]
-    if all(end.isdecimal() for end in ends) and 0 < int(ends[0]) < int(ends[1]):
-        return float(ends[0]), float(ends[1]), "minthrottle and maxthrottle of the header"
+    least, most = (
+        whole_number(headers.get(name, ""), 1, 10**9) for name in ("minthrottle", "maxthrottle")
+    )
+    if least and most and least < most:
+        return float(least), float(most), "minthrottle and maxthrottle of the header"
     outside = any(np.any((x > _PWM[1]) | ((x < _PWM[0]) & (x > 0.0))) for x in motors)
     low, high = _DSHOT if outside else _PWM
     return low, high, f"assumed: {'DShot' if outside else 'pulses in us'}, no header says it"
@@ -182,21 +184,20 @@ def _magnet_poles(path: Path, option: str, stated: str) -> tuple[int, str]:
         InputError: the option is none.
     """
     if option:
-        if option.isdecimal() and len(option) < 4 and int(option) >= 2 and int(option) % 2 == 0:
-            return int(option), "as the reader's option says"
+        if (poles := whole_number(option, 2, 999)) and poles % 2 == 0:
+            return poles, "as the reader's option says"
         raise InputError(
             f"{path}: reader option {option!r}; expected the motors' number of magnet poles, even, "
             "such as betaflight:14"
         )
-    if stated.isdecimal() and 2 <= int(stated[:4]) <= 100:
-        return int(stated), "motor_poles of the header"
+    if poles := whole_number(stated, 2, 100):
+        return poles, "motor_poles of the header"
     return _POLES, "assumed; betaflight:NUMBER says another"
 
 
 def _one_g(t: Array, force: list[Array], headers: Mapping[str, str]) -> tuple[float, str]:
     """Return the accelerometer's counts of 1 g, and words on whence they are known."""
-    stated = headers.get("acc_1G", "")
-    if stated.isdecimal() and 1 <= int(stated[:9]) <= 10**6:
+    if stated := whole_number(headers.get("acc_1G", ""), 1, 10**6):
         return float(stated), f"accelerometer: acc_1G of the header: {stated} counts are 1 g"
     length = np.linalg.norm(np.column_stack(force)[t <= t[0] + _STANDING], axis=1)
     middle = float(np.nanmedian(length)) if np.isfinite(length).any() else 0.0

@@ -23,8 +23,6 @@ from ..table import Array
 from .blackbox_frames import ENCODINGS, FRAMES, PREDICTORS, Layout, decode
 
 _START = b"H Product:Blackbox"
-BEGINS = (_START,)
-
 WHAT = "a blackbox of Betaflight or INAV"
 _HEADERS = re.compile(rb"(H [^\n]{0,20000}\n){0,2000}")
 
@@ -88,6 +86,13 @@ def read_blackbox(
     return headers, dict(zip(keep, rows.T.astype(np.float64), strict=True)), notes
 
 
+def whole_number(text: str, least: int, most: int) -> int | None:
+    """Return the whole number that a header states; None where it is none between two limits."""
+    if not text.lstrip("-").isdecimal() or len(text) > 10:
+        return None
+    return int(text) if least <= int(text) <= most else None
+
+
 def _layout(path: Path, headers: Mapping[str, str], names: list[str]) -> Layout:
     """Return what the headers say of the frames.
 
@@ -112,7 +117,8 @@ def _layout(path: Path, headers: Mapping[str, str], names: list[str]) -> Layout:
         raise InputError(f"{path}: no field loopIteration, which its predictors count on")
 
     def number(text: str, default: int) -> int:
-        return int(text) if text.lstrip("-").isdecimal() and len(text) < 10 else default
+        found = whole_number(text, -999_999_999, 999_999_999)
+        return default if found is None else found
 
     top, _, bottom = headers.get("P interval", "1/1").rpartition("/")
     every = headers.get("I interval", "32")
@@ -142,11 +148,9 @@ def _frame_lists(
     for letter in FRAMES:
         key = f"Field {letter} {what}"
         texts = headers.get(key, "").split(",") if headers.get(key) else []
-        for text in texts:
-            if not (text.strip().isdecimal() and len(text) < 6 and int(text) in known):
-                raise InputError(
-                    f"{path}: header {key}: {text[:20]}; expected one of "
-                    f"{', '.join(map(str, known))}"
-                )
+        if bad := [text for text in texts if text.strip() not in map(str, known)]:
+            raise InputError(
+                f"{path}: header {key}: {bad[0][:20]}; expected one of {', '.join(map(str, known))}"
+            )
         lists.append([int(text) for text in texts])
     return lists

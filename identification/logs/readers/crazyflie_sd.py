@@ -35,7 +35,7 @@ from ..log_map import load_map
 from ..mapped_log import chosen, recording_of
 
 _FIRST = b"tick(I),"  # of the columns of a log before 2021
-BEGINS = (b"\xbc\x01\x00", b"\xbc\x02\x00", *(bytes([n]) + _FIRST for n in range(2, 256)))
+BEGINS = rb"\xbc[\x01\x02]\0|[\x02-\xff]tick\(I\),"
 
 Layout = np.dtype[Any]  # of one event: its number, time and variables
 

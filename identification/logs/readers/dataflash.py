@@ -26,9 +26,8 @@ from ....runtime.regular_files import read_bytes
 Bytes = NDArray[np.uint8]
 Messages = dict[str, NDArray[Any]]  # (N,) of one type: columns by name, numbers or bytes of texts
 
-BEGINS = (b"\xa3\x95",)
-HOLDS = b"FMT, 128, 89, FMT,"  # of a log as text
-
+_AS_TEXT = b"FMT, 128, 89, FMT,"  # stands in a log as text
+BEGINS = b"\xa3\x95|(?s:.*)" + _AS_TEXT
 WHAT = "an ArduPilot log (DataFlash .BIN)"
 _TEXTS = ("Name", "Message")  # columns, of PARM and MSG
 _FMT, _FMT_LENGTH = 128, 89
@@ -50,7 +49,7 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messa
             ``FileLimits.table_rows``.
     """
     content = read_bytes(path, WHAT, LIMITS.binary_log)
-    if HOLDS in content[:4096]:
+    if _AS_TEXT in content[:4096]:
         return _of_text(path, content, wanted), 0
     data = np.frombuffer(content, np.uint8)
     counts, nowhere = np.zeros(256, np.int64), np.empty(0, np.int64)

@@ -105,21 +105,15 @@ def motor_order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> 
 def with_motors(log_map: LogMap, order: Order, parameters: Parameters, outputs: Outputs) -> LogMap:
     """Return the map with the order of the motors, and with the thrust curve of their outputs."""
     factor = min(max(parameters.get("THR_MDL_FAC", 0.0), 0.0), 1.0)
-    rotors, (motors, sent) = log_map.rotors, log_map.ways("commands")
-    assert rotors is not None
+    motors, sent = log_map.ways("commands")
     note = (
         f"commands: actuator_outputs, x = 0 to 1 ({outputs.words}), gives relative thrust "
         f"f x^2 + (1 - f) x with THR_MDL_FAC f = {factor:g}; motors 1 to 4 at outputs "
         f"{', '.join(str(slot + 1) for slot in outputs.slots)}"
     )
     columns = tuple(f"output[{slot}]" for slot in outputs.slots)
-    sent = replace(sent, columns=columns, order=order, thrust_factor=factor, note=note)
-    return replace(
-        log_map,
-        rotors=replace(rotors, order=order),
-        commands=replace(motors, order=order),
-        alternatives={**log_map.alternatives, "commands": (sent,)},
-    )
+    sent = replace(sent, columns=columns, thrust_factor=factor, note=note)
+    return log_map.with_ways({"commands": [motors, sent]}).with_order(order)
 
 
 def without_ranges(parameters: Parameters) -> Parameters:

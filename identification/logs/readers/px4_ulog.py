@@ -21,7 +21,6 @@ from pathlib import Path
 import numpy as np
 
 from ....dynamics.vehicle import Vehicle
-from ....runtime.errors import InputError
 from ....runtime.extras import need
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import check_regular, open_regular
@@ -30,7 +29,7 @@ from ..flight_log import FlightLog
 from ..log_map import shipped_map
 from ..mapped_log import recording_of
 from ..streams import Recording
-from ..table import Array
+from ..table import Array, one_line
 from .px4_motors import (
     Outputs,
     motor_order,
@@ -45,8 +44,7 @@ from .ulog_counting import counting
 
 Fields = Mapping[str, Array]  # (N,) of an instance of a topic, by name
 
-BEGINS = (b"ULog\x01\x12\x35",)
-
+BEGINS = rb"ULog\x01\x12\x35"
 WHAT = "a PX4 log (ULog)"
 _FILTER, _STATUS = "vehicle_local_position", "vehicle_status"
 _SENSORS = (  # field of an inertial sensor, and that of what it gained over a time
@@ -130,7 +128,7 @@ def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bo
 
     wanted = shipped_map("recordings/px4").topics | {_STATUS}
     check_regular(path, WHAT, LIMITS.ulog_file)
-    try:
+    with one_line(f"{path}: cannot be read as a ULog", "a PX4 log (.ulg)"):
         # pyulog prints its doubts; the notes say them
         with open_regular(path, WHAT) as file, redirect_stdout(io.StringIO()):
             parsed = counting(Parser)(file, sorted(wanted))
@@ -140,12 +138,6 @@ def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bo
                 file.seek(place)
                 place += _MESSAGE + int.from_bytes(file.read(2), "little")
         is_damaged = bool(parsed.file_corruption) or place != size
-    except InputError:
-        raise
-    except Exception as error:  # whatever a parser makes of bytes that are no ULog
-        raise InputError(
-            f"{path}: cannot be read as a ULog: {error}; expected a PX4 log (.ulg)"
-        ) from error
     topics: dict[str, list[Fields]] = {}
     for data in parsed.data_list:
         if "timestamp" in data.data:

@@ -48,7 +48,7 @@ from ....runtime.yaml_file import read_yaml
 from ..channels import Samples
 from ..flight_log import FlightLog
 from ..mapped_log import recording_of
-from ..table import Array
+from ..table import Array, one_line
 from .ros_messages import Fields, definitions, stamp
 from .ros_topics import map_of
 from .unpacking import check_bag_files, limited_unpacking
@@ -56,7 +56,7 @@ from .unpacking import check_bag_files, limited_unpacking
 WHAT = "a ROS bag (ROS 1, SQLite or MCAP)"
 SUFFIXES = (".bag", ".db3", ".mcap")
 _ROS1 = b"#ROSBAG V2.0"
-BEGINS = (_ROS1, b"\x89MCAP0\r\n", b"SQLite format 3\0")
+BEGINS = _ROS1 + rb"|\x89MCAP0\r\n|SQLite format 3\0"
 
 _Messages = Callable[[str], Iterator[tuple[int, Any]]]  # topic to (recorded at ns, message)
 
@@ -123,18 +123,6 @@ def given_map(file: Path) -> Mapping[str, Any]:
 
 
 @contextmanager
-def _one_line(what: str, expected: str) -> Iterator[None]:
-    """Make one line of whatever a parser raises of bytes that are none of its own."""
-    try:
-        yield
-    except InputError:
-        raise
-    except Exception as error:
-        words = f"{what}: {error or type(error).__name__}; expected {expected}"
-        raise InputError(words) from error
-
-
-@contextmanager
 def _opened(path: Path) -> Iterator[tuple[dict[str, str], _Messages]]:
     """Open a bag of either kind; give the types of its topics, and how to read the messages of one.
 
@@ -167,7 +155,7 @@ def _opened(path: Path) -> Iterator[tuple[dict[str, str], _Messages]]:
     def messages(topic: str) -> Iterator[tuple[int, Any]]:
         kind = types[topic]
         where = f"{path}: topic {topic}"
-        with _one_line(f"{where}: a message cannot be read", kind):
+        with one_line(f"{where}: a message cannot be read", kind):
             wanted = [connection for connection in reader.connections if connection.topic == topic]
             fitting = [s for s in stores if all(_same(c, s, is_ros1) for c in wanted)]
             if not fitting:
@@ -182,7 +170,7 @@ def _opened(path: Path) -> Iterator[tuple[dict[str, str], _Messages]]:
 
     with ExitStack() as opened:
         what = f"{path}: cannot be read as a ROS {1 if is_ros1 else 2} bag"
-        with _one_line(what, "a whole bag"):
+        with one_line(what, "a whole bag"):
             opened.enter_context(limited_unpacking())
             reader = opened.enter_context((rosbag1 if is_ros1 else rosbag2).Reader(path))
             types = {connection.topic: connection.msgtype for connection in reader.connections}
