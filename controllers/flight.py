@@ -108,11 +108,12 @@ def _wanted(c: Record, x: Array, dt: float, i: int) -> float:
     s = c.setpoint
     error = s[i] - x[i]
     c.sum[i] = min(max(c.sum[i] + dt * error, -2.0), 2.0)
-    wanted: float = (
+    wanted = (
         s[6 + i] + c.position * error + c.velocity * (s[3 + i] - x[7 + i]) + c.integral * c.sum[i]
     )
     # what the model's effects push, the rotors need not
-    return wanted - c.foreseen[i] / c.body.mass
+    left: float = wanted - c.foreseen[i] / c.body.mass
+    return left
 
 
 @compiled

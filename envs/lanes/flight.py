@@ -99,8 +99,10 @@ _FAN = LaneRecord(
     ("turbulence", "keep", "mixing", "stations", "blown"),
 )
 # fields of a closed loop's own record that differ from lane to lane, and that do not
-_OWN = ("qpos", "qvel", "xfrc", "acceleration", "noise")
-_OWN += ("action", "specific", "thrust", "accelerometer_bias")
+_OWN = (
+    *("qpos", "qvel", "xfrc", "acceleration", "noise"),
+    *("action", "specific", "thrust", "accelerometer_bias"),
+)
 _COMMON = ("none", "accelerometer_sigma")
 LOOPS = LaneRecord(
     LOOP,

@@ -110,7 +110,11 @@ class Shear(CompiledWind):
         w["reference"] = number(reference, "reference", 0.0)
         if law == "log":
             w["roughness"] = w["floor"] = number(roughness, "roughness", 0.0)
-            number(reference, "reference, above roughness,", roughness)
+            if roughness >= reference:
+                raise InputError(
+                    f"wind: Shear: roughness must be below reference, got {roughness:g} and "
+                    f"{reference:g} m"
+                )
         else:
             w["roughness"] = number(exponent, "exponent", 0.0)
         super().__init__(_steady, parameters)
