@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -14,6 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..dynamics.vehicle import Vehicle
 from ..dynamics.vehicle_file import load_vehicle
+
+# the vehicle of the tasks
+standard_vehicle = partial(load_vehicle, "ardrone2")
 
 
 def _along(value: ArrayLike, axis: int) -> float:
@@ -103,7 +107,7 @@ class Motions:
 class Briefing:
     """All of it. The defaults are those of the scenario ``base``."""
 
-    vehicle: Vehicle = field(default_factory=lambda: load_vehicle("ardrone2"))
+    vehicle: Vehicle = field(default_factory=standard_vehicle)
     noise: FilterNoise = FilterNoise()
     air: Air = Air()
     jet: Jet = Jet()

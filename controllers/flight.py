@@ -13,7 +13,7 @@ import numpy as np
 from ..dynamics.effects.base import ROTORS_SIZE, STATE_SIZE
 from ..dynamics.model import MAX_EFFECTS, MEMORY
 from ..dynamics.motion import BODY, Array, body_record
-from ..dynamics.rotation import quaternion_to_matrix
+from ..dynamics.rotation import product, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled
 from ..runtime.vector_lanes import any_of, choose
@@ -103,6 +103,20 @@ def move_setpoint(c: Record, position: Array, dt: float) -> None:
 
 
 @compiled
+def _wanted(c: Record, x: Array, dt: float, i: int) -> float:
+    """Return the acceleration, m/s2, that the rotors must make along an axis of the world."""
+    s = c.setpoint
+    error = s[i] - x[i]
+    c.sum[i] = min(max(c.sum[i] + dt * error, -2.0), 2.0)
+    wanted = (
+        s[6 + i] + c.position * error + c.velocity * (s[3 + i] - x[7 + i]) + c.integral * c.sum[i]
+    )
+    # what the model's effects push, the rotors need not
+    left: float = wanted - c.foreseen[i] / c.body.mass
+    return left
+
+
+@compiled
 def fly(c: Record, x: Array, dt: float) -> None:
     """Write the rotor speeds (4,) rad/s that steer the estimated state ``x`` to the set point into
     ``c.command``.
@@ -112,27 +126,8 @@ def fly(c: Record, x: Array, dt: float) -> None:
     """
     R, s = c.rotation, c.setpoint
     quaternion_to_matrix(x[3:7], R)
-    a0, a1, a2 = 0.0, 0.0, 0.0
-    for i in range(3):
-        error = s[i] - x[i]
-        c.sum[i] = min(max(c.sum[i] + dt * error, -2.0), 2.0)
-        a = (
-            s[6 + i]
-            + c.position * error
-            + c.velocity * (s[3 + i] - x[7 + i])
-            + c.integral * c.sum[i]
-        )
-        if i == 0:
-            a0 = a
-        elif i == 1:
-            a1 = a
-        else:
-            a2 = a
-    # what the model's effects push, the rotors need not
-    a0 -= c.foreseen[0] / c.body.mass
-    a1 -= c.foreseen[1] / c.body.mass
-    a2 -= c.foreseen[2] / c.body.mass
-    a2 = max(a2 + c.body.gravity, 0.3 * c.body.gravity)
+    a0, a1 = _wanted(c, x, dt, 0), _wanted(c, x, dt, 1)
+    a2 = max(_wanted(c, x, dt, 2) + c.body.gravity, 0.3 * c.body.gravity)
     lateral = math.sqrt(a0 * a0 + a1 * a1)
     limit = a2 * math.tan(c.tilt_limit)
     steep = lateral > limit
@@ -157,18 +152,12 @@ def fly(c: Record, x: Array, dt: float) -> None:
     alpha_y = c.attitude * bx - c.rate * (wy - ry)
     alpha_z = c.yaw * yaw_error + c.yaw_rate * (rz - wz) + c.yaw_integral * c.yaw_sum
     J = c.body.inertia
-    hx = J[0, 0] * wx + J[0, 1] * wy + J[0, 2] * wz
-    hy = J[1, 0] * wx + J[1, 1] * wy + J[1, 2] * wz
-    hz = J[2, 0] * wx + J[2, 1] * wy + J[2, 2] * wz
-    tx = J[0, 0] * alpha_x + J[0, 1] * alpha_y + J[0, 2] * alpha_z + wy * hz - wz * hy
-    ty = J[1, 0] * alpha_x + J[1, 1] * alpha_y + J[1, 2] * alpha_z + wz * hx - wx * hz
-    tz = J[2, 0] * alpha_x + J[2, 1] * alpha_y + J[2, 2] * alpha_z + wx * hy - wy * hx
-    tx -= c.foreseen[3]
-    ty -= c.foreseen[4]
-    tz -= c.foreseen[5]
+    hx, hy, hz = product(J, wx, wy, wz)
+    tx, ty, tz = product(J, alpha_x, alpha_y, alpha_z)
     # what a declared centre of mass off the rotors' centre makes of the thrust is balanced here
-    tx += c.body.com[1] * thrust
-    ty -= c.body.com[0] * thrust
+    tx = tx + wy * hz - wz * hy - c.foreseen[3] + c.body.com[1] * thrust
+    ty = ty + wz * hx - wx * hz - c.foreseen[4] - c.body.com[0] * thrust
+    tz = tz + wx * hy - wy * hx - c.foreseen[5]
     for i in range(4):
         square = (
             c.unmixing[i, 0] * thrust

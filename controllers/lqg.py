@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ..dynamics.vehicle import Vehicle
 from ..runtime.errors import InputError
 from .axis_models import AxisModel, axis_models, tilting
-from .briefing import Briefing
-from .preview import regulator, standard_vehicle
+from .briefing import Briefing, standard_vehicle
+from .preview import regulator
 from .wind_observation import (
     FORCE,
     MAX_ACCELERATION,

@@ -10,17 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..dynamics.vehicle import Vehicle
-from ..dynamics.vehicle_file import load_vehicle
 from ..runtime.errors import InputError
 from .axis_models import PLACE, axis_models, tilting
-from .briefing import Briefing
+from .briefing import Briefing, standard_vehicle
 from .observation import DECISION_PERIOD, MAX_COMMAND
 from .wind_observation import (
     MAX_ACCELERATION,
@@ -33,10 +32,6 @@ Array = NDArray[np.floating[Any]]
 Wide = NDArray[np.float64]
 DISTURBANCE_TIME = 0.3  # s, over which the actuators' disturbance lasts
 Step = tuple[Wide, Wide, Wide]  # A (n, n), B (n, 1) and D (n, d) of a decision
-
-
-# the vehicle of the tasks
-standard_vehicle = partial(load_vehicle, "ardrone2")
 
 
 def regulator(A: Wide, B: Wide, effort: float) -> tuple[Wide, Wide, Wide]:

@@ -40,20 +40,7 @@ def layers_of(weights: Weights) -> int:
     return sum(name.startswith("weight") for name in weights)
 
 
-def dense(weights: Weights, activation: str, x: Array) -> Array:
-    """Return the output (n,) of the dense layers ``weight0, bias0, weight1, ...`` for an input
-    (m,).
-    """
-    act = _ACTIVATIONS[activation]
-    last = layers_of(weights) - 1
-    for i in range(last + 1):
-        x = weights[f"weight{i}"] @ x + weights[f"bias{i}"]
-        if i < last:
-            x = act(x)
-    return x
-
-
-def lstm(weights: Weights, x: Array, hidden: Array, cell: Array) -> tuple[Array, Array]:
+def _lstm(weights: Weights, x: Array, hidden: Array, cell: Array) -> tuple[Array, Array]:
     """Return the next hidden state and cell (h,) of an LSTM with gates in the order input, forget,
     cell, output.
     """
@@ -69,8 +56,10 @@ def lstm(weights: Weights, x: Array, hidden: Array, cell: Array) -> tuple[Array,
     return after, cell
 
 
-def gru(weights: Weights, x: Array, hidden: Array) -> Array:
-    """Return the next hidden state (h,) of a GRU with gates in the order reset, update, new."""
+def _gru(weights: Weights, x: Array, hidden: Array, cell: Array) -> tuple[Array, Array]:
+    """Return the next hidden state (h,) of a GRU with gates in the order reset, update, new, and
+    ``cell``, which it has no use for.
+    """
     entered = weights["gru_input"] @ x + weights["gru_input_bias"]
     kept = weights["gru_hidden"] @ hidden + weights["gru_hidden_bias"]
     size = len(hidden)
@@ -78,11 +67,11 @@ def gru(weights: Weights, x: Array, hidden: Array) -> Array:
     reset, update = gates[:size], gates[size:]
     new = np.tanh(entered[2 * size :] + reset * kept[2 * size :])
     after: Array = new + update * (hidden - new)
-    return after
+    return after, cell
 
 
-# gates of each recurrent cell
-_CELLS = {"lstm": 4, "gru": 3}
+# gates of each recurrent cell, and what it does
+_CELLS = {"lstm": (4, _lstm), "gru": (3, _gru)}
 
 
 def cell_of(weights: Weights) -> str | None:
@@ -117,7 +106,7 @@ class _Network:
         shapes: dict[str, tuple[int, ...]] = {}
         if self._cell is not None:
             rows = len(weights[f"{self._cell}_input"])
-            below = self._memory_size = rows // _CELLS[self._cell]
+            below = self._memory_size = rows // _CELLS[self._cell][0]
             shapes = {
                 f"{self._cell}_input": (rows, seen),
                 f"{self._cell}_hidden": (rows, below),
@@ -141,15 +130,18 @@ class _Network:
 
     def act(self, x: Array) -> Array:
         """Return the action for what is seen (n,); a recurrent policy remembers what it saw."""
-        if self._cell == "lstm":
-            self._hidden, self._kept = lstm(self.weights, x, self._hidden, self._kept)
+        if self._cell is not None:
+            _, step = _CELLS[self._cell]
+            self._hidden, self._kept = step(self.weights, x, self._hidden, self._kept)
             x = self._hidden
-        elif self._cell == "gru":
-            x = self._hidden = gru(self.weights, x, self._hidden)
-        out = dense(self.weights, self._activation, x)
+        last = layers_of(self.weights) - 1
+        for i in range(last + 1):
+            x = self.weights[f"weight{i}"] @ x + self.weights[f"bias{i}"]
+            if i < last:
+                x = _ACTIVATIONS[self._activation](x)
         if self._squash:
-            out = np.tanh(out) * np.float32(self._largest)
-        return np.clip(out, -self._largest, self._largest).astype(np.float32)
+            x = np.tanh(x) * np.float32(self._largest)
+        return np.clip(x, -self._largest, self._largest).astype(np.float32)
 
 
 @contextmanager

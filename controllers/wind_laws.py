@@ -8,14 +8,16 @@ the torque ask the flight loop for the tilt that its attitude loop turns against
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..dynamics.vehicle import Vehicle
 from ..runtime.errors import InputError
 from .axis_models import tilting
+from .briefing import Briefing, standard_vehicle
 from .flight import FlightGains
 from .wind_observation import (
     FORCE,
@@ -31,11 +33,6 @@ from .wind_observation import (
 
 Array = NDArray[np.floating[Any]]
 Wide = NDArray[np.float64]
-_GRAVITY = 9.81  # m/s2
-_MASS = 0.465  # kg, declared, of the tasks' standard vehicle
-_INERTIA = np.array([2.985236e-3, 2.237568e-3])  # kg m2, likewise, against tilting along x and y
-# m/s2 for 1 Nm: of which the attitude loop makes an angular acceleration of 1 Nm over the inertia
-_TURN = np.array([*(_GRAVITY / (FlightGains.attitude * _INERTIA)), 0.0])
 # s, of the attitude loop behind an acceleration that is asked for; upwards there is none
 _ATTITUDE_LAG = FlightGains.rate / FlightGains.attitude * np.array([1.0, 1.0, 0.0])
 
@@ -51,9 +48,14 @@ class WindLaw:
     kp: float = 0.0  # 1/s2
     kd: float = 0.0  # 1/s
     ki: float = 0.0  # 1/s3
+    vehicle: Vehicle = field(default_factory=standard_vehicle)
 
     def __post_init__(self) -> None:
         self.reset()
+
+    def brief(self, briefing: Briefing) -> None:
+        """Fly the declared vehicle."""
+        self.vehicle = briefing.vehicle
 
     def reset(self) -> None:
         """Forget the last episode."""
@@ -89,10 +91,19 @@ class WindLaw:
         led: Wide = value + lead * ((value - last) / WIND_PERIOD)
         return led
 
+    def _tilting(self, o: Wide, lead: float) -> Wide:
+        """Return what of the estimated torque, led, tilts the vehicle along x and y, and 0: (3,)
+        Nm.
+        """
+        return self._led("torque", np.array([*tilting(o[TORQUE]), 0.0]), lead)
 
-def _tilting(o: Wide) -> Wide:
-    """Return what of the estimated torque tilts the vehicle along x and y, and 0: (3,) Nm."""
-    return np.array([*tilting(o[TORQUE]), 0.0])
+    def _turned(self, o: Wide, lead: float) -> Wide:
+        """Return the acceleration (3,) m/s2 of which the attitude loop makes the angular
+        acceleration of the estimated torque, led.
+        """
+        against_tilt = np.diag(self.vehicle.inertia)[[1, 0]]  # kg m2, along x and y
+        turn = self.vehicle.gravity / (FlightGains.attitude * against_tilt)
+        return np.array([*turn, 0.0]) * self._tilting(o, lead)
 
 
 class FlightLoopAlone(WindLaw):
@@ -113,12 +124,10 @@ class PIDWithForce(WindLaw):
 
     gain: float = 1.0  # share of the force that is cancelled
     lead: float = 0.0  # s, by which the force's change over a decision is added
-    mass: float = _MASS  # kg
 
     def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
         """Return ``- gain (f + lead df/dt) / m``."""
-        against: Wide = -self.gain / self.mass * self._led("force", o[FORCE], self.lead)
-        return against
+        return -self.gain / self.vehicle.mass * self._led("force", o[FORCE], self.lead)
 
 
 @dataclass(eq=False)
@@ -132,9 +141,7 @@ class PIDWithWrench(PIDWithForce):
 
     def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
         """Return the force's part, and ``- tilt (tau + tilt_lead dtau/dt)`` across."""
-        turned = self._led("torque", _tilting(o), self.tilt_lead)
-        against: Wide = super().against_the_wind(o, info) - self.tilt * turned
-        return against
+        return super().against_the_wind(o, info) - self.tilt * self._tilting(o, self.tilt_lead)
 
 
 @dataclass(eq=False)
@@ -181,8 +188,7 @@ class INDI(WindLaw):
         """Return the low-passed difference of rotor model and accelerometer, less the tilt."""
         from scipy.signal import lfilter, lfilter_zi
 
-        turned = self._led("torque", _tilting(o), self.tilt_lead)
-        x = o[ROTOR_FORCE] - o[SPECIFIC_FORCE] - _TURN * turned
+        x = o[ROTOR_FORCE] - o[SPECIFIC_FORCE] - self._turned(o, self.tilt_lead)
         if self._state is None:  # as if it had always been so
             self._state = np.outer(lfilter_zi(*self._filter), x)
         y, self._state = lfilter(*self._filter, x[np.newaxis], axis=0, zi=self._state)
@@ -230,8 +236,8 @@ class L1Adaptive(WindLaw):
 
     def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
         """Advance predictor and adaptation by a decision; return ``-C(s) sigma^``."""
-        v, pushed = o[VELOCITY], o[ROTOR_FORCE] - np.array([0.0, 0.0, _GRAVITY])
-        turned = _TURN * self._led("torque", _tilting(o), self.tilt_lead)
+        v, pushed = o[VELOCITY], o[ROTOR_FORCE] - np.array([0.0, 0.0, self.vehicle.gravity])
+        turned = self._turned(o, self.tilt_lead)
         if self._gap is None:  # hovering: the wind is what the rotors balance
             self._gap, self._sigma, self._filtered = np.zeros(3), -pushed, turned - pushed
         else:

@@ -56,6 +56,16 @@ def matrix_of_numbers(w: float, x: float, y: float, z: float) -> Numbers:
 
 
 @compiled_inline
+def product(M: Array, x: float, y: float, z: float) -> Numbers:
+    """Return the three numbers of a matrix (3, 3) times a vector."""
+    return (
+        M[0, 0] * x + M[0, 1] * y + M[0, 2] * z,
+        M[1, 0] * x + M[1, 1] * y + M[1, 2] * z,
+        M[2, 0] * x + M[2, 1] * y + M[2, 2] * z,
+    )
+
+
+@compiled_inline
 def quaternion_of_mrp(r0: float, r1: float, r2: float) -> Numbers:
     """Return the quaternion of modified Rodrigues parameters: (17)."""
     square = r0 * r0 + r1 * r1 + r2 * r2

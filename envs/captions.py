@@ -1,5 +1,6 @@
 """What a film says beside its picture: time, what the arrows are, numbers, score, and a scale."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -17,7 +18,7 @@ _MARGIN, _LINE = 14, 21
 _FONT, _SMALL = 16, 14
 _INK, _PAPER = (28, 36, 48), (255, 255, 255)
 _STEPS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)  # m, of a scale
-_WIDTHS = (8, 3)  # pixels of a line in the legend: true, estimated
+_WIDE, _NARROW = 8, 3  # pixels of a line in the legend: true, estimated
 
 
 @dataclass(frozen=True)
@@ -42,11 +43,6 @@ def _font(size: int, bold: bool) -> Any:
 
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
     return ImageFont.truetype(f"{get_data_path()}/fonts/ttf/{name}", size)
-
-
-def _colour(mark: Array) -> tuple[int, int, int]:
-    red, green, blue = (round(255 * float(c)) for c in mark[:3])
-    return red, green, blue
 
 
 def scale_of(pixels_per_metre: float, longest: float) -> float:
@@ -78,24 +74,22 @@ def with_caption(picture: Picture, caption: Caption) -> Picture:
     write(width - margin, margin, f"{caption.time:.1f} s", bold, "ra")
 
     # the legend: a wide pale arrow is the truth, a narrow dark one the estimate, as in the picture
-    rows: list[tuple[str, int, Array, str]] = []
-    if caption.true_force is not None:
-        rows.append(("true force", 0, TRUE, _newtons(caption.true_force)))
-    rows.append(("estimated force", 1, ESTIMATED, _newtons(caption.force)))
-    if caption.true_torque_z is not None:
-        rows.append(("true yaw torque", 0, TURNING_TRUE, _millis(caption.true_torque_z)))
-    rows.append(("estimated yaw torque", 1, TURNING, _millis(caption.torque_z)))
-    y = margin + 1.5 * line
-    for label, kind, mark, number in rows:
-        middle = y + 0.5 * line
-        draw.line(
-            (margin, middle, margin + 34 * size, middle),
-            _colour(mark),
-            max(1, round(_WIDTHS[kind] * size)),
-        )
+    rows: tuple[tuple[str, int, Array, Any, Callable[[Any], str]], ...] = (
+        ("true force", _WIDE, TRUE, caption.true_force, _newtons),
+        ("estimated force", _NARROW, ESTIMATED, caption.force, _newtons),
+        ("true yaw torque", _WIDE, TURNING_TRUE, caption.true_torque_z, _millis),
+        ("estimated yaw torque", _NARROW, TURNING, caption.torque_z, _millis),
+    )
+    middle = margin + 2.0 * line
+    for label, stroke, mark, value, told in rows:
+        if value is None:
+            continue
+        colour = tuple(np.round(255 * mark[:3]).astype(int).tolist())
+        shown = margin, middle, margin + 34 * size, middle
+        draw.line(shown, colour, max(1, round(stroke * size)))
         write(margin + 44 * size, middle, label, small, "lm")
-        write(margin + 305 * size, middle, number, small, "rm")
-        y += line
+        write(margin + 305 * size, middle, told(value), small, "rm")
+        middle += line
     y = margin + 1.5 * line
     for text in caption.lines:
         write(width - margin, y + 0.5 * line, text, plain, "rm")

@@ -94,6 +94,13 @@ LOOP = np.dtype(
         # of the rotors by the declared model
         ("specific", "f8", (3,)),
         ("thrust", "f8", (3,)),
+        # of loops in lanes: what others have from MuJoCo, and the unit normals of the tick in hand
+        ("qpos", "f8", (7,)),
+        ("qvel", "f8", (6,)),
+        ("xfrc", "f8", (6,)),
+        ("acceleration", "f8", (6,)),
+        ("noise", "f8", (NOISE + ACCELEROMETER_NOISE,)),
+        ("none", "f8", (6,)),
     ]
 )
 
@@ -286,16 +293,6 @@ def run_ticks(record: Record, world: World, path: Array, noise: Array, move: int
 
 
 @compiled
-def write_motion(record: Record, world: World, motion: Motion, n: int) -> None:
-    """Write where a loop stands into row ``n``."""
-    loop = record[0]
-    motion.position[n, :, 0], motion.velocity[n, :, 0] = world.qpos, world.qvel
-    motion.wrench[n, :, 0], motion.state[n, :, 0] = loop.plant.external, loop.filter.x
-    motion.specific[n, :, 0], motion.thrust[n, :, 0] = loop.specific, loop.thrust
-    motion.air[n, :, :, 0] = loop.fan.air
-
-
-@compiled
 def is_healthy(state: Array, qvel: Array) -> bool:
     """Return whether an estimate (20,) is finite, and no velocity (6,) larger than a vehicle's."""
     healthy = math.isfinite(state[:19].sum())
@@ -352,7 +349,7 @@ class ClosedLoop:
         position: (3,) m, world, true, of the geometric centre; ``quaternion`` (4,), body to world,
             and ``velocity`` (3,) m/s, world, likewise.
         motion: MuJoCo's generalised position and velocity: the vehicle's are the first (7,) and
-            (6,).
+            (6,). ``shown`` has them, with estimate and wrench, as a row of vehicles side by side.
         external: (6,) true external force N and torque Nm, world; of it ``jet`` is the jet's part,
             ``disturbance`` that of the actuators, and ``applied`` what a user applies.
         specific: (3,) m/s2, world, specific force by the accelerometer, mean of the last run.
@@ -459,6 +456,8 @@ class ClosedLoop:
         self.position, self.quaternion, self.velocity = p[:3], p[3:7], v[:3]
         xfrc: Array = self.data.xfrc_applied[self.model.body("vehicle").id]
         self.world = World(self.jet_table, p[:7], v[:6], xfrc, self.reference, self.winds.calls)
+        shown = p[:7], v[:6], self.external, self.state, self.specific, self.thrust, self.air
+        self.shown = Motion(*(values[np.newaxis, ..., np.newaxis] for values in shown))
 
     @property
     def seen(self) -> bool:

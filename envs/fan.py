@@ -21,6 +21,7 @@ from ..dynamics.mean_jet import (
     STEP_X,
     jet_table,
 )
+from ..dynamics.rotation import product
 from ..runtime.compiled import Record, compiled
 from ..runtime.vector_lanes import any_of, choose, corners
 
@@ -158,18 +159,12 @@ def jet_wrench(
     R, axial, radial = rotation, jet[0], jet[1]
     for i in range(6):
         out[i] = 0.0
-    ox = R[0, 0] * velocity[3] + R[0, 1] * velocity[4] + R[0, 2] * velocity[5]
-    oy = R[1, 0] * velocity[3] + R[1, 1] * velocity[4] + R[1, 2] * velocity[5]
-    oz = R[2, 0] * velocity[3] + R[2, 1] * velocity[4] + R[2, 2] * velocity[5]
-    cx = R[0, 0] * com[0] + R[0, 1] * com[1] + R[0, 2] * com[2]
-    cy = R[1, 0] * com[0] + R[1, 1] * com[1] + R[1, 2] * com[2]
-    cz = R[2, 0] * com[0] + R[2, 1] * com[1] + R[2, 2] * com[2]
+    ox, oy, oz = product(R, velocity[3], velocity[4], velocity[5])
+    cx, cy, cz = product(R, com[0], com[1], com[2])
     hull = 0.5 * AIR_DENSITY * f.hull_area / (STATIONS - 4)
     for i in range(STATIONS):
         s = f.stations[i]
-        x = R[0, 0] * s[0] + R[0, 1] * s[1] + R[0, 2] * s[2]
-        y = R[1, 0] * s[0] + R[1, 1] * s[1] + R[1, 2] * s[2]
-        z = R[2, 0] * s[0] + R[2, 1] * s[1] + R[2, 2] * s[2]
+        x, y, z = product(R, s[0], s[1], s[2])
         jet_at(f, axial, radial, position[0] + x, position[1] + y, position[2] + z, wind)
         strength = f.turbulence * wind[0]
         ux = wind[0] + strength * f.gusts[i, 0] + f.air[i, 0] - velocity[0] - (oy * z - oz * y)
@@ -183,9 +178,7 @@ def jet_wrench(
         else:
             scale = hull * math.sqrt(ux * ux + uy * uy + uz * uz)
             fx, fy, fz = scale * ux, scale * uy, scale * uz
-        x -= cx
-        y -= cy
-        z -= cz
+        x, y, z = x - cx, y - cy, z - cz
         out[0] += fx
         out[1] += fy
         out[2] += fz

@@ -58,25 +58,19 @@ def look_across(
 class FanTracking2DEnv(FanTask):
     """A quadrotor in a spherical cage must stay on the axis of a fan that moves in y and z.
 
+    What is not said here is as in ``FanTrackingEnv``: the filter, the times, the arguments ``scenario``
+    and ``fan``, and what is refused.
+
     ## Description
 
-    A drum fan blows along +x and moves along y and along z. A quadrotor hovers 2.3 m in front of it
-    and faces it. It flies in a cage: the stations on which the wind acts on its hull lie in turn 0.15 m
-    above and below the rotors, so that a jet that falls off in height pitches it as one that falls off
-    sideways turns it (a flat ring, as in ``FanTracking``, would feel no torque of a vertical offset). An
-    unscented Kalman filter turns rotor speeds and motion-capture pose into the external force and torque,
-    at 200 Hz. The agent sees the estimate, 12.5 times a second, and commands velocities along y and z.
+    A drum fan blows along +x and moves along y and along z. The quadrotor flies in a cage: the stations
+    on which the wind acts on its hull lie in turn 0.15 m above and below the rotors, so that a jet that
+    falls off in height pitches it as one that falls off sideways turns it (a flat ring, as in
+    ``FanTracking``, would feel no torque of a vertical offset).
 
     ## Action space
 
-    ``Box(-1, 1, (2,), float32)``
-
-    | Num | Action                           | Min | Max | Unit |
-    | --- | -------------------------------- | --- | --- | ---- |
-    | 0   | commanded velocity along world y | -1  | 1   | m/s  |
-    | 1   | commanded velocity along world z | -1  | 1   | m/s  |
-
-    A command out of range is clipped; one that is not finite raises ``InputError``.
+    ``Box(-1, 1, (2,), float32)``: commanded velocity along the world's y and z, m/s.
 
     ## Observation space
 
@@ -89,41 +83,22 @@ class FanTracking2DEnv(FanTask):
     | 6-7 | own estimated velocity along y and z      | 5     | 0.5   | m/s  |
     | 8-9 | last command                              | 1     | 1     | m/s  |
 
-    Where the fan is, is not observed: ``info`` has it. Above the axis the world's ``tau_y`` is negative,
-    at positive y its ``tau_z`` is positive.
+    Above the axis the world's ``tau_y`` is negative, at positive y its ``tau_z`` is positive.
 
     ## Rewards
 
-    ``reward = reward_tracking + reward_change``, each of them in ``info``:
-
-    * ``reward_tracking = 1 / (1 + (offset / 0.3)^2)``, where ``offset`` is the true distance from the axis,
-      ``sqrt(dy^2 + dz^2)``, in m;
-    * ``reward_change = -0.05 |command - last command|^2``.
+    Those of ``FanTracking`` of ``offset = sqrt(dy^2 + dz^2)``, the true distance from the axis in m, and
+    of ``|command - last command|``.
 
     ## Starting state
 
-    The vehicle hovers off the axis by what the scenario says, on a side drawn at random, and the filter settles
-    for 1.5 s in the standing jet. The fan's axis starts at 1.5 m. Along y it moves as in ``FanTracking``, along
-    z as a second path drawn from the same scenario, half as fast and as far. Paths, offset and all noise are
-    drawn from the seed.
+    The vehicle hovers off the axis by what the scenario says, on a side drawn at random. The fan's axis
+    starts at 1.5 m. Along y it moves as in ``FanTracking``, along z as a second path drawn from the same
+    scenario, half as fast and as far.
 
     ## Episode end
 
-    Terminated when the vehicle is lost: 2.5 m off the axis, 1 m off its distance, on the floor, or tilted by
-    more than 70 degrees. Truncated after 20 s (250 decisions).
-
-    ## Arguments
-
-    ```python
-    gym.make("windwrench/FanTracking2D-v0", scenario="base", render_mode=None)
-    ```
-
-    | Parameter     | Default      | Description                                                       |
-    | ------------- | ------------ | ----------------------------------------------------------------- |
-    | `scenario`    | `"base"`     | one of `windwrench.envs.SCENARIOS`, or a `Scenario`                |
-    | `fan`         | `None`       | a `Fan`, in place of the standard one with a cage                  |
-
-    All arguments of ``windwrench.envs.task.Task`` come beside these. ``reset`` refuses any ``options``.
+    As in ``FanTracking``, but for the height: on the floor the vehicle is lost.
 
     ## Version history
 

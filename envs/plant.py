@@ -331,15 +331,10 @@ def blow(p: Record, fan: Record, jet: Array, qpos: Array, qvel: Array, noise: Ar
 def disturb(p: Record, noise: Array) -> None:
     """Let the unmodelled disturbance age by one tick."""
     fresh = math.sqrt(1.0 - p.disturbance_keep * p.disturbance_keep)
-    for i in range(3):
-        p.disturbance[i] = (
-            p.disturbance_keep * p.disturbance[i]
-            + fresh * p.disturbance_force * noise[_DISTURBANCE + i]
-        )
-        p.disturbance[3 + i] = (
-            p.disturbance_keep * p.disturbance[3 + i]
-            + fresh * p.disturbance_torque * noise[_DISTURBANCE + 3 + i]
-        )
+    for i in range(6):
+        size = p.disturbance_force if i < 3 else p.disturbance_torque
+        kept = p.disturbance_keep * p.disturbance[i]
+        p.disturbance[i] = kept + fresh * size * noise[_DISTURBANCE + i]
 
 
 @compiled
@@ -350,21 +345,15 @@ def add_up(p: Record, xfrc: Array) -> None:
     R = p.rotation
     for i in range(3):
         p.external[i] = p.effect_wrench[i] + p.jet[i] + p.disturbance[i] + p.applied[i]
-        p.external[3 + i] = (
-            R[i, 0] * p.effect_wrench[3]
-            + R[i, 1] * p.effect_wrench[4]
-            + R[i, 2] * p.effect_wrench[5]
-            + p.jet[3 + i]
-            + p.disturbance[3 + i]
-            + p.applied[3 + i]
-        )
         xfrc[i] = p.external[i] + R[i, 2] * p.rotor_wrench[0]
-        xfrc[3 + i] = (
-            p.external[3 + i]
-            + R[i, 0] * p.rotor_wrench[1]
-            + R[i, 1] * p.rotor_wrench[2]
-            + R[i, 2] * p.rotor_wrench[3]
-        )
+        torque = 0.0
+        for j in range(3):
+            torque += R[i, j] * p.effect_wrench[3 + j]
+        p.external[3 + i] = torque + p.jet[3 + i] + p.disturbance[3 + i] + p.applied[3 + i]
+        made = p.external[3 + i]
+        for j in range(3):
+            made += R[i, j] * p.rotor_wrench[1 + j]
+        xfrc[3 + i] = made
 
 
 @compiled

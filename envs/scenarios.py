@@ -1,13 +1,15 @@
-"""The scenarios of the fan-tracking task, as data, and those of a user's own as YAML files."""
+"""The scenarios of the fan-tracking tasks, and those of a user's own, as YAML files."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
@@ -100,24 +102,14 @@ class Scenario:
     variation: Variation = Variation()  # from this distribution
 
 
-SCENARIOS: dict[str, Scenario] = {
-    "static": Scenario(
-        "the fan stands still; start 0.8 m off its axis", motions=("still",), offset=(0.8, 0.8)
-    ),
-    "base": Scenario(
-        "the fan moves at up to 0.05-0.35 m/s: a sine, a triangle, a ramp, or not at all"
-    ),
-    "fast": Scenario(
-        "the fan moves at up to 0.2-0.6 m/s", motions=("sine", "triangle", "ramp"), speed=(0.2, 0.6)
-    ),
-    "slow-filter": Scenario("base, with a filter of 1 s rise time", rise_time=1.0),
-    "noisy": Scenario(
-        "base, with a pose noise of 0.01 m and 0.05 rad", sigma_position=0.01, sigma_attitude=0.05
-    ),
-    "gusty": Scenario("base, with 35 % turbulence", turbulence=0.35),
-    "far": Scenario("base, from 1.0-1.4 m off the axis", offset=(1.0, 1.4)),
-    "varied": Scenario("base, with fan strength, distance and vehicle drawn anew", varied=True),
-}
+def kept_scenarios(section: str, form: type[AnyScenario]) -> dict[str, AnyScenario]:
+    """Return the kit's own scenarios of a section of ``scenarios.yaml``, by name."""
+    text = (resources.files(__package__) / "scenarios.yaml").read_text(encoding="utf-8")
+    stated = yaml.safe_load(text)[section].items()
+    return {name: checked(form, fields, f"scenarios.yaml: {name}") for name, fields in stated}
+
+
+SCENARIOS = kept_scenarios("fan", Scenario)
 
 
 def find_scenario(name: str, known: Mapping[str, AnyScenario]) -> AnyScenario:

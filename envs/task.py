@@ -25,7 +25,7 @@ from ..dynamics.vehicle_file import load_vehicle
 from ..estimator.tuning import UKFTuning
 from ..runtime.compiled import compiled, specialised
 from ..runtime.errors import InputError, unknown_name
-from .closed_loop import ESTIMATORS, REFERENCE_SIZE, ClosedLoop, Stage, is_healthy, write_motion
+from .closed_loop import ESTIMATORS, REFERENCE_SIZE, ClosedLoop, Stage, is_healthy
 from .display import modes_shown, need_display
 from .fan import Fan
 from .observing import Episodes, Motion, View
@@ -65,6 +65,31 @@ def is_flying(state: Array, position: Array, velocity: Array) -> bool:
     """Return whether a vehicle still flies: finite, no faster than one can be, and upright."""
     tilted = position[4] * position[4] + position[5] * position[5]
     return is_healthy(state, velocity) and 1.0 - 2.0 * tilted >= UPRIGHT
+
+
+def true_motion(
+    vehicle: Vehicle, pose: Array, velocity: Array, speeds: Array, integral: Array
+) -> dict[str, Any]:
+    """Return what an oracle knows of a vehicle's motion.
+
+    Args:
+        vehicle: as it is declared.
+        pose: (7,) position m and quaternion.
+        velocity: (6,) m/s, world, and rad/s, body.
+        speeds: (4,) rad/s, of the rotors.
+        integral: (3,) of the flight loop.
+    """
+    R = np.empty((3, 3))
+    quaternion_to_matrix(pose[3:7], R)
+    thrust, *torques = (vehicle.mixing @ speeds**2).tolist()
+    return {
+        "velocity": velocity[:3].copy(),
+        "rate": R @ velocity[3:6],
+        "angular_acceleration": R @ np.linalg.solve(vehicle.inertia, torques),
+        "up": R[:, 2].copy(),
+        "lift": thrust * R[2, 2] / vehicle.mass - vehicle.gravity,
+        "integral": integral.copy(),
+    }
 
 
 class Task(gym.Env[Frame, Frame], ABC):
@@ -161,7 +186,6 @@ class Task(gym.Env[Frame, Frame], ABC):
         self.path, self.distance = np.zeros((1, 2)), 0.0
         self.reference: Array = _NO_REFERENCE
         self.drawn_label = ""
-        self._motion = Motion.zeros(1)
         self._frames = np.zeros((1, len(self.limits)), dtype=np.float32)
         self._table = np.zeros(1, dtype=self.values)
         self._lay_episode()
@@ -183,7 +207,7 @@ class Task(gym.Env[Frame, Frame], ABC):
         self._compile()
 
     def _compile(self) -> None:
-        seen = self._episodes, self._motion, self._frames, self._table
+        seen = self._episodes, Motion.zeros(1), self._frames, self._table
         self._look = specialised(type(self).look, _ONE, *seen)
 
     def _see_by(self, view: View) -> None:
@@ -200,9 +224,8 @@ class Task(gym.Env[Frame, Frame], ABC):
     def _look_around(self) -> None:
         """Write frame and values of now."""
         loop, episodes = self.loop, self._episodes
-        write_motion(loop.record, loop.world, self._motion, 0)
         episodes.ticks[0], episodes.broken[0] = loop.ticks, loop.was_reset
-        self._look(_ONE, episodes, self._motion, self._frames, self._table)
+        self._look(_ONE, episodes, loop.shown, self._frames, self._table)
 
     @property
     def loop(self) -> ClosedLoop:
@@ -306,7 +329,7 @@ class Task(gym.Env[Frame, Frame], ABC):
 
     def _get_obs(self) -> Frame:
         """Return what the agent sees now."""
-        seen: Frame = self.view.of(_ALL, self._frames, self._motion.state[..., 0])[0]
+        seen: Frame = self.view.of(_ALL, self._frames, self.loop.shown.state[..., 0])[0]
         return seen
 
     def _get_info(self) -> dict[str, Any]:
@@ -326,18 +349,9 @@ class Task(gym.Env[Frame, Frame], ABC):
         """Return what the oracle knows beyond ``info``: the true motion and the integral of the
         flight loop, world axes, SI units. A task adds what is to come.
         """
-        loop, R = self.loop, np.empty((3, 3))
-        record = loop.record[0]
-        quaternion_to_matrix(loop.quaternion, R)
-        thrust, *torques = (self.vehicle.mixing @ record["plant"]["speeds"] ** 2).tolist()
-        return {
-            "velocity": loop.velocity.copy(),
-            "rate": R @ loop.motion[1][3:6],
-            "angular_acceleration": R @ np.linalg.solve(self.vehicle.inertia, torques),
-            "up": R[:, 2].copy(),
-            "lift": thrust * R[2, 2] / self.vehicle.mass - self.vehicle.gravity,
-            "integral": record["flight"]["sum"].copy(),
-        }
+        record, world = self.loop.record[0], self.loop.world
+        speeds, integral = record["plant"]["speeds"], record["flight"]["sum"]
+        return true_motion(self.vehicle, world.qpos, world.qvel, speeds, integral)
 
     def _told(self) -> dict[str, Any]:
         """Return ``info``, with the truth where somebody foresees."""
@@ -362,7 +376,7 @@ class Task(gym.Env[Frame, Frame], ABC):
         self._begin()
         self._in_flight = True
         self.command = np.zeros(self.action_size)
-        self.view.restart(_ALL, self._motion.state[..., 0])
+        self.view.restart(_ALL, self.loop.shown.state[..., 0])
         if self.render_mode == "human":
             self.render()
         # rewards, and whether the vehicle is lost, are decided by steps

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from ..dynamics.motion import Array
 from ..runtime.compiled import specialised
 from ..runtime.errors import InputError, unknown_name
-from .closed_loop import write_motion
 from .fan_tracking import FanTrackingEnv
 from .observing import Episodes, Flags, Motion
 from .task import Frame, Task
@@ -231,7 +230,8 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
     def _see(self, i: int) -> None:
         """Write where environment ``i`` stands."""
         loop, episodes = self.envs[i].loop, self._episodes
-        self._call(write_motion, loop.record, loop.world, self._motion, i)
+        for kept, shown in zip(self._motion, loop.shown, strict=True):
+            kept[i] = shown[0]
         episodes.ticks[i], episodes.broken[i] = loop.ticks, loop.was_reset
 
     @property

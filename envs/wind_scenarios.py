@@ -1,9 +1,9 @@
-"""The scenarios of the tasks in the wind, as data, and the winds that are drawn from them."""
+"""The scenarios of the tasks in the wind, and the winds that are drawn from them."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -12,7 +12,7 @@ from ..dynamics.motion import Array
 from ..dynamics.vehicle import NotNegative
 from ..runtime.forms import STRICT, Positive
 from .references import figure_of_eight, hold, random_spline
-from .scenarios import Drawn, Factors, Range
+from .scenarios import Drawn, Factors, Range, kept_scenarios
 from .wind import (
     CompiledWind,
     FanWall,
@@ -60,35 +60,7 @@ class WindScenario:
     variation: WindVariation = WindVariation()
 
 
-_BASE = WindScenario(
-    "Dryden's turbulence in 1-2.5 m/s, and a wall of fans of up to 4.5 m/s that switch",
-    mean=(1.0, 2.5),
-    turbulence="dryden",
-    wall=(1.5, 4.5),
-)
-
-WIND_SCENARIOS: dict[str, WindScenario] = {
-    "calm": WindScenario("still air; only the actuators disturb"),
-    "turbulent": WindScenario(
-        "a mean wind of 3-5 m/s with Dryden's turbulence", mean=(3.0, 5.0), turbulence="dryden"
-    ),
-    "fan-wall": WindScenario("a wall of fans of up to 6 m/s that switch", wall=(2.0, 6.0)),
-    "base": _BASE,
-    "gusts": WindScenario(
-        "von Karman's turbulence in 2-3 m/s, and gusts of 2-3.5 m/s",
-        mean=(2.0, 3.0),
-        turbulence="von-karman",
-        gusts=(2.0, 3.5),
-    ),
-    "wash": WindScenario("the wash of a vehicle that crosses above", wash=True),
-    "noisy": replace(
-        _BASE,
-        summary="base, with a pose noise of 0.01 m and 0.05 rad",
-        sigma_position=0.01,
-        sigma_attitude=0.05,
-    ),
-    "varied": replace(_BASE, summary="base, with the vehicle drawn anew", varied=True),
-}
+WIND_SCENARIOS = kept_scenarios("wind", WindScenario)
 
 HEIGHT = 1.5  # m, of the vehicle
 DISTANCE = 2.3  # m, from the wall of fans

@@ -112,4 +112,4 @@ def _fly_chunk(chunk: Chunk) -> list[Episode]:
     task, name, scenario, seeds = chunk
     known, pilot = TASKS[task], make_pilot(name, task)
     env = known.environment(scenario)
-    return [fly_episode(env, pilot, seed, decisions=known.decisions) for seed in seeds]
+    return [fly_episode(env, pilot, seed) for seed in seeds]

@@ -71,7 +71,7 @@ def fly_episode(
     controller: Any,
     seed: int,
     each: Callable[[dict[str, Any]], None] = lambda info: None,
-    decisions: int = DECISIONS,
+    decisions: int | None = None,
 ) -> Episode:
     """Fly one episode of a task and return it.
 
@@ -82,7 +82,7 @@ def fly_episode(
             ``foresight`` is how many decisions ahead it sees wind or fan.
         seed: of the episode.
         each: called with the ``info`` of every decision.
-        decisions: of a whole episode.
+        decisions: of a whole episode; default: those of the task.
     """
     env.unwrapped.foresight = getattr(controller, "foresight", 0)
     observation, info = env.reset(seed=seed)
@@ -90,43 +90,30 @@ def fly_episode(
         controller.brief(env.unwrapped.briefing())
     if hasattr(controller, "reset"):
         controller.reset()
-    loop, rows, observations, total = env.unwrapped.loop, [], [], 0.0
-    for _ in range(decisions):
+    loop, rows, total = env.unwrapped.loop, [], 0.0
+    whole = decisions or env.unwrapped.decisions()
+    for _ in range(whole):
         action = controller(observation, info)
         observation, reward, lost, _, info = env.step(np.asarray(action, dtype=np.float32))
         total += float(reward)
-        error = info["error"] if "error" in info else abs(info["offset"])
-        state = loop.state
-        rows.append(
-            (
-                *(info["time"], error, *loop.position, *loop.quaternion),
-                *(*state[16:19], *state[13:16], *info["force"], *info["torque"]),
-                info.get("fan_y", np.nan),
-            )
+        row = (
+            info["time"],
+            info["error"] if "error" in info else abs(info["offset"]),
+            loop.position.copy(),
+            loop.quaternion.copy(),
+            np.concatenate([loop.state[16:19], loop.state[13:16]]),
+            info["force"],
+            info["torque"],
+            info.get("fan_y", np.nan),
+            observation,
         )
-        observations.append(observation)
+        rows.append(row)
         each(info)
         if lost:
             break
-    table = np.array(rows, dtype=np.float64)
-    parts = np.split(table[:, 2:21], [3, 7, 13, 16], axis=1)
-    position, quaternion, estimate, force, torque = parts
-    return Episode(
-        seed,
-        info.get("fan_motion") or info.get("trajectory", ""),
-        bool(info["lost"]),
-        total,
-        decisions,
-        table[:, 0],
-        table[:, 1],
-        position,
-        quaternion,
-        estimate,
-        force,
-        torque,
-        table[:, 21],
-        np.array(observations, dtype=np.float64),
-    )
+    columns = [np.array(column, dtype=np.float64) for column in zip(*rows, strict=True)]
+    motion = info.get("fan_motion") or info.get("trajectory", "")
+    return Episode(seed, motion, bool(info["lost"]), total, whole, *columns)
 
 
 def benchmark_seeds(seed: int, episodes: int) -> list[int]:
@@ -141,14 +128,16 @@ def time_series(episode: Episode) -> dict[str, Array]:
     fz`` N and ``tx, ty, tz`` Nm, estimated, ``true_fx`` to ``true_tz`` true, both in the world
     frame. Of FanTracking also ``fan_y`` m, ``command`` m/s along y and ``vy`` m/s, estimated.
     """
-    wrench = ("fx", "fy", "fz", "tx", "ty", "tz")
-    names = ("px", "py", "pz", "qw", "qx", "qy", "qz", *wrench, *(f"true_{x}" for x in wrench))
-    parts = (
-        *(episode.position, episode.quaternion, episode.estimate),
-        *(episode.force, episode.torque),
-    )
+    groups = {
+        ("px", "py", "pz"): episode.position,
+        ("qw", "qx", "qy", "qz"): episode.quaternion,
+        ("fx", "fy", "fz", "tx", "ty", "tz"): episode.estimate,
+        ("true_fx", "true_fy", "true_fz"): episode.force,
+        ("true_tx", "true_ty", "true_tz"): episode.torque,
+    }
     columns = {"t": episode.time, "error": episode.error}
-    columns |= dict(zip(names, np.concatenate(parts, axis=1).T, strict=True))
+    for names, values in groups.items():
+        columns |= dict(zip(names, values.T, strict=True))
     if episode.in_jet:
         columns["fan_y"], columns["command"] = episode.fan_y, episode.command
         columns["vy"] = episode.observation[:, 6]

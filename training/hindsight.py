@@ -54,6 +54,15 @@ def mix_of(name: str, episodes: int) -> dict[str, int]:
     return {each: episodes * part // sum(parts.values()) for each, part in parts.items()}
 
 
+def lanes_of(task: str, scenario: str, episodes: int) -> list[TaskLanes]:
+    """Return environments of a task for so many episodes in a scenario, or in ``MIX``."""
+    kind, own = TASKS[task].environment, {LATE: _LATE}
+    return [
+        TaskLanes(count, task=kind, scenario=own.get(name, name))
+        for name, count in mix_of(scenario, episodes).items()
+    ]
+
+
 @lru_cache(maxsize=32)
 def _models(oracle: WindOracle, late: float) -> list[tuple[Array, ...]]:
     """Return of each axis A (n, n) and B (n,) of a decision where commands are ``late`` by so many
@@ -88,14 +97,6 @@ class WindLesson:
         """
         self._task, self._oracle, self._limit = task, WindOracle(), limit * self.largest
         self.scale = np.array(TASKS[task].environment.scales, dtype=np.float32)
-
-    def environments(self, scenarios: dict[str, int]) -> list[TaskLanes]:
-        """Return so many environments of each scenario."""
-        kind, own = TASKS[self._task].environment, {LATE: _LATE}
-        return [
-            TaskLanes(count, task=kind, scenario=own.get(name, name))
-            for name, count in scenarios.items()
-        ]
 
     def begin(self, envs: TaskLanes, leads: bool) -> None:
         """Start an episode in each of ``envs``; ``leads``: ``lqg`` flies."""

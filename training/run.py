@@ -11,10 +11,8 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..controllers.registry import STANDARD_TASK
 from ..controllers.trained_policy import TaskPolicy, TrainedPolicy, save_policy
 from ..evaluation.episodes import fly_episode
-from ..evaluation.tasks import TASKS
 from ..runtime.errors import InputError
 from ..runtime.forms import STRICT, checked
 from ..runtime.page_files import write_json
@@ -115,16 +113,13 @@ def card_of(config: Config, scenario: str, seed: int, steps: int) -> dict[str, A
     }
 
 
-def validate(
-    policy: TrainedPolicy | TaskPolicy, env: Any, episodes: int, task: str = STANDARD_TASK
-) -> tuple[float, int]:
+def validate(policy: TrainedPolicy | TaskPolicy, env: Any, episodes: int) -> tuple[float, int]:
     """Fly validation episodes with the full filter.
 
     Returns:
         The mean RMSE (m), and how many episodes were lost.
     """
-    seeds, decisions = validation_seeds(episodes), TASKS[task].decisions
-    flown = [fly_episode(env, policy, seed, decisions=decisions) for seed in seeds]
+    flown = [fly_episode(env, policy, seed) for seed in validation_seeds(episodes)]
     return float(np.mean([e.rmse for e in flown])), sum(e.lost for e in flown)
 
 

@@ -10,24 +10,21 @@ stable-baselines3 on the task's version 1. Beside the wind all learn on ``base``
 
 import argparse
 import time
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import torch
-from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from numpy.typing import NDArray
 
-from ..controllers import make_controller
 from ..controllers.trained_policy import TaskPolicy, save_policy
 from ..envs.plant import TICK
 from ..evaluation.tasks import TASKS
 from .belief_network import BeliefNetwork
 from .configuration import load_config
 from .flown_sequences import Flights
-from .hindsight import MIX, WindLesson, mix_of
+from .hindsight import MIX, WindLesson, lanes_of
 from .imitation import rounds as taught_in_rounds
 from .learners import make_learner, weights_of
 from .run import origin, validate
@@ -69,42 +66,22 @@ def _card(task: str, kind: str, scenario: str, seed: int, steps: int) -> dict[st
 
 class FanPlaneLesson:
     """FanTracking2D: scaled observations; the fan's offset from the vehicle (m) and its velocity
-    (m/s), both in the plane of the commands. The oracle flies the first round.
+    (m/s), both in the plane of the commands. A law that sees both flies the first round.
     """
 
     _kind = TASKS["FanTracking2D"].environment
     decisions, period = _kind.decisions(), TICK * _kind.decision_ticks
     largest, scale = _kind.largest_action, np.array(_kind.scales, dtype=np.float32)
 
-    def environments(self, scenarios: dict[str, int]) -> list[SyncVectorEnv]:
-        """Return so many environments of each scenario, with what their oracle must see."""
-
-        def make(scenario: str) -> Any:
-            env = self._kind(scenario)
-            env.foresight = make_controller("oracle", env.name).foresight
-            return env
-
-        return [
-            SyncVectorEnv([partial(make, name)] * count, autoreset_mode=AutoresetMode.NEXT_STEP)
-            for name, count in scenarios.items()
-        ]
-
     def begin(self, envs: Any, leads: bool) -> None:
         """Start an episode in each of ``envs``."""
-        self._oracles = [make_controller("oracle", self._kind.name) for _ in range(envs.num_envs)]
         self._truth: list[Any] = []
 
     def look(self, observations: Array, infos: dict[str, Any]) -> tuple[Array, Any]:
-        """Return scaled observations (n, quantities) and the oracle's actions (n, 2)."""
-        wanted = np.array(
-            [
-                oracle(observations[i], {name: values[i] for name, values in infos.items()})
-                for i, oracle in enumerate(self._oracles)
-            ]
-        )
-        offset, velocity = infos["fan"] - infos["position"], infos["fan_velocity"]
-        self._truth.append(np.concatenate([offset[:, :2], velocity[:, :2]], axis=1))
-        return observations / self.scale, wanted
+        """Return scaled observations (n, quantities) and the law's commands (n, 2)."""
+        truth = np.hstack([infos["fan"] - infos["position"], infos["fan_velocity"]])
+        self._truth.append(truth)
+        return observations / self.scale, truth @ _shares(True, _GAINS[1]).T
 
     def taught(self, kept: NDArray[np.bool_]) -> tuple[Any, NDArray[np.bool_]]:
         """Return what is taught (decisions, n, 4), and what counts (decisions, n)."""
@@ -134,8 +111,7 @@ def teach(
     torch.manual_seed(seed)
     shape = "gru", config["state"], config["net"], _ACTIVATION
     network = BeliefNetwork(len(lesson.scale), 4 if of_fan else 3, *shape)
-    envs = lesson.environments(mix_of(scenario, episodes))
-    flights = Flights(envs, lesson, config, seed)
+    flights = Flights(lanes_of(task, scenario, episodes), lesson, config, seed)
     mirrored = _TURNED if of_fan else None
     shares = _shares(of_fan, _GAINS[1])
     for last in taught_in_rounds(network, flights, shares, config, seed, mirrored, not of_fan):
@@ -148,7 +124,7 @@ def teach(
         for gain in _GAINS
     ]
     env = TASKS[task].environment(BASE)
-    return min(tried, key=lambda each: validate(each, env, VALIDATION, task)[0])
+    return min(tried, key=lambda each: validate(each, env, VALIDATION)[0])
 
 
 def sac(task: str, seed: int, steps: int) -> TaskPolicy:
@@ -189,7 +165,7 @@ def main() -> None:
     given.out.mkdir(parents=True, exist_ok=True)
     path = given.out / f"{given.task}-{given.kind}-{given.seed}.npz"
     env = TASKS[given.task].environment(BASE)
-    rmse, lost = validate(policy, env, VALIDATION, given.task)
+    rmse, lost = validate(policy, env, VALIDATION)
     policy.card |= {
         "validation": {"episodes": VALIDATION, "rmse_m": round(rmse, 5), "lost": lost},
         "training_cpu_s": round(time.process_time() - began),

@@ -95,7 +95,7 @@ def tune(
         }
         controller, rmse, lost = known.laws[law](**gains), [], 0
         for k, one in enumerate(seeds):
-            episode = fly_episode(env, controller, one, decisions=known.decisions)
+            episode = fly_episode(env, controller, one)
             rmse.append(episode.rmse)
             lost += episode.lost
             if k + 1 == _PRUNE_AFTER:

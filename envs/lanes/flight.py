@@ -24,7 +24,6 @@ from ...runtime.addresses import call_at
 from ...runtime.compiled import Record, compiled, compiled_without_gil
 from ...runtime.vector_lanes import WIDTH, LaneRecord
 from ..closed_loop import (
-    ACCELEROMETER_NOISE,
     LOOP,
     WIND_EVERY,
     ClosedLoop,
@@ -49,24 +48,6 @@ from ..plant import (
     measure,
 )
 
-# fields of a closed loop's own record that differ from lane to lane
-_OWN = ("action", "specific", "thrust", "accelerometer_bias")
-# a block of loops, as one of them would have it
-_LOOP = np.dtype(
-    [
-        ("plant", PLANT),
-        ("flight", FLIGHT),
-        ("fan", FAN),
-        ("qpos", "f8", (7,)),  # as MuJoCo's
-        ("qvel", "f8", (6,)),
-        ("xfrc", "f8", (6,)),
-        ("acceleration", "f8", (6,)),
-        ("noise", "f8", (NOISE + ACCELEROMETER_NOISE,)),  # unit normals of the tick in hand
-        ("none", "f8", (6,)),
-        *[(name, LOOP[name]) for name in _OWN],
-        ("accelerometer_sigma", "f8"),
-    ]
-)
 # the true body is each vehicle's own, the declared one that of all
 _BODY = LaneRecord(BODY, ("mass", "inertia", "inverse_inertia"), ("gravity", "com", "k", "mixing"))
 _PLANT = LaneRecord(
@@ -117,10 +98,16 @@ _FAN = LaneRecord(
     ("speed", "rotor_drag", "hull_area", "gusts", "y", "height", "air"),
     ("turbulence", "keep", "mixing", "stations", "blown"),
 )
+# fields of a closed loop's own record that differ from lane to lane, and that do not
+_OWN = (
+    *("qpos", "qvel", "xfrc", "acceleration", "noise"),
+    *("action", "specific", "thrust", "accelerometer_bias"),
+)
+_COMMON = ("none", "accelerometer_sigma")
 LOOPS = LaneRecord(
-    _LOOP,
-    ("qpos", "qvel", "xfrc", "acceleration", "noise", *_OWN),
-    ("none", "accelerometer_sigma"),
+    LOOP,
+    _OWN,
+    _COMMON,
     {"plant": _PLANT, "flight": _FLIGHT, "fan": _FAN},
 )
 _loop_at = LOOPS.at
@@ -346,20 +333,10 @@ class Blocks:
 
 def _single(loop: ClosedLoop) -> dict[str, Any]:
     """Return what a closed loop's record and MuJoCo hold, by the names of ``LOOPS``."""
-    qpos, qvel = loop.motion
     record = loop.record[0]
-    return {
-        "plant": record["plant"],
-        "flight": record["flight"],
-        "fan": record["fan"],
-        "qpos": qpos[:7],
-        "qvel": qvel[:6],
-        "xfrc": np.zeros(6),
-        "acceleration": np.zeros(6),
-        "noise": np.zeros(NOISE + ACCELEROMETER_NOISE),
-        "none": np.zeros(6),
-        **{name: record[name] for name in (*_OWN, "accelerometer_sigma")},
-    }
+    names = ("plant", "flight", "fan", *_OWN, *_COMMON)
+    pose = {"qpos": loop.world.qpos, "qvel": loop.world.qvel}
+    return {name: record[name] for name in names} | pose
 
 
 __all__ = ["LOOPS", "Blocks", "fly_blocks", "fly_freely", "tick_lanes"]

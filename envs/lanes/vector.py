@@ -19,7 +19,7 @@ from ..fan_tracking import FanTrackingEnv
 from ..fan_tracking_2d import FanTracking2DEnv
 from ..observing import Flags, Motion
 from ..plant import TICK
-from ..task import SETTLE_TICKS, Task
+from ..task import SETTLE_TICKS, Task, true_motion
 from ..vector import TaskVectorEnv
 from ..wind.field import Sum
 from ..wind_tasks import WindHoverEnv, WindTrajectoryEnv
@@ -84,24 +84,11 @@ class TaskLanes(TaskVectorEnv):
         """Return the true motion and the integral of the flight loop as ``Task`` tells an oracle of
         them, a row an environment.
         """
-        from scipy.spatial.transform import Rotation
-
         loops, vehicle = self._flying.loops, self.envs[0].vehicle
-        pose, velocity, speeds, integral = (
-            self._rows(values)
-            for values in (*self._motion[:2], loops["plant"]["speeds"], loops["flight"]["sum"])
-        )
-        rotation = Rotation.from_quat(pose[:, 3:], scalar_first=True)
-        thrust, *torques = vehicle.mixing @ speeds.T**2
-        up = rotation.apply([0.0, 0.0, 1.0])
-        return {
-            "velocity": velocity[:, :3],
-            "rate": rotation.apply(velocity[:, 3:]),
-            "angular_acceleration": rotation.apply(np.linalg.solve(vehicle.inertia, torques).T),
-            "up": up,
-            "lift": thrust * up[:, 2] / vehicle.mass - vehicle.gravity,
-            "integral": integral,
-        }
+        values = *self._motion[:2], loops["plant"]["speeds"], loops["flight"]["sum"]
+        rows = zip(*map(self._rows, values), strict=True)
+        known = [true_motion(vehicle, *row) for row in rows]
+        return {name: np.array([one[name] for one in known]) for name in known[0]}
 
     def late(self) -> Array:
         """Return by how much (n,) s an answer of the flight loop is late: that of the actuators

@@ -168,13 +168,16 @@ def vector(value: ArrayLike, name: str) -> Array:
     return given
 
 
-def number(value: float, name: str, least: float = -math.inf) -> float:
-    """Return a finite number that is above ``least``.
+def number(value: float, name: str, above: float = -math.inf, least: float = -math.inf) -> float:
+    """Return a finite number that is greater than ``above``, and no less than ``least``.
 
     Raises:
         InputError: something else.
     """
-    if not (isinstance(value, int | float | np.number) and math.isfinite(value) and value > least):
-        limit = "" if least == -math.inf else f" above {least:g}"
+    known = isinstance(value, int | float | np.number) and math.isfinite(value)
+    if not (known and value > above and value >= least):
+        limit = f" above {above:g}" * (above > -math.inf) + f" from {least:g} on" * (
+            least > -math.inf
+        )
         raise InputError(f"wind: {name} must be a finite number{limit}, got {value!r}")
     return float(value)

@@ -23,7 +23,7 @@ from ...runtime.errors import InputError
 from ...runtime.extras import need
 from ...runtime.regular_files import read_bytes
 from ...runtime.whole_files import replaced
-from .field import CompiledWind, Wind
+from .field import Array, CompiledWind, Wind
 
 AXES = ("t", "x", "y", "z")
 _LARGEST = 400_000_000  # bytes of a grid in memory
@@ -158,31 +158,31 @@ def read_wind(path: str | Path) -> GridWind:
     file = Path(path)
     if not file.is_file():
         raise InputError(f"{file}: no such file; expected a wind on a grid, .npz or .nc")
-    if file.suffix == ".npz":
-        return _read_npz(file)
-    if file.suffix in (".nc", ".nc4", ".cdf"):
-        return _read_netcdf(file)
-    raise InputError(f"{file}: expected .npz or .nc")
-
-
-def _read_npz(file: Path) -> GridWind:
+    if file.suffix not in (".npz", ".nc", ".nc4", ".cdf"):
+        raise InputError(f"{file}: expected .npz or .nc")
+    read, what = (_read_npz, "arrays") if file.suffix == ".npz" else (_read_netcdf, "netCDF")
     try:
-        data = io.BytesIO(read_bytes(file, "a wind", _LARGEST))
-        check_archive(file, data, _LARGEST, "a wind")
-        with np.load(data, allow_pickle=False) as arrays:
-            given = {name: np.asarray(arrays[name], dtype=np.float64) for name in arrays.files}
+        axes, wind = read(file)
     except InputError:
         raise
-    except Exception as error:  # whatever a parser makes of bytes that are no archive of arrays
-        raise InputError(f"{file}: cannot be read as arrays: {error}") from error
+    except Exception as error:  # whatever a parser makes of bytes that are none of its form
+        raise InputError(f"{file}: cannot be read as {what}: {error}") from error
+    return GridWind((axes[0], axes[1], axes[2], axes[3]), wind, str(file))
+
+
+def _read_npz(file: Path) -> tuple[list[Array], Array]:
+    data = io.BytesIO(read_bytes(file, "a wind", _LARGEST))
+    check_archive(file, data, _LARGEST, "a wind")
+    with np.load(data, allow_pickle=False) as arrays:
+        given = {name: np.asarray(arrays[name], dtype=np.float64) for name in arrays.files}
     given.setdefault("t", np.zeros(1))
     for name in (*AXES, "wind"):
         if name not in given:
             raise InputError(
                 f"{file}: lacks {name!r}; expected t (s), x, y, z (m) and wind (t, x, y, z, 3) m/s"
             )
-    wind = given["wind"][None] if given["wind"].ndim == 4 else given["wind"]
-    return GridWind((given["t"], given["x"], given["y"], given["z"]), wind, str(file))
+    wind = given["wind"]
+    return [given[name] for name in AXES], wind[None] if wind.ndim == 4 else wind
 
 
 def _xarray() -> Any:
@@ -190,26 +190,17 @@ def _xarray() -> Any:
     return import_module("xarray")
 
 
-def _read_netcdf(file: Path) -> GridWind:
-    xarray = _xarray()
-    try:
-        with xarray.open_dataset(file, decode_times=False) as data:
-            if missing := [n for n in ("u", "v", "w", "x", "y", "z") if n not in data.variables]:
-                raise InputError(
-                    f"{file}: lacks {missing[0]!r}; expected u, v, w (m/s) over time (s), x, y, z "
-                    f"(m)"
-                )
-            names = [n for n in ("time", "x", "y", "z") if n in data.dims]
-            axes = [np.asarray(data[n].values, dtype=np.float64) for n in names]
-            parts = [data[n].transpose(*names).values for n in ("u", "v", "w")]
-    except InputError:
-        raise
-    except Exception as error:  # of xarray, or of what reads the file for it
-        raise InputError(f"{file}: cannot be read as netCDF: {error}") from error
+def _read_netcdf(file: Path) -> tuple[list[Array], Array]:
+    with _xarray().open_dataset(file, decode_times=False) as data:
+        if missing := [n for n in ("u", "v", "w", "x", "y", "z") if n not in data.variables]:
+            raise InputError(
+                f"{file}: lacks {missing[0]!r}; expected u, v, w (m/s) over time (s), x, y, z (m)"
+            )
+        names = [n for n in ("time", "x", "y", "z") if n in data.dims]
+        axes = [np.asarray(data[n].values, dtype=np.float64) for n in names]
+        parts = [data[n].transpose(*names).values for n in ("u", "v", "w")]
     wind = np.stack(parts, axis=-1)
-    if "time" not in names:
-        axes, wind = [np.zeros(1), *axes], wind[None]
-    return GridWind((axes[0], axes[1], axes[2], axes[3]), wind, str(file))
+    return (axes, wind) if "time" in names else ([np.zeros(1), *axes], wind[None])
 
 
 def write_wind(wind: GridWind, path: str | Path) -> Path:

@@ -22,6 +22,7 @@ from ...dynamics.mean_jet import (
     STEP_X,
     jet_table,
 )
+from ...dynamics.rotation import product
 from ...runtime.addresses import numbers_at, pointer_to
 from ...runtime.errors import InputError
 from ..fan import between
@@ -53,7 +54,7 @@ def _jets(parameters: int, count: int, time: int, positions: int, velocities: in
     places = numbers_at(w.places, (w.place_steps, w.jets, 3))
     speeds, R = numbers_at(w.speeds, (w.steps, w.jets)), w.axes
     p, out = numbers_at(positions, (3, count)), numbers_at(velocities, (3, count))
-    gusts = np.zeros((3, count))
+    gusts, off = np.zeros((3, count)), np.empty(3)
     if w.waves > 0:
         add_modes(numbers_at(w.modes, (w.waves, 7)), w.advection, now, p, gusts)
     at = min(max(now / TABLE_PERIOD, 0.0), 1e9)
@@ -66,12 +67,10 @@ def _jets(parameters: int, count: int, time: int, positions: int, velocities: in
             speed = (1.0 - share) * speeds[k, n] + share * speeds[after, n]
             if speed < _SLOWEST:
                 continue
-            a0 = p[0, j] - (1.0 - share) * places[kp, n, 0] - share * places[after_p, n, 0]
-            a1 = p[1, j] - (1.0 - share) * places[kp, n, 1] - share * places[after_p, n, 1]
-            a2 = p[2, j] - (1.0 - share) * places[kp, n, 2] - share * places[after_p, n, 2]
-            x = R[0, 0] * a0 + R[0, 1] * a1 + R[0, 2] * a2
-            y = R[1, 0] * a0 + R[1, 1] * a1 + R[1, 2] * a2
-            z = R[2, 0] * a0 + R[2, 1] * a1 + R[2, 2] * a2
+            for i in range(3):
+                place = (1.0 - share) * places[kp, n, i], share * places[after_p, n, i]
+                off[i] = p[i, j] - place[0] - place[1]
+            x, y, z = product(R, off[0], off[1], off[2])
             r = math.sqrt(y * y + z * z)
             row, column = (x - FIRST_X) / STEP_X, r / STEP_R
             if row < 0.0 or row >= COUNT_X - 1 or column >= COUNT_R - 1:
@@ -108,9 +107,7 @@ class _Jets(CompiledWind):
         gusts: tuple[float, float, int | np.random.Generator],
     ) -> None:
         turbulence, gust_length, seed = gusts
-        if number(turbulence, "turbulence") < 0.0:
-            kind = type(self).__name__
-            raise InputError(f"wind: {kind}: turbulence must be at least 0, got {turbulence:g}")
+        number(turbulence, "turbulence", least=0.0)
         number(gust_length, "gust_length", 0.0)
         table = np.zeros((0, 7))
         if turbulence > 0.0:
@@ -182,10 +179,7 @@ class FanWall(_Jets):
                 f"wind: FanWall: speeds must be numbers from 0 on, shape ({rows * columns},) or "
                 f"(steps, {rows * columns}), got shape {table.shape}"
             )
-        if number(hub_radius, "hub_radius") < 0.0:
-            raise InputError(f"wind: FanWall: hub_radius must be at least 0, got {hub_radius:g}")
-        if number(radius, "radius", 0.0) <= hub_radius:
-            raise InputError("wind: FanWall: radius must be above hub_radius")
+        number(radius, "radius, above hub_radius,", number(hub_radius, "hub_radius", least=0.0))
         number(pitch, "pitch", 0.0)
         axes = _axes(heading)
         right = pitch * (np.arange(columns) - 0.5 * (columns - 1))

@@ -45,26 +45,15 @@ def add_modes(table: Array, advection: Array, time: float, p: Array, out: Array)
         kx, ky, kz = table[m, 0], table[m, 1], table[m, 2]
         begin = table[m, 3] - time * (kx * advection[0] + ky * advection[1] + kz * advection[2])
         begin -= np.floor(begin)
-        ax, ay, az = table[m, 4], table[m, 5], table[m, 6]
         for j in range(p.shape[1]):
             s = begin + kx * p[0, j] + ky * p[1, j] + kz * p[2, j]
             s -= np.floor(s + 0.5)
             y = s * s
-            c = _COS[11]
-            c = c * y + _COS[10]
-            c = c * y + _COS[9]
-            c = c * y + _COS[8]
-            c = c * y + _COS[7]
-            c = c * y + _COS[6]
-            c = c * y + _COS[5]
-            c = c * y + _COS[4]
-            c = c * y + _COS[3]
-            c = c * y + _COS[2]
-            c = c * y + _COS[1]
-            c = c * y + _COS[0]
-            out[0, j] += ax * c
-            out[1, j] += ay * c
-            out[2, j] += az * c
+            c = _COS[-1]
+            for power in range(len(_COS) - 2, -1, -1):
+                c = c * y + _COS[power]
+            for i in range(3):
+                out[i, j] += table[m, 4 + i] * c
 
 
 TURBULENCE = np.dtype(

@@ -16,7 +16,6 @@ from tests.training.tiny import TINY
 from windwrench.dynamics import InputError
 from windwrench.evaluation.benchmark import fly_all
 from windwrench.runtime.workers import each, every
-from windwrench.training.rllib import register_with_rllib
 from windwrench.training.sweep import jobs_of, run_job, run_jobs
 
 
@@ -101,15 +100,14 @@ def test_flights_on_a_cluster_are_the_local_ones(cluster):
             assert (a.rmse, a.seed, a.lost) == (b.rmse, b.seed, b.lost)
 
 
-def test_rllib_knows_the_environment_after_one_line(cluster):
-    register_with_rllib()
+def test_rllib_knows_the_environment_by_its_name(cluster):
     ppo = pytest.importorskip(
         "ray.rllib.algorithms.ppo",
         reason="RLlib lacks what it needs: pip install dm-tree ormsgpack",
     )
     config = (
         ppo.PPOConfig()
-        .environment("windwrench", env_config={"scenario": "base"})
+        .environment("windwrench:windwrench/FanTracking-v1", env_config={"scenario": "base"})
         .env_runners(num_env_runners=0, rollout_fragment_length=50)
         .training(train_batch_size_per_learner=50, minibatch_size=25, num_epochs=1)
     )

@@ -15,7 +15,7 @@ from windwrench.envs.lanes.vector import TaskLanes
 from windwrench.envs.plant import PlantSettings
 from windwrench.evaluation.tasks import TASKS
 from windwrench.training.belief_network import BeliefNetwork
-from windwrench.training.hindsight import AHEAD, LATE, MIX, WindLesson, mix_of
+from windwrench.training.hindsight import AHEAD, LATE, MIX, WindLesson, lanes_of, mix_of
 from windwrench.training.run import validate
 from windwrench.training.task_policies import _card, sac, teach
 
@@ -38,7 +38,7 @@ def test_lanes_tell_how_late_their_answers_are():
     lanes = TaskLanes(3, task=HOVER, settings=PlantSettings(actuator_delay=0.01, pose_delay=0.015))
     lanes.reset(seed=0)
     np.testing.assert_allclose(lanes.late(), 0.025)
-    (delayed,) = WindLesson("WindHover").environments({LATE: 8})
+    (delayed,) = lanes_of("WindHover", LATE, 8)
     delayed.reset(seed=0)
     assert len(set(delayed.late())) > 2
     assert delayed.late().max() <= 0.04 + 1e-9
@@ -105,4 +105,4 @@ def test_sac_trains_in_the_wind():
     pytest.importorskip("stable_baselines3", reason="stable_baselines3 is not installed")
     policy = sac("WindHover", 0, 1100)
     assert policy.card["squash"]
-    assert np.isfinite(validate(policy, HOVER("base"), 2, "WindHover")[0])
+    assert np.isfinite(validate(policy, HOVER("base"), 2)[0])
