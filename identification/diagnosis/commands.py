@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ...dynamics.effects import Role, get, playing
 from ..findings import NamedEffect
-from .commanded_rotors import THRUST_FACTORS, thrust_is_assumed
+from .commanded_rotors import THRUST_FACTORS
 from .regression import CENTRAL, Flights
 from .turning_delay import turning_delay
 
@@ -22,14 +22,12 @@ class Given:
         fixed: effects that are known from elsewhere, with their coefficients.
         late: the delay of commands, which the vehicle's turns show and no force; None where no
             delay is known.
-        assumed: whether how much thrust a command makes is an assumption.
     """
 
     library: list[str]
     first: dict[str, dict[str, float]]
     fixed: dict[str, dict[str, float]]
     late: NamedEffect | None = None
-    assumed: bool = False
 
 
 def what_commands_show(flights: Flights, library: Sequence[str]) -> Given:
@@ -75,6 +73,5 @@ def what_commands_show(flights: Flights, library: Sequence[str]) -> Given:
     }
     if thrust:  # thrust over mass is known, and neither alone
         library = [e for e in library if e in first or get(e).role not in THRUST_FACTORS]
-    assumed = thrust_is_assumed(flights.logs, flights.vehicle)
     fixed = {late.name: dict(late.coefficients)} if late else {}
-    return Given(library, first, fixed, late, assumed)
+    return Given(library, first, fixed, late)

@@ -125,20 +125,9 @@ def diagnose(
 
 def _segments(flights: Flights) -> list[tuple[int, float, float]]:
     """Return the held-out stretches of flight: log, from, to (s)."""
-    held_out = ~flights.fit_rows
-    begins = np.flatnonzero(
-        held_out
-        & (
-            flights.start
-            | np.concatenate([[True], flights.fit_rows[:-1]])
-            | (np.diff(flights.block, prepend=-1) != 0)
-        )
-    )
-    ends = [int(np.flatnonzero(flights.block == flights.block[b])[-1]) for b in begins]
-    return [
-        (int(flights.log[b]), float(flights.t[b]), float(flights.t[e]))
-        for b, e in zip(begins, ends, strict=True)
-    ]
+    blocks = np.unique(flights.block[~flights.fit_rows])
+    ends = [np.flatnonzero(flights.block == b)[[0, -1]] for b in blocks]
+    return [(int(flights.log[a]), float(flights.t[a]), float(flights.t[b])) for a, b in ends]
 
 
 def _errors(
@@ -169,16 +158,15 @@ def _mean(values: Array, weight: Sequence[float]) -> float:
 
 
 def _traces(flights: Flights, said: Judged) -> Iterator[Trace]:
-    begins = np.flatnonzero(flights.start)
-    for a, b in zip(begins, [*begins[1:], len(flights.t)], strict=True):
+    for rows in flights.runs:
         yield Trace(
-            flights.logs[flights.log[a]].name,
+            flights.logs[flights.log[rows[0]]].name,
             flights.period,
-            flights.t[a:b],
-            said.balance.before[a:b],
-            said.balance.after[a:b],
-            ~flights.fit_rows[a:b],
-            {effect: part[a:b] for effect, part in said.parts.items()},
+            flights.t[rows],
+            said.balance.before[rows],
+            said.balance.after[rows],
+            ~flights.fit_rows[rows],
+            {effect: part[rows] for effect, part in said.parts.items()},
         )
 
 

@@ -5,7 +5,6 @@ whether flights that a fit did not see lie within the range of those that it saw
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.smoothing import CUTOFFS, low_pass
 from .regression import Flights, Setting
 
 Array = NDArray[np.float64]
@@ -18,42 +17,29 @@ KNOWN, OUTSIDE = 0.995, 0.05
 
 def explanatory_variables(flights: Flights, setting: Setting) -> list[Variable]:
     """Return the explanatory variables at the rows: what a force may depend on, with its unit."""
-    parts: list[list[Variable]] = []
-    vehicle = flights.amended(setting)
-    for piece in flights.pieces(setting):
-        s, at = piece.signals, piece.rows
-        body = np.einsum("nij,ni->nj", s.rotation[at], s.velocity[at])
-        speed = np.linalg.norm(body, axis=1)
-        thrust = vehicle.rotor_wrench(s.rotor_speeds)[:, 0]
-        heading = np.arctan2(s.rotation[at, 1, 0], s.rotation[at, 0, 0])
-        found: list[Variable] = [
-            (f"body velocity {a} (m/s)", body[:, i]) for i, a in enumerate("xyz")
-        ]
-        found += [
-            ("speed (m/s)", speed),
-            ("squared speed (m2/s2)", speed**2),
-            ("height (m)", s.position[at, 2]),
-            ("sine of the heading", np.sin(heading)),
-            ("cosine of the heading", np.cos(heading)),
-            ("time (s)", s.t[at]),
-        ]
-        if flights.rotor_speeds_vary:
-            found.append(("thrust (N)", low_pass(thrust, CUTOFFS.residual_hz, s.period)[at]))
-        found += [
-            (
-                f"angular velocity {a} (rad/s)",
-                low_pass(s.angular_velocity[:, i], CUTOFFS.residual_hz, s.period)[at],
-            )
-            for i, a in enumerate("xyz")
-        ]
-        found += [(f"world position {a} (m)", s.position[at, i]) for i, a in enumerate("xy")]
-        if s.voltage is not None:
-            found.append(("battery voltage (V)", s.voltage[at]))
-        parts.append(found)
-    joined = [
-        (name, np.concatenate([p[i][1] for p in parts])) for i, (name, _) in enumerate(parts[0])
+    names = ("t", "position", "rotation", "velocity")
+    t, position, rotation, velocity = (flights.at_rows(name, setting) for name in names)
+    pieces = flights.pieces(setting)
+    rate = np.concatenate([p.smooth(p.signals.angular_velocity) for p in pieces])
+    body = np.einsum("nij,ni->nj", rotation, velocity)
+    speed = np.linalg.norm(body, axis=1)
+    heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
+    found: list[Variable] = [(f"body velocity {a} (m/s)", body[:, i]) for i, a in enumerate("xyz")]
+    found += [
+        ("speed (m/s)", speed),
+        ("squared speed (m2/s2)", speed**2),
+        ("height (m)", position[:, 2]),
+        ("sine of the heading", np.sin(heading)),
+        ("cosine of the heading", np.cos(heading)),
+        ("time (s)", t),
     ]
-    return [(name, x) for name, x in joined if x.std() > 1e-9]
+    if flights.rotor_speeds_vary:
+        found.append(("thrust (N)", flights.rotor_wrench(setting)[:, 0]))
+    found += [(f"angular velocity {a} (rad/s)", rate[:, i]) for i, a in enumerate("xyz")]
+    found += [(f"world position {a} (m)", position[:, i]) for i, a in enumerate("xy")]
+    if all(p.signals.voltage is not None for p in pieces):
+        found.append(("battery voltage (V)", flights.at_rows("voltage", setting)))
+    return [(name, x) for name, x in found if x.std() > 1e-9]
 
 
 def range_notes(flights: Flights) -> list[str]:
@@ -63,14 +49,13 @@ def range_notes(flights: Flights) -> list[str]:
     holds that far, which the fit cannot know.
     """
     seen, out = flights.fit_rows, []
-    thrust, weight = flights.vehicle.rotor_wrench, flights.vehicle.weight
-    pieces = [p.signals.at(p.rows) for p in flights.pieces({})]
-    for name, unit, parts in (
-        ("the speed", "m/s", [np.linalg.norm(s.velocity, axis=1) for s in pieces]),
-        ("the turn rate", "rad/s", [np.linalg.norm(s.angular_velocity, axis=1) for s in pieces]),
-        ("the thrust", "weights", [thrust(s.rotor_speeds)[:, 0] / weight for s in pieces]),
+    vehicle = flights.vehicle
+    thrust = vehicle.rotor_wrench(flights.at_rows("rotor_speeds"))[:, 0]
+    for name, unit, values in (
+        ("the speed", "m/s", np.linalg.norm(flights.at_rows("velocity"), axis=1)),
+        ("the turn rate", "rad/s", np.linalg.norm(flights.at_rows("angular_velocity"), axis=1)),
+        ("the thrust", "weights", thrust / vehicle.weight),
     ):
-        values = np.concatenate(parts)
         most = float(np.quantile(values[seen], KNOWN))
         beyond = values[~seen] > most
         if beyond.mean() > OUTSIDE:

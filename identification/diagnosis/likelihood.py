@@ -7,9 +7,10 @@ from sums of products alone.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +20,8 @@ from scipy.spatial.transform import Rotation
 from ...dynamics.effects import Role, get, playing
 from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
+from ..findings import CHANNELS, Disturbance
 from ..logs.flight_log import FlightLog
-from ..motion.residual import acting_wrench
 from ..motion.sensing_effects import undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, log_signals
@@ -32,9 +33,7 @@ from .log_offsets import (
     ATTITUDE_TIME_OFFSET,
     LAG_ASYMMETRY,
     ROTOR_TIME_OFFSET,
-    TIMINGS,
     with_time_offsets,
-    with_uneven_lag,
 )
 from .priors import (
     BETWEEN,
@@ -52,7 +51,6 @@ from .priors import (
 from .regression import (
     CENTRAL,
     REGRESSION,
-    START_PREFIX,
     STEP,
     Column,
     Flights,
@@ -69,15 +67,8 @@ STATES = (0, 1, 2)  # of an axis: pose, rate, disturbance
 SIDEWAYS = 0.01
 
 
-@dataclass(frozen=True)
-class LikelihoodSettings:
-    """What the likelihood allows for beside effects."""
-
-    noise_rounds: int = 2  # of the noise and of the flight as it is seen with it
-    first_disturbance: float = 0.3  # m/s2 and rad/s2, at which the search for the noise begins
-
-
-LIKELIHOOD = LikelihoodSettings()
+NOISE_ROUNDS = 2  # of the noise and of the flight as it is seen with it
+FIRST_DISTURBANCE = 0.3  # m/s2 and rad/s2, at which the search for the noise begins
 
 
 class Likelihood:
@@ -100,7 +91,7 @@ class Likelihood:
         same_noise: bool = False,
     ) -> None:
         self.flights, self.setting = flights, setting
-        self.vehicle = flights.amended({k: v for k, v in setting.items() if k})
+        self.vehicle = flights.amended(setting)
         self.pieces: list[Poses]
         self._fit: list[NDArray[np.bool_]]
         if near is not None and _sensing(near.vehicle) == _sensing(self.vehicle):
@@ -125,14 +116,14 @@ class Likelihood:
         self.known: list[Array] = near.known if near else [np.zeros((n, 6, 3)) for n in lengths]
         self.tracks = self._run(self.noise, self.known)
         self.answers: list[Array] = same.answers if same else self._rotor_innovations()
-        for i in range(0 if same else 1 if near else LIKELIHOOD.noise_rounds):
+        for i in range(0 if same else 1 if near else NOISE_ROUNDS):
             self.noise, self.known = self._likeliest(begun=near is not None or i > 0)
             self.tracks = self._run(self.noise, self.known)
             self.answers = self._rotor_innovations()
         self.signals = [
             _signals(piece, track) for piece, track in zip(self.pieces, self.tracks, strict=True)
         ]
-        self._base = [self._acceleration(s, self.vehicle) for s in self.signals]
+        self._base = self._accelerations(setting, self.signals)
         # what a unit of each column adds to the accelerations, or to the measured pose; a column
         # that was asked for once is kept. What any flight may have changes little with effects
         self._acting: dict[Column, list[Array]] = {}
@@ -160,7 +151,7 @@ class Likelihood:
         out = []
         for axis in range(6):
             pose = max(floor.position if axis < 3 else floor.attitude, 1e-6)
-            size = LIKELIHOOD.first_disturbance * (1.0 if axis < 3 else 10.0)
+            size = FIRST_DISTURBANCE * (1.0 if axis < 3 else 10.0)
             white = float(self._rounding()[axis])
             out.append(steady_noise(pose, size, AXIS.first_time, white, self.period))
         return tuple(out)
@@ -249,55 +240,61 @@ class Likelihood:
                     x[:, axis, state] = jump[:, at] @ gains[at]
         return tuple(out), known
 
-    def answered(self) -> list[float]:
-        """Return of each axis the standard deviation of the disturbance that the rotors show: a
-        flight loop that reads a gyro answers most of a gust's torque before the pose shows it.
+    def gusts(self) -> tuple[Disturbance, ...]:
+        """Return the disturbance of each channel, of which the rotors show a part: a flight loop
+        that reads a gyro answers most of a gust's torque before the pose shows it.
         """
         out = []
-        for axis, own in enumerate(self.noise):
+        for axis, (own, size) in enumerate(zip(self.noise, self.inertias.tolist(), strict=True)):
             keep = math.exp(-self.period / own.time)
             shown = [lfilter([1.0], [1.0, -keep], known[:, axis, 2]) for known in self.known]
-            out.append(float(np.concatenate(shown).std()))
-        return out
+            rms = size * math.hypot(own.disturbance, float(np.concatenate(shown).std()))
+            out.append(Disturbance(CHANNELS[axis], rms, own.time, size * own.disturbance))
+        return tuple(out)
 
     # Columns
 
-    def _acceleration(self, signals: Signals, vehicle: Vehicle) -> Array:
-        wrench, _ = acting_wrench(signals, vehicle, self.flights.vehicle)
-        return np.column_stack(
-            [
-                wrench[:, :3] / self.flights.vehicle.mass,
-                np.linalg.solve(self.flights.vehicle.inertia, wrench[:, 3:].T).T,
-            ]
-        )
+    def _accelerations(self, setting: Setting, signals: Iterable[Signals]) -> list[Array]:
+        """Return the accelerations (n, 6) that a setting makes along each piece's signals."""
+        vehicle, out = self.flights.vehicle, []
+        for s in signals:
+            wrench = self.flights.acting(s, setting)
+            turning = np.linalg.solve(vehicle.inertia, wrench[:, 3:].T).T
+            out.append(np.column_stack([wrench[:, :3] / vehicle.mass, turning]))
+        return out
 
     def _change(
-        self,
-        setting: Setting,
-        step: float = 1.0,
-        moved: Callable[[Signals], Signals] = lambda s: s,
+        self, setting: Setting, step: float = 1.0, signals: Iterable[Signals] | None = None
     ) -> list[Array]:
-        """Return what another setting, and signals that are ``moved``, add to the acceleration
-        (n, 6) of each piece, over a step.
+        """Return what another setting, and other signals, add to the acceleration (n, 6) of each
+        piece, over a step.
         """
-        vehicle = self.flights.amended(setting)
-        return [
-            (self._acceleration(moved(s), vehicle) - base) / step
-            for s, base in zip(self.signals, self._base, strict=True)
-        ]
+        found = self._accelerations(setting, self.signals if signals is None else signals)
+        return [(x - base) / step for x, base in zip(found, self._base, strict=True)]
 
-    def _slope(self, column: Column) -> list[Array] | None:
-        """Return what a unit of a coefficient adds; None where no vehicle can be like that."""
+    def _add(self, column: Column) -> None:
+        """Add what a unit of a coefficient does, but where it is known already, or where no vehicle
+        can be like that.
+        """
         effect, name = column
+        if column in self._acting or column in self._posed:
+            return
+        if effect and is_delay(effect):
+            self._acting[column] = self._acting[ROTOR_TIME_OFFSET]
+            return
+        if effect and get(effect).kind == "sensing":
+            self._posed[column] = self._moved(column)
+            return
         own = dict(self.flights.coefficients(self.setting, effect))
         if name.startswith(WHOLE_PREFIX):
             own[CENTRAL] = 1.0
         name = name.removeprefix(WHOLE_PREFIX)
         value, delta = self.flights.step(self.setting, (effect, name))
-        try:
-            return self._change({**self.setting, effect: {**own, name: value + delta}}, delta)
-        except (InputError, np.linalg.LinAlgError):
-            return None
+        there = {**self.setting, effect: {**own, name: value + delta}}
+        with suppress(InputError, np.linalg.LinAlgError):
+            self._acting[column] = self._change(there, delta)
+            if effect and get(effect).role == Role.CENTRE_OF_MASS:
+                self._swing(column)
 
     def _moved(self, column: Column) -> list[Array]:
         """Return by how much a unit of a sensing effect moves the pose (n, 6), at the pose that the
@@ -328,36 +325,20 @@ class Likelihood:
             starts: columns of whole effects, with the coefficients of each.
             unknown: whether the discrepancy's columns are wanted.
         """
-        acting, moved = self._acting, self._posed
-        if playing(Role.LAG, among=self.setting) and LAG_ASYMMETRY not in acting:
-            delta = STEP * TIMINGS[LAG_ASYMMETRY].size
-            acting[LAG_ASYMMETRY] = self._change(
-                self.setting, delta, lambda s: with_uneven_lag(s, self.vehicle, delta)
-            )
+        acting = self._acting
+        if playing(Role.LAG, among=self.setting):
+            self._add(LAG_ASYMMETRY)
         if unknown and not any(name.startswith(UNKNOWN) for _, name in acting):
             acting |= discrepancy_columns(self.tracks, self.flights)
             self._add_changing_coefficients()
         for c, start in starts.items():
             if c not in acting:
                 acting[c] = self._change({**self.setting, c[0]: dict(start)})
-        wanted = (
-            c
-            for e in library
-            for _, columns in variants_of(self.flights, e, self.setting, starts)
-            for c in columns
-            if c[1].removeprefix(WHOLE_PREFIX) not in self.flights.stated(e)
-        )
-        for c in wanted:
-            if c in acting or c in moved or c[1].startswith(START_PREFIX):
-                continue
-            if is_delay(c[0]):
-                acting[c] = acting[ROTOR_TIME_OFFSET]
-            elif get(c[0]).kind == "sensing":
-                moved[c] = self._moved(c)
-            elif (slope := self._slope(c)) is not None:
-                acting[c] = slope
-                if get(c[0]).role == Role.CENTRE_OF_MASS:
-                    self._swing(c)
+        for effect in library:
+            for _, columns in variants_of(self.flights, effect, self.setting, starts):
+                for c in columns:
+                    if c[1].removeprefix(WHOLE_PREFIX) not in self.flights.stated(effect):
+                        self._add(c)
         return self._products(starts)
 
     def _add_changing_coefficients(self) -> None:
@@ -378,16 +359,13 @@ class Likelihood:
 
     def _add_what_any_flight_may_have(self) -> None:
         """Add the columns of time offsets, of rotors between samples and of the model's error."""
-        acting, delta = self._acting, 0.001  # s
-        offset = {ROTOR_TIME_OFFSET[1]: delta}
-        acting[ROTOR_TIME_OFFSET] = self._change(
-            self.setting, delta, lambda s: with_time_offsets(s, offset)
-        )
-        acting["", BETWEEN] = self._change(self.setting, 1.0, _bent_rotors)
+        self._add(ROTOR_TIME_OFFSET)
+        bent = map(_bent_rotors, self.signals)
+        self._acting["", BETWEEN] = self._change(self.setting, signals=bent)
         self._add_model_errors()
         if self._rounding_std > 0.0:
             for axis, column in zip("xyz", self._rounded_torques(), strict=True):
-                acting["", ROUNDED + axis] = column
+                self._acting["", ROUNDED + axis] = column
         moved = self._posed[ATTITUDE_TIME_OFFSET] = []
         for track in self.tracks:
             # the rate before the sample is read: after it, it knows that sample's noise

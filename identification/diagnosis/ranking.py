@@ -5,6 +5,7 @@ missing. A set's evidence is that of the likelier noise of two: that beside no e
 beside the best set, because what is not explained counts as a disturbance.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -12,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.effects import get
-from ..findings import Ranking
-from .axis_filter import AxisNoise
+from ..findings import Disturbance, Ranking
 from .climbing import Height, linearised, mode
 from .likelihood import Likelihood
 from .priors import Base, Setting, Starts
@@ -24,16 +24,9 @@ from .starting_points import starting_points
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class RankingSettings:
-    """How often sets are tried anew, and where lags are."""
-
-    # typical sizes at which a lag or a delay is tried as a whole: their columns change with them
-    time_starts: tuple[float, ...] = (0.3, 0.6, 1.2)
-    rounds: int = 6  # of fitting the noise beside the best set
-
-
-RANKING = RankingSettings()
+# typical sizes at which a lag or a delay is tried as a whole: their columns change with them
+TIME_STARTS = (0.3, 0.6, 1.2)
+ROUNDS = 6  # of fitting the noise beside the best set
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +37,7 @@ class Found:
     ranking: Ranking
     setting: Setting  # coefficients of the likeliest set
     # of each channel, where the likelihood has a noise of the motion; none for a force balance
-    noise: tuple[AxisNoise, ...] = ()
-    answered: Sequence[float] = ()  # of each channel's disturbance, what the rotors show
+    gusts: tuple[Disturbance, ...] = ()
     # biases and time offsets of the sensors, with their standard deviations
     sensors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     # of each effect of the set, those that the logs do not show and that do as well in its place
@@ -69,14 +61,14 @@ def rank(
         return Likelihood(flights, setting, near), starts_of(flights, library, setting)
 
     near = Likelihood(flights, {})
-    best, starts = nothing = beside({})
+    best, starts = nothing = near, starts_of(flights, library, {})
     loud = best.base(library, starts)
     quiet = best.quieter(_whole_library(loud), starts)
     found = Posterior(flights, library, (loud, quiet))
     # the best effect first, alone: another set's columns are those of the model that has it
     setting = found.best_setting(1)
     tried: dict[frozenset[str], Setting] = {frozenset(): {}}
-    for _ in range(RANKING.rounds):
+    for _ in range(ROUNDS):
         # the columns of the same set change with its coefficients, where these have moved far
         if not found.is_elsewhere(setting, tried):
             setting = found.best_setting()
@@ -99,11 +91,12 @@ def rank(
         best, starts = beside(setting) if setting else nothing
     whole = best.base(library, starts, unknown=True)
     found = Posterior(flights, library, (loud, whole), found.tempering())
-    column, size, _ = found.strangest()
-    ranking = found.ranking(best.quieter({column: size}, starts))
+    column, size, gained = found.strangest()
+    # of so many columns one explains as much by chance, and no noise beside it would be likelier
+    by_chance = 2.0 * math.log(len(whole.dictionary))
+    ranking = found.ranking(best.quieter({column: size}, starts) if gained > by_chance else None)
     late = {c[1]: x for c, x in found.nuisances().items() if c in flights.offsets}
-    noise = (best.noise, best.answered())
-    return Found(found, ranking, found.best_setting(), *noise, late)
+    return Found(found, ranking, found.best_setting(), best.gusts(), late)
 
 
 def _whole_library(base: Base) -> dict[Column, float]:
@@ -126,7 +119,7 @@ def starts_of(flights: Flights, library: Sequence[str], setting: Setting) -> Sta
         if moves_time(effect) and get(effect).kind == "rotor input":
             name = get(effect).coefficients[0].name
             typical = typical_size((effect, name), flights.vehicle)
-            for i, share in enumerate(RANKING.time_starts):
+            for i, share in enumerate(TIME_STARTS):
                 out[effect, f"{START_PREFIX}{i}"] = {name: share * typical}
             continue
         if not flights.is_nonlinear(effect):

@@ -60,6 +60,7 @@ V = TypeVar("V")
 class RegressionSettings:
     """Rows and blocks of the regression, what flights must excite, and how much memory is used."""
 
+    rows_per_cutoff: float = 5.0  # rows in a period of the residual's cut-off
     margin: float = 0.6  # s at either end of a piece, where the filters lack half of what they need
     # share of sensor noise in an effect's column, from which the effect is not identifiable; of one
     # that scales a measurement, it could cancel the measurement's own noise
@@ -162,6 +163,10 @@ class Piece:
     rows: Index  # the samples that are rows
     needed: Array  # (rows, 6) what the motion needs, N and Nm, by the declared mass and inertia
 
+    def smooth(self, x: Array) -> Array:
+        """Return samples (n, ...) at the rows, through the residual's low-pass."""
+        return _smooth(x, self.signals)[self.rows]
+
 
 class Flights:
     """Flights of one vehicle, ready to be regressed.
@@ -207,7 +212,6 @@ class Flights:
             [log.period for log in self.logs], self.logs[0].period, rtol=0.01
         )
         self.logs = tuple(excerpt(self.logs))
-        self.residual_hz, self._row_rate_hz = CUTOFFS.residual_hz, 5.0 * CUTOFFS.residual_hz
         self._fit_logs, self._has_test = len(logs), bool(test)
         self._drift: np.random.Generator | None = None  # of a copy whose fusion errs otherwise
         self._fused: dict[FlightLog, list[InertialSignals]] = {}
@@ -279,17 +283,6 @@ class Flights:
         )
         self.period = float(np.median(np.diff(self.t)))
 
-    def in_band(self, cutoff_hz: float, rate_hz: float) -> "Flights":
-        """Return the same flights with a residual up to another cut-off, and as many rows a second;
-        what is identifiable stays as it is.
-        """
-        out = copy(self)
-        out._forget()
-        out.residual_hz, out._row_rate_hz, out._first = cutoff_hz, rate_hz, []
-        out._lay_rows()
-        out.visible_noise = out._noisier().residual({}) - out.residual({})
-        return out
-
     def _lost_in_noise(self, noisy: "Flights") -> frozenset[str]:
         """Return the effects whose columns are noise to a large part.
 
@@ -357,33 +350,33 @@ class Flights:
         An attitude that is wrong turns needed and modelled force alike: only what acts in other
         axes than the body's changes with it.
         """
-        own, other = (
-            np.concatenate([p.signals.rotation[p.rows] for p in flights.pieces({})])
-            for flights in (self, noisy)
-        )
+        own, other = (flights.at_rows("rotation") for flights in (self, noisy))
         return np.column_stack([np.einsum("nij,nkj,nk->ni", own, other, x[:, :3]), x[:, 3:]])
 
     def rotor_wrench(self, setting: Setting) -> Array:
         """Return what the rotors deliver at the rows (rows, 4): thrust (N) and torque (Nm, body),
         low-passed.
         """
-        vehicle = self.amended(setting)
+        vehicle, pieces = self.amended(setting), self.pieces(setting)
         return np.concatenate(
-            [
-                low_pass(
-                    vehicle.rotor_wrench(p.signals.rotor_speeds),
-                    self.residual_hz,
-                    p.signals.period,
-                )[p.rows]
-                for p in self.pieces(setting)
-            ]
+            [p.smooth(vehicle.rotor_wrench(p.signals.rotor_speeds)) for p in pieces]
         )
+
+    def at_rows(self, name: str, setting: Setting | None = None) -> Array:
+        """Return a signal (rows, ...) of ``Signals``, by its name, at the rows."""
+        return np.concatenate(
+            [getattr(p.signals, name)[p.rows] for p in self.pieces(setting or {})]
+        )
+
+    @property
+    def runs(self) -> list[NDArray[np.intp]]:
+        """The rows of each piece."""
+        return np.split(np.arange(len(self.t)), np.flatnonzero(self.start)[1:])
 
     @cached_property
     def speed(self) -> float:
         """RMS of the speed, m/s."""
-        velocity = np.concatenate([p.signals.velocity[p.rows] for p in self._first])
-        return float(np.sqrt(np.mean(np.sum(np.square(velocity), axis=1))))
+        return float(np.sqrt(np.mean(np.sum(np.square(self.at_rows("velocity")), axis=1))))
 
     @property
     def inertias(self) -> Array:
@@ -393,9 +386,8 @@ class Flights:
     @property
     def rotor_speeds_vary(self) -> bool:
         """Whether the rotor speeds vary by enough of their rounding steps."""
-        speeds = np.concatenate([p.signals.rotor_speeds[p.rows] for p in self._first])
         return (
-            float(np.median(speeds.std(axis=0)))
+            float(np.median(self.at_rows("rotor_speeds").std(axis=0)))
             > REGRESSION.least_steps_of_rotor_speed * self.vehicle.omega_lsb
         )
 
@@ -424,7 +416,7 @@ class Flights:
         if self.commanded:
             found = [(i, downsampled(s)) for i, s in found]
         if not self._first:
-            return [self._piece(i, s, _rows(s, self._row_rate_hz)) for i, s in found]
+            return [self._piece(i, s, _rows(s)) for i, s in found]
         # a clock offset moves the start of a piece: the rows stay where they are in time
         pieces = []
         for first in self._first:
@@ -442,7 +434,9 @@ class Flights:
         needed = needed_wrench(signals, self.vehicle)
         if self.commanded:
             needed[:, 3:] = 0.0
-        return Piece(log, signals, rows, low_pass(needed, self.residual_hz, signals.period)[rows])
+        return Piece(
+            log, signals, rows, low_pass(needed, CUTOFFS.residual_hz, signals.period)[rows]
+        )
 
     def _inertial_signals(self, log: FlightLog) -> list[InertialSignals]:
         # no effect of the library changes what an IMU measured: each log is fused once
@@ -522,13 +516,7 @@ class Flights:
 
         def made() -> Array:
             pieces = zip(self.pieces(setting), self.model(setting), strict=True)
-            found = np.concatenate(
-                [
-                    piece.needed
-                    - low_pass(model, self.residual_hz, piece.signals.period)[piece.rows]
-                    for piece, model in pieces
-                ]
-            )
+            found = np.concatenate([piece.needed - piece.smooth(model) for piece, model in pieces])
             found.setflags(write=False)
             return found
 
@@ -542,20 +530,24 @@ class Flights:
         Force is in the world frame, without the weight; both are by the declared mass and inertia,
         as the residual is.
         """
-        vehicle = self.amended(setting)
-        offsets = setting.get(ROTOR_TIME_OFFSET[0], {})
         out = []
         for piece in self.pieces(setting):
-            s = with_time_offsets(piece.signals, offsets)
-            s = with_uneven_lag(s, vehicle, offsets.get(LAG_ASYMMETRY[1], 0.0))
-            model, _ = acting_wrench(s, vehicle, self.vehicle)
-            off = np.array([offsets.get(bias_column(piece.log, i)[1], 0.0) for i in range(3)])
-            if off.any():
-                model[:, :3] += self.vehicle.mass * np.einsum("nij,j->ni", s.rotation, off)
+            acting = self.acting(piece.signals, setting, piece.log)
             if self.commanded:
-                model[:, 3:] = 0.0
-            out.append(model)
+                acting[:, 3:] = 0.0
+            out.append(acting)
         return out
+
+    def acting(self, signals: Signals, setting: Setting, log: int = 0) -> Array:
+        """Return the force and the torque (n, 6) along signals of a log; as of ``model``."""
+        vehicle, offsets = self.amended(setting), setting.get(ROTOR_TIME_OFFSET[0], {})
+        s = with_time_offsets(signals, offsets)
+        s = with_uneven_lag(s, vehicle, offsets.get(LAG_ASYMMETRY[1], 0.0))
+        wrench, _ = acting_wrench(s, vehicle, self.vehicle)
+        off = np.array([offsets.get(bias_column(log, i)[1], 0.0) for i in range(3)])
+        if off.any():
+            wrench[:, :3] += self.vehicle.mass * np.einsum("nij,j->ni", s.rotation, off)
+        return wrench
 
     def felt(self, setting: Setting) -> Array | None:
         """Return the force (rows, 3) N, world, by which the accelerometers differ from what the
@@ -571,8 +563,7 @@ class Flights:
                 self._smooth_imu[piece.log] = _smooth_accelerometer(log)
             read = resampled(s.t, *self._smooth_imu[piece.log])
             force = self.vehicle.mass * np.einsum("nij,nj->ni", s.rotation, read)
-            smooth = low_pass(force, self.residual_hz, s.period)[piece.rows]
-            out.append(smooth - piece.needed[:, :3])
+            out.append(piece.smooth(force) - piece.needed[:, :3])
         return np.concatenate(out)
 
     def _kept_columns(self, setting: Setting) -> dict[Column, Array]:
@@ -674,6 +665,10 @@ def _smooth_accelerometer(log: FlightLog) -> tuple[Array, Array]:
     return even, low_pass(resampled(even, times, values), CUTOFFS.pose_hz, period)
 
 
+def _smooth(x: Array, signals: Signals) -> Array:
+    return low_pass(x, CUTOFFS.residual_hz, signals.period)
+
+
 def _most_noise_share(effect: str) -> float:
     return (
         REGRESSION.most_noise_share_of_scale
@@ -691,7 +686,7 @@ def held_out(number: Index) -> Index:
     return np.asarray(REGRESSION.blocks_per_held_out * turn, dtype=np.int64)
 
 
-def _rows(signals: Signals, rate_hz: float) -> Index:
-    step = max(1, round(1.0 / (rate_hz * signals.period)))
+def _rows(signals: Signals) -> Index:
+    step = max(1, round(1.0 / (REGRESSION.rows_per_cutoff * CUTOFFS.residual_hz * signals.period)))
     edge = round(REGRESSION.margin / signals.period)
     return np.arange(edge, len(signals.t) - edge, step)

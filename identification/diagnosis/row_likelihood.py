@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from ...dynamics.effects import Role, playing
-from ..motion.smoothing import low_pass
 from .causal_filter import State
 from .climbing import Height, height, linearised, mode
 from .discrepancy import changing_columns, discrepancy_columns, variables
@@ -139,12 +138,7 @@ class RowLikelihood:
         for column, parts in found.items():
             if not self.rows.with_torques and not any(x[:, :3].any() for x in parts):
                 continue
-            sampled = np.concatenate(
-                [
-                    low_pass(x, flights.residual_hz, p.signals.period)[p.rows]
-                    for x, p in zip(parts, pieces, strict=True)
-                ]
-            )
+            sampled = np.concatenate([p.smooth(x) for x, p in zip(parts, pieces, strict=True)])
             out[column] = self.rows.from_world(sampled[:, :3], torque=sampled[:, 3:])
         return out
 
@@ -164,7 +158,9 @@ class RowLikelihood:
         parts = {e: [rows.residual(without(setting, e)) - here] for e in setting}
         found = variables(self._states())
         at_rows = {
-            name: [rows.at_rows([z[p.rows] for z, p in zip(x, pieces, strict=True)])]
+            name: [
+                rows.at_rows(np.concatenate([z[p.rows] for z, p in zip(x, pieces, strict=True)]))
+            ]
             for name, x in found.items()
         }
         return {c: x for c, (x,) in changing_columns(parts, at_rows).items()}

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.smoothing import low_pass
 from .log_offsets import ROTOR_TIME_OFFSET
 from .priors import MODEL_ERROR, PRIORS
 from .rows import Rows
@@ -85,7 +84,7 @@ def _of_commands(of: _Flown) -> dict[str, Array]:
     out[f"bend {i}"] = use.drift * rows.from_body(of.along(2, bend))
     if rows.fixed:
         late = rows.columns({}, [ROTOR_TIME_OFFSET])[ROTOR_TIME_OFFSET]
-        out[f"delay {i}"] = use.delay * rows.at_rows([of.here])[:, None] * late
+        out[f"delay {i}"] = use.delay * rows.at_rows(of.here)[:, None] * late
     level = flights.vehicle.gravity * of.here[:, None]
     for axis, name in enumerate("xy"):
         if not flights.inertial:
@@ -142,14 +141,9 @@ class Follower:
 def followers(rows: Rows) -> list[Follower]:
     """Return the signals of measured rotors and of the motion that follow disturbances."""
     flights = rows.flights
-    wrench = flights.rotor_wrench({}) / flights.inertias[2:]
-    rates = np.concatenate(
-        [
-            low_pass(p.signals.angular_velocity, flights.residual_hz, p.signals.period)[p.rows]
-            for p in flights.pieces({})
-        ]
-    )
-    rates /= NUISANCES.stopped
+    wrench = rows.at_rows(flights.rotor_wrench({}) / flights.inertias[2:])
+    turned = [p.smooth(p.signals.angular_velocity) for p in flights.pieces({})]
+    rates = rows.at_rows(np.concatenate(turned) / NUISANCES.stopped)
     torque = rows.channels - 3
     force = tuple(range(2, torque, 3))
     return [

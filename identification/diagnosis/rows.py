@@ -7,14 +7,14 @@ from the other is the whole band down to zero. Above 3.5 Hz motors, filters and 
 decide what commands do, and they say nothing of torques.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.effects import get
-from ..motion.smoothing import low_pass
+from ..motion.smoothing import CUTOFFS, low_pass
 from .regression import Column, Flights, Setting
 
 Array = NDArray[np.float64]
@@ -29,7 +29,6 @@ class RowSettings:
     cutoff_hz: float = 3.5  # where rotors are known by commands
     # where the pose was filtered: well below any filter
     filtered_cutoff_hz: float = 2.0
-    inertial_cutoff_hz: float = 5.0  # where the motion is read from an IMU
     rows_per_cutoff: float = 25.0 / 10.5  # rows in a period of the cut-off
     block: float = 4.0  # s, of the sums by which the likelihood's scatter is judged
 
@@ -62,17 +61,13 @@ class Rows:
     """
 
     def __init__(self, flights: Flights, fixed: Setting) -> None:
-        self.with_torques, use = not flights.commanded, ROWS
-        self._cutoff, step = np.inf, 1
-        if flights.commanded:
-            self._cutoff = use.cutoff_hz
-            step = max(1, round(1.0 / (use.rows_per_cutoff * self._cutoff * flights.period)))
-        else:
-            cutoff = use.filtered_cutoff_hz if flights.filtered else use.inertial_cutoff_hz
-            flights = flights.in_band(cutoff, use.rows_per_cutoff * cutoff)
+        self.with_torques, cutoff, use = not flights.commanded, CUTOFFS.residual_hz, ROWS
+        self._cutoff = np.inf
+        if flights.commanded or flights.filtered:
+            self._cutoff = cutoff = use.cutoff_hz if flights.commanded else use.filtered_cutoff_hz
+        step = max(1, round(1.0 / (use.rows_per_cutoff * cutoff * flights.period)))
         self.flights, self.fixed = flights, fixed
-        self._pieces = np.split(np.arange(len(flights.t)), np.flatnonzero(flights.start)[1:])
-        kept = [rows[::step] for rows in self._pieces]
+        kept = [rows[::step] for rows in flights.runs]
         self._at: Index = np.concatenate(kept)
         self.begins: Mask = np.concatenate([np.arange(len(rows)) == 0 for rows in kept])
         self.t: Array = flights.t[self._at]
@@ -85,11 +80,7 @@ class Rows:
         self.has_accelerometer = flights.felt({}) is not None
         self.channels = 3 * (1 + self.has_accelerometer + self.with_torques)
         self._inertia = flights.inertias[3:]
-        self.rotation = self._axes({})
-
-    def _axes(self, setting: Setting) -> Array:
-        pieces = self.flights.pieces(setting)
-        return np.concatenate([p.signals.rotation[p.rows] for p in pieces])
+        self.rotation = flights.at_rows("rotation")
 
     def from_world(
         self, pose: Array, accelerometer: Array | None = None, torque: Array | None = None
@@ -119,13 +110,13 @@ class Rows:
         channels = forces[: 1 + self.has_accelerometer]
         if self.with_torques:
             channels = [*channels, np.zeros_like(forces[0]) if torque is None else torque]
-        x = np.concatenate(channels, axis=1)
-        smooth = [low_pass(x[rows], self._cutoff, self.flights.period) for rows in self._pieces]
-        return np.asarray(np.concatenate(smooth)[self._at])
+        return self.at_rows(np.concatenate(channels, axis=1))
 
-    def at_rows(self, parts: Sequence[Array]) -> Array:
-        """Return at the rows (n, ...) what is known at the samples of each piece."""
-        return np.asarray(np.concatenate(parts)[self._at])
+    def at_rows(self, x: Array) -> Array:
+        """Return at the rows (n, ...) what is known at the samples of ``flights``, low-passed."""
+        period, runs = self.flights.period, self.flights.runs
+        smooth = [low_pass(x[rows], self._cutoff, period) for rows in runs]
+        return np.asarray(np.concatenate(smooth)[self._at])
 
     def residual(self, setting: Setting) -> Array:
         """Return what a model with these effects leaves (n, channels).
@@ -138,7 +129,7 @@ class Rows:
         left = wrench[:, :3] / mass
         felt = self.flights.felt(setting)
         both = [left] if felt is None else [left, left + felt / mass]
-        rotation = self._axes(setting)
+        rotation = self.flights.at_rows("rotation", setting)
         return self._thinned(
             [self._in_body(x, rotation) for x in both], wrench[:, 3:] / self._inertia
         )

@@ -14,10 +14,7 @@ from numpy.typing import NDArray
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Unexplained
-from ...dynamics.vehicle import EffectSetting, Vehicle
-from ..motion.residual import residual_wrench
-from ..motion.signals import Signals
-from .regression import Flights, typical_size
+from .regression import Flights, Setting, typical_size
 
 Array = NDArray[np.float64]
 
@@ -48,9 +45,7 @@ def starting_points(
     declared = get(effect).starting_points
     if declared is None:
         return []
-    pieces = flights.pieces({})
-    thin = [piece.signals.at(_every(piece.rows)) for piece in pieces]
-    seen = flights.fit_rows
+    position, seen = flights.at_rows("position"), flights.fit_rows
     found = [
         dict(start)
         for start in declared(
@@ -61,9 +56,9 @@ def starting_points(
                     for c in get(effect).coefficients
                 },
                 stated,
-                np.concatenate([s.position for s in thin]).mean(axis=0),
-                np.concatenate([p.signals.position[p.rows] for p in pieces])[seen],
-                np.concatenate([p.signals.velocity[p.rows] for p in pieces])[seen],
+                position.mean(axis=0),
+                position[seen],
+                flights.at_rows("velocity")[seen],
                 residual[seen, :3],
                 residual[seen, 3:],
             )
@@ -83,30 +78,26 @@ def _likeness(
     """Return how much of the residual goes like each start's wrench; minus infinity where it has
     none.
     """
-    bare = replace(flights.vehicle, effects=())
     pieces = flights.pieces({})
-    whole = not _is_steady(pieces[0].signals, bare.with_effects(EffectSetting(effect, starts[0])))
-    looked_at, rows, picked = [], [], []
-    row = 0
-    for piece in pieces:
-        at = _every(piece.rows)
-        rows.append(row + np.searchsorted(piece.rows, at))
-        row += len(piece.rows)
-        looked_at.append(piece.signals if whole else piece.signals.at(at))
-        picked.append(at if whole else np.arange(len(at)))
-    every = np.concatenate(rows)
+    steady = _is_steady(flights, {effect: starts[0]})
+    at = [_every(p.rows) for p in pieces]
+    every = np.concatenate([np.isin(p.rows, x) for p, x in zip(pieces, at, strict=True)])
     seen = flights.fit_rows[every]
     target = residual[every][seen]
     scale = 1.0 / np.maximum(np.sqrt(np.mean(np.square(target), axis=0)), 1e-12)
-    base = [residual_wrench(s, bare) for s in looked_at]
-    out = []
+
+    def acting(setting: Setting) -> Array:
+        parts = [
+            flights.acting(p.signals.at(x), setting)
+            if steady
+            else flights.acting(p.signals, setting)[x]
+            for p, x in zip(pieces, at, strict=True)
+        ]
+        return np.concatenate(parts)[seen] * scale
+
+    base, out = acting({}), []
     for start in starts:
-        vehicle = bare.with_effects(EffectSetting(effect, start))
-        parts = zip(base, looked_at, picked, strict=True)
-        shape = (
-            np.concatenate([(b - residual_wrench(s, vehicle))[at] for b, s, at in parts])[seen]
-            * scale
-        )
+        shape = acting({effect: start}) - base
         size = float(np.sum(shape * shape))
         out.append(
             float(np.sum(shape * target * scale)) / math.sqrt(size) if size > 0.0 else -math.inf
@@ -114,13 +105,14 @@ def _likeness(
     return out
 
 
-def _is_steady(signals: Signals, vehicle: Vehicle) -> bool:
-    """Return whether a vehicle's effects do the same as long as nothing else changes: they have no
-    state of their own and go by no clock, so not every sample need be looked at.
+def _is_steady(flights: Flights, setting: Setting) -> bool:
+    """Return whether effects do the same as long as nothing else changes: they have no state of
+    their own and go by no clock, so not every sample need be looked at.
     """
     # one sample, repeated for a minute, in step with no whole Hz
+    signals = flights.pieces({})[0].signals
     same = replace(signals.at(np.zeros(200, dtype=np.int64)), period=0.317)
-    found = residual_wrench(same, vehicle)
+    found = flights.acting(same, setting)
     return bool(np.all(found == found[0]))
 
 

@@ -36,11 +36,8 @@ def transient_disturbances(flights: Flights, setting: Setting) -> list[Transient
     """Return the largest transient disturbance of each channel in the residual of a model with
     these effects, the most significant first.
     """
-    residual, starts = flights.residual(setting), np.flatnonzero(flights.start)[1:]
-    edge = round(TRANSIENT.margin / flights.period)
-    inner = np.concatenate(
-        [rows[edge : len(rows) - edge] for rows in np.split(np.arange(len(residual)), starts)]
-    )
+    residual, edge = flights.residual(setting), round(TRANSIENT.margin / flights.period)
+    inner = np.concatenate([rows[edge : len(rows) - edge] for rows in flights.runs])
     if not inner.size:
         return []
     weight = flights.vehicle.weight
@@ -48,7 +45,7 @@ def transient_disturbances(flights: Flights, setting: Setting) -> list[Transient
     found: dict[str, tuple[float, TransientDisturbance]] = {}
     for cutoff in CUTOFFS.transient_hz:
         slow = np.concatenate(
-            [low_pass(x, cutoff, flights.period) for x in np.split(residual, starts)]
+            [low_pass(residual[rows], cutoff, flights.period) for rows in flights.runs]
         )
         size = np.abs(slow[inner])
         std = np.median(size, axis=0) / 0.6745  # of a normal distribution, whatever comes seldom

@@ -28,7 +28,7 @@ from ..motion.inertial_signals import pose_rate
 from ..motion.smoothing import CUTOFFS
 from .balance import balance, calm
 from .carrying_channels import carrying_channels
-from .commanded_rotors import COMMANDED, THRUST_FACTORS, assumed_thrust_doubts
+from .commanded_rotors import THRUST_FACTORS, assumed_thrust_doubts
 from .commands import what_commands_show
 from .composite import composites
 from .log_offsets import ROTOR_TIME_OFFSET
@@ -113,7 +113,7 @@ class Judged:
             for e in self.setting
             if e
         }
-        self.gusts = self._gusts()
+        self.gusts = found.gusts
         self.pushes = tuple(transient_disturbances(flights, self.setting))
         differs = {e: self._differs(e) for e in given.first if e in best.effects}
         named = [e for e in found.setting if differs.get(e, 1.0) >= rule.least_sure_probability]
@@ -168,20 +168,6 @@ class Judged:
         """
         shown = self._found.posterior.shown(known)
         return frozenset(e for e, x in shown.items() if x < self._rule.least_shown)
-
-    def _gusts(self) -> tuple[Disturbance, ...]:
-        sizes, found = self._flights.inertias.tolist(), self._found
-        return tuple(
-            Disturbance(
-                channel,
-                size * math.hypot(noise.disturbance, answered),
-                noise.time,
-                size * noise.disturbance,
-            )
-            for channel, size, noise, answered in zip(
-                CHANNELS, sizes, found.noise, found.answered, strict=False
-            )
-        )
 
     def _differs(self, effect: str) -> float:
         """Return the probability that a calibration, which is in every set, differs from what the
@@ -247,7 +233,7 @@ class Judged:
             "Log the pose to tell them apart"
             for effect, hidden in found.behind.items()
         )
-        if self._given.assumed:
+        if flights.thrust_std > 0.0:
             doubts["assumed thrust"] = assumed_thrust_doubts(named)
         return {check: sentences for check, sentences in doubts.items() if sentences}
 
@@ -274,13 +260,10 @@ class Judged:
             for name, x in found.setting[effect].items()
             if name != CENTRAL or x > rule.least_in_std * std.get(name, math.inf)
         }
-        uncertain = self._given.assumed and get(effect).role in THRUST_FACTORS
+        uncertain = flights.thrust_std > 0.0 and get(effect).role in THRUST_FACTORS
         if uncertain:
             unit = {name: unit_of_change((effect, name), flights.vehicle) for name in std}
-            std = {
-                name: math.hypot(x, COMMANDED.unstated_thrust_std * unit[name])
-                for name, x in std.items()
-            }
+            std = {name: math.hypot(x, flights.thrust_std * unit[name]) for name, x in std.items()}
         sizes = [
             abs(x) / typical_size((effect, name), flights.vehicle)
             for name, x in values.items()
