@@ -151,7 +151,7 @@ class PredictionErrors:
     starts: int
     horizon: Array  # (m,) s after the start
     model: Array  # (4, m)
-    still: Array  # (4, m) where velocity and body rate stay as they are at the start
+    still: Array  # (4, m) where velocity and body rate stay as the pose has them at the start
 
     @property
     def worse(self) -> list[str]:
@@ -196,16 +196,16 @@ def prediction_errors(
         first, last = log.t[[0, -1]].tolist()
         ends = [(first + begin, min(first + end, last)) for begin, end in parts]
         flown = with_commanded_speeds(log, vehicle)
-        for piece, states, rows, path in _predictions(flown, vehicle, ends, horizon_s):
+        for piece, _, rows, path in _predictions(flown, vehicle, ends, horizon_s):
             begun = rows[:, 0] - 1
             ahead = piece.period * np.arange(1, rows.shape[1] + 1)[:, None]
             seen = Rotation.from_matrix(piece.rotation)
             guess = np.zeros_like(path)
-            guess[..., 7:13] = states[begun, None, 7:13]
-            guess[..., :3] = states[begun, None, :3] + ahead * guess[..., 7:10]
+            guess[..., 7:10] = piece.velocity[begun, None]
+            guess[..., 10:13] = piece.angular_velocity[begun, None]
+            guess[..., :3] = piece.position[begun, None] + ahead * guess[..., 7:10]
             turn = Rotation.from_rotvec((ahead * guess[..., 10:13]).reshape(-1, 3))
-            at = np.repeat(states[begun, 3:7], rows.shape[1], axis=0)
-            turned = Rotation.from_quat(at, scalar_first=True) * turn
+            turned = seen[np.repeat(begun, rows.shape[1])] * turn
             guess[..., 3:7] = turned.as_quat(scalar_first=True).reshape(*rows.shape, 4)
             for out, x in ((model, path), (still, guess)):
                 attitude = Rotation.from_quat(x[..., 3:7].reshape(-1, 4), scalar_first=True)

@@ -52,7 +52,7 @@ def vehicle_of(
         value = estimates[of_lag].value
         effects.append(EffectSetting(of_lag, {get(of_lag).coefficients[0].name: value}))
     moments = {f"J{a}": estimates[f"J{a}{a}"].value for a in "xyz"}
-    products = {n: estimates[n].value for n in ("Jxy", "Jxz", "Jyz") if n in estimates}
+    products = {n: _shown(estimates.get(n)) for n in ("Jxy", "Jxz", "Jyz")}
     com = np.array([_shown(estimates.get(f"com {a}")) for a in "xyz"])
     vehicle = Vehicle(
         name=name,

@@ -14,9 +14,8 @@ from .channels import MotionPiece, Sources
 from .effect_settings import effect_of, estimate_name
 from .geometry import USUAL, Geometry
 from .parameters import OPTIONAL
-from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, told
+from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, Hidden, told
 from .solve import VehicleFit
-from .spectra import SPECTRUM
 
 Values = Mapping[str, float]
 Function = Callable[[Values], float]
@@ -70,12 +69,21 @@ class Estimates:
         fit: of the parameters.
         sources: what the logs measure.
         geometry: where the rotors stand.
-        kept: names of the further effects that show.
+        kept: the further effects that show, and why one of them is not to be believed.
+        hidden: the moment of velocity where it does not show.
+        doubt: why nothing is to be believed that torque says; empty where it is.
     """
 
     def __init__(
-        self, fit: VehicleFit, sources: Sources, geometry: Geometry, kept: Sequence[str]
+        self,
+        fit: VehicleFit,
+        sources: Sources,
+        geometry: Geometry,
+        kept: Mapping[str, str],
+        hidden: Hidden | None,
+        doubt: str,
     ) -> None:
+        self.hidden, self.doubt = hidden, doubt
         self.fit, self.sources, self.geometry, self.kept = fit, sources, geometry, kept
         self.intervals = Intervals(fit)
         self.said: list[Estimate] = []
@@ -215,18 +223,16 @@ class Estimates:
                 self._add(f"l/{axis}{axis[1]}", known, "1/(kg m)", how)
         if "products of inertia" in self.kept:
             for name in ("Jxy", "Jxz", "Jyz"):
-                how = f"{self.sources.rate} across axes"
-                self._add(name, self._scaled(self._of(name)), "kg m2", how, given[0])
+                how = self.doubt or f"{self.sources.rate} across axes"
+                status = NOTHING if self.doubt else given[0]
+                self._add(name, self._scaled(self._of(name)), "kg m2", how, status)
 
     def _say_yaw(self) -> None:
         how = f"{self.sources.rate} in yaw {self.rotors}"
         gain = self.intervals.of(lambda v: v["reach"] / v["Jz"])
         inertia = next(e for e in self.said if e.name == "Jzz")
-        doubtful = self.fit.drive.band < SPECTRUM.band
-        if doubtful or not told(gain):
-            how = "the flight hardly accelerates in yaw"
-            if doubtful:
-                how = "quick motion contradicts slow motion in these logs"
+        if self.doubt or not told(gain):
+            how = self.doubt or "the flight hardly accelerates in yaw"
             self._add("(p/k)/Jzz", gain, "1/(kg m)", how, NOTHING)
             length = float(np.mean(np.abs(self.fit.drive.positions[:, :2]))) * self.arm
             low, high = (r * length for r in USUAL.reach_range)
@@ -277,10 +283,12 @@ class Estimates:
             if known[2] - known[1] > 0.5 * self.arm * self.geometry.arm:
                 status = NOTHING
                 reason = "thrust hardly changes: a constant torque does the same"
+            if self.doubt:
+                status, reason = NOTHING, self.doubt
             self._add(f"com {axis}", known, "m", reason, status)
         if self.sources.force == "pose":
             known = self._of("rz", times=-1.0)
-            wide = known[2] - known[0] > 0.5 * self.arm * self.geometry.arm
+            wide = known[2] - known[1] > 0.5 * self.arm * self.geometry.arm
             how = "the pose's point swings about it: or the markers' middle is off"
             self._add("com z", known, "m", how, NOTHING if wide else IDENTIFIED)
 
@@ -293,11 +301,26 @@ class Estimates:
         damped = f"{self.sources.rate}, its own derivative against it and against velocity"
         for kind, (role, first, channel) in AIR.items():
             how = {"": along, "z": "force along body z", "turning": damped}[channel]
+            doubt = self.kept.get(kind, "") or (self.doubt if channel == "turning" else "")
             for index, parameter in enumerate(OPTIONAL[kind] if kind in self.kept else (), first):
                 factor = {"lift": 0.25}.get(kind, self.arm if channel == "turning" else 1.0)
                 known = self._of(parameter, channel == "turning", factor)
                 unit = get(effect_of(role)).coefficients[index].unit
-                self._add(estimate_name(role, index), known, unit, how)
+                status = NOTHING if doubt else IDENTIFIED
+                self._add(estimate_name(role, index), known, unit, doubt or how, status)
+        if self.hidden:
+            role, first, _ = AIR["flapping"]
+            value, wide, least = (
+                self.arm * x for x in (self.hidden.value, self.hidden.deviation, self.hidden.least)
+            )
+            wide *= self.intervals.width
+            unit = get(effect_of(role)).coefficients[first].unit
+            how = self.doubt or (
+                f"moments that nothing measures hide it: it would show from {least:.2g} on. Fly "
+                "faster to and fro, and longer"
+            )
+            known = value, value - wide, value + wide
+            self._add(estimate_name(role, first), known, unit, how, NOTHING)
         if not {"rotor drag", "linear drag", "quadratic drag"} & set(self.kept):
             known = (0.0, math.nan, math.nan)
             self._add("drag", known, "N/(m/s)", "none stands out of the disturbances", NOTHING)

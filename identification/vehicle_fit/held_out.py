@@ -10,7 +10,7 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
-from ..prediction import PredictionErrors, prediction_errors
+from ..prediction import QUANTITIES, PredictionErrors, prediction_errors
 from .channels import MotionPiece
 from .solve import VehicleFit, refitted
 from .spectra import edges_of
@@ -55,6 +55,22 @@ def predicted(
             parts.append(prediction_errors(of, vehicle_of(part), windows=list(windows.values())))
         found[where] = PredictionErrors.pooled(parts)
     return found
+
+
+def torque_refuted(errors: Mapping[str, PredictionErrors]) -> str:
+    """Return where fitted torques predict the body rate worse than the guess that nothing changes,
+    with the figures; nothing where they do not.
+    """
+    rate = list(QUANTITIES).index("body rate")
+    for where, of in errors.items():
+        model, still = of.model[rate, -1], of.still[rate, -1]
+        if model > still:
+            return (
+                f"not identifiable: torques predict the body rate of {where.replace('_', ' ')} "
+                f"worse than the guess that nothing changes ({model:.2g} against {still:.2g} rad/s "
+                f"after {of.horizon[-1]:.2g} s)"
+            )
+    return ""
 
 
 def warnings_of(errors: Mapping[str, PredictionErrors]) -> list[str]:

@@ -25,11 +25,11 @@ from .columns import ANSWERED_HZ, Drive
 from .effect_settings import effect_of
 from .estimates import Estimates, Intervals, thrust_of
 from .geometry import SPIN, USUAL, Geometry
-from .held_out import predicted, warnings_of
+from .held_out import predicted, torque_refuted, warnings_of
 from .motors import motor_response
 from .parameters import ANSWERED, FORCE_BIAS, OPTIONAL, POSITIVE, first_model
-from .result import IDENTIFIED, NOTHING, WIDEST, Estimate, Identified, told
-from .solve import VehicleFit, fall_with, lag_with, solve
+from .result import IDENTIFIED, NOTHING, WIDEST, Estimate, Hidden, Identified, told
+from .solve import VehicleFit, lag_with, score_tests, solve
 from .spectra import SPECTRUM
 
 Array = NDArray[np.float64]
@@ -79,6 +79,8 @@ def identify(
     """
     if not (math.isfinite(mass) and mass > 0.0):
         raise InputError(f"--mass {mass:g}: expected the vehicle's mass in kg")
+    if not logs:
+        raise InputError("identify: no log is given; expected one or more of a vehicle")
     pieces, sources = pieces_of(logs, windows or [(0.0, math.inf)] * len(logs))
     notes: list[str] = []
     voltage = _voltage(pieces)
@@ -99,7 +101,7 @@ def identify(
             "only what is slower was used"
         )
     report(0.5, "asking what else shows")
-    fit, kept = _with_optional(pieces, fit, sources)
+    fit, kept, hidden = _with_optional(pieces, fit, sources)
     if "answered torque" in kept:
         shares = ", ".join(f"{100 * fit.values[f'answered {a}']:.0f} %" for a in "xyz")
         notes.append(
@@ -108,7 +110,9 @@ def identify(
             "what is quicker"
         )
     report(0.8, "asking what can be told")
-    not_told = _not_told(fit, geometry)
+    doubt = ""
+    if fit.drive.band < SPECTRUM.band:
+        doubt = "quick motion contradicts slow motion in these logs"
     if turned:
         notes.append(
             "yaw turns against the usual turning senses of the rotors (front-left clockwise from "
@@ -121,12 +125,19 @@ def identify(
         )
     motors = None if commands or "lag" in fit.model.free else motor_response(pieces)
 
-    def described(fit: VehicleFit) -> tuple[dict[str, Estimate], Vehicle]:
-        said = Estimates(fit, sources, geometry, kept).say_all(pieces, not_told)
-        named = {estimate.name: estimate for estimate in said}
-        return named, vehicle_of(name, fit, named, geometry, logs, voltage, step, motors)
+    def described(part: VehicleFit, doubt: str) -> tuple[dict[str, Estimate], Vehicle]:
+        said = Estimates(part, sources, geometry, kept, hidden, doubt)
+        named = {e.name: e for e in said.say_all(pieces, _not_told(fit, geometry, doubt))}
+        return named, vehicle_of(name, part, named, geometry, logs, voltage, step, motors)
 
-    named, vehicle = described(fit)
+    report(0.9, "predicting what is held out")
+    errors: dict[str, PredictionErrors] = {}
+    try:
+        errors = predicted(pieces, logs, fit, lambda part: described(part, doubt)[1])
+    except InputError as error:
+        notes.append(f"nothing that is held out was predicted: {error}")
+    notes += warnings_of(errors)
+    named, vehicle = described(fit, doubt or torque_refuted(errors))
     if "lag" in fit.model.free:
         named |= {alone.name: alone for alone in [_lag_alone(pieces, fit)]}
     if motors is not None:
@@ -135,13 +146,6 @@ def identify(
         )
         lag = effect_of(Role.LAG)
         named[lag] = Estimate(lag, *motors.known, "s", IDENTIFIED, how)
-    report(0.9, "predicting what is held out")
-    errors: dict[str, PredictionErrors] = {}
-    try:
-        errors = predicted(pieces, logs, fit, lambda part: described(part)[1])
-    except InputError as error:
-        notes.append(f"nothing that is held out was predicted: {error}")
-    notes += warnings_of(errors)
     return Identified(
         vehicle,
         tuple(named.values()),
@@ -255,9 +259,12 @@ def _frequencies(fit: VehicleFit) -> float:
 
 def _with_optional(
     pieces: list[MotionPiece], fit: VehicleFit, sources: Sources
-) -> tuple[VehicleFit, list[str]]:
-    """Return a fit with those further effects that make the logs much likelier, and which."""
-    kept: list[str] = []
+) -> tuple[VehicleFit, dict[str, str], Hidden | None]:
+    """Return a fit with those further effects that make the logs much likelier, the one that makes
+    them likeliest first, lest another stands for it; which, and why one is not to be believed; and
+    the moment of velocity where it does not show.
+    """
+    offered: dict[str, tuple[str, ...]] = {}
     for name, parameters in OPTIONAL.items():
         air = {p for p in parameters if "drag" in p or p == "lift"}
         air |= {"rotor drag x"} & {"rotor drag x" for p in parameters if p == "flapping"}
@@ -267,18 +274,42 @@ def _with_optional(
         # the noise of a pose goes round the loop: quick torques then follow it, and say nothing
         if parameters == ANSWERED and sources.rate != "gyro":
             continue
-        model, start = fit.model.with_more(fit.theta, *parameters)
-        least = IDENTIFY.penalty * len(parameters) * math.log(_frequencies(fit))
-        if fall_with(fit, model, start) > least:
-            richer = solve(pieces, fit.drive, model, start)
-            if all(richer.values[p] > 0.0 for p in richer.model.free if p in POSITIVE):
-                fit = richer
-                kept.append(name)
-    return fit, kept
+        offered[name] = parameters
+    kept: dict[str, str] = {}
+    hidden = None
+    while offered:
+        tests = score_tests(fit, offered)
+        falls = {name: tests[name][0] - _least_fall(fit, name) for name in offered}
+        name = max(falls, key=falls.__getitem__)
+        if falls[name] <= 0.0:
+            if "flapping" in tests:
+                _, (value,), (size,) = tests["flapping"]
+                hidden = Hidden(value, size, math.sqrt(_least_fall(fit, "flapping")) * size)
+            break
+        richer = solve(pieces, fit.drive, *fit.model.with_more(fit.theta, *offered.pop(name)))
+        if all(richer.values[p] > 0.0 for p in richer.model.free if p in POSITIVE):
+            fit = richer
+            kept[name] = ""
+    # what was taken since it stood out is too large on average where another flight of the same
+    # vehicle would not have shown it: where its interval reaches what is not taken
+    width = Intervals(fit).width
+    for name in kept:
+        at = [fit.model.free.index(p) for p in OPTIONAL[name]]
+        theta, covariance = fit.theta[at], fit.covariance[np.ix_(at, at)]
+        size = math.sqrt(theta @ np.linalg.solve(covariance, theta))
+        if size < math.sqrt(_least_fall(fit, name)) + width:
+            kept[name] = "it shows, but by so little that what shows is too large on average"
+    return fit, kept, hidden
 
 
-def _not_told(fit: VehicleFit, geometry: Geometry) -> dict[str, tuple[str, float]]:
-    """Return the inertias that the flight does not show: why, and what is usual instead.
+def _least_fall(fit: VehicleFit, name: str) -> float:
+    """Return by how much twice the negative log-likelihood must fall with a further effect."""
+    return IDENTIFY.penalty * len(OPTIONAL[name]) * math.log(_frequencies(fit))
+
+
+def _not_told(fit: VehicleFit, geometry: Geometry, doubt: str) -> dict[str, tuple[str, float]]:
+    """Return the inertias that the flight does not show: why, and what is usual instead; all of
+    them where there is a doubt about torque.
 
     Raises:
         InputError: neither turning nor an arm says how large the vehicle is.
@@ -286,22 +317,17 @@ def _not_told(fit: VehicleFit, geometry: Geometry) -> dict[str, tuple[str, float
     not_told: dict[str, tuple[str, float]] = {}
     values = fit.values
     usual = USUAL.gyration * fit.model.mass * geometry.arm**2
-    doubtful = fit.drive.band < SPECTRUM.band
     for axis, motion in (("Jx", "roll"), ("Jy", "pitch")):
-        if doubtful:  # turning is quick, and quick motion contradicts itself here
-            not_told[axis] = f"quick {motion} contradicts slow motion in these logs", usual
-        elif 1.96 * fit.deviation(axis) > WIDEST:
-            not_told[axis] = f"the flight hardly shows {motion}", usual
+        if doubt or 1.96 * fit.deviation(axis) > WIDEST:
+            not_told[axis] = doubt or f"the flight hardly shows {motion}", usual
     if not_told and not geometry.known:
         raise InputError(
-            f"{'; '.join(why for why, _ in not_told.values())}, and no arm is given; expected "
+            f"{'; '.join({why: 0 for why, _ in not_told.values()})}, and no arm is given; expected "
             "--geometry, or a log with quick roll and pitch"
         )
     wide = 1.96 * fit.deviation("Jz") > WIDEST
-    if doubtful or wide or not 0.3 < values["Jz"] / (values["Jx"] + values["Jy"]) < 1.3:
-        why = "the flight does not yaw while it rolls or pitches"
-        if doubtful:
-            why = "quick motion contradicts slow motion in these logs"
+    if doubt or wide or not 0.3 < values["Jz"] / (values["Jx"] + values["Jy"]) < 1.3:
         both = sum(not_told.get(axis, ("", values[axis]))[1] for axis in ("Jx", "Jy"))
+        why = doubt or "the flight does not yaw while it rolls or pitches"
         not_told["Jz"] = why, USUAL.flat * both
     return not_told

@@ -5,7 +5,7 @@ Rotor speeds are noisy (rounded) where they are measured: what that adds to the 
 is taken away before the normal equations are solved, so that it does not shrink the coefficients.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -135,16 +135,30 @@ def refitted(fit: VehicleFit, kept: Sequence[NDArray[np.bool_]]) -> list[Vehicle
     return out
 
 
-def fall_with(fit: VehicleFit, model: Model, start: Array) -> float:
-    """Return by how much twice the negative log-likelihood would fall with a model that has further
-    parameters than a fit's, by the score test: one step from where they are nothing.
+def score_tests(
+    fit: VehicleFit, groups: Mapping[str, Sequence[str]]
+) -> dict[str, tuple[float, Array, Array]]:
+    """Return, for each group of further parameters alone, by how much twice the negative
+    log-likelihood would fall with them, where one step from nothing brings them, and their standard
+    deviations there, both in SI units.
     """
+    model, start = fit.model.with_more(fit.theta, *(p for group in groups.values() for p in group))
     total = np.sum(_grams(fit.balance, fit.spectra), axis=0)
-    falls = []
-    for tried, theta in ((model, start), (fit.model, fit.theta)):
-        step, information, *_ = _newton(fit.balance, total, tried, theta)
-        falls.append(float(step @ information @ step))
-    return falls[0] - falls[1]
+    step, information, *_ = _newton(fit.balance, total, model, start)
+    gradient, without, found = information @ step, list(range(len(fit.theta))), {}
+
+    def reached(rows: list[int]) -> tuple[float, Array, Array]:
+        inverse = np.linalg.inv(information[np.ix_(rows, rows)])
+        moved = inverse @ gradient[rows]
+        return float(gradient[rows] @ moved), moved, np.sqrt(np.diag(inverse))
+
+    for name, group in groups.items():
+        further = [model.free.index(p) for p in group]
+        units = np.array([model.scale.get(p, 1.0) for p in group])
+        fall, moved, size = reached(without + further)
+        own = slice(len(without), None)
+        found[name] = fall - reached(without)[0], units * moved[own], units * size[own]
+    return found
 
 
 def lag_with(pieces: list[MotionPiece], fit: VehicleFit) -> float:

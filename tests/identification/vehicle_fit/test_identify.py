@@ -25,6 +25,7 @@ from tests.support.golden_identification import GOLDEN, made, vehicles
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle_file import dump_vehicle, parse_vehicle
 from windwrench.identification.logs.screening import screen_log
+from windwrench.identification.prediction import PredictionErrors
 from windwrench.identification.vehicle_fit.channels import MotionPiece, Sources
 from windwrench.identification.vehicle_fit.columns import Drive
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
@@ -180,6 +181,31 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say(inertial):
         for name, truth in (("k", K), ("Jxx", INERTIA[0, 0]), ("Jyy", INERTIA[1, 1])):
             held.append(found[name].low <= truth <= found[name].high)
     assert sum(held) >= 20  # of 24; 95 % intervals miss more than 4 once in 170 times
+
+
+def test_torque_that_loses_to_a_rate_that_stays_tells_no_inertia(crazyflie, commanded, monkeypatch):
+    """As where the flight loop answers what nothing measures: 17 against .7 rad/s was a warning."""
+    lost = PredictionErrors(9, np.array([0.5]), np.full((4, 1), 2.0), np.full((4, 1), 1.0))
+    where = "windwrench.identification.vehicle_fit.identify.predicted"
+    monkeypatch.setattr(where, lambda *_: {"held_out_blocks": lost})
+    logs = commanded[:2]
+    found = identify(logs, crazyflie.mass, parse_geometry(str(crazyflie.arm_l)))
+    check(found, "k", crazyflie.k[0], 0.05)
+    for name in ("Jxx", "Jyy", "Jzz", "p/k", "p", "com x", "com y", "flapping_moment kflap"):
+        assert found[name].status in ("assumed", "not identifiable")
+        assert "(2 against 1 rad/s after 0.5 s)" in found[name].how
+    assert found["Jxx"].high > 3.0 * found["Jxx"].low
+    assert np.all(found.vehicle.com == 0.0)
+    assert any("roll movements" in line for line in found.advice)
+    with pytest.raises(
+        InputError, match=r"2 against 1 rad/s.*no arm is given; expected --geometry"
+    ):
+        identify(logs, crazyflie.mass, parse_geometry(None))
+
+
+def test_no_log_is_refused():
+    with pytest.raises(InputError, match="identify: no log is given; expected one or more"):
+        identify([], MASS, parse_geometry(str(ARM)))
 
 
 def test_rotors_in_another_order_are_refused(inertial):
