@@ -62,9 +62,8 @@ def _kind(change: Change) -> str:
     if change.place == SOMETHING_ELSE:
         return "The rotors share the work otherwise than one weaker rotor or one weight would ask."
     if change.place == "all rotors":
-        return (
-            f"All rotors are asked for {size} more: a heavier vehicle, a weaker battery, thin air."
-        )
+        why = "a heavier vehicle, a weaker battery, thin air"
+        return f"All rotors are asked for {size} more: {why}."
     if not change.place.startswith("rotor"):
         return f"The vehicle carries {size} of its weight more at that side."
     if change.weaker >= 0.95:
@@ -80,18 +79,15 @@ def _kind(change: Change) -> str:
 def change_data(change: Change) -> dict[str, Any]:
     """Return the finding as plain data."""
 
-    def flights(trims: Sequence[Trim]) -> list[dict[str, Any]]:
-        return [
-            {
-                "log": trim.name,
-                "seconds": trim.seconds,
-                "thrust_share": trim.thrust / trim.total,
-                "total": trim.total,
-                "std": np.sqrt(trim.noise),
-                "voltage": trim.voltage,
-            }
-            for trim in trims
-        ]
+    def flight(trim: Trim) -> dict[str, Any]:
+        return {
+            "log": trim.name,
+            "seconds": trim.seconds,
+            "thrust_share": trim.thrust / trim.total,
+            "total": trim.total,
+            "std": np.sqrt(trim.noise),
+            "voltage": trim.voltage,
+        }
 
     names = ("left_less_right", "front_less_rear", "diagonals", "log_total")
     data: dict[str, Any] = plain(
@@ -101,8 +97,8 @@ def change_data(change: Change) -> dict[str, Any]:
             **{key: getattr(change, key) for key in _SAID},
             "difference": dict(zip(names, change.difference, strict=True)),
             "difference_std_if_unchanged": dict(zip(names, change.std, strict=True)),
-            "before": flights(change.before),
-            "after": flights(change.after),
+            "before": [*map(flight, change.before)],
+            "after": [*map(flight, change.after)],
         }
     )
     return data
