@@ -133,12 +133,11 @@ def estimate(
     for i, (name, values, unit) in enumerate(
         (("force", series.force, "N"), ("torque", series.torque, "Nm"))
     ):
-        if not np.isfinite(values).any():  # the log tells no torque
-            continue
         measures = {"mean": values.mean(axis=0), "std": values.std(axis=0)}
         if truth is not None:
             measures["RMSE to truth"] = truth[i]
-        for measure, value in measures.items():
+        # a log may tell no torque
+        for measure, value in measures.items() if np.isfinite(values).any() else ():
             sign = "+" if measure == "mean" else ""
             table.append((f"{name}, {measure} ({unit})", *(f"{v:{sign}.4g}" for v in value)))
             result[f"{name}_{measure.lower().replace(' ', '_')}_{unit}"] = value

@@ -100,9 +100,8 @@ def draw_film(
     def caption(k: int) -> Caption:
         """Return the words beside a sample."""
         force, torque = part.true_force, part.true_torque
-        before = max(k - 1, 0)
-        speed = np.linalg.norm(part.position[k] - part.position[before])
-        speed /= max(part.t[k] - part.t[before], 1e-6)
+        way, dt = (x[k] - x[max(k - 1, 0)] for x in (part.position, part.t))
+        speed = np.linalg.norm(way) / max(dt, 1e-6)
         return Caption(
             title,
             float(part.t[k] - whole.t[0]),

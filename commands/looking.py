@@ -87,10 +87,10 @@ def look(
             except InputError as refused:
                 steps.append(Step(title, (f"Not from this log: {refused}",), command))
             else:
-                sentence, rest = told(results[name])
+                sentence, *_ = said = told(results[name])
                 picture = folder / name / "wrench.png" if name == "estimate" else None
                 report = "" if picture else f"{name}/report.html"
-                steps.append(Step(title, (sentence, *rest), command, picture, report))
+                steps.append(Step(title, said, command, picture, report))
             _tell(steps[-1])
     page = folder / "log.html"
     write_page(found["log"], sentence, steps, then, command_line(), page)
@@ -124,23 +124,19 @@ def _what_it_holds(found: Mapping[str, Any]) -> tuple[str, ...]:
     return (read, f"Channels: {', '.join(rates)}.", *said)
 
 
-def _what_acts(result: Mapping[str, Any]) -> tuple[str, list[str]]:
-    """Return the mean force as a sentence, and further sentences."""
+def _what_acts(result: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the mean force as a sentence."""
     mean, spread = result["force_mean_N"], result["force_std_N"]
     force = ", ".join(f"{x:+.2g} ({s:.2g})" for x, s in zip(mean, spread, strict=True))
-    return f"Beside the model act {force} N along x, y and z: mean (standard deviation).", []
+    return (f"Beside the model act {force} N along x, y and z: mean (standard deviation).",)
 
 
-def _what_lacks(result: Mapping[str, Any]) -> tuple[str, list[str]]:
+def _what_lacks(result: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the first sentence of a diagnosis, and what is left of the force: in that sentence
     where it has no number of its own, else as a further one.
     """
     headline, error = result["headline"], result["error"]
     before, after = (1e3 * error[when]["force_rms_N"] for when in ("before", "after"))
-    told = (
-        f"The force that it leaves on unseen stretches falls from {before:.3g} to {after:.3g} mN."
-        if result["effects"]
-        else f"The force that it leaves on unseen stretches is {before:.3g} mN."
-    )
-    whole = headline if any(x.isdigit() for x in headline) else f"{headline} {told}"
-    return whole, [] if whole != headline else [told]
+    change = f"falls from {before:.3g} to {after:.3g}" if result["effects"] else f"is {before:.3g}"
+    told = f"The force that it leaves on unseen stretches {change} mN."
+    return (headline, told) if any(x.isdigit() for x in headline) else (f"{headline} {told}",)

@@ -146,9 +146,8 @@ def _estimate(
     loads = np.zeros((count, *LOAD))
     events = np.zeros(count, dtype=np.int64)  # of a recording filter: the one that ends a row
     ukf.reset(log.position[first], log.quaternion[first])
-    with np.errstate(
-        over="ignore", invalid="ignore"
-    ):  # an estimate that overflows is refused below
+    # an estimate that overflows is refused below
+    with np.errstate(over="ignore", invalid="ignore"):
         for k in range(first, count):
             if k % _REPORTED == 0:
                 report(k / count)

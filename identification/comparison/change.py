@@ -27,7 +27,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import softmax
+from scipy.special import log_softmax, logsumexp, softmax
 
 from ...runtime.errors import InputError
 from .sessions import difference
@@ -129,12 +129,10 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
         """
         variance = unchanged[:, None] + spread**2
         off = np.square(moved - means) / variance + np.log(2.0 * np.pi * variance)
-        logs = found.log[:, None] - 0.5 * off.sum(axis=2)
-        return np.asarray(np.logaddexp.reduce(logs, axis=0))
+        return np.asarray(logsumexp(found.log[:, None] - 0.5 * off.sum(axis=2), axis=0))
 
     amounts = np.linspace(0.02, 4.0, _AMOUNTS) * use.amount
-    prior = -0.5 * np.square(amounts / use.amount)
-    prior -= np.logaddexp.reduce(prior)
+    prior = log_softmax(-0.5 * np.square(amounts / use.amount))
     nothing = float(logs_of(np.zeros((1, 4)), np.zeros((1, 4)))[0])
     # by place and kind: the logarithm of how likely it is; mean and deviation of the amount
     logs = {(NOWHERE, ""): nothing + math.log(use.unchanged)}
@@ -146,14 +144,12 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
             means = np.array([_moved(place, kind, amount, shares) for amount in amounts])
             spread = np.linalg.norm(means, axis=1)[:, None] * np.array(use.bend)
         every = logs_of(means, spread) + prior
-        total = float(np.logaddexp.reduce(every))
-        weights = np.exp(every - total)
+        weights = softmax(every)
         middle = float(amounts @ weights)
         sizes[place, kind] = middle, math.sqrt(float(np.square(amounts - middle) @ weights))
         # each place is as likely as the other beforehand
-        logs[place, kind] = total + math.log(
-            (1.0 - use.unchanged) / (len(_KINDS) * len(_KINDS[place]))
-        )
+        each = (1.0 - use.unchanged) / (len(_KINDS) * len(_KINDS[place]))
+        logs[place, kind] = float(logsumexp(every)) + math.log(each)
     chances = dict(zip(logs, softmax(list(logs.values())).tolist(), strict=True))
     places = {place: sum(p for (at, _), p in chances.items() if at == place) for place, _ in logs}
     likeliest = max(places, key=places.__getitem__)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
+from scipy.special import log_softmax, logsumexp, softmax
 from scipy.stats import norm
 
 from .fault_balance import BalanceChannel, Begin, FaultBalance
@@ -108,8 +108,7 @@ def find_fault(channels: Channels) -> RotorFault:
     # sizes left free, is the search's
     whole = math.log(use.prior[0]) + max(one.nothing for one in tried)
     happened = evidence + math.log(float(prior.sum()))
-    every = np.append(whole, happened + logs - logsumexp(logs))
-    chances = np.exp(every - logsumexp(every))
+    chances = softmax(np.append(whole, happened + log_softmax(logs)))
     rotor = int(np.argmax(logs[:4]))
     _, least, most = _quantiles(shares, weights[rotor], 0.5 * float(shares[1] - shares[0]))
     return RotorFault(
@@ -163,11 +162,11 @@ def _fitted(balance: FaultBalance, rows: Index) -> _Tried:
     return _Tried(balance, channels, nothing, *_jump(balance, channels, rows))
 
 
-def _steps(balance: FaultBalance, channels: list[BalanceChannel], rows: Index) -> Array:
-    """Return the log-likelihoods (J, K) of a jump of each kind of ``_BEGINS`` at each of some
-    rows.
-    """
-    ramps = [balance.ramp(begin) for begin in _BEGINS]
+def _steps(
+    balance: FaultBalance, channels: list[BalanceChannel], rows: Index, begins: list[Begin]
+) -> Array:
+    """Return the log-likelihoods (J, K) of a jump of each kind at each of some rows."""
+    ramps = [balance.ramp(begin) for begin in begins]
     return np.array([np.sum([c.steps(rows, ramp) for c in channels], axis=0) for ramp in ramps])
 
 
@@ -177,10 +176,9 @@ def _jump(
     """Return the log-likelihood, the row and the kind of the likeliest jump, also at rows that are
     left out between ``rows``.
     """
-    at_once = np.sum([c.steps(rows, balance.ramp(_BEGINS[0])) for c in channels], axis=0)
-    k = int(np.argmax(at_once))
+    k = int(np.argmax(_steps(balance, channels, rows, _BEGINS[:1])))
     around = np.arange(rows[max(k - 2, 0)], rows[min(k + 2, len(rows) - 1)] + 1)
-    logs = _steps(balance, channels, around)
+    logs = _steps(balance, channels, around, _BEGINS)
     j, k = divmod(int(np.argmax(logs)), len(around))
     return float(logs[j, k]), int(around[k]), _BEGINS[j]
 
@@ -191,13 +189,12 @@ def _onsets(samples: Samples, best: _Tried) -> tuple[float, Array, Array]:
     """
     every = _rows(len(samples.t))
     rows = np.arange(max(best.row - 5, FAULTS.before), min(best.row + 6, every[-1] + 1))
-    logs, fine = (_steps(best.balance, best.channels, some) for some in (every, rows))
+    logs, fine = (_steps(best.balance, best.channels, some, _BEGINS) for some in (every, rows))
     parts = np.array([begin.part for begin in _BEGINS])
     starts = samples.t[rows] + STEP * (parts[:, None] - 0.5)
     evidence = max(float(logsumexp(logs)), float(logsumexp(fine)))
-    weights = np.exp(fine - logsumexp(fine))
     places = len(_BEGINS) * len(samples.t)
-    return evidence - math.log(places), starts.ravel(), weights.ravel()
+    return evidence - math.log(places), starts.ravel(), softmax(fine).ravel()
 
 
 def _patterns(best: _Tried) -> tuple[Array, Array, Array]:
@@ -228,11 +225,11 @@ def _patterns(best: _Tried) -> tuple[Array, Array, Array]:
     # only what speaks under every hypothesis, so that all explain the same numbers
     says = np.isfinite([std for _, std, *_ in tried]).all(axis=0)
     logs = [
-        norm.logpdf(seen[says], means[:, says], np.hypot(std, spread)[:, says]).sum(axis=1)
-        for seen, std, means, spread in tried
+        norm.logpdf(part[says], means[:, says], np.hypot(std, spread)[:, says]).sum(axis=1)
+        for part, std, means, spread in tried
     ]
     evidence = np.array([logsumexp(log) - math.log(len(log)) for log in logs])
-    return evidence, shares, np.array([np.exp(log - logsumexp(log)) for log in logs[:4]])
+    return evidence, shares, softmax(logs[:4], axis=1)
 
 
 def _rows(count: int) -> Index:
@@ -250,10 +247,6 @@ def _rows(count: int) -> Index:
 def _quantiles(values: Array, weight: Array, margin: float) -> tuple[float, float, float]:
     """Return the median and the ends of a 95 % interval, widened by a step of the grid."""
     order = np.argsort(values, kind="stable")
-    values, weight = values[order], weight[order]
-    total = np.cumsum(weight)
-    low, middle, high = (
-        float(values[min(int(np.searchsorted(total, q)), len(values) - 1)])
-        for q in (0.025, 0.5, 0.975)
-    )
+    at = np.searchsorted(np.cumsum(weight[order]), (0.025, 0.5, 0.975))
+    low, middle, high = values[order[np.minimum(at, len(order) - 1)]].tolist()
     return middle, low - margin, high + margin

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import log_softmax
 
 from .trim import Trim
 
@@ -72,10 +73,10 @@ def difference(after: Sequence[Trim], before: Sequence[Trim]) -> Difference:
     every.sort(key=lambda flown: names.index(flown[0].session) if flown[0].session else -1)
     trims, later = [trim for trim, _ in every], np.array([which for _, which in every])
     x = np.array([trim.features for trim in trims])
-    noise = np.array([np.diagonal(trim.noise) for trim in trims])
+    noise = np.array([trim.noise for trim in trims])
     parts = (_of_cut(x, later, noise, cut, log) for cut, log in _cuts(trims, later, x))
     mean, variance, log = map(np.concatenate, zip(*parts, strict=True))
-    log -= np.logaddexp.reduce(log)
+    log = log_softmax(log)
     keep = log > log.max() + SCATTER.least_log
     return Difference(mean[keep], variance[keep], log[keep])
 

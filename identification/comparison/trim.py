@@ -46,8 +46,8 @@ class Trim:
     name: str
     thrust: Array  # (4,)
     seconds: float  # that it is a mean of
-    # (4, 4) covariance of ``features`` (``change.py``) as means of one flight; zero: not known
-    noise: Array = field(default_factory=lambda: np.zeros((4, 4)))
+    # (4,) variance of ``features`` as means of one flight; zero: not known
+    noise: Array = field(default_factory=lambda: np.zeros(4))
     voltage: float | None = None  # V, mean over the same time
     session: str = ""  # flights of one name share it; empty: not known
 
@@ -107,15 +107,15 @@ def trim_of(
 
 
 def _noise(t: Array, thrust: Array, steady: NDArray[np.bool_], step: Array) -> Array:
-    """Return the covariance (4, 4) of the four numbers of a flight, from the means of batches."""
+    """Return the variance (4,) of the four numbers of a flight, from the means of batches."""
     batch = np.floor(np.cumsum(np.where(steady, step, 0.0)) / BATCH).astype(np.int64)
     batches = (steady & (batch == number) for number in range(int(batch[-1]) + 1))
     # the last batch may be a short one
     means = (thrust[rows].mean(axis=0) for rows in batches if step[rows].sum() > 0.5 * BATCH)
     numbers = [features_of(mean) for mean in means if mean.min() > 0.0]
     if len(numbers) < 2:
-        return np.zeros((4, 4))
-    return np.asarray(np.cov(numbers, rowvar=False) / len(numbers))
+        return np.zeros(4)
+    return np.asarray(np.var(numbers, axis=0, ddof=1) / len(numbers))
 
 
 def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:

@@ -14,13 +14,13 @@ from ...runtime.drawing import (
     BLACK,
     GREY,
     PALE,
-    SERIES,
     new_figure,
     room_above,
     styled,
 )
 from ...runtime.page_files import write_json, write_png
 from ...runtime.plain_values import plain
+from ..motion.smoothing import resampled
 from .change import CHANGES, NOWHERE, SOMETHING_ELSE, Change
 from .fault_detection import ALL, NOTHING, OTHER, RotorFault
 from .trim import Trim
@@ -62,9 +62,8 @@ def _kind(change: Change) -> str:
     if change.place == SOMETHING_ELSE:
         return "The rotors share the work otherwise than one weaker rotor or one weight would ask."
     if change.place == "all rotors":
-        return (
-            f"All rotors are asked for {size} more: a heavier vehicle, a weaker battery, thin air."
-        )
+        why = "a heavier vehicle, a weaker battery, thin air"
+        return f"All rotors are asked for {size} more: {why}."
     if not change.place.startswith("rotor"):
         return f"The vehicle carries {size} of its weight more at that side."
     if change.weaker >= 0.95:
@@ -80,18 +79,15 @@ def _kind(change: Change) -> str:
 def change_data(change: Change) -> dict[str, Any]:
     """Return the finding as plain data."""
 
-    def flights(trims: Sequence[Trim]) -> list[dict[str, Any]]:
-        return [
-            {
-                "log": trim.name,
-                "seconds": trim.seconds,
-                "thrust_share": trim.thrust / trim.total,
-                "total": trim.total,
-                "std": np.sqrt(np.diagonal(trim.noise)),
-                "voltage": trim.voltage,
-            }
-            for trim in trims
-        ]
+    def flight(trim: Trim) -> dict[str, Any]:
+        return {
+            "log": trim.name,
+            "seconds": trim.seconds,
+            "thrust_share": trim.thrust / trim.total,
+            "total": trim.total,
+            "std": np.sqrt(trim.noise),
+            "voltage": trim.voltage,
+        }
 
     names = ("left_less_right", "front_less_rear", "diagonals", "log_total")
     data: dict[str, Any] = plain(
@@ -101,8 +97,8 @@ def change_data(change: Change) -> dict[str, Any]:
             **{key: getattr(change, key) for key in _SAID},
             "difference": dict(zip(names, change.difference, strict=True)),
             "difference_std_if_unchanged": dict(zip(names, change.std, strict=True)),
-            "before": flights(change.before),
-            "after": flights(change.after),
+            "before": [*map(flight, change.before)],
+            "after": [*map(flight, change.after)],
         }
     )
     return data
@@ -223,29 +219,23 @@ def write_faults(found: Sequence[RotorFault], folder: Path) -> tuple[Path, Path]
 @styled()
 def _draw_faults(found: Sequence[RotorFault]) -> Any:
     figure = new_figure(3.4 * len(found))
-    axes = np.atleast_2d(figure.subplots(len(found), 2, squeeze=False))
+    axes = figure.subplots(len(found), 2, squeeze=False)
     for fault, (left, right) in zip(found, axes, strict=True):
-        samples = fault.samples
-        for axis, colour in zip(range(3), SERIES, strict=False):
-            left.plot(
-                samples.t, samples.angular_acceleration[:, axis], color=colour, lw=1,
-                label=f"about {'xyz'[axis]}",
-            )  # fmt: skip
-        left.set_ylabel("angular acceleration, rad/s2")
-        room_above(left)
-        left.legend(loc="upper left", ncols=3)
-        command = samples.channels.command
-        for i in range(4):
-            u = np.interp(samples.t, command.t, command.values[:, i])
-            right.plot(samples.t, u, lw=1, label=f"rotor {i + 1}")
-        right.set_ylabel("command")
-        room_above(right)
-        right.legend(loc="upper left", ncols=4)
-        for axis_ in (left, right):
-            axis_.set_xlabel("t, s (the log's clock)")
+        samples, command = fault.samples, fault.samples.channels.command
+        commands = resampled(samples.t, command.t, command.values)
+        turning = samples.angular_acceleration
+        for panel, what, lines, kind, names in (
+            (left, "angular acceleration, rad/s2", turning, "about", "xyz"),
+            (right, "command", commands, "rotor", "1234"),
+        ):
+            panel.plot(samples.t, lines, lw=1, label=[f"{kind} {name}" for name in names])
+            panel.set_ylabel(what)
+            room_above(panel)
+            panel.legend(loc="upper left", ncols=len(names))
+            panel.set_xlabel("t, s (the log's clock)")
             if fault.likeliest in ("1", "2", "3", "4"):
-                axis_.axvline(fault.onset[0], color=BLACK, lw=1, ls="--")
-                axis_.set_xlim(fault.onset[0] - 3.0, samples.t[-1] + 0.1)
+                panel.axvline(fault.onset[0], color=BLACK, lw=1, ls="--")
+                panel.set_xlim(fault.onset[0] - 3.0, samples.t[-1] + 0.1)
         left.set_title(Path(samples.channels.name).name)
         chance = fault.probabilities[fault.likeliest]
         right.set_title(f"{_finding(fault, fault.likeliest)}: {chance:.3f}")

@@ -23,10 +23,7 @@ _SMALL_UNITS = {
     "s": (1e3, "ms"),
     "kg": (1e3, "g"),
     "rad": (180.0 / math.pi, "degrees"),
-    "N": (1e3, "mN"),
-    "Nm": (1e3, "mNm"),
 }
-_MILLI = 0.1  # the same of N and Nm
 # of a coefficient's unit: what it does at which speed
 _AT = {
     "N/(m/s)": ("N", "at 1 m/s"),
@@ -91,9 +88,11 @@ def amount(effect: NamedEffect, coefficient: str, vehicle: Vehicle) -> Amount:
         where = rotor or f"{how} {axis}"
         if unit == "m" and frame == "body":
             where, value = _SIDES[axis][value < 0.0], abs(value)
-    small, smaller = _SMALL_UNITS.get(unit, (1.0, unit))
-    if abs(value) < (_MILLI if unit in ("N", "Nm") else _SMALL):
-        value, std, unit = small * value, small * std, smaller
+    if unit in ("N", "Nm"):
+        factor, unit = scale_of([value], unit)
+    else:
+        factor, unit = _SMALL_UNITS.get(unit if abs(value) < _SMALL else "", (1.0, unit))
+    value, std = factor * value, factor * std
     return Amount(value, std, "" if unit == "1" else unit, where, when)
 
 

@@ -155,12 +155,11 @@ def page_plots(diagnosis: Diagnosis) -> PagePlots:
             "held": joined.held_out(),
             "channels": [plot.packed for plot in time],
         }
-    if long := [trace for trace in diagnosis.traces if len(trace.t) >= 16]:
-        channels = _Joined(long).channels
+        long = [trace for trace in diagnosis.traces if len(trace.t) >= 16]
         frequency = [
             _plot_of_spectrum(long, what, group, unit, diagnosis.cutoff_hz)
             for what, group, unit in _GROUPS
-            if group.start in channels
+            if long and group.start in joined.channels
         ]
     signatures = [_plot_of_signature(s, number) for number, s in enumerate(diagnosis.signatures)]
     for name, plots in (("frequency", frequency), ("signatures", signatures)):
@@ -336,26 +335,19 @@ def telling_samples(trace: Trace, i: int, columns: int) -> Index:
 
 def _table_over_time(traces: Sequence[Trace], i: int, factor: float, unit: str) -> PlotTable:
     """Return the residual's rms before and after in a channel, interval by interval."""
-    several, many = len(traces) > 1, len(traces) > PLOTS.most_pieces
-    each = max(PLOTS.rows // len(traces), 1)
+    many, each = len(traces) > PLOTS.most_pieces, max(PLOTS.rows // len(traces), 1)
+    head: tuple[str, ...] = ("Piece", "Time (s)", "Held out", "Before", "After")
     rows: list[tuple[str, ...]] = []
     for number, trace in enumerate(traces[: PLOTS.most_pieces], 1):
         for part in np.array_split(np.arange(len(trace.t)), min(each, len(trace.t))):
-            share = trace.held_out[part].mean()
-            rows.append(
-                (
-                    *((str(number),) if several else ()),
-                    f"{trace.t[part[0]]:.1f} to {trace.t[part[-1]]:.1f}",
-                    "no" if share == 0 else "yes" if share == 1 else "in part",
-                    *(rounded(factor * _rms(x[part, i]), 2) for x in (trace.before, trace.after)),
-                )
-            )
+            held = {0.0: "no", 1.0: "yes"}.get(trace.held_out[part].mean(), "in part")
+            time = f"{trace.t[part[0]]:.1f} to {trace.t[part[-1]]:.1f}"
+            sides = (rounded(factor * _rms(x[part, i]), 2) for x in (trace.before, trace.after))
+            rows.append((str(number), time, held, *sides))
+    if len(traces) == 1:
+        head, rows = head[1:], [row[1:] for row in rows]
     more = f", the first {PLOTS.most_pieces} of {len(traces)} pieces" if many else ""
-    return PlotTable(
-        f"Residual {_SYMBOLS[i]}, rms ({unit}){more}",
-        (*(("Piece",) if several else ()), "Time (s)", "Held out", "Before", "After"),
-        rows,
-    )
+    return PlotTable(f"Residual {_SYMBOLS[i]}, rms ({unit}){more}", head, rows)
 
 
 class Bar(NamedTuple):

@@ -15,6 +15,7 @@ from ...runtime.page_files import write_png
 from ..logs.flight_log import FlightLog
 from ..logs.flight_phases import FLIGHT, GROUND, LANDING, TAKE_OFF, Phase, flight_phases
 from ..wrench_series import WrenchSeries
+from .words import scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,8 +54,7 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
     if not known:
         height.set_yticks([])
     backdrop = _draw_thrust(height, series.t, log, vehicle)
-    in_milli = float(np.percentile(np.abs(series.torque), 99)) < 0.1
-    scale, unit = (1e3, "mNm") if in_milli else (1.0, "Nm")
+    scale, unit = scale_of([float(np.percentile(np.abs(series.torque), 99))], "Nm")
     truth = None if log.torque is None else scale * log.torque
     mean, std = scale * series.torque, scale * series.std_torque
     _draw_vectors(force, series.t, series.force, series.std_force, log.force, ("f", "N"))
