@@ -14,7 +14,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ..motion.smoothing import resampled
 from .column_names import Group, Name, groups_of, named_alone, side_by_side, words
 from .magnitudes import likely_unit
 from .table import Array
@@ -88,9 +87,9 @@ class Numbers:
     def between(self, t: Array, columns: Sequence[str]) -> Array:
         """Return values (n, k) at times (n,), of lines between the rows."""
         times, values = self.rows(columns)
-        return (
-            resampled(t, times, values) if len(times) else np.full((len(t), len(columns)), np.nan)
-        )
+        if not len(times):
+            return np.full((len(t), len(columns)), np.nan)
+        return np.column_stack([np.interp(t, times, x) for x in values.T])
 
     def _bend(self, t: Array, columns: Sequence[str]) -> Array:
         """Return the second differences (n, k) around times (n,)."""

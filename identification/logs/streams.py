@@ -123,7 +123,7 @@ class Recording:
                 assumption that the notes state; None: the map's, where that comes with the kit.
 
         Raises:
-            InputError: too few samples, neither
+            InputError: too few samples, an infinite rotor speed, neither
                 a pose nor gyro and accelerometer, no motors, or streams that do not overlap.
         """
         path, reader, log_map = self.path, self.reader, self.log_map
@@ -191,7 +191,7 @@ def _cleaned(
     """Return the streams that hold something, within what a flight has, and notes.
 
     Raises:
-        InputError: too few samples.
+        InputError: too few samples, or an infinite rotor speed.
     """
     made: dict[str, Stream] = {}
     notes: tuple[str, ...] = ()
@@ -202,6 +202,13 @@ def _cleaned(
             )
         values = stream.values
         if name in _MOTORS:
+            infinite = np.argwhere(np.isinf(values))
+            if infinite.size and name == "rotors":
+                row, rotor = infinite[0]
+                raise InputError(
+                    f"{path}: {stream.name}, message {row + 1}: the rotor speed of rotor "
+                    f"{rotor + 1} is {values[row, rotor]}; expected a finite number"
+                )
             if len(stream.whole().t) < 2:
                 raise InputError(
                     f"{path}: {stream.name}: no two samples have four finite {_MOTORS[name]}; "

@@ -39,7 +39,7 @@ _LATIN = "windwrench-latin-1"  # name of an error handler
 _BUFFER = 2**18  # bytes unpacked at a time
 _UNUSED = 2**21  # packed bytes, of which a line may come yet
 _DAY_0 = date(1970, 1, 1).toordinal()
-_BLOCK = 20_000  # lines turned into numbers at a time
+_BLOCK = 200  # lines turned into numbers at a time; their texts stay in the cache of the processor
 _LOOKED_AT = 2**18  # characters in which the layout is found
 _LINES = 600  # of them; what Betaflight's decoder writes before the header has 150
 _BETWEEN = 5  # lines between header and first row, at most
@@ -91,8 +91,12 @@ class TextLayout:
     lists: tuple[tuple[int, int], ...] = ()  # fields (from 0) that hold lists, and their lengths
 
     def fields(self, line: str) -> list[str]:
-        """Return the fields of a line, an item of a list each, without the space around them; none
-        where its quotation marks are not those of CSV.
+        """Return the fields of a line without the space around them, as ``split``."""
+        return list(map(str.strip, self.split(line)))
+
+    def split(self, line: str) -> list[str]:
+        """Return the fields of a line, an item of a list each; none where its quotation marks are
+        not those of CSV.
         """
         if self.separator == " ":
             return line.split()
@@ -109,7 +113,7 @@ class TextLayout:
         for i, count in reversed(self.lists):  # as many empty fields as an empty list has items
             if i < len(found):
                 found[i : i + 1] = _items(found[i]) or [""] * count
-        return list(map(str.strip, found))
+        return found
 
     def names(self, line: str) -> list[str]:
         """Return the columns' names of a header; a separator behind the last name, and the mark of
@@ -380,9 +384,9 @@ def _fill(
         InputError: a field holds something else, or a row has more or fewer fields than the header.
     """
     width = len(table.header)
-    rows = [layout.fields(line) for line in lines]
+    rows = [layout.split(line) for line in lines]
     for i, fields in enumerate(rows):
-        if len(fields) == width + 1 and not fields[-1]:  # a separator behind the last
+        if len(fields) == width + 1 and not fields[-1].strip():  # a separator behind the last
             fields.pop()
         if len(fields) != width:
             hint = f". {_DECIMAL_COMMA.capitalize()}" if len(fields) == 2 * width else ""
@@ -390,18 +394,22 @@ def _fill(
                 f"{table.path}: {table.row(first + i)} has {len(fields)} field(s); expected "
                 f"{width}, as many as the header{hint}"
             )
-    is_plain = layout.decimal == "." and not any("_" in line for line in lines)
-    texts = dict(zip(table.header, zip(*rows, strict=True), strict=True))
+    is_plain = not any("_" in line for line in lines)  # Python's numbers may hold underscores
+    columns = dict(zip(table.header, zip(*rows, strict=True), strict=True))
     for column, values in zip(wanted, out, strict=True):
+        texts: Sequence[str] = columns[column]
+        if layout.decimal == ",":
+            texts = "\n".join(texts).translate(_POINTS).split("\n")
         with suppress(ValueError):
             if is_plain:  # as Python reads numbers, which is quick
-                values[:] = [float(text or "nan") for text in texts[column]]
+                values[:] = [float(text or "nan") for text in texts]
                 continue
-        numbers = [layout.number(text) for text in texts[column]]
+        texts = [text.strip() for text in columns[column]]
+        numbers = list(map(layout.number, texts))
         if None in numbers:
             i = numbers.index(None)
             raise InputError(
                 f"{table.path}: column {column}, {table.row(first + i)}: "
-                f"{texts[column][i][:100]!r} is not a number; expected a decimal number"
+                f"{texts[i][:100]!r} is not a number; expected a decimal number"
             )
         values[:] = numbers

@@ -2,7 +2,8 @@
 
 Each message begins with A3 95 and its type's number. Type 128, FMT, states of a type its number,
 its length, its name, and the letters and names of its columns. pymavlink reads it, too: as Python
-objects, one by one, with a printed line for each byte that is damaged, and with 100 MB of disk.
+objects, one by one, in 14 times the time, with a printed line for each byte that is damaged, and
+with 100 MB of disk.
 Here compiled code goes through a file, first to count and then to note the places of the messages
 that are wanted, and their columns are read at once, so that any file costs a bounded time.
 
