@@ -15,7 +15,6 @@ from .effects.base import (
     ROTATION,
     ROTOR_SPEED,
     ROTOR_THRUST,
-    STATE_SIZE,
     TIME,
     VELOCITY,
     VOLTAGE,
@@ -272,16 +271,3 @@ def fill_state(
         state[ROTOR_THRUST + i] = body.k[i] * rotor_speeds[i] * rotor_speeds[i]
     state[VOLTAGE] = voltage
     state[TIME] = time
-
-
-__all__ = [
-    "BODY",
-    "LONG_TURN",
-    "STATE_SIZE",
-    "accelerations",
-    "body_record",
-    "effect_wrench",
-    "fill_state",
-    "gyroscopic_rest",
-    "rotor_wrench",
-]

@@ -33,11 +33,11 @@ _MOST_POWERS = 6  # coefficients of a motor curve
 
 
 def _must(hold: Callable[[Any], bool], words: str) -> AfterValidator:
-    """Return a validator of an array that refuses what does not hold."""
+    """Return a validator of numbers that refuses those for which something does not hold."""
 
-    def check(value: Array) -> Array:
+    def check(value: Any) -> Any:
         if not hold(value):
-            raise ValueError(f"must be {words}, got {value.tolist()}")
+            raise ValueError(f"must be {words}, got {np.asarray(value).tolist()}")
         return value
 
     return AfterValidator(check)
@@ -54,12 +54,6 @@ def _full_thrust(value: tuple[float, ...]) -> tuple[float, ...]:
             f"at the full command, the sum of its coefficients, is {sum(value):g} N; expected a "
             "positive one"
         )
-    return value
-
-
-def _rising(value: tuple[float, float]) -> tuple[float, float]:
-    if not value[0] < value[1]:
-        raise ValueError("falls")
     return value
 
 
@@ -92,10 +86,7 @@ InertiaMatrix = Annotated[
 TurningSense = Annotated[
     Array,
     numbers(4),
-    _must(
-        lambda x: np.all(np.isin(x, (-1.0, 1.0))),
-        "four times 1 or -1 (turning sense about body +z)",
-    ),
+    _must(lambda x: np.all(abs(x) == 1.0), "four times 1 or -1 (turning sense about body +z)"),
 ]
 NotNegative = Annotated[Number, Field(ge=0.0), expected("a number that is not negative")]
 Share = Annotated[Number, Field(ge=0.0, lt=1.0), expected("a share, from 0 to below 1")]
@@ -143,7 +134,7 @@ class MotorCurve:
     voltage_exponent: Number = 0.0
     command: Annotated[
         tuple[Number, Number],
-        AfterValidator(_rising),
+        _must(lambda ends: ends[0] < ends[1], "rising"),
         expected("the raw command at u = 0 and a larger one at u = 1"),
     ] = (0.0, 1.0)
 

@@ -3,10 +3,10 @@ much less than whom.
 """
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from ..envs.plant import TICK
@@ -16,6 +16,7 @@ from .fig5_flights import FLIGHTS, NOISES, Array
 
 _NOISE_COLOURS = {"low": SERIES[0], "high": SERIES[1]}
 _MARKERS = {"hover": "o", "yawing": "^"}
+_KINDS = tuple(product(NOISES, FLIGHTS))
 _LINES = {
     "observer low": (SERIES[1], "observer, tuned at low noise"),
     "observer anew": (SERIES[4], "observer, re-tuned"),
@@ -93,16 +94,11 @@ def _draw_ratios(
         axes.set_xlim(lowest, highest)
         axes.axvspan(lowest, 1.0, color=HELD_OUT, lw=0)
         axes.axvline(1.0, color="black", lw=0.9)
-        for i, label in enumerate(labels):
-            _draw_pair(
-                axes,
-                i,
-                {
-                    key[1:3]: value
-                    for key, value in ratios.items()
-                    if key[0] == plant and key[3:] == (label, error)
-                },
-            )
+        for (i, label), (k, (noise, flight)) in product(enumerate(labels), enumerate(_KINDS)):
+            value, low, high = ratios[plant, flight, noise, label, error]
+            y, colour = i + 0.17 * (k - 1.5), _NOISE_COLOURS[noise]
+            axes.plot([low, high], [y, y], color=colour, lw=1.8)
+            axes.plot(value, y, _MARKERS[flight], color=colour, ms=5)
         axes.set_ylim(len(labels) - 0.45, -0.55)
         only_ticks(axes.xaxis, [v for v in (0.1, 0.2, 0.5, 1, 2, 5, 10) if lowest < v < highest])
         title = error.replace("_", ", ") + (" state" if "steady" in error else "")
@@ -110,24 +106,7 @@ def _draw_ratios(
         axes.grid(axis="x", color="0.9", lw=0.6)
         axes.set_axisbelow(True)
     panels[0].set_yticks(range(len(labels)), labels)
-    for noise in NOISES:
-        for flight in FLIGHTS:
-            panels[-1].plot(
-                [],
-                [],
-                _MARKERS[flight],
-                color=_NOISE_COLOURS[noise],
-                label=f"{noise} noise, {flight}",
-            )
+    for noise, flight in _KINDS:
+        label = f"{noise} noise, {flight}"
+        panels[-1].plot([], [], _MARKERS[flight], color=_NOISE_COLOURS[noise], label=label)
     figure.legend(*panels[-1].get_legend_handles_labels(), loc="outside lower center", ncols=4)
-
-
-def _draw_pair(
-    axes: Axes, row: int, values: Mapping[tuple[str, str], tuple[float, float, float]]
-) -> None:
-    """Draw a pair's four ratios, (flight, noise) -> ratio and interval, one below the other."""
-    for k, (noise, flight) in enumerate((n, f) for n in NOISES for f in FLIGHTS):
-        value, low, high = values[flight, noise]
-        y = row + 0.17 * (k - 1.5)
-        axes.plot([low, high], [y, y], color=_NOISE_COLOURS[noise], lw=1.8)
-        axes.plot(value, y, _MARKERS[flight], color=_NOISE_COLOURS[noise], ms=5)

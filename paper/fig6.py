@@ -7,8 +7,7 @@ also knows the truth.
 """
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,10 +35,9 @@ RADII = (0.35, 0.45, 0.55)  # m, of fans: the chosen one, and to either side of 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Hovers:
-    """The hovers of one flight, in order; wrenches are force (N) and torque (Nm) in the world
-    frame.
+class Hovers(NamedTuple):
+    """The hovers of one flight, in order, or of several (seeds, ...); wrenches are force (N) and
+    torque (Nm) in the world frame.
     """
 
     points: Array  # (n, 2) m, where they should be
@@ -98,15 +96,9 @@ def grid_points() -> Array:
 
 
 def as_map(points: Array, values: Array) -> Array:
-    """Return values (n,) in the order of flight as a map (x, y)."""
+    """Return values (..., n) in the order of flight as maps (..., x, y)."""
     order = np.lexsort((points[:, 1], points[:, 0]))
-    grid: Array = values[order].reshape(len(GRID_X), len(GRID_Y))
-    return grid
-
-
-def _as_maps(points: Array, wrenches: Array) -> Array:
-    """Return wrenches (seeds, n, 6) in the order of flight as maps (seeds, 6, x, y)."""
-    return np.array([[as_map(points, flight[:, i]) for i in range(6)] for flight in wrenches])
+    return values[..., order].reshape(*values.shape[:-1], len(GRID_X), len(GRID_Y))
 
 
 def odd_share(values: Array) -> float:
@@ -149,63 +141,55 @@ def run(seeds: int, progress: Progress) -> Result:
         raise InputError(f"fig6: needs at least one seed, got {seeds}")
     fan, vehicle = Fan(), load_vehicle("ardrone2")
     points, line = grid_points(), np.stack([np.full(len(PROFILE_Y), PROFILE_X), PROFILE_Y], axis=1)
-    maps, profiles = [], []
+    flown: tuple[list[Hovers], list[Hovers]] = ([], [])
     for seed in range(seeds):
-        maps.append(fly_points(points, seed))
+        flown[0].append(fly_points(points, seed))
         progress((seed + 0.6) / seeds)
-        profiles.append(fly_points(line, 1000 + seed))
+        flown[1].append(fly_points(line, 1000 + seed))
         progress((seed + 1.0) / seeds)
+    maps, profiles = (Hovers(*map(np.array, zip(*some, strict=True))) for some in flown)
     calm_map, calm_line = calm_jet(fan, vehicle, *points.T), calm_jet(fan, vehicle, *line.T)
     # which points count as jet is the fan's matter and must not depend on the noise of a flight
     inside = np.linalg.norm(calm_map[:, :3], axis=1) > JET_FORCE
-    estimate, truth, jet = (
-        np.array([getattr(m, name) for m in maps]) for name in ("estimate", "truth", "jet")
-    )
-    profile, profile_truth = (
-        np.array([p.estimate for p in profiles]),
-        np.array([p.truth for p in profiles]),
-    )
-    traces = np.array([m.traces[inside] for m in maps])  # (seeds, n, 2, 2, ticks)
+    estimate, truth, traces = (x[:, inside] for x in (maps.estimate, maps.truth, maps.traces))
     middle = int(np.argmin(np.abs(PROFILE_Y)))
-    at, size = peak(PROFILE_Y, profile[:, :, 5].mean(axis=0))
+    at, size = peak(PROFILE_Y, profiles.estimate[:, :, 5].mean(axis=0))
     calm_size, calm_at = strongest_torque(fan, vehicle, PROFILE_X)
     peaks = {r: strongest_torque(Fan(radius=r), vehicle, PROFILE_X)[1] for r in RADII}
-    torque_map = as_map(points, estimate[:, :, 5].mean(axis=0))
+    felt_map, true_map = (as_map(points, np.moveaxis(x, 2, 1)) for x in (maps.estimate, maps.truth))
+    mean_map = felt_map.mean(axis=0)
     figures: dict[str, Any] = {"seeds": seeds, "points_in_jet": int(inside.sum())}
     for trace, (axis, name, unit) in enumerate(((0, "force_x", "N"), (5, "torque_z", "Nm"))):
-        felt = estimate[:, inside, axis]
+        felt, true = estimate[..., axis], truth[..., axis]
+        shown, really = traces[:, :, trace, 0], traces[:, :, trace, 1]
         figures |= {
-            f"correlation_{name}": _correlation(felt, truth[:, inside, axis]),
-            f"correlation_{name}_with_jet_alone": _correlation(felt, jet[:, inside, axis]),
-            f"correlation_{name}_200hz": _correlation(
-                traces[:, :, trace, 0], traces[:, :, trace, 1]
-            ),
-            f"error_rms_{name}_{unit}": _rms(felt - truth[:, inside, axis]),
+            f"correlation_{name}": _correlation(felt, true),
+            f"correlation_{name}_with_jet_alone": _correlation(felt, maps.jet[:, inside, axis]),
+            f"correlation_{name}_200hz": _correlation(shown, really),
+            f"error_rms_{name}_{unit}": _rms(felt - true),
             f"error_rms_{name}_to_mean_jet_{unit}": _rms(felt - calm_map[inside, axis]),
         }
     figures |= {
-        "torque_z_antisymmetry": odd_share(torque_map),
-        "force_x_symmetry": 1.0 - odd_share(as_map(points, estimate[:, :, 0].mean(axis=0))),
+        "torque_z_antisymmetry": odd_share(mean_map[5]),
+        "force_x_symmetry": 1.0 - odd_share(mean_map[0]),
         "profile_torque_peak_offset_m": at,
         "profile_torque_peak_Nm": size,
         "true_jet_torque_peak_offset_m": calm_at,
         "true_jet_torque_peak_Nm": calm_size,
         "true_jet_torque_peak_offset_m_by_fan_radius": {f"{r:g}": at for r, at in peaks.items()},
-        "map_largest_torque_Nm": float(np.abs(torque_map).max()),
-        "profile_force_x_on_axis_N": float(profile[:, middle, 0].mean()),
-        "true_force_x_on_axis_N": float(profile_truth[:, middle, 0].mean()),
-        "hover_offset_rms_m": _rms(
-            np.concatenate([np.linalg.norm(m.position[:, :2] - m.points, axis=1) for m in maps])
-        ),
+        "map_largest_torque_Nm": float(np.abs(mean_map[5]).max()),
+        "profile_force_x_on_axis_N": float(profiles.estimate[:, middle, 0].mean()),
+        "true_force_x_on_axis_N": float(profiles.truth[:, middle, 0].mean()),
+        "hover_offset_rms_m": _rms(np.linalg.norm(maps.position[..., :2] - maps.points, axis=2)),
     }
     picture = draw_map(
         GRID_X,
         GRID_Y,
-        _as_maps(points, estimate),
-        _as_maps(points, truth),
+        felt_map,
+        true_map,
         PROFILE_Y,
-        profile,
-        profile_truth,
+        profiles.estimate,
+        profiles.truth,
         calm_line,
         inside=as_map(points, inside.astype(np.float64)) > 0,
         correlations=(figures["correlation_force_x"], figures["correlation_torque_z"]),
@@ -213,9 +197,7 @@ def run(seeds: int, progress: Progress) -> Result:
     comparison, remarks = compared(
         "fig6", globals(), f=figures, radius=fan.radius, peaks=peaks, points=len(points)
     )
-    return Result(
-        figures, _columns(maps, profiles, calm_map, calm_line), picture, comparison, remarks
-    )
+    return Result(figures, _columns(*flown, calm_map, calm_line), picture, comparison, remarks)
 
 
 def _columns(

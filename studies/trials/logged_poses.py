@@ -101,6 +101,16 @@ IMU = ImuNoise()
 POSITION_HZ = 10.0
 
 
+def pose_removed(log: FlightLog, position_every: int = 0) -> FlightLog:
+    """Return a log without its pose, or with each so many-th position alone."""
+    count = len(log.t)
+    position = np.full((count, 3), np.nan)
+    if position_every:
+        position[::position_every] = log.position[::position_every]
+    none, nothing = np.full((count, 4), np.nan), np.zeros(count, dtype=np.bool_)
+    return replace(log, position=position, quaternion=none, valid=nothing)
+
+
 def without_pose(
     log: FlightLog, seed: int = 0, position_hz: float = 0.0, noise: ImuNoise = IMU
 ) -> FlightLog:
@@ -108,22 +118,15 @@ def without_pose(
     alone, ``position_hz`` of them a second, or with no pose at all.
     """
     rng = np.random.default_rng((seed, 7))
-    count = len(log.t)
 
     def read(true: np.ndarray | None, std: float, bias: float) -> np.ndarray:
         assert true is not None
         off = bias * rng.standard_normal(3)
-        return np.asarray(true + off + std * rng.standard_normal((count, 3)))
+        return np.asarray(true + off + std * rng.standard_normal((len(log.t), 3)))
 
-    position = np.full((count, 3), np.nan)
-    if position_hz > 0.0:
-        every = round(1.0 / (position_hz * log.period))
-        position[::every] = log.position[::every]
+    every = round(1.0 / (position_hz * log.period)) if position_hz > 0.0 else 0
     return replace(
-        log,
-        position=position,
-        quaternion=np.full((count, 4), np.nan),
-        valid=np.zeros(count, dtype=np.bool_),
+        pose_removed(log, every),
         gyro=read(log.gyro, noise.gyro, noise.gyro_bias),
         accelerometer=read(log.accelerometer, noise.accelerometer, noise.accelerometer_bias),
     )

@@ -30,12 +30,14 @@ VEHICLE = load_vehicle("ardrone2")
 
 
 @pytest.mark.parametrize("name", preset_names())
-def test_presets_load_and_can_hover(name):
+def test_presets_load_can_hover_and_survive_dumping(name):
     vehicle = load_vehicle(name)
     assert vehicle.name == name
     wrench = vehicle.rotor_wrench(np.full(4, vehicle.hover_rate))
     np.testing.assert_allclose(wrench, [vehicle.weight, 0, 0, 0], atol=1e-9)
     assert 1.5 * vehicle.hover_rate < vehicle.omega_max
+    text = dump_vehicle(vehicle)
+    assert dump_vehicle(parse_vehicle(text)) == text
 
 
 def test_the_measured_flights_vehicle_loads():
@@ -90,12 +92,6 @@ def test_a_saved_vehicle_is_the_vehicle_again(tmp_path):
     assert [p.name for p in path.parent.iterdir()] == ["vehicle.yaml"]
     with pytest.raises(InputError, match=r"vehicle\.yaml.*cannot be written"):
         save_vehicle(vehicle, path / "vehicle.yaml")
-
-
-@pytest.mark.parametrize("name", preset_names())
-def test_presets_survive_dumping(name):
-    text = dump_vehicle(load_vehicle(name))
-    assert dump_vehicle(parse_vehicle(text)) == text
 
 
 def test_a_measured_vehicle_has_the_digits_that_are_known():

@@ -6,6 +6,9 @@ import numpy as np
 
 from windwrench.envs.recording import background, record_flight
 from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.studies.trials.logged_poses import pose_removed
+
+__all__ = ["imu_flight", "pose_removed"]
 
 
 def imu_flight(vehicle, effects=(), seconds=20.0, trajectory="excite", seed=1, turbulence=0.0):
@@ -20,18 +23,4 @@ def imu_flight(vehicle, effects=(), seconds=20.0, trajectory="excite", seed=1, t
         log,
         accelerometer=log.accelerometer + 0.1 * noise[0] + [0.05, -0.1, 0.08],
         gyro=log.gyro + 0.005 * noise[1] + [0.01, -0.005, 0.008],
-    )
-
-
-def pose_removed(log, position_every=0):
-    """The log without its pose, or with each so many-th position alone."""
-    count = len(log.t)
-    position = np.full((count, 3), np.nan)
-    if position_every:
-        position[::position_every] = log.position[::position_every]
-    return replace(
-        log,
-        position=position,
-        quaternion=np.full((count, 4), np.nan),
-        valid=np.zeros(count, dtype=np.bool_),
     )
