@@ -12,10 +12,10 @@ from ...dynamics.vehicle import EffectSetting, Mocap, MotorCurve, Uncertainty, V
 from ..logs.flight_log import FlightLog
 from ..motion.sensor_noise import sensor_noise
 from .effect_settings import effect_of, estimate_name
-from .estimates import AIR
 from .geometry import USUAL, Geometry
 from .model import inertia_of
 from .motors import MotorResponse
+from .parameters import FURTHER
 from .result import ASSUMED, IDENTIFIED, NOTHING, Estimate
 from .solve import VehicleFit
 
@@ -124,7 +124,7 @@ def _shown(estimate: Estimate | None) -> float:
 
 def _effects(estimates: Mapping[str, Estimate]) -> Sequence[EffectSetting]:
     out = []
-    for role in dict.fromkeys(role for role, *_ in AIR.values()):
+    for role in dict.fromkeys(further.role for further in FURTHER.values() if further.role):
         effect = effect_of(role)
         coefficients = {}
         for i, c in enumerate(get(effect).coefficients):
