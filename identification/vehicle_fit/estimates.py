@@ -15,7 +15,7 @@ from .channels import MotionPiece, Sources
 from .effect_settings import effect_of, estimate_name
 from .geometry import USUAL, Geometry
 from .parameters import FURTHER
-from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, Hidden, told
+from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, told
 from .solve import Function, Interval, Values, VehicleFit
 
 UNKNOWN: Interval = (math.nan, math.nan, math.nan)
@@ -34,7 +34,7 @@ class Estimates:
     sources: Sources
     geometry: Geometry
     kept: Mapping[str, str]  # further effects that show, and why one is not to be believed
-    hidden: Hidden | None  # the moment of velocity where it does not show
+    hidden: Interval | None  # moment of velocity that does not show: value, deviation, what would
     doubt: str  # why nothing is to be believed that torque says; empty where it is
     said: dict[str, Estimate] = field(default_factory=dict)
     arm: float = 1.0  # m for each unit of the rotors' positions
@@ -269,8 +269,8 @@ class Estimates:
                 self._say(estimate_name(effect.role, index), known, unit, how, doubt=why)
         if self.hidden:
             role = Role.FLAPPING_MOMENT
-            value, least = self.arm * self.hidden.value, self.arm * self.hidden.least
-            wide = self.arm * self.fit.width * self.hidden.deviation
+            value, deviation, least = (self.arm * x for x in self.hidden)
+            wide = self.fit.width * deviation
             why = self.doubt or (
                 f"moments that nothing measures hide it: it would show from {least:.2g} on. Fly "
                 "faster to and fro, and longer"

@@ -28,8 +28,8 @@ from .geometry import SPIN, Geometry
 from .held_out import predicted, torque_refuted, warnings_of
 from .motors import motor_response
 from .parameters import FORCE_BIAS, FURTHER, first_model
-from .result import IDENTIFIED, NOTHING, Estimate, Hidden, Identified, told
-from .solve import VehicleFit, score_tests, solve
+from .result import IDENTIFIED, NOTHING, Estimate, Identified, told
+from .solve import Interval, VehicleFit, score_tests, solve
 from .spectra import SPECTRUM
 
 Array = NDArray[np.float64]
@@ -93,8 +93,9 @@ def identify(
     report(0.05, "fitting forces and torques")
     fit, turned = _first_fit(pieces, sources, drive, mass)
     report(0.4, "asking whether slow and quick motion agree")
-    fit = _agreeing(pieces, fit)
+    fit, doubt = _agreeing(pieces, fit), ""
     if fit.drive.band < SPECTRUM.band:
+        doubt = "quick motion contradicts slow motion in these logs"
         notes.append(
             f"warning: above {fit.drive.band:g} Hz these logs contradict what they say below, as "
             "logs do that were smoothed before they were written, or whose rotor speeds are noisy: "
@@ -110,9 +111,6 @@ def identify(
             "what is quicker"
         )
     report(0.8, "asking what can be told")
-    doubt = ""
-    if fit.drive.band < SPECTRUM.band:
-        doubt = "quick motion contradicts slow motion in these logs"
     if turned:
         notes.append(
             "yaw turns against the usual turning senses of the rotors (front-left clockwise from "
@@ -138,12 +136,10 @@ def identify(
     notes += warnings_of(errors)
     named, vehicle = described(fit, doubt or torque_refuted(errors))
     if "lag" in fit.model.free:
-        named |= {alone.name: alone for alone in [_lag_alone(pieces, fit)]}
+        named["lag without offset"] = _lag_alone(pieces, fit)
     if motors is not None:
-        how = (
-            f"rotor speeds against commands, {100 * motors.left:.0f} % of their variation left over"
-        )
-        lag = effect_of(Role.LAG)
+        lag, left = effect_of(Role.LAG), f"{100 * motors.left:.0f} % of their variation left over"
+        how = f"rotor speeds against commands, {left}"
         named[lag] = Estimate(lag, *motors.known, "s", IDENTIFIED, how)
     return Identified(
         vehicle,
@@ -258,10 +254,10 @@ def _frequencies(fit: VehicleFit) -> float:
 
 def _with_optional(
     pieces: list[MotionPiece], fit: VehicleFit, sources: Sources
-) -> tuple[VehicleFit, dict[str, str], Hidden | None]:
+) -> tuple[VehicleFit, dict[str, str], Interval | None]:
     """Return a fit with those further effects that make the logs much likelier, the one that makes
     them likeliest first, lest another stands for it; which, and why one is not to be believed; and
-    the moment of velocity where it does not show.
+    of a moment of velocity that does not show the value, its standard deviation, and what would.
     """
     moving = "linear drag x" in fit.balance.names  # is there a velocity?
     offered = {
@@ -281,7 +277,7 @@ def _with_optional(
         if falls[name] <= 0.0:
             if "flapping" in tests:
                 _, (value,), (size,) = tests["flapping"]
-                hidden = Hidden(value, size, math.sqrt(_least_fall(fit, "flapping")) * size)
+                hidden = value, size, math.sqrt(_least_fall(fit, "flapping")) * size
             break
         richer = solve(pieces, fit.drive, *fit.model.with_more(fit.theta, *offered.pop(name)))
         asked = [FURTHER[n] for n in (*kept, name)]

@@ -108,7 +108,8 @@ def solve(pieces: list[MotionPiece], drive: Drive, model: Model, start: Array) -
     theta = start.copy()
 
     def linear() -> BalanceSpectra:
-        return balance(pieces, drive.at(model.values(theta)), model.nonlinear)
+        here = {n: float(theta[model.free.index(n)]) for n in model.nonlinear}
+        return balance(pieces, replace(drive, **here), model.nonlinear)
 
     made = linear()
     powers = [np.mean(np.abs(s.columns[:, :, :6]) ** 2, axis=0) for s in made.segments]
