@@ -12,10 +12,10 @@ from ...dynamics.vehicle import EffectSetting, Mocap, MotorCurve, Uncertainty, V
 from ..logs.flight_log import FlightLog
 from ..motion.sensor_noise import sensor_noise
 from .effect_settings import effect_of, estimate_name
-from .estimates import AIR
 from .geometry import USUAL, Geometry
 from .model import inertia_of
 from .motors import MotorResponse
+from .parameters import FURTHER
 from .result import ASSUMED, IDENTIFIED, NOTHING, Estimate
 from .solve import VehicleFit
 
@@ -46,14 +46,15 @@ def vehicle_of(
         if motors is not None:  # thrust against command by way of the speed
             steady = np.polynomial.polynomial.polypow(motors.speed, 2)
             curve = MotorCurve(tuple(k * steady))
-    late = "lag" in fit.model.free
-    of_lag = effect_of(Role.LAG)
+    late, of_lag = "lag" in fit.model.free, effect_of(Role.LAG)
     if late:
         value = estimates[of_lag].value
         effects.append(EffectSetting(of_lag, {get(of_lag).coefficients[0].name: value}))
     moments = {f"J{a}": estimates[f"J{a}{a}"].value for a in "xyz"}
     products = {n: _shown(estimates.get(n)) for n in ("Jxy", "Jxz", "Jyz")}
     com = np.array([_shown(estimates.get(f"com {a}")) for a in "xyz"])
+    size = np.abs(geometry.positions[:, :2])
+    uneven = geometry.known and (np.ptp(size) > 1e-9 or np.any(geometry.positions[:, 2] != 0.0))
     vehicle = Vehicle(
         name=name,
         mass=fit.model.mass,
@@ -66,25 +67,18 @@ def vehicle_of(
         omega_source="commanded" if late else "measured",
         voltage_ref=voltage,
         spin=fit.drive.spin.copy(),
-        rotor_positions=geometry.positions if geometry.known and _uneven(geometry) else None,
+        rotor_positions=geometry.positions if uneven else None,
         com=com,
         effects=tuple(effects),
         motor_curve=curve,
         uncertainty=_uncertainty(estimates, arm, curve is not None),
     )
-    posed = [log for log in logs if log.has_pose]
-    if not posed:
+    posed = next((log for log in logs if log.has_pose), None)
+    if posed is None:
         return vehicle
-    noise = sensor_noise(posed[0], vehicle)
-    seen = posed[0].t[posed[0].valid]
-    return replace(
-        vehicle,
-        mocap=Mocap(
-            float(1.0 / np.median(np.diff(seen))),
-            max(noise.position, 1e-5),
-            max(noise.attitude, 1e-4),
-        ),
-    )
+    noise, rate = sensor_noise(posed, vehicle), 1.0 / np.median(np.diff(posed.t[posed.valid]))
+    mocap = Mocap(float(rate), max(noise.position, 1e-5), max(noise.attitude, 1e-4))
+    return replace(vehicle, mocap=mocap)
 
 
 def _uncertainty(estimates: Mapping[str, Estimate], arm: float, commands: bool) -> Uncertainty:
@@ -110,11 +104,6 @@ def _uncertainty(estimates: Mapping[str, Estimate], arm: float, commands: bool) 
     )
 
 
-def _uneven(geometry: Geometry) -> bool:
-    size = np.abs(geometry.positions[:, :2])
-    return bool(np.ptp(size) > 1e-9 or np.any(geometry.positions[:, 2] != 0.0))
-
-
 def _shown(estimate: Estimate | None) -> float:
     """Return a value whose interval leaves nothing out; else nothing."""
     if estimate is None or estimate.status != IDENTIFIED or estimate.low < 0.0 < estimate.high:
@@ -124,7 +113,7 @@ def _shown(estimate: Estimate | None) -> float:
 
 def _effects(estimates: Mapping[str, Estimate]) -> Sequence[EffectSetting]:
     out = []
-    for role in dict.fromkeys(role for role, *_ in AIR.values()):
+    for role in dict.fromkeys(further.role for further in FURTHER.values() if further.role):
         effect = effect_of(role)
         coefficients = {}
         for i, c in enumerate(get(effect).coefficients):
@@ -149,20 +138,15 @@ def _curve(fit: VehicleFit, exponent: Estimate) -> MotorCurve:
 
 def advice_of(estimates: Mapping[str, Estimate]) -> list[str]:
     """Return what to fly, or to give, where the logs say too little."""
-    turning = {
-        "Jxx": "Fly quick roll movements for 20 s: they show Jxx.",
-        "Jyy": "Fly quick pitch movements for 20 s: they show Jyy.",
-        "Jzz": "Yaw at 1 to 2 rad/s while moving to and fro in roll and pitch for 20 s: the "
-        "gyroscopic torque shows Jzz, and with it p.",
-    }
-    if estimates["arm_l"].status == ASSUMED:
-        give = "Give --geometry, the rotors' distance from the body axes: inertia follows."
-        turning = {"arm_l": give}
     lag = effect_of(Role.LAG)
     climb = "Climb hard and let the vehicle sink: the thrust curve is known where it flew."
     brisk = "Climb and sink briskly: thrust that changes shows the centre of mass."
     advice = {
-        **turning,
+        "arm_l": "Give --geometry, the rotors' distance from the body axes: inertia follows.",
+        "Jxx": "Fly quick roll movements for 20 s: they show Jxx.",
+        "Jyy": "Fly quick pitch movements for 20 s: they show Jyy.",
+        "Jzz": "Yaw at 1 to 2 rad/s while moving to and fro in roll and pitch for 20 s: the "
+        "gyroscopic torque shows Jzz, and with it p.",
         "(p/k)/Jzz": "Turn quickly to the left and to the right: it shows p/k over Jzz.",
         lag: "Climb, roll and pitch in quick steps: they tell a motor's lag from a time offset.",
         "thrust(0.75)": climb,
@@ -173,13 +157,12 @@ def advice_of(estimates: Mapping[str, Estimate]) -> list[str]:
         "com y": brisk,
         "drag": "Fly to and fro at 2 m/s and more along both body axes: it shows drag.",
     }
-    if lag in estimates and math.isnan(estimates[lag].value):
-        advice[lag] = "Log the motor commands beside the rotor speeds: together they show the lag."
-    if "drag" in estimates and math.isnan(estimates["drag"].value):
-        advice["drag"] = "Log the position: drag needs a velocity."
-    needed = [
-        text
-        for name, text in advice.items()
-        if name in estimates and estimates[name].status in (ASSUMED, NOTHING)
-    ]
-    return list(dict.fromkeys(needed))
+    unmeasured = {
+        lag: "Log the motor commands beside the rotor speeds: together they show the lag.",
+        "drag": "Log the position: drag needs a velocity.",
+    }
+    if estimates["arm_l"].status == ASSUMED:  # and inertia with it
+        advice = {n: text for n, text in advice.items() if n not in ("Jxx", "Jyy", "Jzz")}
+    open_ones = [n for n in advice if n in estimates and estimates[n].status in (ASSUMED, NOTHING)]
+    nothing = [n for n in open_ones if n in unmeasured and math.isnan(estimates[n].value)]
+    return list(dict.fromkeys((unmeasured if n in nothing else advice)[n] for n in open_ones))

@@ -8,16 +8,13 @@ too. Forward velocity goes with pitch rate, so that the moment of lift while yaw
 gyroscopic one, from which ``Jz`` is told.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..motion.smoothing import derivative, lagged, low_pass
 from .channels import MotionPiece
-from .model import NONLINEAR
 from .spectra import SPECTRUM, Complex, Segment, segments_of
 
 Array = NDArray[np.float64]
@@ -45,11 +42,6 @@ class Drive:
     band: float = SPECTRUM.band  # Hz, up to which force and turning are compared
     # rad/s, standard deviation of one measured speed; of those behind a lag nothing is known
     speed_noise: float = 0.0
-
-    def at(self, values: Mapping[str, float]) -> "Drive":
-        """Return the drive with the lag, time offset and exponent among some values."""
-        changed: dict[str, Any] = {name: values[name] for name in NONLINEAR if name in values}
-        return replace(self, **changed)
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,15 +21,15 @@ from ..logs.flight_log import FlightLog
 from ..prediction import PredictionErrors
 from .assemble import advice_of, vehicle_of
 from .channels import MotionPiece, Sources, pieces_of, rounding_step, speed_noise
-from .columns import ANSWERED_HZ, Drive
+from .columns import ANSWERED_HZ, Drive, balance
 from .effect_settings import effect_of
-from .estimates import Estimates, Intervals, thrust_of
-from .geometry import SPIN, USUAL, Geometry
+from .estimates import Estimates, thrust_of
+from .geometry import SPIN, Geometry
 from .held_out import predicted, torque_refuted, warnings_of
 from .motors import motor_response
-from .parameters import ANSWERED, FORCE_BIAS, OPTIONAL, POSITIVE, first_model
-from .result import IDENTIFIED, NOTHING, WIDEST, Estimate, Hidden, Identified, told
-from .solve import VehicleFit, lag_with, score_tests, solve
+from .parameters import FORCE_BIAS, FURTHER, first_model
+from .result import IDENTIFIED, NOTHING, Estimate, Identified, told
+from .solve import Interval, VehicleFit, score_tests, solve
 from .spectra import SPECTRUM
 
 Array = NDArray[np.float64]
@@ -93,8 +93,9 @@ def identify(
     report(0.05, "fitting forces and torques")
     fit, turned = _first_fit(pieces, sources, drive, mass)
     report(0.4, "asking whether slow and quick motion agree")
-    fit = _agreeing(pieces, fit)
+    fit, doubt = _agreeing(pieces, fit), ""
     if fit.drive.band < SPECTRUM.band:
+        doubt = "quick motion contradicts slow motion in these logs"
         notes.append(
             f"warning: above {fit.drive.band:g} Hz these logs contradict what they say below, as "
             "logs do that were smoothed before they were written, or whose rotor speeds are noisy: "
@@ -110,9 +111,6 @@ def identify(
             "what is quicker"
         )
     report(0.8, "asking what can be told")
-    doubt = ""
-    if fit.drive.band < SPECTRUM.band:
-        doubt = "quick motion contradicts slow motion in these logs"
     if turned:
         notes.append(
             "yaw turns against the usual turning senses of the rotors (front-left clockwise from "
@@ -126,8 +124,7 @@ def identify(
     motors = None if commands or "lag" in fit.model.free else motor_response(pieces)
 
     def described(part: VehicleFit, doubt: str) -> tuple[dict[str, Estimate], Vehicle]:
-        said = Estimates(part, sources, geometry, kept, hidden, doubt)
-        named = {e.name: e for e in said.say_all(pieces, _not_told(fit, geometry, doubt))}
+        named = Estimates(part, sources, geometry, kept, hidden, doubt).say_all(pieces)
         return named, vehicle_of(name, part, named, geometry, logs, voltage, step, motors)
 
     report(0.9, "predicting what is held out")
@@ -139,12 +136,10 @@ def identify(
     notes += warnings_of(errors)
     named, vehicle = described(fit, doubt or torque_refuted(errors))
     if "lag" in fit.model.free:
-        named |= {alone.name: alone for alone in [_lag_alone(pieces, fit)]}
+        named["lag without offset"] = _lag_alone(pieces, fit)
     if motors is not None:
-        how = (
-            f"rotor speeds against commands, {100 * motors.left:.0f} % of their variation left over"
-        )
-        lag = effect_of(Role.LAG)
+        lag, left = effect_of(Role.LAG), f"{100 * motors.left:.0f} % of their variation left over"
+        how = f"rotor speeds against commands, {left}"
         named[lag] = Estimate(lag, *motors.known, "s", IDENTIFIED, how)
     return Identified(
         vehicle,
@@ -163,7 +158,7 @@ def _lag_alone(pieces: list[MotionPiece], fit: VehicleFit) -> Estimate:
     place = fit.model.free.index("delay")
     model = replace(fit.model, free=(*fit.model.free[:place], *fit.model.free[place + 1 :]))
     alone = solve(pieces, replace(fit.drive, delay=0.0), model, np.delete(fit.theta, place))
-    known = Intervals(alone).of(lambda v: v["lag"])
+    known = alone.interval("lag")
     how = "of a model without a time offset: what other tools call the lag"
     return Estimate("lag without offset", *known, "s", IDENTIFIED if told(known) else NOTHING, how)
 
@@ -186,13 +181,16 @@ def _first_fit(
         model, start, drive, turned = first_model(pieces, sources, drive, mass, ("delay",))
         plain = solve(pieces, drive, model, start)
         # do the logged speeds lead the motion as commands do?
-        if lag_with(pieces, plain) < IDENTIFY.least_lag:
+        late = balance(pieces, replace(plain.drive, speed_noise=0.0), ("delay", "lag"))
+        _, (lag,), (size,) = score_tests(plain, {"lag": ("lag",)}, late)["lag"]
+        if lag < IDENTIFY.least_lag * size:
             return plain, turned
         model, start = model.with_more(plain.theta, "lag")
         start[-1] = IDENTIFY.lags[0]
         other = solve(pieces, drive, model, start)
         enough = IDENTIFY.penalty * math.log(_frequencies(plain))
-        sure = other.drive.lag > IDENTIFY.least_lag * other.deviation("lag")
+        lag, low, _ = other.interval("lag", logarithm=False)
+        sure = lag > IDENTIFY.least_lag * (lag - low) / other.width
         return (other if sure and plain.loss - other.loss > enough else plain), turned
     nonlinear = ("lag", "delay", *(("gamma",) if drive.voltage_ref > 0.0 else ()))
     best: tuple[float, VehicleFit, bool] | None = None
@@ -233,17 +231,14 @@ def _agreeing(pieces: list[MotionPiece], fit: VehicleFit) -> VehicleFit:
 
 def _hover_thrust(fit: VehicleFit) -> tuple[float, float]:
     """Return the thrust at what a hover takes by the fit's own start, as a share of the weight, and
-    its standard deviation.
+    its standard deviation, as a share of it.
     """
-    intervals = Intervals(fit)
     exponents, weight = fit.drive.exponents, fit.model.weight
     # where the start's curve, in which each power carries its share, carries the weight
     scale = fit.model.scale
     u = (weight / (4.0 * scale[f"a{len(exponents) - 1}"])) ** (1.0 / exponents[-1])
-    value, low, high = intervals.of(
-        lambda v: 4.0 * thrust_of(v, exponents, u) / weight, logarithm=False
-    )
-    return value, (high - low) / (2.0 * intervals.width * max(abs(value), 1e-9))
+    value, low, _ = fit.interval(lambda v: 4.0 * thrust_of(v, exponents, u) / weight, False)
+    return value, (value - low) / (fit.width * max(abs(value), 1e-9))
 
 
 def _rises(fit: VehicleFit) -> bool:
@@ -259,22 +254,20 @@ def _frequencies(fit: VehicleFit) -> float:
 
 def _with_optional(
     pieces: list[MotionPiece], fit: VehicleFit, sources: Sources
-) -> tuple[VehicleFit, dict[str, str], Hidden | None]:
+) -> tuple[VehicleFit, dict[str, str], Interval | None]:
     """Return a fit with those further effects that make the logs much likelier, the one that makes
     them likeliest first, lest another stands for it; which, and why one is not to be believed; and
-    the moment of velocity where it does not show.
+    of a moment of velocity that does not show the value, its standard deviation, and what would.
     """
-    offered: dict[str, tuple[str, ...]] = {}
-    for name, parameters in OPTIONAL.items():
-        air = {p for p in parameters if "drag" in p or p == "lift"}
-        air |= {"rotor drag x"} & {"rotor drag x" for p in parameters if p == "flapping"}
-        of_speeds = name in ("rotor drag", "inflow", "flapping")
-        if not air <= set(fit.balance.names) or (fit.drive.commands and of_speeds):
-            continue
+    moving = "linear drag x" in fit.balance.names  # is there a velocity?
+    offered = {
+        name: further.parameters
+        for name, further in FURTHER.items()
+        if (moving or further.role in (None, Role.RATE_DAMPING))
+        and not (fit.drive.commands and further.of_speeds)
         # the noise of a pose goes round the loop: quick torques then follow it, and say nothing
-        if parameters == ANSWERED and sources.rate != "gyro":
-            continue
-        offered[name] = parameters
+        and (name != "answered torque" or sources.rate == "gyro")
+    }
     kept: dict[str, str] = {}
     hidden = None
     while offered:
@@ -284,50 +277,24 @@ def _with_optional(
         if falls[name] <= 0.0:
             if "flapping" in tests:
                 _, (value,), (size,) = tests["flapping"]
-                hidden = Hidden(value, size, math.sqrt(_least_fall(fit, "flapping")) * size)
+                hidden = value, size, math.sqrt(_least_fall(fit, "flapping")) * size
             break
         richer = solve(pieces, fit.drive, *fit.model.with_more(fit.theta, *offered.pop(name)))
-        if all(richer.values[p] > 0.0 for p in richer.model.free if p in POSITIVE):
+        asked = [FURTHER[n] for n in (*kept, name)]
+        if all(richer.values[p] > 0.0 for f in asked if f.positive for p in f.parameters):
             fit = richer
             kept[name] = ""
     # what was taken since it stood out is too large on average where another flight of the same
     # vehicle would not have shown it: where its interval reaches what is not taken
-    width = Intervals(fit).width
     for name in kept:
-        at = [fit.model.free.index(p) for p in OPTIONAL[name]]
+        at = [fit.model.free.index(p) for p in FURTHER[name].parameters]
         theta, covariance = fit.theta[at], fit.covariance[np.ix_(at, at)]
         size = math.sqrt(theta @ np.linalg.solve(covariance, theta))
-        if size < math.sqrt(_least_fall(fit, name)) + width:
+        if size < math.sqrt(_least_fall(fit, name)) + fit.width:
             kept[name] = "it shows, but by so little that what shows is too large on average"
     return fit, kept, hidden
 
 
 def _least_fall(fit: VehicleFit, name: str) -> float:
     """Return by how much twice the negative log-likelihood must fall with a further effect."""
-    return IDENTIFY.penalty * len(OPTIONAL[name]) * math.log(_frequencies(fit))
-
-
-def _not_told(fit: VehicleFit, geometry: Geometry, doubt: str) -> dict[str, tuple[str, float]]:
-    """Return the inertias that the flight does not show: why, and what is usual instead; all of
-    them where there is a doubt about torque.
-
-    Raises:
-        InputError: neither turning nor an arm says how large the vehicle is.
-    """
-    not_told: dict[str, tuple[str, float]] = {}
-    values = fit.values
-    usual = USUAL.gyration * fit.model.mass * geometry.arm**2
-    for axis, motion in (("Jx", "roll"), ("Jy", "pitch")):
-        if doubt or 1.96 * fit.deviation(axis) > WIDEST:
-            not_told[axis] = doubt or f"the flight hardly shows {motion}", usual
-    if not_told and not geometry.known:
-        raise InputError(
-            f"{'; '.join({why: 0 for why, _ in not_told.values()})}, and no arm is given; expected "
-            "--geometry, or a log with quick roll and pitch"
-        )
-    wide = 1.96 * fit.deviation("Jz") > WIDEST
-    if doubt or wide or not 0.3 < values["Jz"] / (values["Jx"] + values["Jy"]) < 1.3:
-        both = sum(not_told.get(axis, ("", values[axis]))[1] for axis in ("Jx", "Jy"))
-        why = doubt or "the flight does not yaw while it rolls or pitches"
-        not_told["Jz"] = why, USUAL.flat * both
-    return not_told
+    return IDENTIFY.penalty * len(FURTHER[name].parameters) * math.log(_frequencies(fit))

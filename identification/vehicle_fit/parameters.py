@@ -3,12 +3,13 @@ squares, axis by axis, in which every coefficient is linear.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
+from ...dynamics.effects import Role
 from ...runtime.errors import InputError
 from .channels import MotionPiece, Sources
 from .columns import Drive, rotor_columns
@@ -35,27 +36,37 @@ BASE = (
     *("turn bias x", "turn bias y", "turn bias z"),
 )
 BIASES = ("force bias x", "force bias y", "force bias z")
-# shares of slow torques that turn nothing, since the flight loop answers with them
-ANSWERED = ("answered x", "answered y", "answered z")
-# of these a negative value is no physics, but another fault of the model
-POSITIVE = (
-    *(f"{kind} {a}" for kind in ("rotor drag", "linear drag", "damping") for a in "xyz"),
-    *("flapping", *ANSWERED),
-)
-# each is added where it makes the logs much likelier
-OPTIONAL: dict[str, tuple[str, ...]] = {
-    "rotor drag": ("rotor drag x", "rotor drag y"),
-    "linear drag": ("linear drag x", "linear drag y"),
-    "quadratic drag": ("quadratic drag x", "quadratic drag y"),
-    "vertical drag": ("linear drag z",),
-    "inflow": ("rotor drag z",),
-    "lift": ("lift",),
-    "answered torque": ANSWERED,
-    "flapping": ("flapping",),
-    "damping x": ("damping x",),
-    "damping y": ("damping y",),
-    "damping z": ("damping z",),
-    "products of inertia": ("Jxy", "Jxz", "Jyz"),
+
+
+@dataclass(frozen=True)
+class Further:
+    """An effect that is fitted where it makes the logs much likelier."""
+
+    parameters: tuple[str, ...]
+    role: Role | None = None  # of the library's effect; None: it is none
+    first: int = 0  # of the effect's coefficients
+    shows: str = ""  # in force along body x and y; or along "z", or in "turning"
+    of_speeds: bool = False  # takes measured rotor speeds
+    positive: bool = True  # a negative value is no physics, but another fault of the model
+
+
+FURTHER: dict[str, Further] = {
+    "rotor drag": Further(("rotor drag x", "rotor drag y"), Role.ROTOR_DRAG, of_speeds=True),
+    "linear drag": Further(("linear drag x", "linear drag y"), Role.BODY_DRAG),
+    "quadratic drag": Further(
+        ("quadratic drag x", "quadratic drag y"), Role.BODY_DRAG, 3, positive=False
+    ),
+    "vertical drag": Further(("linear drag z",), Role.BODY_DRAG, 2),
+    "inflow": Further(("rotor drag z",), Role.INFLOW_THRUST, 0, "z", of_speeds=True),
+    "lift": Further(("lift",), Role.TRANSLATIONAL_LIFT, 0, "z", positive=False),
+    # shares of slow torques that turn nothing, since the flight loop answers with them
+    "answered torque": Further(("answered x", "answered y", "answered z")),
+    **{
+        f"damping {a}": Further((f"damping {a}",), Role.RATE_DAMPING, i, "turning")
+        for i, a in enumerate("xyz")
+    },
+    "flapping": Further(("flapping",), Role.FLAPPING_MOMENT, 0, "turning", of_speeds=True),
+    "products of inertia": Further(("Jxy", "Jxz", "Jyz"), positive=False),
 }
 
 

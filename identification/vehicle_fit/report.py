@@ -39,14 +39,8 @@ def identified_data(found: Identified) -> dict[str, Any]:
         "segments": len(found.fit.balance.segments),
         "channels": found.sources,
         "estimates": [
-            {
-                "name": e.name,
-                "value": e.value,
-                "interval_95": [e.low, e.high],
-                "unit": e.unit,
-                "status": e.status,
-                "how": e.how,
-            }
+            {"name": e.name, "value": e.value, "interval_95": [e.low, e.high]}
+            | {"unit": e.unit, "status": e.status, "how": e.how}
             for e in found.estimates
         ],
         "notes": found.notes,
@@ -108,14 +102,11 @@ def fitted(found: Identified, piece: MotionPiece) -> tuple[Array, Array]:
     each, of a piece; both through the picture's low-pass, within the band that was used.
     """
     fit = found.fit
-    rotors = rotor_columns(piece, fit.drive)
-    names = (*rotors, *(air := air_columns(piece, fit.drive)))
-    late = {
-        name: np.interp(piece.t - fit.drive.delay, piece.t, column)
-        for name, column in rotors.items()
-    }
-    columns = np.column_stack([*late.values(), *air.values()])
-    model = columns @ coefficients(fit.values, names, fit.model.mass, fit.model.powers).T
+    then = piece.t - fit.drive.delay
+    columns = {n: np.interp(then, piece.t, x) for n, x in rotor_columns(piece, fit.drive).items()}
+    columns |= air_columns(piece, fit.drive)
+    gains = coefficients(fit.values, tuple(columns), fit.model.mass, fit.model.powers)
+    model = np.column_stack(list(columns.values())) @ gains.T
     measured = piece.measured()
     if piece.specific_force is None:
         measured[:, :3] = np.nan
@@ -155,13 +146,9 @@ def _picture(found: Identified) -> "Figure":
     for i, axis in enumerate("xyz"):
         for row, (what, unit) in enumerate((("force", "N"), ("torque", "Nm"))):
             j = 3 * row + i
-            plot = axes[row, i]
-            plot.plot(
-                longest.t[shown], scale[j] * measured[shown, j], TRUTH, lw=1.6, label="measured"
-            )
-            plot.plot(
-                longest.t[shown], scale[j] * model[shown, j], ESTIMATE, lw=1.0, label="fitted"
-            )
+            plot, t = axes[row, i], longest.t[shown]
+            plot.plot(t, scale[j] * measured[shown, j], TRUTH, lw=1.6, label="measured")
+            plot.plot(t, scale[j] * model[shown, j], ESTIMATE, lw=1.0, label="fitted")
             told = "not measured" if np.isnan(share[j]) else f"{share[j]:.0%} explained"
             plot.set_title(f"{what} {axis} ({unit}), {told}")
         axes[1, i].set_xlabel("time (s)")

@@ -41,15 +41,6 @@ class Estimate:
     how: str  # which channels carried it, which assumption, or why it cannot be told
 
 
-@dataclass(frozen=True)
-class Hidden:
-    """A coefficient that does not show beside what nothing measures, SI units."""
-
-    value: float  # by one step from nothing
-    deviation: float
-    least: float  # that would show
-
-
 @dataclass(frozen=True, eq=False)
 class Identified:
     """A vehicle from its logs."""

@@ -5,20 +5,24 @@ Rotor speeds are noisy (rounded) where they are measured: what that adds to the 
 is taken away before the normal equations are solved, so that it does not shrink the coefficients.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import t as student
 
 from ...runtime.errors import InputError
 from .channels import MotionPiece
 from .columns import BalanceSpectra, Drive, balance
-from .model import LOGARITHMIC, NONLINEAR, Model, jacobian
+from .model import NONLINEAR, Model, jacobian
 from .spectra import SPECTRUM, residual_spectra
 
 Array = NDArray[np.float64]
+Values = Mapping[str, float]
+Function = Callable[[Values], float]
+Interval = tuple[float, float, float]  # value, low and high
 
 
 @dataclass(frozen=True)
@@ -61,12 +65,12 @@ class VehicleFit:
         """Covariance (p, p), the larger of what the noise's spectrum says and what the segments'
         own scatter says (White's sandwich), parameter by parameter.
         """
-        inverse = np.asarray(np.linalg.inv(self.information), dtype=np.float64)
+        inverse = SPECTRUM.loss * np.linalg.inv(self.information)
         count = len(self.scores)
         if count < 4:
             return inverse
         meat = self.scores.T @ self.scores * (count / (count - 1.0))
-        sandwich = inverse @ meat @ inverse
+        sandwich = inverse @ meat @ inverse / SPECTRUM.loss**2
         # few segments scatter: their evidence counts by how many there are
         share = count / (count + 30.0)
         ratio = np.diag(sandwich) / np.diag(inverse)
@@ -78,13 +82,25 @@ class VehicleFit:
         """All parameters in SI units."""
         return self.model.values(self.theta)
 
-    def deviation(self, name: str) -> float:
-        """Return a parameter's standard deviation in SI units; a share of the value for those in
-        logarithms.
+    @cached_property
+    def width(self) -> float:
+        """Standard deviations to either end of a 95 % interval: Student's, for the segments."""
+        return float(student.ppf(0.975, max(len(self.balance.segments) - 1, 3)))
+
+    def interval(self, what: str | Function, logarithm: bool = True) -> Interval:
+        """Return value, low and high of a parameter, or of a function of the parameters, in SI
+        units; of a positive quantity as a ratio.
         """
-        i = self.model.free.index(name)
-        unit = 1.0 if name in LOGARITHMIC else self.model.scale.get(name, 1.0)
-        return unit * float(np.sqrt(self.covariance[i, i]))
+        of: Function = (lambda v: v[what]) if isinstance(what, str) else what
+        theta, values = self.theta, self.model.values
+        here = float(of(values(theta)))
+        steps = 1e-5 * np.eye(len(theta))
+        slope = np.array([of(values(theta + e)) - of(values(theta - e)) for e in steps]) / 2e-5
+        size = self.width * float(np.sqrt(max(slope @ self.covariance @ slope, 0.0)))
+        if logarithm and here > 0.0:
+            factor = float(np.exp(min(size / here, 50.0)))
+            return here, here / factor, here * factor
+        return here, here - size, here + size
 
 
 def solve(pieces: list[MotionPiece], drive: Drive, model: Model, start: Array) -> VehicleFit:
@@ -92,7 +108,8 @@ def solve(pieces: list[MotionPiece], drive: Drive, model: Model, start: Array) -
     theta = start.copy()
 
     def linear() -> BalanceSpectra:
-        return balance(pieces, drive.at(model.values(theta)), model.nonlinear)
+        here = {n: float(theta[model.free.index(n)]) for n in model.nonlinear}
+        return balance(pieces, replace(drive, **here), model.nonlinear)
 
     made = linear()
     powers = [np.mean(np.abs(s.columns[:, :, :6]) ** 2, axis=0) for s in made.segments]
@@ -136,21 +153,22 @@ def refitted(fit: VehicleFit, kept: Sequence[NDArray[np.bool_]]) -> list[Vehicle
 
 
 def score_tests(
-    fit: VehicleFit, groups: Mapping[str, Sequence[str]]
+    fit: VehicleFit, groups: Mapping[str, Sequence[str]], made: BalanceSpectra | None = None
 ) -> dict[str, tuple[float, Array, Array]]:
     """Return, for each group of further parameters alone, by how much twice the negative
     log-likelihood would fall with them, where one step from nothing brings them, and their standard
-    deviations there, both in SI units.
+    deviations there, both in SI units; ``made``: in place of the fit's own transforms.
     """
     model, start = fit.model.with_more(fit.theta, *(p for group in groups.values() for p in group))
-    total = np.sum(_grams(fit.balance, fit.spectra), axis=0)
-    step, information, *_ = _newton(fit.balance, total, model, start)
+    made = made or fit.balance
+    total = np.sum(_grams(made, fit.spectra), axis=0)
+    step, information, *_ = _newton(made, total, model, start)
     gradient, without, found = information @ step, list(range(len(fit.theta))), {}
 
     def reached(rows: list[int]) -> tuple[float, Array, Array]:
         inverse = np.linalg.inv(information[np.ix_(rows, rows)])
         moved = inverse @ gradient[rows]
-        return float(gradient[rows] @ moved), moved, np.sqrt(np.diag(inverse))
+        return float(gradient[rows] @ moved), moved, np.sqrt(SPECTRUM.loss * np.diag(inverse))
 
     for name, group in groups.items():
         further = [model.free.index(p) for p in group]
@@ -159,15 +177,6 @@ def score_tests(
         own = slice(len(without), None)
         found[name] = fall - reached(without)[0], units * moved[own], units * size[own]
     return found
-
-
-def lag_with(pieces: list[MotionPiece], fit: VehicleFit) -> float:
-    """Return the lag that one step from a fit without one would take, in standard deviations."""
-    model, start = fit.model.with_more(fit.theta, "lag")
-    made = balance(pieces, replace(fit.drive, speed_noise=0.0), model.nonlinear)
-    total = np.sum(_grams(made, fit.spectra), axis=0)
-    step, information, *_ = _newton(made, total, model, start)
-    return float(step[-1] / np.sqrt(np.linalg.inv(information)[-1, -1]))
 
 
 def _moved(

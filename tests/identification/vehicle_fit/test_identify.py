@@ -32,6 +32,7 @@ from windwrench.identification.vehicle_fit.geometry import parse_geometry
 from windwrench.identification.vehicle_fit.identify import identify
 from windwrench.identification.vehicle_fit.parameters import first_model
 from windwrench.identification.vehicle_fit.report import explained
+from windwrench.identification.vehicle_fit.spectra import SPECTRUM, segments_of
 from windwrench.identification.wrench_series import estimate_log
 from windwrench.runtime.errors import InputError
 
@@ -170,6 +171,16 @@ def test_without_a_discharge_voltage_and_curve_are_not_told_apart(inertial):
     assert "hardly changes" in same["voltage_exponent"].how
     assert any("with a full and with an empty battery" in line for line in same.advice)
     assert same.vehicle.motor_curve.voltage_exponent == 0.0
+
+
+def test_tapers_lose_what_the_intervals_add():
+    """A regression of white noise on white noise, of density 0.01: its variance by its weight."""
+    rng, off = np.random.default_rng(0), []
+    for noise in rng.standard_normal((2000, 500, 2)):
+        (s,) = segments_of(noise, 0.01, 0, np.inf)
+        x, y = np.moveaxis(s.columns * np.sqrt(s.weight)[:, None], 2, 0)
+        off.append(np.vdot(x, y).real / np.linalg.norm(x))
+    assert np.var(off) == pytest.approx(0.01 * SPECTRUM.loss, rel=0.08)  # 1.17: 1 would be off
 
 
 @pytest.mark.slow
