@@ -36,7 +36,7 @@ from ..controllers.flight import (
 )
 from ..controllers.model_inverse import foresee, through_the_rotors
 from ..dynamics.effects import compile_effects
-from ..dynamics.mean_jet import COUNT_R, COUNT_X
+from ..dynamics.mean_jet import COUNT_R, COUNT_X, jet_table
 from ..dynamics.model import lay_addresses, without_addresses
 from ..dynamics.motion import Array
 from ..dynamics.rotation import quaternion_of_yaw, quaternion_to_matrix
@@ -48,7 +48,7 @@ from ..estimator.ukf import WrenchUKF
 from ..runtime.addresses import call_at, call_step
 from ..runtime.compiled import Record, compiled, compiled_without_gil, specialised
 from ..runtime.errors import InputError, unknown_name
-from .fan import FAN, STATIONS, Fan, fan_record, jet_table
+from .fan import FAN, STATIONS, Fan, fan_record
 from .observing import Motion
 from .plant import (
     NOISE,

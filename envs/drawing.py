@@ -20,9 +20,8 @@ from .wind import FanWall
 
 Array = NDArray[np.float64]
 
-_FIELD = (
-    48.0  # degrees that a picture of 4:3 shows from top to bottom; a wider one shows less there
-)
+# degrees that a picture of 4:3 shows from top to bottom; a wider one shows less there
+_FIELD = 48.0
 SCALES = (1.6, 25.0)  # m per N, m per Nm
 _WIND_SCALES = (0.5, 8.0)  # likewise, of the tasks in the wind
 _TRAIL = 120  # pictures back that the path is shown for
@@ -81,21 +80,17 @@ class Viewer:
                 self._window = viewer.launch_passive(
                     model, data, show_left_ui=False, show_right_ui=False
                 )
-                self._window.cam.lookat[:] = (1.3, 0.0, 1.1)
-                self._window.cam.distance, self._window.cam.azimuth, self._window.cam.elevation = (
-                    4.5,
-                    140,
-                    -22,
-                )
+                camera = self._window.cam
+                camera.lookat[:], camera.distance = (1.3, 0.0, 1.1), 4.5
+                camera.azimuth, camera.elevation = 140, -22
             else:
                 if near:
                     up = math.tan(math.radians(_FIELD) / 2)
                     across = up * 4 / 3 * self.height / self.width
                     model.cam_fovy[:] = math.degrees(2 * math.atan(min(up, across)))
                 self._renderer = mujoco.Renderer(model, self.height, self.width)
-        except (
-            Exception
-        ) as error:  # what a missing OpenGL raises differs from one backend to the next
+        # what a missing OpenGL raises differs from one backend to the next
+        except Exception as error:
             raise InputError(
                 f"render: this machine cannot draw ({error}). Without a screen, set MUJOCO_GL=egl "
                 f"or MUJOCO_GL=osmesa and "

@@ -19,7 +19,6 @@ from ..dynamics.mean_jet import (
     HULL_STATIONS,
     STEP_R,
     STEP_X,
-    jet_table,
 )
 from ..dynamics.rotation import product
 from ..runtime.compiled import Record, compiled
@@ -185,16 +184,3 @@ def jet_wrench(
         out[3] += y * fz - z * fy
         out[4] += z * fx - x * fz
         out[5] += x * fy - y * fx
-
-
-__all__ = [
-    "FAN",
-    "HULL_RADIUS",
-    "STATIONS",
-    "Fan",
-    "fan_record",
-    "gust",
-    "jet_at",
-    "jet_table",
-    "jet_wrench",
-]

@@ -157,6 +157,3 @@ class View:
                 frame[LAST_COMMAND],
             ]
         )
-
-
-__all__ = ["FRAMES", "OBSERVE", "SCALES", "Episodes", "Flags", "Motion", "View"]

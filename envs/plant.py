@@ -48,9 +48,8 @@ class PlantSettings:
     """What the plant does that its vehicle file does not say."""
 
     motor_lag: float = 0.04  # s, of a first-order motor whose true rotor speed is logged
-    disturbance_force: float = (
-        0.03  # N, standard deviation of the unmodelled part of the actuation, each axis
-    )
+    # N, standard deviation of the unmodelled part of the actuation, each axis
+    disturbance_force: float = 0.03
     disturbance_torque: float = 0.01  # Nm
     disturbance_time: float = 0.3  # s, over which it lasts
     # s, until what was commanded, or measured, arrives: at most ``MAX_DELAY``, whole ticks
@@ -76,14 +75,21 @@ class PlantSettings:
 PLANT = np.dtype(
     [
         *MODEL_FIELDS,
+        ("voltage_ref", "f8"),
+        ("battery_life", "f8"),
+        ("battery", "f8"),  # V now; 0: not modelled
+        ("seen", "i8"),
+        # of loops in lanes all of a block have these
         ("motor_keep", "f8"),
-        ("omega_max", "f8"),
         ("omega_lsb", "f8"),
         ("sigma_position", "f8"),
         ("sigma_attitude", "f8"),
         ("disturbance_force", "f8"),
         ("disturbance_torque", "f8"),
         ("disturbance_keep", "f8"),
+        ("applied", "f8", (6,)),  # the part of ``external`` that a user applies, until it changes
+        # and each has its own of these
+        ("omega_max", "f8"),
         # a unit normal below it loses the pose: after one that came, and after one that was lost
         ("dropout", "f8"),
         ("dropout_kept", "f8"),
@@ -91,26 +97,21 @@ PLANT = np.dtype(
         ("actuator_late", "f8"),  # ticks
         ("pose_late", "f8"),
         ("imu_late", "f8"),
-        # of the last ticks, the newest first: rad/s; m and quaternion; m/s2, body
-        ("past_commands", "f8", (_KEPT, 4)),
-        ("past_poses", "f8", (_KEPT, 7)),
-        ("past_felt", "f8", (_KEPT, 3)),
-        ("late", "f8", (7,)),  # what arrives now of one of them
-        ("voltage_ref", "f8"),
-        ("battery_life", "f8"),
-        ("battery", "f8"),  # V now; 0: not modelled
+        ("late", "f8", (7,)),  # what arrives now of one of ``past``
         ("speeds", "f8", (4,)),  # of the motors, rad/s
         # the sample: logged rotor speeds of the last tick, position, quaternion
         ("z", "f8", (11,)),
-        ("seen", "i8"),
         ("disturbance", "f8", (6,)),
         ("external", "f8", (6,)),  # true external force and torque about the centre of mass, world
         ("jet", "f8", (6,)),  # the jet's part of it
-        ("applied", "f8", (6,)),  # and the part that a user applies, held until it is changed
         ("rotation", "f8", (3, 3)),
         ("q", "f8", (4,)),
         ("rho", "f8", (3,)),
         ("scratch", "f8", (3,)),
+        # of the last ticks, the newest first: rad/s; m and quaternion; m/s2, body
+        ("past_commands", "f8", (_KEPT, 4)),
+        ("past_poses", "f8", (_KEPT, 7)),
+        ("past_felt", "f8", (_KEPT, 3)),
     ]
 )
 

@@ -18,9 +18,8 @@ from .scene_shapes import add_path, add_shadow, add_wrench
 Array = NDArray[np.float64]
 
 _DRAWN_ARM = 0.1262  # m, arm_l of the vehicle that the model shows
-_LONGEST_ARROW = (
-    0.6  # m, at the 99th percentile of the flight's force or torque, for a vehicle of that size
-)
+# m, at the 99th percentile of the flight's force or torque, for a vehicle of that size
+_LONGEST_ARROW = 0.6
 _FARTHEST = 4.0  # m, from where a vehicle of that size is still seen well
 _TRAIL = 2.0  # s of path behind the vehicle that are drawn closely
 _PATH_POINTS = 300

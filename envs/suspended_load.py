@@ -31,15 +31,11 @@ class SuspendedLoad:
     """
 
     mass: float = 0.053  # kg
-    anchor: tuple[float, float, float] = (
-        0.0,
-        0.0,
-        -0.02,
-    )  # m, from the geometric centre, body axes
+    # m, from the geometric centre, body axes
+    anchor: tuple[float, float, float] = (0.0, 0.0, -0.02)
     length: float = 0.15  # m, of the thread to the load's centre
-    drag: float = (
-        0.01  # N/(m/s), air and thread: lets a swing decay in about 2 * mass / drag = 10 s
-    )
+    # N/(m/s), air and thread: lets a swing decay in about 2 * mass / drag = 10 s
+    drag: float = 0.01
 
     def __post_init__(self) -> None:
         for name, low in (("mass", 1e-4), ("length", 1e-3), ("drag", 0.0)):

@@ -311,6 +311,3 @@ def _mode(given: AutoresetMode | str, task: str) -> AutoresetMode:
         f"{task}: autoreset_mode must be {' or '.join(m.name for m in known)} of "
         f"gymnasium.vector.AutoresetMode, got {given!r}"
     )
-
-
-FanTrackingVectorEnv = TaskVectorEnv  # its name where it flew FanTracking alone

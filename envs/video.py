@@ -57,6 +57,7 @@ class Film:
                 output_params=["-f", "mp4"],
             )
             self._stream.send(None)
+            self._whole.callback(self._stream.close)  # first, and then the film takes its place
 
     def add(self, picture: Picture | None) -> None:
         """Append a picture (height, width, 3); None, which a window returns, is none."""
@@ -87,14 +88,8 @@ class Film:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if self._stream is not None:
-            try:
-                self._stream.close()
-            except BaseException as failed:
-                self._whole.__exit__(type(failed), failed, failed.__traceback__)
-                raise
-            self._whole.__exit__(kind, error, trace)  # which puts the film in its place
-        elif kind is None and self._pictures:
+        self._whole.__exit__(kind, error, trace)
+        if kind is None and self._pictures:
             first, *others = _reduced(self._pictures)
             with replaced(self.path) as partial:
                 first.save(

@@ -265,6 +265,3 @@ class WindTrajectoryEnv(WindHoverEnv):
 
     name = "WindTrajectory"
     moving = True
-
-
-__all__ = ["WIND_DECISION_TICKS", "WindHoverEnv", "WindTrajectoryEnv"]

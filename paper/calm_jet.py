@@ -7,9 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ..dynamics.mean_jet import jet_table
 from ..dynamics.rotation import matrix_of, quaternion_of_yaw
 from ..dynamics.vehicle import Vehicle
-from ..envs.fan import Fan, fan_record, jet_table, jet_wrench
+from ..envs.fan import Fan, fan_record, jet_wrench
 from ..envs.plant import TICK
 
 Array = NDArray[np.float64]

@@ -48,44 +48,19 @@ from ..plant import (
     measure,
 )
 
+
+def _between(form: np.dtype, first: str, last: str) -> tuple[str, ...]:
+    """Return the names of a structured type's fields from one to another."""
+    names = form.names or ()
+    return names[names.index(first) : names.index(last) + 1]
+
+
 # the true body is each vehicle's own, the declared one that of all
 _BODY = LaneRecord(BODY, ("mass", "inertia", "inverse_inertia"), ("gravity", "com", "k", "mixing"))
 _PLANT = LaneRecord(
     PLANT,
-    (
-        "omega_max",
-        "rotor_wrench",
-        "speeds",
-        "z",
-        "disturbance",
-        "external",
-        "jet",
-        "rotation",
-        "q",
-        "rho",
-        "scratch",
-        "dropout",
-        "dropout_kept",
-        "lost",
-        "actuator_late",
-        "pose_late",
-        "imu_late",
-        "past_commands",
-        "past_poses",
-        "past_felt",
-        "late",
-    ),
-    (
-        "motor_keep",
-        "omega_lsb",
-        "sigma_position",
-        "sigma_attitude",
-        "disturbance_force",
-        "disturbance_torque",
-        "disturbance_keep",
-        "effect_wrench",
-        "applied",
-    ),
+    ("rotor_wrench", *_between(PLANT, "omega_max", "past_felt")),
+    ("effect_wrench", *_between(PLANT, "motor_keep", "applied")),
     {"body": _BODY},
 )
 _FLIGHT = LaneRecord(
@@ -337,6 +312,3 @@ def _single(loop: ClosedLoop) -> dict[str, Any]:
     names = ("plant", "flight", "fan", *_OWN, *_COMMON)
     pose = {"qpos": loop.world.qpos, "qvel": loop.world.qvel}
     return {name: record[name] for name in names} | pose
-
-
-__all__ = ["LOOPS", "Blocks", "fly_blocks", "fly_freely", "tick_lanes"]

@@ -263,5 +263,3 @@ make_fan_tracking_vector = partial(make_vector, FanTrackingEnv)
 make_fan_tracking_2d_vector = partial(make_vector, FanTracking2DEnv)
 make_wind_hover_vector = partial(make_vector, WindHoverEnv)
 make_wind_trajectory_vector = partial(make_vector, WindTrajectoryEnv)
-
-__all__ = ["PLANTS", "TaskLanes", "make_vector"]

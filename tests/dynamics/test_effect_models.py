@@ -18,8 +18,9 @@ from windwrench.dynamics.effects.base import (
     STATE_SIZE,
 )
 from windwrench.dynamics.effects.call import deliver, report
+from windwrench.dynamics.mean_jet import jet_table
 from windwrench.dynamics.motion import body_record, effect_wrench
-from windwrench.envs.fan import Fan, fan_record, jet_table, jet_wrench
+from windwrench.envs.fan import Fan, fan_record, jet_wrench
 
 VEHICLE = load_vehicle("ardrone2")
 PERIOD = 0.005

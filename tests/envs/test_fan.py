@@ -6,7 +6,8 @@ from scipy.integrate import trapezoid
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import load_vehicle
-from windwrench.envs.fan import Fan, fan_record, jet_at, jet_table, jet_wrench
+from windwrench.dynamics.mean_jet import jet_table
+from windwrench.envs.fan import Fan, fan_record, jet_at, jet_wrench
 
 VEHICLE = load_vehicle("ardrone2")
 PERIOD = 0.005

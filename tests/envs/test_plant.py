@@ -9,8 +9,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import EffectSetting, load_vehicle
+from windwrench.dynamics.mean_jet import jet_table
 from windwrench.envs.closed_loop import ClosedLoop
-from windwrench.envs.fan import Fan, fan_record, jet_table
+from windwrench.envs.fan import Fan, fan_record
 from windwrench.envs.plant import (
     NOISE,
     SUBSTEPS,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from windwrench.dynamics import InputError
-from windwrench.dynamics.mean_jet import AIR_DENSITY
-from windwrench.envs.fan import Fan, fan_record, jet_at, jet_table
+from windwrench.dynamics.mean_jet import AIR_DENSITY, jet_table
+from windwrench.envs.fan import Fan, fan_record, jet_at
 from windwrench.envs.wind import (
     FanWall,
     GridWind,
