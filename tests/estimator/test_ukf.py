@@ -13,7 +13,15 @@ from tests.support.reference_filters import (
 )
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import compile_effects
-from windwrench.estimator import UKFTuning, WrenchUKF, WrenchUKFBatch
+from windwrench.estimator import (
+    ConstantGainFilter,
+    Recovery,
+    TimedFilter,
+    UKFTuning,
+    WrenchUKF,
+    WrenchUKFBatch,
+)
+from windwrench.estimator.consistency import chi2_band
 from windwrench.estimator.smoother import RecordingUKF
 
 VEHICLE = load_vehicle("ardrone2")
@@ -125,6 +133,13 @@ def test_a_missing_measurement_is_a_prediction():
     np.testing.assert_array_equal(*(e.covariance for e in ends))
 
 
+def begun(make, *arguments):
+    """Return an estimator that has been started in a hover."""
+    estimator = make(VEHICLE, *arguments)
+    estimator.reset([0, 0, 1], [1, 0, 0, 0])
+    return estimator
+
+
 @pytest.mark.parametrize(
     ("make", "words"),
     [
@@ -133,6 +148,7 @@ def test_a_missing_measurement_is_a_prediction():
         (lambda: UKFTuning(torque_walk=-1.0), "torque_walk"),
         (lambda: UKFTuning(position_noise=(1, 2)), "position_noise"),
         (lambda: UKFTuning(force_walk="a"), "force_walk"),
+        (lambda: Recovery(patience=-1.0), "patience"),
         (lambda: WrenchUKF(VEHICLE, period=0.0), "period"),
         (lambda: WrenchUKF(VEHICLE, gate=2.0), "gate"),
         (lambda: WrenchUKF(VEHICLE).reset([0, 0], [1, 0, 0, 0]), "position"),
@@ -148,8 +164,40 @@ def test_a_missing_measurement_is_a_prediction():
             lambda: WrenchUKFBatch(VEHICLE, 2).reset([0, 0, 0], [[1, 0, 0, 0], [3, 0, 0, 0]]),
             r"length 1, got 3 \(filter 1\)",
         ),
+        (lambda: RecordingUKF(VEHICLE).smooth(), "start"),
+        (lambda: begun(RecordingUKF).smooth().covariance, "covariance=True"),
+        (lambda: begun(RecordingUKF).correct_imu(np.zeros(3)), "inertial"),
+        (lambda: begun(ConstantGainFilter).correct_imu(gyro=[0, 0, 0]), "correct_imu"),
+        (lambda: TimedFilter(WrenchUKF(VEHICLE), horizon=0.0), "horizon"),
+        (lambda: chi2_band(0, 1), "chi2_band"),
+        (lambda: chi2_band(6, 0), "chi2_band"),
+        (lambda: chi2_band(6, 1, 1.0), "chi2_band"),
     ],
 )
 def test_bad_settings_are_named(make, words):
     with pytest.raises(InputError, match=words):
         make()
+
+
+SPEEDS, POSITION = np.full((2, 4), 400.0), np.zeros((2, 3))
+QUATERNION = np.tile([1.0, 0, 0, 0], (2, 1))
+
+
+@pytest.mark.parametrize(
+    ("method", "arguments", "words"),
+    [
+        ("step", (SPEEDS[:1], POSITION, QUATERNION), r"rotor_speeds \(2, 4\) of rad/s"),
+        ("step", (SPEEDS, POSITION[:, :2], QUATERNION), r"position \(2, 3\)"),
+        ("step", (SPEEDS, POSITION, QUATERNION * [[1.0], [2.0]]), r"length 1, got 2 \(filter 1\)"),
+        ("step", (SPEEDS, POSITION, QUATERNION, [1.0, 2.0, 3.0]), "voltage"),
+        ("correct_imu", ([1, 2],), "gyro"),
+        ("correct_imu", (None, [0, 0, np.nan]), "accelerometer"),
+    ],
+)
+def test_bad_measurements_are_named_and_change_nothing(method, arguments, words):
+    estimator = begun(WrenchUKFBatch, 2) if method == "step" else begun(WrenchUKF)
+    before, P = estimator.estimate.state, estimator.covariance
+    with pytest.raises(InputError, match=words):
+        getattr(estimator, method)(*arguments)
+    np.testing.assert_array_equal(estimator.estimate.state, before)
+    np.testing.assert_array_equal(estimator.covariance, P)
