@@ -120,10 +120,7 @@ def test_bounds_hold_where_there_is_no_noise_to_find():
     assert np.all(np.asarray(fit.tuning.attitude_noise) >= use.attitude[0] * (1 - 1e-9))
     assert np.all(np.asarray(fit.tuning.thrust_noise) >= use.white[0] * VEHICLE.weight * (1 - 1e-9))
     assert np.isnan(fit.deviation[6:]).all()
-    estimator = WrenchUKF(VEHICLE, fit.tuning, PERIOD)
-    estimator.reset(log[2][0], log[3][0])
-    for k in range(1, len(log[0])):
-        estimate = estimator.step(log[1][k], log[2][k], log[3][k])
+    estimate = truth.fly(WrenchUKF(VEHICLE, fit.tuning, PERIOD))[-1]
     assert np.isfinite(estimate.covariance).all()
     assert np.linalg.norm(estimate.force - truth.force[-1]) < 0.05
 

@@ -1,4 +1,7 @@
-"""The wrench filter and its smoother against the literal ones, and what the filter must hold."""
+"""The wrench filter and its smoother against the literal ones, and what the filter must hold.
+
+A mass that is hung on, its rise time and its lateral force are ``tests/paper/test_figures.py``'s.
+"""
 
 import numpy as np
 import pytest
@@ -62,48 +65,6 @@ def test_filter_and_smoother_equal_the_literal_ones(effects, steps, wrench, yaw_
         e, size = found.at(k), np.sqrt(np.diag(P))
         np.testing.assert_allclose(as_reference(e, state), state, rtol=0, atol=1e-8)
         assert np.abs((e.covariance - P) / np.outer(size, size)).max() < 1e-7
-
-
-FORCE, TORQUE = np.array([0.0, 0.0, -0.52]), np.array([0.067, 0.0, 0.0])
-BEGIN = 400  # step at which the load hangs on
-
-
-def loaded_hover(ukf, steps, noise, seed=0):
-    """Return estimated force and torque of a hover; the rotors balance a load from a step on."""
-    rng = np.random.default_rng(seed)
-    W = ukf.vehicle.rotor_speeds(ukf.vehicle.weight - FORCE[2], -TORQUE)
-    hold = ukf.vehicle.rotor_speeds(ukf.vehicle.weight, np.zeros(3))
-    position, estimates = np.array([0.0, 0.0, 1.0]), []
-    ukf.reset(position, [1, 0, 0, 0])
-    for k in range(steps):
-        q = np.concatenate([[1.0], 0.5 * noise[1] * rng.standard_normal(3)])
-        measured = position + noise[0] * rng.standard_normal(3)
-        estimates.append(ukf.step(hold if k < BEGIN else W, measured, q / np.linalg.norm(q)))
-    return np.array([e.force for e in estimates]), np.array([e.torque for e in estimates])
-
-
-@pytest.mark.parametrize("noise", [(0.001, 0.005), (0.01, 0.05)])
-def test_static_load_is_read_within_the_paper_s_spread(noise):
-    tuning = UKFTuning(position_noise=noise[0], attitude_noise=noise[1])
-    ukf = WrenchUKF(VEHICLE, tuning, PERIOD)
-    force, torque = loaded_hover(ukf, 5000, noise)
-    settled = slice(2000, None)
-    np.testing.assert_allclose(force[settled].mean(0), FORCE, atol=0.01)
-    np.testing.assert_allclose(torque[settled].mean(0), TORQUE, atol=0.002)
-    assert np.all(force[settled].std(0) < 0.025)
-    assert np.all(torque[settled].std(0) < 0.01)
-    # mean over seeds: a single noisy curve crosses 10 and 90 % more than once
-    curves = [loaded_hover(ukf, 1400, noise, seed) for seed in range(8)]
-    for curve, final in (
-        (np.mean([f[:, 2] for f, _ in curves], 0), FORCE[2]),
-        (np.mean([t[:, 0] for _, t in curves], 0), TORQUE[0]),
-    ):
-        share = curve[BEGIN:] / final
-        rise = PERIOD * (np.argmax(share > 0.9) - np.argmax(share > 0.1))
-        assert 0.8 < rise < 1.2
-    lateral = np.mean([f[BEGIN:, :2] for f, _ in curves], 0)
-    assert np.abs(lateral).max() < 0.1
-    assert np.abs(force[BEGIN:, :2]).max() < 0.1
 
 
 def test_asynchronous_measurements_agree_with_regular_ones():
