@@ -105,14 +105,7 @@ def test_the_likelihood_is_that_of_the_filters_own_steps():
 
 def test_bounds_hold_where_there_is_no_noise_to_find():
     """A log filtered before it was written: no noise floor."""
-    quiet = UKFTuning(
-        force_walk=1e-9,
-        torque_walk=1e-10,
-        thrust_noise=1e-9,
-        motor_torque_noise=1e-10,
-        position_noise=1e-9,
-        attitude_noise=1e-9,
-    )
+    quiet = UKFTuning(**dict.fromkeys((*WALKS, *NOISES), 1e-9))
     use = NoiseFitSettings()
     log, truth = flight(quiet, seconds=4.0, whole=True)
     fit = fit_noise(VEHICLE, *log)

@@ -71,15 +71,8 @@ def test_each_is_the_single_filter_bit_for_bit(samples, vehicles, gate):
     assert together.status == [ukf.estimate.status for ukf in singles]
     assert together.restarts[4] == 1
     last = singles[-1].estimate
-    for name in (
-        "position",
-        "quaternion",
-        "velocity",
-        "angular_velocity",
-        "torque",
-        "force",
-        "nis",
-    ):
+    vectors = ("position", "quaternion", "velocity", "angular_velocity", "torque", "force")
+    for name in (*vectors, "nis"):
         np.testing.assert_array_equal(getattr(together, name)[-1], getattr(last, name))
 
 

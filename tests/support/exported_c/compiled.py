@@ -56,7 +56,7 @@ def _estimate_type(imu, number):
 class CompiledFilter:
     """An export, compiled, with the methods of the Python filter; each returns what C returns."""
 
-    def __init__(self, exported, folder, compiler="gcc"):
+    def __init__(self, exported, folder):
         write(exported, folder)
         header = exported.files["windwrench_filter.h"]
         lines = ['#include "windwrench_filter.h"']
@@ -70,7 +70,7 @@ class CompiledFilter:
         library = folder / "filter.so"
         sources = ("windwrench_filter.c", "size.c")
         run(
-            *(compiler, *STRICT, "-O1", "-fno-math-errno", "-shared", "-fPIC", *sources),
+            *("gcc", *STRICT, "-O1", "-fno-math-errno", "-shared", "-fPIC", *sources),
             *("-o", library.name, "-lm"),
             cwd=folder,
         )
