@@ -10,10 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.flights import PERIOD, begin, fly, yawing_flight
 from tests.support.model_flights import ANISOTROPIC
+from tests.support.reference_filters import KIT_ORDER
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.estimator import WrenchUKF
 from windwrench.estimator.ekf import WrenchEKF, model_jacobian
 from windwrench.estimator.filter_record import drive, propagate
+from windwrench.estimator.reference import difference, displaced
 from windwrench.runtime.compiled import compiled
 
 VEHICLE = load_vehicle("ardrone2")
@@ -32,36 +34,6 @@ def one_step(record, speeds, dt, A):
     drive(f, speeds, dt, 11.1)
     propagate(f, f.x, dt, f.centre)
     model_jacobian(f, dt, A, True)
-
-
-def boxplus(x, error):
-    """Return the state (20,) that differs from ``x`` by an error (18,), the MRP's world-frame turn
-    by scipy.
-    """
-    y = x.copy()
-    turn = Rotation.from_mrp(error[:3]) * Rotation.from_quat(x[3:7], scalar_first=True)
-    y[3:7] = turn.as_quat(scalar_first=True)
-    y[10:13] += error[3:6]
-    y[0:3] += error[6:9]
-    y[7:10] += error[9:12]
-    y[13:19] += error[12:18]
-    return y
-
-
-def boxminus(y, x):
-    turn = (
-        Rotation.from_quat(y[3:7], scalar_first=True)
-        * Rotation.from_quat(x[3:7], scalar_first=True).inv()
-    )
-    return np.concatenate(
-        [
-            turn.as_mrp(),
-            y[10:13] - x[10:13],
-            y[0:3] - x[0:3],
-            y[7:10] - x[7:10],
-            y[13:19] - x[13:19],
-        ]
-    )
 
 
 @pytest.mark.parametrize(
@@ -87,18 +59,20 @@ def test_jacobian_equals_finite_differences(vehicle, rate):
     x[7:10], x[10:13] = rng.standard_normal(3), rate * rng.standard_normal(3)
     x[13:16], x[16:19] = 0.05 * rng.standard_normal(3), rng.standard_normal(3)
     speeds, numeric, size = np.array([350.0, 380.0, 360.0, 400.0]), np.empty((18, 18)), 1e-5
+    start = x[KIT_ORDER]
 
-    def stepped(x):
-        ekf.record[0]["x"], A = x, np.zeros((12, 18))
+    def stepped(error):
+        A = np.zeros((12, 18))
+        ekf.record[0]["x"][KIT_ORDER] = displaced(start, error)
         one_step(ekf.record, speeds, PERIOD, A)
-        return ekf.record[0]["centre"].copy(), A
+        return ekf.record[0]["centre"][KIT_ORDER], A
 
-    centre, A = stepped(x)
+    centre, A = stepped(np.zeros(18))
     F = np.eye(18)
     F[:12] += A
     for n in range(18):
-        high, low = (stepped(boxplus(x, s * size * np.eye(18)[n]))[0] for s in (1.0, -1.0))
-        numeric[:, n] = (boxminus(high, centre) - boxminus(low, centre)) / (2 * size)
+        high, low = (stepped(s * size * np.eye(18)[n])[0] for s in (1.0, -1.0))
+        numeric[:, n] = (difference(high, centre) - difference(low, centre)) / (2 * size)
     assert np.abs(A).max() > 1
     assert np.allclose(F, numeric, rtol=0, atol=1e-8)
 

@@ -105,14 +105,7 @@ def test_the_likelihood_is_that_of_the_filters_own_steps():
 
 def test_bounds_hold_where_there_is_no_noise_to_find():
     """A log filtered before it was written: no noise floor."""
-    quiet = UKFTuning(
-        force_walk=1e-9,
-        torque_walk=1e-10,
-        thrust_noise=1e-9,
-        motor_torque_noise=1e-10,
-        position_noise=1e-9,
-        attitude_noise=1e-9,
-    )
+    quiet = UKFTuning(**dict.fromkeys((*WALKS, *NOISES), 1e-9))
     use = NoiseFitSettings()
     log, truth = flight(quiet, seconds=4.0, whole=True)
     fit = fit_noise(VEHICLE, *log)
@@ -120,10 +113,7 @@ def test_bounds_hold_where_there_is_no_noise_to_find():
     assert np.all(np.asarray(fit.tuning.attitude_noise) >= use.attitude[0] * (1 - 1e-9))
     assert np.all(np.asarray(fit.tuning.thrust_noise) >= use.white[0] * VEHICLE.weight * (1 - 1e-9))
     assert np.isnan(fit.deviation[6:]).all()
-    estimator = WrenchUKF(VEHICLE, fit.tuning, PERIOD)
-    estimator.reset(log[2][0], log[3][0])
-    for k in range(1, len(log[0])):
-        estimate = estimator.step(log[1][k], log[2][k], log[3][k])
+    estimate = truth.fly(WrenchUKF(VEHICLE, fit.tuning, PERIOD))[-1]
     assert np.isfinite(estimate.covariance).all()
     assert np.linalg.norm(estimate.force - truth.force[-1]) < 0.05
 

@@ -1,6 +1,10 @@
-"""Inputs that no vehicle makes, and numbers at the ends of what is stated."""
+"""Inputs that no vehicle makes, numbers at the ends of what is stated, and what passes between
+Python and compiled code.
+"""
 
+import copy
 import gc
+import pickle
 import tracemalloc
 
 import numpy as np
@@ -8,12 +12,14 @@ import pytest
 
 from windwrench.dynamics import load_vehicle
 from windwrench.envs.vector import TaskVectorEnv
-from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF
+from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF, WrenchUKFBatch
 from windwrench.estimator.ekf import WrenchEKF
 
 VEHICLE = load_vehicle("ardrone2")
 HOVER = np.full(4, VEHICLE.hover_rate)
 POSE = [0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0]
+QUATERNION = np.array([0.5, 0.1, -0.2, 0.8]) / np.linalg.norm([0.5, 0.1, -0.2, 0.8])
+ARGUMENTS = np.array([380.0, 390.0, 400.0, 410.0]), np.array([0.01, 0.0, 1.0]), QUATERNION
 FILTERS = {"ukf": WrenchUKF, "ekf": WrenchEKF, "constant-gain": ConstantGainFilter}
 
 
@@ -78,3 +84,60 @@ def test_steps_and_episodes_hold_on_to_nothing():
     finally:
         tracemalloc.stop()
     assert np.diff(held).min() < 20_000
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        list,
+        lambda a: np.repeat(a, 2)[::2],
+        lambda a: a.astype(">f8"),
+        lambda a: a.astype(np.longdouble),
+        lambda a: [np.array(v) for v in a],
+    ],
+    ids=["list", "strided", "big-endian", "long", "list of arrays"],
+)
+def test_any_form_of_the_same_numbers_gives_the_same_estimate(form):
+    states = []
+    for change in (np.asarray, form):
+        estimator = WrenchUKF(VEHICLE)
+        estimator.reset([0, 0, 1], QUATERNION)
+        for _ in range(5):
+            estimate = estimator.step(*(change(a) for a in ARGUMENTS))
+        states.append(estimate.state)
+    np.testing.assert_array_equal(*states)
+
+
+def pickled(one):
+    return pickle.loads(pickle.dumps(one))
+
+
+@pytest.mark.parametrize(
+    ("count", "duplicate"),
+    [(0, copy.copy), (0, copy.deepcopy), (0, pickled), (11, copy.deepcopy), (11, pickled)],
+)
+def test_a_copy_and_an_estimate_go_their_own_way(count, duplicate):
+    """A filter with an IMU and a gate, and a batch of more than are side by side at once."""
+    one = WrenchUKFBatch(VEHICLE, count) if count else WrenchUKF(VEHICLE, gate=0.999)
+    one.reset([0, 0, 1], QUATERNION)
+
+    def go_on(estimator):
+        if count:
+            return estimator.step(*(np.tile(values, (count, 1)) for values in ARGUMENTS))
+        estimator.step(*ARGUMENTS)
+        return estimator.correct_imu([0.1, 0.2, 0.3], [0.3, -0.2, 9.9])
+
+    first = go_on(one)
+    state, covariance, other = first.state.copy(), one.covariance, duplicate(one)
+    second = go_on(one)
+    assert not np.array_equal(second.state, state)
+    np.testing.assert_array_equal(second.state, one.estimate.state)
+    after, biases = one.covariance, None if count else one.covariance_with_biases
+    go_on(one)
+    np.testing.assert_array_equal(first.state, state)
+    np.testing.assert_array_equal(other.covariance, covariance)
+    np.testing.assert_array_equal(go_on(other).state, second.state)
+    np.testing.assert_array_equal(other.covariance, after)
+    if not count:
+        np.testing.assert_array_equal(first.covariance, covariance)
+        np.testing.assert_array_equal(other.covariance_with_biases, biases)

@@ -8,8 +8,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tests.support.exported_c.hostile import KINDS, befall
-from windwrench.dynamics import InputError, load_vehicle
-from windwrench.estimator import ConstantGainFilter, Recovery, UKFTuning, WrenchEKF, WrenchUKF
+from windwrench.dynamics import load_vehicle
+from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchEKF, WrenchUKF
 
 VEHICLES = {name: load_vehicle(name) for name in ("ardrone2", "crazyflie")}
 FILTERS = {"ukf": WrenchUKF, "ekf": WrenchEKF, "constant gain": ConstantGainFilter}
@@ -84,14 +84,6 @@ class Flight:
         assert np.all(np.abs(wrench) < 3.0 * np.sqrt(np.diag(estimate.covariance)[12:18]))
 
 
-def live_through(kind, vehicle, dt, gate, fault=None, turn=0.0, imu=False):
-    flight = Flight(kind, vehicle, dt, gate, turn, imu)
-    flight.recover(RISE)
-    if fault is not None:
-        flight.suffer(*fault)
-    flight.assert_right_again()
-
-
 # what happens, for how many samples, how large (1 mm to 1 km), and a seed
 FAULTS = st.tuples(
     st.sampled_from(("long gap", "back and forth", *KINDS)),
@@ -122,49 +114,71 @@ def test_nothing_makes_numbers_overflow_or_a_covariance_indefinite(kind, example
     live()
 
 
-@pytest.mark.parametrize("gate", [None, 0.999])
-@pytest.mark.parametrize("kind", FILTERS)
-@pytest.mark.parametrize(
-    "fault",
-    [
-        ("gap", 120, 1.0, 0),
-        ("long gap", 1, 1.0, 0),
-        ("jump", 1, 1000.0, 1),
-        ("jump", 1, 2.0, 2),
-        ("jump for good", 1, 2.0, 3),
-        ("jump for good", 1, 100.0, 4),
-        ("back and forth", 100, 1000.0, 5),
-        ("inverted", 1, 1.0, 6),
-        ("inverted", 60, 1.0, 7),
-        ("random poses", 100, 1.0, 8),
-    ],
-    ids=lambda fault: f"{fault[0]} {fault[1]} {fault[2]:g}",
+POSES = (
+    ("gap", 120, 1.0, 0),
+    ("long gap", 1, 1.0, 0),
+    ("jump", 1, 1000.0, 1),
+    ("jump", 1, 2.0, 2),
+    ("jump for good", 1, 2.0, 3),
+    ("jump for good", 1, 100.0, 4),
+    ("back and forth", 100, 1000.0, 5),
+    ("inverted", 1, 1.0, 6),
+    ("inverted", 60, 1.0, 7),
+    ("random poses", 100, 1.0, 8),
 )
-def test_the_wrench_is_right_again_after_two_rise_times(kind, gate, fault):
-    live_through(kind, "ardrone2", 0.005, gate, fault)
+# a second of tilted attitudes beside an IMU makes the velocity run away: poses that are good again
+# agree with each other, and whatever was wrong has not stayed in the biases
+BESIDE_AN_IMU = (
+    *(("tilted", 200, np.radians(tilt), 0) for tilt in (45, 90, 180)),
+    ("inverted", 400, 1.0, 1),
+    ("random attitudes", 400, 1.0, 2),
+    ("random poses", 400, 1.0, 3),
+    ("jump", 1, 2.0, 4),
+    ("jump for good", 1, 30.0, 5),
+    ("back and forth", 300, 1.0, 6),
+    ("gap", 400, 1.0, 7),
+)
+# at 10 and 20 Hz a start that is off by half a turn, and attitudes at random, look like a vehicle
+# that turns by one more turn from each attitude to the next
+SPINS = (
+    ("attitude only", 86, 1.0, 1),
+    ("random attitudes", 60, 1.0, 2),
+    ("rotors", 30, 1.0, 3),
+    ("off", 60, 1.0, 4),
+)
+STARTS = ((np.pi / 2, 0.999), (3.0, None), (np.pi, 0.999))
+SLOW = (("crazyflie", 0.1), ("ardrone2", 0.05))
+KALMAN = ("ukf", "ekf")
+LIVES = (
+    *(
+        ("ardrone2", kind, 0.005, gate, fault)
+        for kind in FILTERS
+        for gate in (None, 0.999)
+        for fault in POSES
+    ),
+    *(
+        ("crazyflie" if fault[1] % 400 else "ardrone2", kind, 0.005, 0.9999, fault, 0.0, True)
+        for kind in KALMAN
+        for fault in BESIDE_AN_IMU
+    ),
+    *(("crazyflie", kind, 0.01, gate, None, turn) for kind in KALMAN for turn, gate in STARTS),
+    *(
+        (vehicle, kind, dt, 0.999, fault, 3.0)
+        for vehicle, dt in SLOW
+        for kind in FILTERS
+        for fault in SPINS
+    ),
+)
 
 
-@pytest.mark.parametrize("kind", ["ukf", "ekf"])
-@pytest.mark.parametrize(
-    "fault",
-    [
-        *(("tilted", 200, np.radians(tilt), 0) for tilt in (45, 90, 180)),
-        ("inverted", 400, 1.0, 1),
-        ("random attitudes", 400, 1.0, 2),
-        ("random poses", 400, 1.0, 3),
-        ("jump", 1, 2.0, 4),
-        ("jump for good", 1, 30.0, 5),
-        ("back and forth", 300, 1.0, 6),
-        ("gap", 400, 1.0, 7),
-    ],
-    ids=lambda fault: f"{fault[0]} {fault[1]} {fault[2]:.2g}",
-)
-def test_an_imu_does_not_lock_good_poses_out(kind, fault):
-    """A second of tilted attitudes beside an IMU makes the velocity run away. Poses that are good
-    again agree with each other, and whatever was wrong has not stayed in the biases.
-    """
-    vehicle = "crazyflie" if fault[1] % 400 else "ardrone2"
-    live_through(kind, vehicle, 0.005, 0.9999, fault, imu=True)
+@pytest.mark.parametrize("life", LIVES, ids=lambda life: " ".join(map(str, life)))
+def test_the_wrench_is_right_again_after_two_rise_times(life):
+    vehicle, kind, dt, gate, fault, *beside = life
+    flight = Flight(kind, vehicle, dt, gate, *beside)
+    flight.recover(RISE)
+    if fault is not None:
+        flight.suffer(*fault)
+    flight.assert_right_again()
 
 
 def test_poses_that_never_agree_restart_the_filter_as_uncertain_as_they_are():
@@ -211,35 +225,10 @@ def test_a_bias_stays_within_its_bound():
     assert ukf.gyro_bias[0] == tuning.gyro_bias_bound
 
 
-@pytest.mark.parametrize("kind", ["ukf", "ekf"])
-@pytest.mark.parametrize(("turn", "gate"), [(np.pi / 2, 0.999), (3.0, None), (np.pi, 0.999)])
-def test_a_start_that_is_far_off_is_recovered_from(kind, turn, gate):
-    live_through(kind, "crazyflie", 0.01, gate, turn=turn)
-
-
-@pytest.mark.parametrize("kind", FILTERS)
-@pytest.mark.parametrize(
-    "fault",
-    [
-        ("attitude only", 86, 1.0, 1),
-        ("random attitudes", 60, 1.0, 2),
-        ("rotors", 30, 1.0, 3),
-        ("off", 60, 1.0, 4),
-    ],
-    ids=lambda fault: f"{fault[0]}",
-)
-def test_a_spin_of_a_turn_between_two_attitudes_is_not_believed(kind, fault):
-    """At 10 and 20 Hz a start that is off by half a turn, and attitudes at random, look like a
-    vehicle that turns by one more turn from each attitude to the next.
-    """
-    for vehicle, dt in (("crazyflie", 0.1), ("ardrone2", 0.05)):
-        live_through(kind, vehicle, dt, 0.999, fault, 3.0)
-
-
 @pytest.mark.parametrize(
     "burst", ["one offset", "one after another", "each its own", "upside down"]
 )
-@pytest.mark.parametrize("kind", ["ukf", "ekf"])
+@pytest.mark.parametrize("kind", KALMAN)
 def test_a_burst_of_bad_poses_costs_what_a_gap_costs(kind, burst):
     """Half a second of poses 10 cm off, while a force that the filter does not foresee sets in:
     none is believed, and those that are back are, at once, though they are far from what is
@@ -296,7 +285,7 @@ def test_poses_of_a_blurred_clock_are_not_held_out(late, seed):
     assert 0 < said.count("rejected") <= 1.2 * hit
 
 
-@pytest.mark.parametrize("kind", ["ukf", "ekf"])
+@pytest.mark.parametrize("kind", KALMAN)
 def test_an_attitude_alone_does_not_end_the_doubt_of_a_position(kind):
     """The first pose after half a second is off and likely, so it is believed; those that follow
     have jumped then, until they have lasted. Attitudes without a position come between them.
@@ -334,7 +323,7 @@ def test_a_doubted_wrench_may_be_none_at_all():
     assert np.sqrt(e.covariance[17, 17]) > abs(e.force[2]) > 0.9 * vehicle.weight
 
 
-@pytest.mark.parametrize("kind", ["ukf", "ekf"])
+@pytest.mark.parametrize("kind", KALMAN)
 def test_rates_do_not_run_away_where_positions_alone_are_measured(kind):
     """A hover that is lost and found by two poses, and then by its positions: they tell neither an
     attitude nor a rate, of which nothing is known but the prior's 10 rad/s.
@@ -390,8 +379,3 @@ def test_a_push_is_not_taken_for_an_outlier():
         force[gate] = e.force[0]
     assert force[0.999] == pytest.approx(vehicle.weight, rel=0.1)
     assert force[None] == pytest.approx(force[0.999], rel=0.05)
-
-
-def test_bad_settings_of_recovery_are_named():
-    with pytest.raises(InputError, match="patience"):
-        Recovery(patience=-1.0)

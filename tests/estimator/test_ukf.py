@@ -1,4 +1,7 @@
-"""The wrench filter and its smoother against the literal ones, and what the filter must hold."""
+"""The wrench filter and its smoother against the literal ones, and what the filter must hold.
+
+A mass that is hung on, its rise time and its lateral force are ``tests/paper/test_figures.py``'s.
+"""
 
 import numpy as np
 import pytest
@@ -13,7 +16,15 @@ from tests.support.reference_filters import (
 )
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import compile_effects
-from windwrench.estimator import UKFTuning, WrenchUKF, WrenchUKFBatch
+from windwrench.estimator import (
+    ConstantGainFilter,
+    Recovery,
+    TimedFilter,
+    UKFTuning,
+    WrenchUKF,
+    WrenchUKFBatch,
+)
+from windwrench.estimator.consistency import chi2_band
 from windwrench.estimator.smoother import RecordingUKF
 
 VEHICLE = load_vehicle("ardrone2")
@@ -56,48 +67,6 @@ def test_filter_and_smoother_equal_the_literal_ones(effects, steps, wrench, yaw_
         assert np.abs((e.covariance - P) / np.outer(size, size)).max() < 1e-7
 
 
-FORCE, TORQUE = np.array([0.0, 0.0, -0.52]), np.array([0.067, 0.0, 0.0])
-BEGIN = 400  # step at which the load hangs on
-
-
-def loaded_hover(ukf, steps, noise, seed=0):
-    """Return estimated force and torque of a hover; the rotors balance a load from a step on."""
-    rng = np.random.default_rng(seed)
-    W = ukf.vehicle.rotor_speeds(ukf.vehicle.weight - FORCE[2], -TORQUE)
-    hold = ukf.vehicle.rotor_speeds(ukf.vehicle.weight, np.zeros(3))
-    position, estimates = np.array([0.0, 0.0, 1.0]), []
-    ukf.reset(position, [1, 0, 0, 0])
-    for k in range(steps):
-        q = np.concatenate([[1.0], 0.5 * noise[1] * rng.standard_normal(3)])
-        measured = position + noise[0] * rng.standard_normal(3)
-        estimates.append(ukf.step(hold if k < BEGIN else W, measured, q / np.linalg.norm(q)))
-    return np.array([e.force for e in estimates]), np.array([e.torque for e in estimates])
-
-
-@pytest.mark.parametrize("noise", [(0.001, 0.005), (0.01, 0.05)])
-def test_static_load_is_read_within_the_paper_s_spread(noise):
-    tuning = UKFTuning(position_noise=noise[0], attitude_noise=noise[1])
-    ukf = WrenchUKF(VEHICLE, tuning, PERIOD)
-    force, torque = loaded_hover(ukf, 5000, noise)
-    settled = slice(2000, None)
-    np.testing.assert_allclose(force[settled].mean(0), FORCE, atol=0.01)
-    np.testing.assert_allclose(torque[settled].mean(0), TORQUE, atol=0.002)
-    assert np.all(force[settled].std(0) < 0.025)
-    assert np.all(torque[settled].std(0) < 0.01)
-    # mean over seeds: a single noisy curve crosses 10 and 90 % more than once
-    curves = [loaded_hover(ukf, 1400, noise, seed) for seed in range(8)]
-    for curve, final in (
-        (np.mean([f[:, 2] for f, _ in curves], 0), FORCE[2]),
-        (np.mean([t[:, 0] for _, t in curves], 0), TORQUE[0]),
-    ):
-        share = curve[BEGIN:] / final
-        rise = PERIOD * (np.argmax(share > 0.9) - np.argmax(share > 0.1))
-        assert 0.8 < rise < 1.2
-    lateral = np.mean([f[BEGIN:, :2] for f, _ in curves], 0)
-    assert np.abs(lateral).max() < 0.1
-    assert np.abs(force[BEGIN:, :2]).max() < 0.1
-
-
 def test_asynchronous_measurements_agree_with_regular_ones():
     """Two predictions by half, position and attitude one after the other: next to no difference."""
     flight = yawing_flight(VEHICLE, 300, seed=8)
@@ -125,6 +94,13 @@ def test_a_missing_measurement_is_a_prediction():
     np.testing.assert_array_equal(*(e.covariance for e in ends))
 
 
+def begun(make, *arguments):
+    """Return an estimator that has been started in a hover."""
+    estimator = make(VEHICLE, *arguments)
+    estimator.reset([0, 0, 1], [1, 0, 0, 0])
+    return estimator
+
+
 @pytest.mark.parametrize(
     ("make", "words"),
     [
@@ -133,6 +109,7 @@ def test_a_missing_measurement_is_a_prediction():
         (lambda: UKFTuning(torque_walk=-1.0), "torque_walk"),
         (lambda: UKFTuning(position_noise=(1, 2)), "position_noise"),
         (lambda: UKFTuning(force_walk="a"), "force_walk"),
+        (lambda: Recovery(patience=-1.0), "patience"),
         (lambda: WrenchUKF(VEHICLE, period=0.0), "period"),
         (lambda: WrenchUKF(VEHICLE, gate=2.0), "gate"),
         (lambda: WrenchUKF(VEHICLE).reset([0, 0], [1, 0, 0, 0]), "position"),
@@ -148,8 +125,40 @@ def test_a_missing_measurement_is_a_prediction():
             lambda: WrenchUKFBatch(VEHICLE, 2).reset([0, 0, 0], [[1, 0, 0, 0], [3, 0, 0, 0]]),
             r"length 1, got 3 \(filter 1\)",
         ),
+        (lambda: RecordingUKF(VEHICLE).smooth(), "start"),
+        (lambda: begun(RecordingUKF).smooth().covariance, "covariance=True"),
+        (lambda: begun(RecordingUKF).correct_imu(np.zeros(3)), "inertial"),
+        (lambda: begun(ConstantGainFilter).correct_imu(gyro=[0, 0, 0]), "correct_imu"),
+        (lambda: TimedFilter(WrenchUKF(VEHICLE), horizon=0.0), "horizon"),
+        (lambda: chi2_band(0, 1), "chi2_band"),
+        (lambda: chi2_band(6, 0), "chi2_band"),
+        (lambda: chi2_band(6, 1, 1.0), "chi2_band"),
     ],
 )
 def test_bad_settings_are_named(make, words):
     with pytest.raises(InputError, match=words):
         make()
+
+
+SPEEDS, POSITION = np.full((2, 4), 400.0), np.zeros((2, 3))
+QUATERNION = np.tile([1.0, 0, 0, 0], (2, 1))
+
+
+@pytest.mark.parametrize(
+    ("method", "arguments", "words"),
+    [
+        ("step", (SPEEDS[:1], POSITION, QUATERNION), r"rotor_speeds \(2, 4\) of rad/s"),
+        ("step", (SPEEDS, POSITION[:, :2], QUATERNION), r"position \(2, 3\)"),
+        ("step", (SPEEDS, POSITION, QUATERNION * [[1.0], [2.0]]), r"length 1, got 2 \(filter 1\)"),
+        ("step", (SPEEDS, POSITION, QUATERNION, [1.0, 2.0, 3.0]), "voltage"),
+        ("correct_imu", ([1, 2],), "gyro"),
+        ("correct_imu", (None, [0, 0, np.nan]), "accelerometer"),
+    ],
+)
+def test_bad_measurements_are_named_and_change_nothing(method, arguments, words):
+    estimator = begun(WrenchUKFBatch, 2) if method == "step" else begun(WrenchUKF)
+    before, P = estimator.estimate.state, estimator.covariance
+    with pytest.raises(InputError, match=words):
+        getattr(estimator, method)(*arguments)
+    np.testing.assert_array_equal(estimator.estimate.state, before)
+    np.testing.assert_array_equal(estimator.covariance, P)

@@ -1,13 +1,10 @@
 """A batch of filters is as many single ones."""
 
-import copy
-import pickle
-
 import numpy as np
 import pytest
 
 from tests.support.flights import yawing_flight
-from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.estimator import WrenchUKF, WrenchUKFBatch
 
 VEHICLE = load_vehicle("ardrone2")
@@ -74,15 +71,8 @@ def test_each_is_the_single_filter_bit_for_bit(samples, vehicles, gate):
     assert together.status == [ukf.estimate.status for ukf in singles]
     assert together.restarts[4] == 1
     last = singles[-1].estimate
-    for name in (
-        "position",
-        "quaternion",
-        "velocity",
-        "angular_velocity",
-        "torque",
-        "force",
-        "nis",
-    ):
+    vectors = ("position", "quaternion", "velocity", "angular_velocity", "torque", "force")
+    for name in (*vectors, "nis"):
         np.testing.assert_array_equal(getattr(together, name)[-1], getattr(last, name))
 
 
@@ -117,46 +107,3 @@ def test_it_starts_from_what_is_given_and_coasts_as_single_filters_do(common, ea
         np.testing.assert_array_equal(batch.covariance[n], single.covariance)
     assert len(batch) == 3
     assert np.isnan(together[-1].nis).all()
-
-
-@pytest.mark.parametrize(
-    "duplicate", [copy.deepcopy, lambda batch: pickle.loads(pickle.dumps(batch))]
-)
-def test_a_copy_flies_on_alone(samples, duplicate):
-    rotors, position, quaternion = samples
-    batch = WrenchUKFBatch(VEHICLE, COUNT)
-    batch.reset(position[0], quaternion[0])
-    batch.step(rotors[1], position[1], quaternion[1])
-    other, before = duplicate(batch), batch.covariance
-    for k in range(2, 20):
-        last = other.step(rotors[k], position[k], quaternion[k])
-    np.testing.assert_array_equal(batch.covariance, before)
-    for k in range(2, 20):
-        expected = batch.step(rotors[k], position[k], quaternion[k])
-    np.testing.assert_array_equal(last.state, expected.state)
-
-
-SPEEDS, POSITION, QUATERNION = (
-    np.full((2, 4), 400.0),
-    np.zeros((2, 3)),
-    np.tile([1.0, 0, 0, 0], (2, 1)),
-)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ((SPEEDS[:1], POSITION, QUATERNION), r"rotor_speeds \(2, 4\) of rad/s"),
-        ((SPEEDS, POSITION[:, :2], QUATERNION), r"position \(2, 3\)"),
-        ((SPEEDS, POSITION, QUATERNION * [[1.0], [2.0]]), r"length 1, got 2 \(filter 1\)"),
-        ((SPEEDS, POSITION, QUATERNION, [1.0, 2.0, 3.0]), "voltage"),
-    ],
-)
-def test_bad_measurements_are_named_and_change_nothing(arguments, words):
-    batch = WrenchUKFBatch(VEHICLE, 2)
-    batch.reset([0, 0, 1], [1, 0, 0, 0])
-    before, P = batch.estimate.state, batch.covariance
-    with pytest.raises(InputError, match=words):
-        batch.step(*arguments)
-    np.testing.assert_array_equal(batch.estimate.state, before)
-    np.testing.assert_array_equal(batch.covariance, P)

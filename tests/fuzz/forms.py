@@ -85,6 +85,13 @@ def _times():
 _vehicle = cache(load_vehicle)
 
 
+def _written(write, name):
+    """Return the bytes of every file by its name, of a writer that is given a path ending so."""
+    with tempfile.TemporaryDirectory() as folder:
+        write(Path(folder) / name)
+        return {p.name: p.read_bytes() for p in Path(folder).rglob("*") if p.is_file()}
+
+
 @cache
 def _own_log(name):
     """Return a hover with a slow turn, in the kit's own form."""
@@ -101,9 +108,7 @@ def _own_log(name):
         np.zeros((_COUNT, 3)),
         np.zeros((_COUNT, 3)),
     )
-    with tempfile.TemporaryDirectory() as folder:
-        write_log(log, Path(folder) / name)
-        return (Path(folder) / name).read_bytes()
+    return _written(partial(write_log, log), name)[name]
 
 
 def _table(log_map):
@@ -136,11 +141,8 @@ def _bag(kind):
         np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
         np.full((count, 4), 376.0),
     )
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / ("flight.bag" if kind == "bag" else "flight")
-        write_bag(still, path, kind, "/pose")
-        found = [path] if kind == "bag" else sorted(path.iterdir())
-        return {p.name: p.read_bytes() for p in found}
+    name = "flight.bag" if kind == "bag" else "flight"
+    return _written(lambda path: write_bag(still, path, kind, "/pose"), name)
 
 
 TOPIC_MAP = (
@@ -220,9 +222,7 @@ def _policy():
         "activation": "relu",
         "squash": True,
     }
-    with tempfile.TemporaryDirectory() as folder:
-        save_policy(card, weights, Path(folder) / "policy.npz")
-        return {p.name: p.read_bytes() for p in Path(folder).iterdir()}
+    return _written(partial(save_policy, card, weights), "policy.npz")
 
 
 def _use_policy(path):

@@ -103,7 +103,5 @@ def test_given_the_same_random_numbers_it_commands_the_same(c):
     # where rounding once draws another particle than Python does, commands go on a little apart
     assert np.sum(np.max(apart, axis=1) < 1e-3) >= 4
     assert np.max(apart) < 0.1
-
-
-def test_it_says_how_much_memory_it_takes(c):
+    # and it says how much memory it takes
     assert 90 * PARTICLES < c.policy_bytes < 110 * PARTICLES + 100

@@ -65,6 +65,14 @@ class Attacked:
         return self.source.tallies.news()
 
 
+def changed(rng, data, share):
+    """Return a message of which one byte is another, in a share of all cases."""
+    data = bytearray(data)
+    if rng.random() < share:
+        data[rng.integers(len(data))] = rng.integers(256)
+    return bytes(data)
+
+
 class Link:
     """A link by which one piece of bytes comes at a time."""
 
@@ -94,10 +102,7 @@ def test_json(count):
         for name in stream.rng.choice(list(one), stream.rng.integers(1, 5)):
             one[name] = stream.any(NUMBERS + OTHERS)
         text = json.dumps([one] * stream.rng.integers(1, 4) if stream.rng.random() < 0.2 else one)
-        data = bytearray(text.encode())
-        if stream.rng.random() < 0.2:
-            data[stream.rng.integers(len(data))] = stream.rng.integers(256)
-        link.pieces.append(bytes(data))
+        link.pieces.append(changed(stream.rng, text.encode(), 0.2))
 
     stream.run(count, lambda k: link.pieces.append(json.dumps(good[k]).encode()), extreme)
 
@@ -125,10 +130,7 @@ def test_a_table(count):
         fields = lines[stream.rng.integers(len(lines))].split(",")
         for at in stream.rng.integers(len(fields), size=stream.rng.integers(1, 4)):
             fields[at] = str(stream.any((*NUMBERS, *OTHERS)))
-        data = bytearray(",".join(fields).encode())
-        if stream.rng.random() < 0.2:
-            data[stream.rng.integers(len(data))] = stream.rng.integers(256)
-        os.write(write, bytes(data) + b"\n")
+        os.write(write, changed(stream.rng, ",".join(fields).encode(), 0.2) + b"\n")
 
     stream.run(count, lambda k: os.write(write, f"{lines[k]}\n".encode()), extreme)
     os.write(write, b"1," * 30_000)
@@ -175,10 +177,7 @@ def test_mavlink(count, only):
         ]
         payload = struct.pack(wire, *map(number, letters))
         message = common.MAVLink_message(kind.id, kind.msgname)
-        data = bytearray(message._pack(sender, kind.crc_extra, payload))
-        if rng.random() < 0.1:
-            data[rng.integers(len(data))] = rng.integers(256)
-        link.pieces.append(bytes(data))
+        link.pieces.append(changed(rng, message._pack(sender, kind.crc_extra, payload), 0.1))
 
     def good(k):
         us, motors = round(flown["t"][k] * 1e6), [3, 1, 0, 2]

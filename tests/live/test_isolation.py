@@ -49,12 +49,12 @@ def fly(**options):
 @pytest.fixture(scope="module")
 def watched():
     """A flight that has ended."""
-    return fly().session
+    return fly()
 
 
-@pytest.fixture(scope="module")
-def outputs():
-    return fly().outputs
+@pytest.fixture
+def outputs(watched):
+    return watched.outputs
 
 
 def record(path, **options):
@@ -204,7 +204,7 @@ def view(monkeypatch, watched):
     """A page that is impatient, with buffers that are small."""
     monkeypatch.setattr("windwrench.live.web_view._TIMEOUT", 0.5)
     monkeypatch.setattr("windwrench.live.web_view._EVERY", 0.01)
-    view = WebView(watched, 0)
+    view = WebView(watched.session, 0)
     view._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
     with view:
         yield view
@@ -247,7 +247,7 @@ def test_connections_are_few_and_last_for_a_time(view, watched, request_):
 
 def test_a_page_that_fails_is_told_and_the_stream_goes_on(monkeypatch, watched):
     monkeypatch.setattr(WebView, "_look", lambda view: fails())
-    view = WebView(watched, 0)
+    view = WebView(watched.session, 0)
     with view:
         view._thread.join()
     assert "the page: RuntimeError" in watched.tallies.news()[-1]

@@ -1,5 +1,5 @@
 """Good poses after any spell of bad ones, in recorded flights: taken in within 2 s, by every kind
-of filter; what is claimed of the wrench holds then. ``test_export_c_hostile.py`` holds C to it.
+of filter; what is claimed of the wrench holds then. ``test_export_c.py`` holds C to it.
 """
 
 import copy
@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from tests.support.exported_c.compiled import begin, take
 from tests.support.exported_c.flights import FLIGHTS, flight, vehicle_of
 from tests.support.exported_c.hostile import befall
 from windwrench.live.export_c import ESTIMATORS, export_c
@@ -22,13 +23,6 @@ KEPT = 50  # rows from one copy of a filter to the next
 SEED = 1
 
 
-def step(estimator, flown, k):
-    estimator.predict(flown["rotor_speeds"][k], flown["dt"][k])
-    if "gyro" in flown:
-        estimator.correct_imu(flown["gyro"][k], flown["accelerometer"][k])
-    estimator.correct(flown["position"][k], flown["quaternion"][k])
-
-
 def seen(estimator):
     """Status, position, wrench, and the wrench's standard deviation: of noise alone."""
     e = estimator.estimate
@@ -36,24 +30,22 @@ def seen(estimator):
     return e.status, e.position, wrench, np.sqrt(np.diag(e.covariance)[12:18])
 
 
-class Calm:
-    """A filter along a flight without faults: what it says at each row, and copies of it."""
-
-    def __init__(self, estimator, flown):
-        self.flown, self.said, self.copies = flown, [None], {}
-        estimator.reset(flown["position"][0], flown["quaternion"][0])
-        for k in range(1, len(flown["dt"])):
-            step(estimator, flown, k)
-            self.said.append(seen(estimator))
-            if k % KEPT == 0:
-                self.copies[k] = copy.copy(estimator)
-
-
 @cache
 def calm(name, imu, kind):
+    """A flight without faults and its rows a second, what a filter says at each row, and copies of
+    the filter.
+    """
     estimator = export_c(vehicle_of(name), kind, gate=GATE).filter
     rate = 200 // FLIGHTS[name][4]
-    return Calm(estimator, flight(name, 15 * rate, SEED, faults=False, imu=imu)), rate
+    flown = flight(name, 15 * rate, SEED, faults=False, imu=imu)
+    begin(estimator, flown)
+    said, copies = [None], {}
+    for k in range(1, len(flown["dt"])):
+        take(estimator, flown, k)
+        said.append(seen(estimator))
+        if k % KEPT == 0:
+            copies[k] = copy.copy(estimator)
+    return flown, rate, said, copies
 
 
 @pytest.mark.parametrize("count", [10, pytest.param(170, marks=pytest.mark.slow)])
@@ -66,20 +58,20 @@ def test_all_is_right_again_after_any_spell_of_bad_poses(kind, count):
     for i in range(count):
         rng = np.random.default_rng((SEED, i))
         name, imu = flights[int(rng.integers(len(flights)))]
-        before, rate = calm(name, imu, kind)
-        rows = len(before.said) - (LONGEST + SOON) * rate
+        sound, rate, said, copies = calm(name, imu, kind)
+        rows = len(said) - (LONGEST + SOON) * rate
         k = KEPT * int(rng.integers(np.ceil(BEGUN * rate / KEPT), rows // KEPT))
         when = slice(k + 1, k + 1 + int(rng.integers(1, LONGEST * rate)))
-        flown = {part: values.copy() for part, values in before.flown.items()}
+        flown = {part: values.copy() for part, values in sound.items()}
         spell = str(rng.choice(SPELLS))
         parts = (flown[name] for name in ("position", "quaternion", "rotor_speeds"))
         away = befall(spell, when, *parts, rng)
         flown["quaternion"] /= np.linalg.norm(flown["quaternion"], axis=1, keepdims=True)
-        estimator, end = copy.copy(before.copies[k]), when.stop + round(SOON * rate)
+        estimator, end = copy.copy(copies[k]), when.stop + round(SOON * rate)
         for row in range(k + 1, end):
-            step(estimator, flown, row)
+            take(estimator, flown, row)
         status, position, wrench, std = seen(estimator)
-        _, right, usual, _ = before.said[end - 1]
+        _, right, usual, _ = said[end - 1]
         misses = np.abs(wrench - usual) / std
         off = float(np.linalg.norm(position - right - (spell == "jump for good") * away))
         if status != "tracking" or off > 0.1 or misses.max() > 4.0:

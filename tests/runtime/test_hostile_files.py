@@ -7,6 +7,7 @@ import hashlib
 import io
 import json
 import os
+import pickle
 import struct
 import sys
 import zipfile
@@ -17,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.fuzz.spoiling import LAUGHS
 from tests.support.programs import said
 from windwrench.controllers.trained_policy import FORMAT, load_policy
 from windwrench.dynamics import load_vehicle
@@ -26,6 +28,7 @@ from windwrench.identification.logs.flight_log import REQUIRED
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.file_limits import LIMITS
 from windwrench.runtime.regular_files import read_json
+from windwrench.runtime.yaml_file import parse_yaml
 
 HEADER = (",".join(REQUIRED) + "\n").encode()
 MEMORY, SECONDS = 1.1e9, 10.0
@@ -74,35 +77,41 @@ def packed_often(piece, times):
     return gzip.compress(HEADER) + gzip.compress(piece, 1) * times
 
 
-def policy_bomb(path):
-    """Write weights of 256 MB in 256 kB, with the card that they belong to."""
-    header = b"\x93NUMPY\x01\x00" + struct.pack("<H", 118)
-    header += b"{'descr': '<f4', 'fortran_order': False, 'shape': (67108864,), }".ljust(117) + b"\n"
+class Harm:
+    """What runs a program when it is unpickled."""
+
+    def __reduce__(self):
+        return os.mkdir, ("harm",)
+
+
+def weights(kind, shape, *pieces):
+    """Return the archive of one array (an .npz) that holds some pieces of bytes."""
+    header = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
     out = io.BytesIO()
     with (
         zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
         archive.open("weight0.npy", "w", force_zip64=True) as member,
     ):
-        member.write(header)
-        for _ in range(4):
-            member.write(bytes(2**26))
-    data = out.getvalue()
-    path.write_bytes(data)
-    card = {"format": FORMAT, "sha256": hashlib.sha256(data).hexdigest()}
-    path.with_suffix(".json").write_text(json.dumps(card))
+        member.write(b"\x93NUMPY\x01\x00" + struct.pack("<H", 118) + header.encode())
+        for piece in pieces:
+            member.write(piece)
+    return out.getvalue()
 
 
-def dictionary_bomb(path):
-    """Write a column of 10,000 times one text of 1 MB, which takes its place once."""
+def parquet_bombs(folder):
+    """Write a column of 10,000 times one text of 1 MB, which takes its place once, and 25 million
+    rows of zeros.
+    """
     import pyarrow
     from pyarrow import parquet
 
-    rows = 10_000
+    rows, zeros = 10_000, pyarrow.chunked_array([np.zeros(2_500_000)] * 10)
+    parquet.write_table(pyarrow.table({"t": zeros}), folder / "claim.parquet")
     text = pyarrow.DictionaryArray.from_arrays(
         pyarrow.array(np.zeros(rows, np.int32)), pyarrow.array(["1" * 1_000_000])
     )
     columns = {name: pyarrow.array(np.arange(rows) * 1.0) for name in REQUIRED} | {"px": text}
-    parquet.write_table(pyarrow.table(columns), path)
+    parquet.write_table(pyarrow.table(columns), folder / "texts.parquet")
 
 
 def ulog(*messages):
@@ -157,23 +166,33 @@ def test_files_that_unpack_to_gigabytes_cost_little(tmp_path):
         "sparse.csv": (b"", "zero bytes"),
         "sparse.BIN": (EMPTY_DATAFLASH, "more than 268435456 bytes"),
         "giant.yaml": (b"", "more than 200000 bytes"),
+        "laughs.yaml": (LAUGHS.encode(), "values, its aliases written out"),
+        "round.yaml": (b"a: &a [*a]", "within what it stands for"),
+        "policy.npz": (weights("<f4", (2**26,), *[bytes(2**26)] * 4), "unpacks to 2684355"),
+        "harm.npz": (weights("|O", (1,), pickle.dumps(Harm())), "Object arrays cannot be loaded"),
+        "pickle.npz": (pickle.dumps(Harm()), "no zip archive"),
     }
     if ULOG:
         files["nested.ulg"] = NESTED_ULOG, "more than 200000 fields"
         files["texts.ulg"] = TEXTS_ULOG, "more than 200000 parameters"
+        # each byte of the filling seems to begin a message of 64 kB
+        files["filled.ulg"] = ulog() + 300_000 * b"\xff", "places hold no message"
     for name, (content, _) in files.items():
         (tmp_path / name).write_bytes(content)
+        if name.endswith(".npz"):  # the card vouches for it
+            card = {"format": FORMAT, "sha256": hashlib.sha256(content).hexdigest()}
+            (tmp_path / name).with_suffix(".json").write_text(json.dumps(card))
     for name, size in (("sparse.csv", 2**34), ("sparse.BIN", 2**34), ("giant.yaml", 50 * 2**30)):
         os.truncate(tmp_path / name, size)
     expected = {name: words for name, (_, words) in files.items()}
-    policy_bomb(tmp_path / "policy.npz")
-    expected["policy.npz"] = "unpacks to 2684355"
     if PARQUET:
-        dictionary_bomb(tmp_path / "texts.parquet")
+        parquet_bombs(tmp_path)
         expected["texts.parquet"] = "column px cannot be read: it holds"
+        expected["claim.parquet"] = "more than 4000000 rows; expected one flight"
     (tmp_path / "few.bbl").write_bytes(EMPTY_FRAMES + b"IP" * 8)
     paths = (str(tmp_path / name) for name in expected)
-    told = said(sys.executable, "-c", CHILD, *paths, timeout=120)
+    told = said(sys.executable, "-c", CHILD, *paths, timeout=120, cwd=tmp_path)
+    assert not (tmp_path / "harm").exists()
     found = [json.loads(line) for line in told.splitlines()]
     assert len(found) == len(expected)
     for path, line, seconds, memory in found:
@@ -203,6 +222,7 @@ def test_what_is_no_regular_file_is_refused_at_once(kind, name, tmp_path):
 
 
 def test_other_files_are_regular_too(tmp_path):
+    assert parse_yaml("k: &k [1, 2]\np: *k", "good.yaml") == {"k": [1, 2], "p": [1, 2]}
     for name in ("p.npz", "p.json", "v.yaml"):
         os.mkfifo(tmp_path / name)
     with pytest.raises(InputError, match=r"p\.json: is a pipe"):

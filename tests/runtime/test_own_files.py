@@ -51,15 +51,13 @@ def test_a_class_of_a_file_is_a_controller(laws):
         assert make_pilot(name)(np.zeros(8)) == pytest.approx([0.25])
     assert not is_file_name("admittance")
     assert not is_file_name("results/sac/best.npz")
-
-
-def test_a_subclass_is_one_too(laws):
-    laws.write_text(
+    subclass = laws.with_name("stiff.py")
+    subclass.write_text(
         "from windwrench.controllers import Admittance\n\nclass Stiff(Admittance):\n    def "
         "__init__(self):\n"
         "        super().__init__(40.0)\n"
     )
-    assert make_pilot(str(laws)).gain == 40.0
+    assert make_pilot(str(subclass)).gain == 40.0
 
 
 def test_a_folder_s_files_join_the_library(folder):

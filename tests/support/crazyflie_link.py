@@ -34,7 +34,6 @@ class FakeLink(CRTPDriver):
     def connect(self, uri, radio_link_statistics_callback, link_error_callback):
         if not uri.startswith("fake://"):
             raise WrongUriType
-        self.silent = "silent" in uri
         self.fail = link_error_callback
         self.answers = queue.Queue()
         self.sent = []  # (port, channel, data) of all that the client sent
@@ -58,8 +57,7 @@ class FakeLink(CRTPDriver):
     def send_packet(self, pk):
         data = bytes(pk.data)
         self.sent.append((pk.port, pk.channel, data))
-        if not self.silent:
-            self._answer(pk.port, pk.channel, data)
+        self._answer(pk.port, pk.channel, data)
 
     def _say(self, port, channel, data):
         packet = CRTPPacket()
@@ -106,7 +104,7 @@ class FakeLink(CRTPDriver):
             self._say(LOG, 2, bytes((number,)) + stamp + payload)
 
 
-def values_of(flown, k, rpm=True):
+def values_of(flown, k):
     """What the firmware's variables hold in row ``k`` of a flight at its kit's rotor speeds."""
     x, y, z = flown["position"][k]
     w, qx, qy, qz = flown["quaternion"][k]

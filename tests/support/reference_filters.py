@@ -8,6 +8,7 @@ from tests.support.flights import matrix
 from windwrench.dynamics.effects import compile_effects
 from windwrench.estimator.reference import ReferenceUKF, difference, displaced
 
+KIT_ORDER = np.r_[3:7, 10:13, 0:3, 7:10, 13:19]  # of the kit's state, to be the reference's
 CORNERS = np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])  # of the rotors, in arms
 
 
@@ -15,11 +16,8 @@ def as_reference(estimate, near):
     """Return an estimate as a state (19,) of the reference filter, its quaternion's sign that of
     another state's.
     """
-    e = estimate
-    state = np.concatenate(
-        [e.quaternion, e.angular_velocity, e.position, e.velocity, e.torque, e.force]
-    )
-    state[:4] *= np.sign(e.quaternion @ near[:4])
+    state = estimate.state[KIT_ORDER]
+    state[:4] *= np.sign(state[:4] @ near[:4])
     return state
 
 

@@ -56,7 +56,7 @@ def _estimate_type(imu, number):
 class CompiledFilter:
     """An export, compiled, with the methods of the Python filter; each returns what C returns."""
 
-    def __init__(self, exported, folder, compiler="gcc"):
+    def __init__(self, exported, folder):
         write(exported, folder)
         header = exported.files["windwrench_filter.h"]
         lines = ['#include "windwrench_filter.h"']
@@ -70,7 +70,7 @@ class CompiledFilter:
         library = folder / "filter.so"
         sources = ("windwrench_filter.c", "size.c")
         run(
-            *(compiler, *STRICT, "-O1", "-fno-math-errno", "-shared", "-fPIC", *sources),
+            *("gcc", *STRICT, "-O1", "-fno-math-errno", "-shared", "-fPIC", *sources),
             *("-o", library.name, "-lm"),
             cwd=folder,
         )
@@ -93,8 +93,10 @@ class CompiledFilter:
         """Call ww_init."""
         return int(self.c.ww_init(self.memory, self._array(position), self._array(quaternion)))
 
-    def predict(self, rotor_speeds, dt):
-        """Call ww_predict."""
+    def predict(self, rotor_speeds, dt, voltage=None):
+        """Call ww_predict, and before it ww_set_voltage where a voltage is given."""
+        if voltage is not None:
+            self.c.ww_set_voltage(self.memory, self._number(voltage))
         return int(self.c.ww_predict(self.memory, self._array(rotor_speeds), dt))
 
     def correct(self, position, quaternion):
@@ -144,23 +146,35 @@ def differences(c, python):
     return out
 
 
+def begin(one, flight):
+    """Start a filter at the first whole pose of a flight; return its row."""
+    first = int(np.flatnonzero(np.isfinite(flight["position"]).all(axis=1))[0])
+    one.reset(flight["position"][first], flight["quaternion"][first])
+    return first
+
+
+def take(one, flight, k, *voltage):
+    """Take in row ``k`` of a flight."""
+    one.predict(flight["rotor_speeds"][k], flight["dt"][k], *voltage)
+    if "gyro" in flight:
+        one.correct_imu(flight["gyro"][k], flight["accelerometer"][k])
+    one.correct(flight["position"][k], flight["quaternion"][k])
+
+
 def compare(c, python, flight, every=1):
     """Fly both filters along a flight of ``flights``; return the largest of ``differences``, looked
-    at ``every`` so many steps, and the count of restarts.
+    at ``every`` so many steps, and the count of restarts. C is told a ``voltage`` (n,) when it
+    changes; until then it takes the battery for full.
     """
-    first = int(np.flatnonzero(np.isfinite(flight["position"]).all(axis=1))[0])
-    c.reset(flight["position"][first], flight["quaternion"][first])
-    python.reset(flight["position"][first], flight["quaternion"][first])
-    worst = {}
+    first = begin(c, flight)
+    begin(python, flight)
+    worst, voltage, told, given = {}, flight.get("voltage"), (), ()
     for k in range(first + 1, len(flight["dt"])):
-        dt, position, quaternion = flight["dt"][k], flight["position"][k], flight["quaternion"][k]
-        c.predict(flight["rotor_speeds"][k], dt)
-        python.predict(flight["rotor_speeds"][k], dt)
-        if "gyro" in flight:
-            c.correct_imu(flight["gyro"][k], flight["accelerometer"][k])
-            python.correct_imu(flight["gyro"][k], flight["accelerometer"][k])
-        c.correct(position, quaternion)
-        python.correct(position, quaternion)
+        if voltage is not None:
+            told = (voltage[k],) if voltage[k] != voltage[k - 1] else ()
+            given = (np.nan_to_num(voltage[k]),)
+        take(c, flight, k, *told)
+        take(python, flight, k, *given)
         if k % every == 0:
             for name, value in differences(c, python).items():
                 worst[name] = max(worst.get(name, 0.0), value)

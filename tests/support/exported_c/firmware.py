@@ -36,17 +36,13 @@ class Measured:
     loop: int  # instructions that the timer saw in the loop of 2,000
 
 
-def object_size(exported, folder):
-    """Return the bytes of the filter's object on a Cortex-M4F."""
-    write(exported, folder)
-    options = ("-std=c99", "-Os", "-fno-math-errno", "-Wall", "-Wextra", "-Werror", *_CPU)
-    run(TOOLS[0], *options, "-c", "windwrench_filter.c", "-o", "filter.o", cwd=folder)
-    return int(run(TOOLS[1], "filter.o", cwd=folder).splitlines()[1].split()[0])
-
-
 def fly(exported, flight, folder):
     """Fly a filter along a flight on the board, at most some thousand steps."""
-    code = object_size(exported, folder)
+    write(exported, folder)
+    options = ("-std=c99", "-Os", "-fno-math-errno", *_CPU)
+    strict = ("-Wall", "-Wextra", "-Werror", "-c", "windwrench_filter.c", "-o", "filter.o")
+    run(TOOLS[0], *options, *strict, cwd=folder)
+    code = int(run(TOOLS[1], "filter.o", cwd=folder).splitlines()[1].split()[0])
     columns = [np.atleast_2d(flight[name].T).T for name in _COLUMNS if name in flight]
     rows = np.concatenate(columns, axis=1)
     unmeasured = "12345.678"  # a number that no flight has, where nothing was measured
@@ -59,9 +55,9 @@ def fly(exported, flight, folder):
     )
     for name in ("bench.c", "mps2_an386.ld"):
         (folder / name).write_text((_FOLDER / name).read_text(encoding="utf-8"), encoding="utf-8")
-    options = ("-std=c99", "-Os", "-fno-math-errno", *_CPU, "-nostartfiles", "-I.")
     run(
-        *(TOOLS[0], *options, "bench.c", "filter.o", "-T", "mps2_an386.ld"),
+        *(TOOLS[0], *options, "-nostartfiles", "-I.", "bench.c", "filter.o"),
+        *("-T", "mps2_an386.ld"),
         *("-o", "bench.elf", "-lm", "-lc", "-lgcc"),
         cwd=folder,
     )

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from tests.support.exported_c.hostile import befall
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import parse_setting
 from windwrench.envs.recording import record_flight
@@ -23,6 +24,7 @@ FLIGHTS = {
     "crazyflie, 50 poses a second": ("crazyflie", "circle", (), (0.0, 0.0, 0.0), 4),
 }
 _FAULT = 0.01  # chance a step that a fault begins
+_SIZES = {"gap": 0.0, "position only": 0.0, "attitude only": 0.0, "burst": 1.5, "tilted": 0.5}
 _LENGTHS = (0.015, 0.08, 0.3, 0.8, 1.5)  # s
 
 
@@ -39,7 +41,7 @@ def flight(name, steps, seed=0, faults=True, imu=False):
     with an IMU ``gyro`` and ``accelerometer`` (n, 3); what was not measured is NaN.
 
     Steps are uneven by 2 %. Faults are gaps, positions or attitudes alone, jumps by 1.5 m, and
-    turns by half a radian, of 15 ms to 1.5 s.
+    tilts by half a radian, of 15 ms to 1.5 s.
     """
     vehicle, trajectory, _, com, every = FLIGHTS[name]
     model = replace(load_vehicle(vehicle), com=np.array(com))
@@ -61,18 +63,14 @@ def flight(name, steps, seed=0, faults=True, imu=False):
             out[key] = log[key][rows] + bias * rng.uniform(-1.0, 1.0, 3)
             out[key] += noise * rng.standard_normal((n, 3))
         _saturate(rng, out["accelerometer"])
-    for begin, end, kind in _faults(rng, n, period) if faults else ():
-        if kind in ("gap", "attitude"):
-            position[begin:end] = np.nan
-        if kind in ("gap", "position"):
-            quaternion[begin:end] = np.nan
-        if kind == "jump":
-            position[begin:end] += (1.5, 0.0, 0.0)
-        if kind == "turn":
-            w, x, y, z = quaternion[begin:end].T
-            c, s = np.cos(0.25), np.sin(0.25)
-            turned = np.stack([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w], axis=1)
-            quaternion[begin:end] = turned
+    k = round(0.5 / period) if faults else n
+    while k < n:
+        if rng.random() < _FAULT * period / 0.005:
+            kind, length = str(rng.choice(list(_SIZES))), float(rng.choice(_LENGTHS))
+            rows = slice(k, min(k + max(1, round(length / period)), n))
+            befall(kind, rows, position, quaternion, out["rotor_speeds"], rng, _SIZES[kind])
+            k = rows.stop
+        k += 1
     return {key: np.asarray(value, dtype=np.float32).astype(float) for key, value in out.items()}
 
 
@@ -81,17 +79,3 @@ def _saturate(rng, accelerometer):
     for begin in np.flatnonzero(rng.random(len(accelerometer)) < 0.001):
         rows = slice(begin, begin + int(rng.integers(1, 160)))
         accelerometer[rows] = np.clip(8.0 * accelerometer[rows], -39.0, 39.0)
-
-
-def _faults(rng, n, period):
-    k = round(0.5 / period)
-    while k < n:
-        if rng.random() < _FAULT * period / 0.005:
-            length = max(1, round(float(rng.choice(_LENGTHS)) / period))
-            yield (
-                k,
-                min(k + length, n),
-                str(rng.choice(["gap", "position", "attitude", "jump", "turn"])),
-            )
-            k += length
-        k += 1
