@@ -186,10 +186,14 @@ def run(poses: Poses, vehicle: Vehicle, noise: tuple[AxisNoise, ...], known: Arr
     shapes = ((3,), (3, 3), (3,), (3,), (6,), (4,), (6,), (7,), (6,))
     out = Track(poses.t, *(np.empty((n, *shape)) for shape in shapes))
     measured = (poses.rotor_speeds, poses.voltage, poses.position, poses.quaternion)
+    speeds, voltage, position, quaternion = map(np.ascontiguousarray, measured)
     _run(
         models,
         poses.period,
-        *map(np.ascontiguousarray, measured),
+        speeds,
+        voltage,
+        position,
+        quaternion,
         np.concatenate([poses.velocity, poses.angular_velocity]),
         np.array([x.gain for x in noise]),
         np.exp(-poses.period / np.array([x.time for x in noise], dtype=np.float64)),
