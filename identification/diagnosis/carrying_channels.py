@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.effects import get
-from ..motion.residual import acting_wrench
 from ..motion.signals import Signals
 from .regression import Flights, Setting, without
 
@@ -95,10 +94,6 @@ def _wrench(flights: Flights, setting: Setting, effect: str, s: Signals) -> Arra
     weight, torque over the weight times the arm.
     """
     vehicle = flights.vehicle
-    a, b = (
-        acting_wrench(s, flights.amended(x), vehicle)[0]
-        for x in (setting, without(setting, effect))
-    )
-    off = a - b
+    off = flights.acting(s, setting) - flights.acting(s, without(setting, effect))
     force = np.einsum("nji,nj->ni", s.rotation, off[:, :3])
     return np.column_stack([force / vehicle.weight, off[:, 3:] / (vehicle.weight * vehicle.arm_l)])

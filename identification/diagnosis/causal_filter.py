@@ -7,7 +7,7 @@ fixed gains: what an innovation changes with a coefficient follows from linear r
 but for second order. Rotor speeds move linearly between samples.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,8 +86,8 @@ def _run(
     at_velocity: Array,
     at_rate: Array,
     acting: Array,
-    model: Array,
     rotors: Array,
+    model: Array,
     predicted: Array,
     innovations: Array,
 ) -> None:
@@ -195,26 +195,20 @@ def run(poses: Poses, vehicle: Vehicle, noise: tuple[AxisNoise, ...], known: Arr
     n = len(poses.t)
     shapes = ((3,), (3, 3), (3,), (3,), (6,), (4,), (6,), (7,), (6,))
     out = Track(poses.t, *(np.empty((n, *shape)) for shape in shapes))
+    measured = (poses.rotor_speeds, poses.voltage, poses.position, poses.quaternion)
+    speeds, voltage, position, quaternion = map(np.ascontiguousarray, measured)
     _run(
         models,
         poses.period,
-        np.ascontiguousarray(poses.rotor_speeds),
-        np.ascontiguousarray(poses.voltage),
-        np.ascontiguousarray(poses.position),
-        np.ascontiguousarray(poses.quaternion),
+        speeds,
+        voltage,
+        position,
+        quaternion,
         np.concatenate([poses.velocity, poses.angular_velocity]),
         np.array([x.gain for x in noise]),
         np.exp(-poses.period / np.array([x.time for x in noise], dtype=np.float64)),
         known,
-        out.position,
-        out.rotation,
-        out.velocity,
-        out.angular_velocity,
-        out.acceleration,
-        out.model,
-        out.rotors,
-        out.predicted,
-        out.innovations,
+        *(getattr(out, field.name) for field in fields(out)[1:]),
     )
     np.divide(out.rotors, [vehicle.mass, *np.diagonal(vehicle.inertia)], out=out.rotors)
     return out

@@ -302,8 +302,8 @@ class Likelihood:
         """
         effect, name = column
         delta = STEP * typical_size(column, self.flights.vehicle)
-        bare = replace(self.flights.vehicle, effects=())
-        vehicle = replace(bare, effects=self.flights.amended({effect: {name: delta}}).effects[-1:])
+        own = EffectSetting(effect, {name: delta})
+        vehicle = replace(self.flights.vehicle, effects=(own,))
         out = []
         for piece, track in zip(self.pieces, self.tracks, strict=True):
             log = FlightLog(

@@ -434,9 +434,7 @@ class Flights:
         needed = needed_wrench(signals, self.vehicle)
         if self.commanded:
             needed[:, 3:] = 0.0
-        return Piece(
-            log, signals, rows, low_pass(needed, CUTOFFS.residual_hz, signals.period)[rows]
-        )
+        return Piece(log, signals, rows, _smooth(needed, signals)[rows])
 
     def _inertial_signals(self, log: FlightLog) -> list[InertialSignals]:
         # no effect of the library changes what an IMU measured: each log is fused once

@@ -131,12 +131,6 @@ class Follower:
     size: Array
     channels: tuple[int, ...]
 
-    def column(self, rows: Rows, size: Array) -> Array:
-        """Return a column (n, channels) that is ``size`` (n,) where the disturbances act."""
-        out = np.zeros((len(size), rows.channels))
-        out[:, self.channels] = size[:, None]
-        return out
-
 
 def followers(rows: Rows) -> list[Follower]:
     """Return the signals of measured rotors and of the motion that follow disturbances."""
@@ -170,7 +164,8 @@ def answered(rows: Rows, signals: Sequence[Follower], disturbance: Array) -> dic
         size = signal.size - signal.size[rows.fit].mean()
         own = disturbance[rows.fit][:, list(signal.channels)]
         share = min(float(own.var(axis=0).max() / max(size[rows.fit].var(), 1e-12)), 1.0)
-        out[f"answer by {signal.name}"] = signal.column(rows, share * size)
+        column = out[f"answer by {signal.name}"] = np.zeros((len(size), rows.channels))
+        column[:, signal.channels] = share * size[:, None]
     return out
 
 

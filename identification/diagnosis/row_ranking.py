@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from .evidence import set_evidence
 from .priors import Base, Setting
 from .ranking import Found, starts_of
-from .regression import Column, Flights, without
+from .regression import Flights, without
 from .row_likelihood import RowLikelihood
 from .sets import Posterior, is_possible
 from .settings import DIAGNOSIS
@@ -45,14 +45,17 @@ def rank_by_rows(
     given = frozenset(first)
     first = likelihood.fitted(first)
     starts = starts_of(flights, library, first)
-    alone = likelihood.base(first, starts)
     fitted: dict[frozenset[str], Setting] = {given: first}
-    bases: dict[frozenset[str], Base] = {given: alone}
-    lags: dict[Column, dict[str, float]] = {
-        c: dict(x) for c, x in starts.items() if not flights.is_nonlinear(c[0])
-    }
-
+    bases: dict[frozenset[str], Base] = {given: likelihood.base(first, starts)}
     idle: set[frozenset[str]] = set()
+
+    def base(setting: Setting, unknown: bool = False) -> Base:
+        lags = {
+            c: x
+            for c, x in starts.items()
+            if not flights.is_nonlinear(c[0]) and c[0] not in setting
+        }
+        return likelihood.base(setting, lags, unknown=unknown)
 
     def add(setting: Setting) -> None:
         key = frozenset(setting)
@@ -63,8 +66,7 @@ def rank_by_rows(
         ):
             idle.add(key)
             return
-        others = {c: x for c, x in lags.items() if c[0] not in setting}
-        bases[key] = likelihood.base(fitted[key], others)
+        bases[key] = base(fitted[key])
 
     for effect in library:
         if not flights.is_nonlinear(effect) or effect in given:
@@ -104,10 +106,8 @@ def rank_by_rows(
     confirmed()
     likelihood.power = posterior().tempering()
     best = confirmed()
-    key = frozenset(best)
-    others = {c: x for c, x in lags.items() if c[0] not in key}
-    bases.pop(key)
-    bases[key] = likelihood.base(best, others, unknown=True)
+    bases.pop(frozenset(best))  # the last is the one that has the dictionary
+    bases[frozenset(best)] = base(best, unknown=True)
     found = posterior()
     hidden = sorted(flights.needs_pose - flights.without_trace - set(best))
     behind = _behind(likelihood, best, [e for e in hidden if not flights.is_nonlinear(e)])

@@ -93,7 +93,7 @@ def _likeness(
             else flights.acting(p.signals, setting)[x]
             for p, x in zip(pieces, at, strict=True)
         ]
-        return np.concatenate(parts)[seen] * scale
+        return np.asarray(np.concatenate(parts)[seen] * scale)
 
     base, out = acting({}), []
     for start in starts:

@@ -6,6 +6,7 @@ factor; the weights of the others are fitted to flights of which the truth is kn
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,37 +27,27 @@ class UnknownSettings:
 UNKNOWN = UnknownSettings()
 
 
-@dataclass(frozen=True)
-class Signs:
-    """What speaks for something unknown.
+def signs(structure: float, disturbance: float, push: bool, named: bool) -> tuple[float, ...]:
+    """Return what each weight is multiplied with.
 
-    Attributes:
+    Args:
         structure: logarithm of the Bayes factor of one more column beside the likeliest set.
         disturbance: logarithm of the largest disturbance over what counts for none. It counts
             where nothing is named: a turbulence that is named with a wind is no sign of more.
         push: whether a transient disturbance was found.
         named: whether an effect is named.
     """
-
-    structure: float
-    disturbance: float
-    push: bool
-    named: bool
-
-    def numbers(self) -> tuple[float, ...]:
-        """Return what each weight is multiplied with."""
-        strength = 0.0 if self.named else self.disturbance
-        return (
-            1.0,
-            float(np.clip(self.structure, *UNKNOWN.structure_range)),
-            float(np.clip(strength, *UNKNOWN.disturbance_range)),
-            float(self.push),
-        )
+    strength = 0.0 if named else disturbance
+    return (
+        1.0,
+        float(np.clip(structure, *UNKNOWN.structure_range)),
+        float(np.clip(strength, *UNKNOWN.disturbance_range)),
+        float(push),
+    )
 
 
-def unknown(signs: Signs, weights: UnknownSettings = UNKNOWN) -> float:
-    """Return the probability that the likeliest set is not all that acts."""
-    w = weights
-    by_sign = (w.nothing, 1.0, w.disturbance, w.push)
-    odds = sum(a * x for a, x in zip(by_sign, signs.numbers(), strict=True))
+def unknown(found: Sequence[float], weights: UnknownSettings = UNKNOWN) -> float:
+    """Return the probability, by the ``signs``, that the likeliest set is not all that acts."""
+    by_sign = (weights.nothing, 1.0, weights.disturbance, weights.push)
+    odds = sum(a * x for a, x in zip(by_sign, found, strict=True))
     return 1.0 / (1.0 + math.exp(-odds))

@@ -47,7 +47,7 @@ from .regression import (
 from .row_ranking import rank_by_rows
 from .settings import DiagnosisSettings
 from .transient_disturbances import transient_disturbances
-from .unknown import Signs, unknown
+from .unknown import signs, unknown
 from .worth import worth
 
 Array = NDArray[np.float64]
@@ -120,7 +120,7 @@ class Judged:
         disturbed = beyond_calm(self.gusts, flights.vehicle)
         some = any(e not in differs for e in named)
         structure = found.ranking.structure
-        strange = unknown(Signs(structure, disturbed, bool(self.pushes), some))
+        strange = unknown(signs(structure, disturbed, bool(self.pushes), some))
         rivals = {e: self._rivals(e) for e in named}
         known = {
             e: differs[e] if e in differs else self._probability({e, *rivals[e]}) for e in named

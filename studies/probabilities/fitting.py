@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from windwrench.identification.diagnosis.unknown import UNKNOWN, Signs, UnknownSettings
+from windwrench.identification.diagnosis.unknown import UNKNOWN, UnknownSettings, signs
 from windwrench.studies.scoring import EQUIVALENTS
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ def _misled(flight: dict[str, Any]) -> bool:
 
 def fit(flights: Sequence[dict[str, Any]]) -> UnknownSettings:
     """Return the weights of signs at maximum posterior; a Bayes factor counts as what it is."""
-    x = np.array([Signs(**flight["signs"]).numbers() for flight in flights])
+    x = np.array([signs(**flight["signs"]) for flight in flights])
     y = np.array([acts_unknown(f) or _misled(f) for f in flights])
     given, x = x[:, 1], np.delete(x, 1, axis=1)
     scale = np.array(_WEIGHT_STD)
