@@ -163,6 +163,7 @@ class Estimates:
         status, given = (IDENTIFIED, "given") if known_arm else (ASSUMED, "assumed")
         rate, rotors = self.sources.rate, f"against {self.sources.rotors}"
         motions = {"Jx": "roll", "Jy": "pitch", "Jz": "yaw while rolling or pitching"}
+        known: Interval
         for axis, motion in motions.items():
             name = axis + axis[1]
             if axis not in why:
@@ -172,12 +173,13 @@ class Estimates:
             if axis == "Jz":
                 x, y = self.said["Jxx"], self.said["Jyy"]
                 low, high = usual.flat_range
-                known = usual.flat * (x.value + y.value), low * (x.low + y.low)
-                known = *known, high * (x.high + y.high)
+                guess = usual.flat * (x.value + y.value)
+                known = (guess, low * (x.low + y.low), high * (x.high + y.high))
                 how = f"{usual.flat:g} of Jxx + Jyy, {low:g} to 1"
             else:
                 low, high = (guess * g / usual.gyration for g in usual.gyration_range)
-                known, how = (guess, low, high), f"{usual.gyration:g} mass arm^2"
+                known = (guess, low, high)
+                how = f"{usual.gyration:g} mass arm^2"
             self._say(name, known, "kg m2", f"{why[axis]}; {how}", ASSUMED)
         for axis, across in (("Jx", 1), ("Jy", 0)):
             if axis not in why:

@@ -5,9 +5,11 @@ Rotor speeds are noisy (rounded) where they are measured: what that adds to the 
 is taken away before the normal equations are solved, so that it does not shrink the coefficients.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +67,7 @@ class VehicleFit:
         """Covariance (p, p), the larger of what the noise's spectrum says and what the segments'
         own scatter says (White's sandwich), parameter by parameter.
         """
-        inverse = SPECTRUM.loss * np.linalg.inv(self.information)
+        inverse = np.asarray(SPECTRUM.loss * np.linalg.inv(self.information), dtype=np.float64)
         count = len(self.scores)
         if count < 4:
             return inverse
@@ -96,7 +98,8 @@ class VehicleFit:
         here = float(of(values(theta)))
         steps = 1e-5 * np.eye(len(theta))
         slope = np.array([of(values(theta + e)) - of(values(theta - e)) for e in steps]) / 2e-5
-        size = self.width * float(np.sqrt(max(slope @ self.covariance @ slope, 0.0)))
+        variance = float(slope @ self.covariance @ slope)
+        size = self.width * math.sqrt(max(variance, 0.0))
         if logarithm and here > 0.0:
             factor = float(np.exp(min(size / here, 50.0)))
             return here, here / factor, here * factor
@@ -108,7 +111,7 @@ def solve(pieces: list[MotionPiece], drive: Drive, model: Model, start: Array) -
     theta = start.copy()
 
     def linear() -> BalanceSpectra:
-        here = {n: float(theta[model.free.index(n)]) for n in model.nonlinear}
+        here: dict[str, Any] = {n: float(theta[model.free.index(n)]) for n in model.nonlinear}
         return balance(pieces, replace(drive, **here), model.nonlinear)
 
     made = linear()
