@@ -222,10 +222,8 @@ def test_effects_in_c_are_those_in_python(tmp_path):
     model = declaring(model, *names)
     folder = write(export_c(model, "ekf"), tmp_path)
     # its functions are the file's own: here they are called from outside
-    text = (
-        (folder / "windwrench_filter.c").read_text().replace("static void effect_", "void effect_")
-    )
-    (folder / "effects.c").write_text(text)
+    text = (folder / "windwrench_filter.c").read_text()
+    (folder / "effects.c").write_text(text.replace("static void effect_", "void effect_"))
     run("gcc", "-std=c99", "-O1", "-shared", "-fPIC", "effects.c", "-o", "e.so", "-lm", cwd=folder)
     library = ctypes.CDLL(str(folder / "e.so"))
     vehicle = compile_effects(model).constants
@@ -237,18 +235,16 @@ def test_effects_in_c_are_those_in_python(tmp_path):
             c[: len(effect.coefficients)] = effect.vector(parse_setting(name, model).coefficients)
             state = rng.uniform(0.2, 2.0, STATE_SIZE)
             state[18:22] = rng.uniform(300.0, 500.0, 4)
-            rotors = rng.uniform(300.0, 500.0, ROTORS_SIZE)
-            rotors[4:] = 0.005, 11.0, 2.0
-            third, fourth = (
-                (state, np.zeros(6)) if effect.kind == "wrench" else (rotors, np.zeros(112))
-            )
-            if effect.kind == "sensing":
-                third = rng.uniform(0.2, 2.0, SAMPLE_SIZE)
-                third[7:11] /= np.linalg.norm(third[7:11])
-                third[12:16] = 1.0, 1.0, 1.0, rng.choice([-1.0, 1.0])
-            if effect.kind == "rotor input":
-                rotors[5] = 10.0
-                fourth[:5] = 1.0, 410.0, 420.0, 430.0, 440.0
+            rotors, memory = rng.uniform(300.0, 500.0, ROTORS_SIZE), np.zeros(112)
+            rotors[4:], memory[:5] = (0.005, 10.0, 2.0), (1.0, 410.0, 420.0, 430.0, 440.0)
+            sample = rng.uniform(0.2, 2.0, SAMPLE_SIZE)
+            sample[7:11] /= np.linalg.norm(sample[7:11])
+            sample[12:16] = 1.0, 1.0, 1.0, rng.choice([-1.0, 1.0])
+            third, fourth = {
+                "wrench": (state, np.zeros(6)),
+                "rotor input": (rotors, memory),
+                "sensing": (sample, np.zeros(112)),
+            }[effect.kind]
             given = [x.astype(np.float32) for x in (c, vehicle, third, fourth)]
             double = [x.astype(np.float64) for x in given]
             pointers = [x.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for x in double]
