@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import deepcopy
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -117,6 +119,10 @@ class WrenchUKFBatch:
     def __repr__(self) -> str:
         names = ", ".join(dict.fromkeys(ukf.vehicle.name for ukf in self._filters))
         return f"<{type(self).__name__} of {self.count} x {names}: period {self.period:g} s>"
+
+    def __copy__(self) -> Self:
+        """Return filters with a memory of their own that stand where these stand."""
+        return deepcopy(self)
 
     def __len__(self) -> int:
         """Return how many filters there are."""

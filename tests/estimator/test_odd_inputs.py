@@ -114,7 +114,7 @@ def pickled(one):
 
 @pytest.mark.parametrize(
     ("count", "duplicate"),
-    [(0, copy.copy), (0, copy.deepcopy), (0, pickled), (11, copy.deepcopy), (11, pickled)],
+    [(count, way) for count in (0, 11) for way in (copy.copy, copy.deepcopy, pickled)],
 )
 def test_a_copy_and_an_estimate_go_their_own_way(count, duplicate):
     """A filter with an IMU and a gate, and a batch of more than are side by side at once."""
