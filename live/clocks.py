@@ -10,11 +10,8 @@ on where the stream was, once enough messages agree that it did.
 
 from collections import deque
 
-from .messages import Sample
+from .messages import SECOND, Sample
 from .tallies import Tallies
-
-_SECOND = 1_000_000_000  # ns
-
 
 # s: clocks of two kinds of messages that read so much alike are one; far above transport's delays,
 # far below what two devices that were switched on one after the other differ by
@@ -34,35 +31,29 @@ class _Offset:
     """How much earlier a clock reads than ours, at the least delay of the last seconds."""
 
     def __init__(self) -> None:
-        self._seconds: deque[list[int]] = deque(maxlen=_WINDOW)  # [second, least]
+        self._least: dict[int, int] = {}  # offset, ns, by the second of arrival
         self.first: tuple[int, int] | None = None  # arrival and offset, ns, at the beginning
         self.value = 0
 
     def add(self, arrival: int, offset: int) -> None:
-        second = arrival // _SECOND
-        seconds = self._seconds
-        if seconds and seconds[-1][0] == second:
-            if offset >= seconds[-1][1]:
-                return
-            seconds[-1][1] = offset
-        else:
-            if self.first is None and len(seconds) == 5:
-                self.first = arrival, min(least for _, least in seconds)
-            seconds.append([second, offset])
-            while seconds[0][0] <= second - _WINDOW:
-                seconds.popleft()
-        self.value = min(least for _, least in seconds)
+        least, second = self._least, arrival // SECOND
+        if self.first is None and len(least) == 5 and second not in least:
+            self.first = arrival, min(least.values())
+        least[second] = min(offset, least.get(second, offset))
+        while (oldest := next(iter(least))) <= second - _WINDOW:
+            del least[oldest]
+        self.value = min(least.values())
 
     def drift(self) -> float | None:
         """Return by how much faster the clock runs than ours, in ppm; None: not known yet."""
-        if self.first is None or len(self._seconds) < 5:
+        latest = list(self._least.items())[-5:]
+        if self.first is None or len(latest) < 5:
             return None
-        latest = list(self._seconds)[-5:]
-        elapsed = latest[-1][0] - self.first[0] // _SECOND
+        elapsed = latest[-1][0] - self.first[0] // SECOND
         if elapsed < 10:
             return None
         change = min(least for _, least in latest) - self.first[1]
-        return -1e6 * change / (elapsed * _SECOND)
+        return -1e6 * change / (elapsed * SECOND)
 
 
 class _Clock:
@@ -87,7 +78,7 @@ class Clocks:
 
     def __init__(self, tallies: Tallies, horizon: float, paced: bool = True) -> None:
         self._tallies, self._paced = tallies, paced
-        self._horizon = round(horizon * _SECOND)
+        self._horizon = round(horizon * SECOND)
         self._clocks: list[_Clock] = []  # the first is the reference
         self._kinds: dict[str, tuple[_Clock, deque[int]]] = {}  # and the last stamps
 
@@ -140,9 +131,9 @@ class Clocks:
         if self._clocks and not self._paced:
             return self._clocks[0]
         for clock in self._clocks:
-            if abs(arrival - stamp - clock.offset.value) < _SAME * _SECOND:
+            if abs(arrival - stamp - clock.offset.value) < _SAME * SECOND:
                 return clock
-        shift = -stamp if not self._clocks and stamp > _EPOCH * _SECOND else 0
+        shift = -stamp if not self._clocks and stamp > _EPOCH * SECOND else 0
         clock = _Clock(shift, stamp, arrival)
         clock.offset.add(arrival, arrival - stamp)
         self._clocks.append(clock)
@@ -151,16 +142,16 @@ class Clocks:
     def _goes_on(self, clock: _Clock, stamp: int, arrival: int) -> bool:
         """Return whether a stamp is taken: none is that would be a jump, until enough agree."""
         late = stamp < clock.newest - self._horizon
-        ahead = self._paced and arrival - stamp < clock.offset.value - _AHEAD * _SECOND
+        ahead = self._paced and arrival - stamp < clock.offset.value - _AHEAD * SECOND
         if not late and not ahead:
             clock.odd.clear()
             return True
-        if clock.odd and not 0 < stamp - clock.odd[-1][0] < _AHEAD * _SECOND:
+        if clock.odd and not 0 < stamp - clock.odd[-1][0] < _AHEAD * SECOND:
             clock.odd.clear()
         clock.odd.append((stamp, arrival))
         agree = len(clock.odd) >= _AGREEING
         if agree and self._paced:
-            agree = arrival - clock.odd[0][1] > _LASTING * _SECOND
+            agree = arrival - clock.odd[0][1] > _LASTING * SECOND
         if not agree:
             self._tallies.counts["implausible times" if ahead else "too late"] += 1
             return False

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..dynamics.vehicle import Vehicle
 from ..identification.logs.channels import in_kit_axes, in_kit_units, quaternions, scaled
+from ..identification.logs.flight_log import NORM_TOLERANCE
 from ..identification.logs.log_map import (
     OWN_MAP,
     UNITS,
@@ -23,10 +24,8 @@ from ..identification.logs.log_map import (
 from ..identification.logs.magnitudes import Magnitudes
 from ..identification.logs.mapped_log import with_range
 from ..runtime.errors import InputError
-from .messages import Array, Malformed, Sample
+from .messages import SECOND, Array, Malformed, Sample
 
-_SECOND = 1_000_000_000  # ns
-_NORM_TOLERANCE = 0.02  # of a quaternion's length, as in a log
 _OUTSIDE = 0.01  # of a command's range, beyond which it is none of that range
 _LARGEST = Magnitudes().largest
 _FIELDS = {"rotors": "rotor_speeds", "commands": "command"}  # of a sample; others as the section
@@ -136,22 +135,22 @@ class FieldMap:
         clock = next((c for c in self._clocks if c.column in fields), self.map.time)
         if not clock.column:
             self._rows += 1
-            return round((self._rows - 1) * _SECOND / clock.rate_hz)
+            return round((self._rows - 1) * SECOND / clock.rate_hz)
         value = fields.get(clock.column)
         if isinstance(value, int) and not isinstance(value, bool):
             if abs(value) < 2**63:
-                return round(value * round(UNITS["time"][clock.unit] * _SECOND))
+                return round(value * round(UNITS["time"][clock.unit] * SECOND))
         elif isinstance(value, float) and math.isfinite(value) and abs(value) < 1e12:
-            return round(value * (UNITS["time"][clock.unit] * _SECOND))
+            return round(value * (UNITS["time"][clock.unit] * SECOND))
         raise Malformed(f"field {clock.column}: {_shown(value)}; expected a time")
 
     def _attitude(self, part: Attitude, values: Array) -> Array:
         quaternion = quaternions(part, values[None])
         if not part.euler:
             length = float(np.linalg.norm(quaternion))
-            if not abs(length - 1.0) <= _NORM_TOLERANCE:
+            if not abs(length - 1.0) <= NORM_TOLERANCE:
                 raise Malformed(
-                    f"a quaternion of length {length:.4g}; expected 1 within {_NORM_TOLERANCE:g}"
+                    f"a quaternion of length {length:.4g}; expected 1 within {NORM_TOLERANCE:g}"
                 )
             quaternion = quaternion / length
         return np.asarray(in_kit_axes(self.map, part, quaternion)[0])
@@ -160,30 +159,9 @@ class FieldMap:
 def _values(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | None:
     """Return a section's numbers, with signs and scale; None where it has none."""
     given: list[Any] = [fields.get(name) for name in part.columns]
-    if all(type(value) is float for value in given):  # nearly always, and quick
-        total = sum(given)
-        if total == total and max(given) <= _LARGEST and min(given) >= -_LARGEST:
-            return scaled(part, np.array(given))
-    elif all(value is None for value in given) and len(part.named) == len(given):
-        return None
-    return _checked(part, section, fields)
-
-
-def _checked(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | None:
-    """Return the same of numbers that may be none; say what is wrong with them."""
-    numbers = {}
-    for name in part.columns:
-        fixed = constant(name)
-        value = fields.get(name) if fixed is None else fixed
-        if value is None:
-            numbers[name] = math.nan
-        elif isinstance(value, int | float) and not isinstance(value, bool):
-            try:
-                numbers[name] = float(value)
-            except OverflowError:
-                numbers[name] = math.inf
-        else:
-            raise Malformed(f"field {name}: {_shown(value)}; expected a number")
+    if all(type(x) is float and abs(x) <= _LARGEST for x in given):  # nearly always, and quick
+        return scaled(part, np.array(given))
+    numbers = {name: _number(name, fields) for name in part.columns}
     missing = [name for name in part.named if math.isnan(numbers[name])]
     if missing:
         if len(missing) == len(part.named):
@@ -197,6 +175,20 @@ def _checked(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | 
             f"{section}: {', '.join(f'{x:.3g}' for x in values)}; expected numbers of a flight"
         )
     return values
+
+
+def _number(name: str, fields: Mapping[str, Any]) -> float:
+    """Return a field, or the constant that its name stands for; NaN: there is none."""
+    fixed = constant(name)
+    value = fields.get(name) if fixed is None else fixed
+    if value is None:
+        return math.nan
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise Malformed(f"field {name}: {_shown(value)}; expected a number")
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
 
 
 def _shown(value: object) -> str:

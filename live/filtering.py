@@ -88,8 +88,7 @@ class LiveFilter:
             if len(self._held) < _FIRST_ROWS and not long:
                 return []
             return self.begin()
-        output = self._process(row)
-        return [] if output is None else [output]
+        return self._process(row)
 
     def begin(self) -> list[Output]:
         """Begin with the rows that are held back, however few; return what they lead to."""
@@ -99,8 +98,7 @@ class LiveFilter:
         self._held = []
         steps = np.diff([row.t for row in held])
         self._start(float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.005)
-        outputs = [self._process(row) for row in held]
-        return [output for output in outputs if output is not None]
+        return [output for row in held for output in self._process(row)]
 
     def _start(self, period: float) -> None:
         self.period = period
@@ -110,29 +108,29 @@ class LiveFilter:
         self._white = ukf.record["innovation"][0]  # of the last pose, whitened
         self._timed = TimedFilter(ukf, self.settings.horizon)
 
-    def _process(self, row: Row) -> Output | None:
+    def _process(self, row: Row) -> list[Output]:
         timed = self._timed
         assert timed is not None
         if math.isnan(timed.time):
             if not row.has_pose:
-                return None
+                return []
             assert row.position is not None
             assert row.quaternion is not None
             timed.reset(row.t, row.position, row.quaternion)
             self._before, self._settled = row, row.t + _STARTUP
-            return self._output(row, timed.estimate)
+            return [self._output(row, timed.estimate)]
         now = timed.time
         if round(row.t, 9) > now:
-            return self._output(row, self._carry(timed, row, now))
+            return [self._output(row, self._carry(timed, row, now))]
         late = round(row.t, 9) < now
         estimate = self._correct(timed, row)
         if estimate is None:
             if late and (row.has_pose or row.gyro is not None):
                 self._tallies.counts["too late"] += 1
-            return None
+            return []
         if late:
             self._tallies.counts["late"] += 1
-        return self._output(row, estimate)
+        return [self._output(row, estimate)]
 
     def _carry(self, timed: TimedFilter, row: Row, now: float) -> WrenchEstimate:
         """Carry the filter to a row, and correct it there."""
@@ -150,17 +148,12 @@ class LiveFilter:
         estimate = timed.predict(row.t, speeds, voltage)
         self._before = row
         estimate = self._correct(timed, row) or estimate
-        if row.has_pose:
-            self._judge(row.t, estimate)
+        status = estimate.numbers[STATUS]  # what the pose says of the tuning
+        if row.has_pose and status == RESTARTED:
+            self._settled = row.t + _STARTUP
+        elif row.has_pose and status == TRACKING and row.t > self._settled:
+            self._tallies.consistency.add(row.t, self._white)
         return estimate
-
-    def _judge(self, t: float, estimate: WrenchEstimate) -> None:
-        """Take in what the pose of now says of the tuning."""
-        status = estimate.numbers[STATUS]
-        if status == RESTARTED:
-            self._settled = t + _STARTUP
-        elif status == TRACKING and t > self._settled:
-            self._tallies.consistency.add(t, self._white)
 
     @staticmethod
     def _correct(timed: TimedFilter, row: Row) -> WrenchEstimate | None:
@@ -174,8 +167,7 @@ class LiveFilter:
 
     def _output(self, row: Row, estimate: WrenchEstimate) -> Output:
         assert self._timed is not None
-        torque_and_force = estimate.std_wrench
-        std = np.concatenate([torque_and_force[3:], torque_and_force[:3]])
+        std = np.roll(estimate.std_wrench, 3)  # from torque and force
         if row.has_pose and estimate.status == "rejected":
             self._tallies.counts["refused"] += 1
         return Output(row, self._timed.time, estimate, std)

@@ -6,11 +6,13 @@ filter and the recording take: a row of a flight log, on the stream's own time.
 """
 
 from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+SECOND = 1_000_000_000  # ns
 
 
 class Malformed(ValueError):  # noqa: N818 - of one message, not of the request
@@ -42,15 +44,18 @@ class Measured:
         return self.gyro is not None or self.accelerometer is not None
 
     @property
-    def parts(self) -> list[Array | float]:
-        """All that was measured or commanded."""
-        values = (getattr(self, one.name) for one in fields(Measured))
-        return [value for value in values if value is not None]
+    def measured(self) -> dict[str, Any]:
+        """All that was measured or commanded, by name."""
+        values = ((name, getattr(self, name)) for name in QUANTITIES)
+        return {name: value for name, value in values if value is not None}
 
     @property
     def has_motors(self) -> bool:
         """Whether rotor speeds were measured, or commands given."""
         return self.rotor_speeds is not None or self.command is not None
+
+
+QUANTITIES = tuple(one.name for one in fields(Measured))
 
 
 @dataclass(slots=True)

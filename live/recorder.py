@@ -9,7 +9,7 @@ the header, and the reader of logs leaves it out.
 import math
 import os
 from bisect import bisect_left
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -106,7 +106,7 @@ class Recorder(Sink[Row]):
         else:
             where = bisect_left(held, row.t, key=lambda one: one.t)
             if held[where].t == row.t:
-                held[where] = _joined(held[where], row)
+                held[where] = replace(row, **(row.measured | held[where].measured))
             else:
                 held.insert(where, row)
         newest = held[-1].t
@@ -177,9 +177,3 @@ class Recorder(Sink[Row]):
             numbers = [] if value is None else np.atleast_1d(value).tolist()
             fields += map(repr, numbers) if numbers else [""] * len(columns)
         return ",".join([*fields, "1"]) + "\n"
-
-
-def _joined(row: Row, other: Row) -> Row:
-    """Return a row with what another of the same time holds besides."""
-    names = [field.name for field in fields(Row) if getattr(row, field.name) is None]
-    return replace(row, **{name: getattr(other, name) for name in names})

@@ -62,22 +62,11 @@ class Joiner:
         if not moving and not sample.has_motors:
             return None
         self._last_row = max(self._last_row, t)
-        pose = sample.has_pose
-        return Row(
-            t=t,
-            arrival=sample.arrival,
-            rotor_speeds=self._at(t),
-            position=sample.position if pose else None,
-            quaternion=sample.quaternion if pose else None,
-            command=self._command,
-            commanded=commanded,
-            voltage=self._voltage,
-            gyro=sample.gyro,
-            accelerometer=sample.accelerometer,
-            force=sample.force,
-            torque=sample.torque,
-            stamp=sample.stamp,
-        )
+        known = sample.measured | {"command": self._command, "voltage": self._voltage}
+        known["rotor_speeds"] = self._at(t)
+        if not sample.has_pose:
+            known |= {"position": None, "quaternion": None}
+        return Row(t, sample.arrival, commanded=commanded, stamp=sample.stamp, **known)
 
     def _take_motors(self, sample: Sample, t: float) -> bool:
         """Keep rotor speeds; return whether they are those that commands give."""

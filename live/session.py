@@ -17,12 +17,11 @@ from typing import Any
 from ..runtime.errors import InputError
 from .clocks import Clocks
 from .filtering import LiveFilter, LiveSettings, Output
-from .messages import Row, Sample
+from .messages import SECOND, Row, Sample
 from .outlets import WAITING, Outlet
 from .rows import Joiner
 from .sources.base import Source
 
-_SECOND = 1_000_000_000  # ns
 _VIEWED = 50.0  # estimates that a view shows, a second
 VIEWED = 1500  # in all: of the last 30 s
 SILENT = 0.5  # s without a message after which a source has stopped
@@ -136,7 +135,7 @@ class Session:
             self.ended = "the source ended"
             return False
         if samples:
-            silence = now - self._last > SILENT * _SECOND
+            silence = now - self._last > SILENT * SECOND
             if silence and self.tallies.rates and self.source.paced:
                 self.tallies.counts["stops"] += 1
             self._last = now
@@ -153,7 +152,7 @@ class Session:
             self._fresh.clear()
             self._record()
         wait = self._settings.wait
-        if not self.estimates and wait and now - self._first > wait * _SECOND:
+        if not self.estimates and wait and now - self._first > wait * SECOND:
             raise self._nothing(f"within {wait:g} s")
         return True
 
@@ -203,7 +202,7 @@ class Session:
             found = f"poses came ({came}), and no rotor speeds"
         else:
             found = f"{came} came, which is no estimate yet"
-        return InputError(f"{self.source.name}: {found} {when}; expected {self.source.expected()}")
+        return InputError(f"{self.source.name}: {found} {when}; expected {self.source.expected}")
 
 
 @contextmanager

@@ -41,17 +41,12 @@ from .filter_code import constants, fields, filter_code
 from .precision import FUNCTIONS, PRECISIONS, in_precision
 from .tracker import tracker_policy
 
-FILTERS: dict[str, type[WrenchUKF]] = {
-    "constant-gain": ConstantGainFilter,
-    "ekf": WrenchEKF,
-    "ukf": WrenchUKF,
+_FILTERS: dict[str, tuple[type[WrenchUKF], str]] = {
+    "constant-gain": (ConstantGainFilter, "The filter with a constant gain"),
+    "ekf": (WrenchEKF, "The extended Kalman filter"),
+    "ukf": (WrenchUKF, "The unscented Kalman filter"),
 }
-ESTIMATORS = tuple(FILTERS)
-_TITLES = {
-    "constant-gain": "The filter with a constant gain",
-    "ekf": "The extended Kalman filter",
-    "ukf": "The unscented Kalman filter",
-}
+ESTIMATORS = tuple(_FILTERS)
 # constants of the Python filters
 _KNOWN = {
     "N": N,
@@ -64,13 +59,8 @@ _KNOWN = {
     "CATCH_UP": CATCH_UP,
     "IMU_PATIENCE": IMU_PATIENCE,
 }
-# the file that is written, and its template
-FILES = {
-    "windwrench_filter.h": "windwrench_filter.h.j2",
-    "windwrench_filter.c": "windwrench_filter.c.j2",
-    "main.c": "main.c.j2",
-    "CMakeLists.txt": "CMakeLists.txt.j2",
-}
+# that are written, each from the template of its name
+FILES = ("windwrench_filter.h", "windwrench_filter.c", "main.c", "CMakeLists.txt")
 
 
 @dataclass(frozen=True)
@@ -112,7 +102,7 @@ def export_c(
         InputError: a setting is out of range, an effect cannot be exported, or single precision
             does not hold a number.
     """
-    if estimator not in FILTERS:
+    if estimator not in _FILTERS:
         raise InputError(f"estimator: expected one of {', '.join(ESTIMATORS)}, got {estimator!r}")
     if precision not in PRECISIONS:
         raise InputError(f"precision: expected {' or '.join(PRECISIONS)}, got {precision!r}")
@@ -123,7 +113,8 @@ def export_c(
     period = 1.0 / rate
     wrench, rotor_effects, sensing, effect_code = _effects(vehicle)
     tuning = UKFTuning.for_vehicle(vehicle, period, rise_time)
-    made = FILTERS[estimator](vehicle, tuning, period, gate, Recovery())
+    kind, title = _FILTERS[estimator]
+    made = kind(vehicle, tuning, period, gate, Recovery())
     if policy is not None and policy["kind"] == "tracker":
         policy = tracker_policy(vehicle, tuning, period)
     f = made.record[0]
@@ -131,7 +122,7 @@ def export_c(
     context: dict[str, Any] = {
         "version": __version__,
         "command": _one_line(command),
-        "title": f"{_TITLES[estimator]}, for the vehicle {_one_line(vehicle.name)}.",
+        "title": f"{title}, for the vehicle {_one_line(vehicle.name)}.",
         "estimator": estimator,
         "precision": precision,
         "imu": estimator != "constant-gain",
@@ -170,15 +161,15 @@ def export_c(
     effects_c = environment.get_template("effects.c.j2").render(context | {"places": places})
     context["places"] = definitions(effects_c)
     context |= {"filter_code": "", "constants": "", "fields": ""}
-    source = environment.get_template(FILES["windwrench_filter.c"]).render(context)
+    source = environment.get_template("windwrench_filter.c.j2").render(context)
     context["filter_code"] = filter_code(f, source)
     source += context["filter_code"]
     called = [name for name in FUNCTIONS if re.search(rf"\b{name}f\(", source)]
     context |= {"constants": constants(f, source), "fields": fields(source)}
     context["functions"] = ", ".join(n if precision == "double" else f"{n}f" for n in called)
     files = {
-        name: in_precision(environment.get_template(template).render(context), precision)
-        for name, template in FILES.items()
+        name: in_precision(environment.get_template(f"{name}.j2").render(context), precision)
+        for name in FILES
     }
     return Exported(files, made, tuple(e.name for e in vehicle.effects), precision)
 

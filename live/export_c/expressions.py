@@ -125,8 +125,6 @@ class Expressions(ABC):
 
     def element(self, of: ast.expr, place: ast.expr) -> Value:
         """Return a part of an array or of several numbers."""
-        if isinstance(of, ast.Name) and of.id not in self.names:
-            raise no_table(of.id)
         array = self.evaluated(of)
         if isinstance(array, tuple):
             return array[int(cast(float, self.number(place).known))]
@@ -156,7 +154,9 @@ class Expressions(ABC):
             return Number(f"WW_{name}", "int", value)
         if isinstance(value, bool | int | float):
             return constant(value)
-        raise no_table(name)
+        raise UntranslatableError(
+            f"looks up a table ({name}); the C has an effect's coefficients alone"
+        )
 
     def kept(self, value: Value) -> Value:
         """Return a number as one that is worked out only once."""
@@ -182,10 +182,3 @@ class Expressions(ABC):
     def floats(self, given: list[ast.expr]) -> str:
         """Return arguments that are numbers."""
         return ", ".join(self.number(one).as_float() for one in given)
-
-
-def no_table(name: str) -> UntranslatableError:
-    """Return the refusal of a name that is neither a number nor an array of the function."""
-    return UntranslatableError(
-        f"looks up a table ({name}); the C has an effect's coefficients alone"
-    )

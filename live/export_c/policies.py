@@ -9,7 +9,6 @@ from ...controllers.features import QUANTITIES
 from ...controllers.registry import shipped_policies
 from ...controllers.trained_policy import TrainedPolicy, cell_of, layers_of, load_policy
 from ...runtime.errors import InputError
-from .c_numbers import literal, table
 
 LAWS = ("lead", "tracker")
 # where the C has the numbers of an observation, in its order
@@ -26,14 +25,11 @@ def exportable_policy(name: str) -> Mapping[str, Any]:
         InputError: there is no such policy, or it is of a kind that is not exported.
     """
     if name == "lead":
-        law = Lead()
         return {
             "kind": "lead",
             "title": "Fan tracking with lead: u = -(gain x + rate_gain dx/dt), x = tau_z / f_x.",
             "source": "controllers/fan_laws.py",
-            "gain": literal(law.gain),
-            "rate_gain": literal(law.lead),
-            "least_force": literal(law.least_force),
+            "law": Lead(),
         }
     if name == "tracker":
         return {"kind": "tracker"}  # the rest is the vehicle's: ``tracker.tracker_policy``
@@ -51,40 +47,26 @@ def exportable_policy(name: str) -> Mapping[str, Any]:
         raise InputError(
             f"--policy {name}: is recurrent; only policies of dense layers can be exported"
         )
-    frame = []
-    for quantity, scale in zip(policy.features.frame, policy.features.scale, strict=True):
-        known = QUANTITIES[quantity]
-        if known.summed:
-            raise InputError(
-                f"--policy {name}: sees {quantity}, which is not in an estimate by itself; "
-                "such a policy cannot be exported"
-            )
-        frame.append({"c": _COLUMNS[known.column], "scale": literal(scale, name)})
-    layers = []
-    for i in range(layers_of(policy.weights)):
-        weight, bias = policy.weights[f"weight{i}"], policy.weights[f"bias{i}"]
-        layers.append(
-            {
-                "rows": weight.shape[0],
-                "columns": weight.shape[1],
-                "weight": table(weight),
-                "bias": table(bias),
-            }
+    features, weights, card = policy.features, policy.weights, policy.card
+    summed = next((quantity for quantity in features.frame if QUANTITIES[quantity].summed), None)
+    if summed is not None:
+        raise InputError(
+            f"--policy {name}: sees {summed}, which is not in an estimate by itself; such a policy "
+            "cannot be exported"
         )
-    squash, activation = bool(policy.card["squash"]), str(policy.card["activation"])
-    last = "b" if len(layers) % 2 == 1 else "a"
-    widest = max(policy.features.size, *(layer["rows"] for layer in layers))
+    places = [_COLUMNS[QUANTITIES[quantity].column] for quantity in features.frame]
+    layers = [(weights[f"weight{i}"], weights[f"bias{i}"]) for i in range(layers_of(weights))]
     return {
         "kind": "dense",
+        "name": name,
         "title": f"The policy {path.stem}, trained with "
-        f"{policy.card.get('algorithm', 'an unknown algorithm')}.",
+        f"{card.get('algorithm', 'an unknown algorithm')}.",
         "source": "controllers/trained_policy.py",
-        "repeat": int(policy.card["repeat"]),
-        "frame": frame,
-        "history": policy.features.history,
+        "repeat": int(card["repeat"]),
+        "frame": list(zip(places, features.scale, strict=True)),
+        "history": features.history,
         "layers": layers,
-        "widest": widest,
-        "activation": activation,
-        "squash": squash,
-        "last": last,
+        "widest": max(features.size, *(len(bias) for _, bias in layers)),
+        "activation": str(card["activation"]),
+        "squash": bool(card["squash"]),
     }

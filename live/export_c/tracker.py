@@ -13,7 +13,6 @@ from ...controllers.tracker import FEW, STOP, TURN, Tracker, nominal
 from ...controllers.wrench_lag import ORDER
 from ...dynamics.vehicle import Vehicle
 from ...estimator import UKFTuning
-from .c_numbers import literal, table
 
 PARTICLES = 400  # 40 kB: what a flight controller can spare
 
@@ -34,23 +33,7 @@ def tracker_policy(vehicle: Vehicle, tuning: UKFTuning, period: float) -> Mappin
         tuning: of its wrench filter.
         period: of it, s.
     """
-    model = sensor_model(briefing_of(vehicle, tuning, period))
     law = Tracker()
-    numbers = {
-        "speed": law.speed,
-        "reach": law.reach,
-        "drift": law.acceleration * np.sqrt(DECISION_PERIOD),
-        "jumps": law.jumps * DECISION_PERIOD,
-        "stop": STOP,
-        "turn": STOP + TURN,
-        "few": FEW,
-        "feed": law.feed,
-        "gain": law.gain,
-        "damping": law.damping,
-        "most": MAX_COMMAND,
-        "first": FIRST,
-        "per_step": 1.0 / STEP,
-    }
     return {
         "kind": "tracker",
         "title": "Fan tracking by a particle filter on the fan's place and velocity.",
@@ -58,12 +41,14 @@ def tracker_policy(vehicle: Vehicle, tuning: UKFTuning, period: float) -> Mappin
         "particles": PARTICLES,
         "order": ORDER,
         "settled": SETTLED,
-        "count": len(model.tables),
-        "jet": table(model.tables),
-        "keep": table(model.keep),
-        "enter": table(model.enter),
-        "regression": table(model.regression),
-        "variance": table(model.variance),
-        "yaw": table(model.yaw),
-        **{name: literal(value, name) for name, value in numbers.items()},
+        "model": sensor_model(briefing_of(vehicle, tuning, period)),
+        "law": law,
+        "drift": law.acceleration * np.sqrt(DECISION_PERIOD),
+        "jumps": law.jumps * DECISION_PERIOD,
+        "stop": STOP,
+        "turn": STOP + TURN,
+        "few": FEW,
+        "most": MAX_COMMAND,
+        "first": FIRST,
+        "per_step": 1.0 / STEP,
     }

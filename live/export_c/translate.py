@@ -39,9 +39,12 @@ _MATHS = {
 }
 _FUNCTIONS = {"abs": "fabsf", "min": "smaller", "max": "larger"}
 _PASSED_ON = ("any_of", "all_of")  # of one lane
-# a line that gives a variable a value
-_PUT = re.compile(r"(?P<indent> *)(?:const \w+ )?(?P<name>\w+)(?:\[\])? [-+*/]?= (?P<value>.*);")
-_CALL = re.compile(rf"(?!(?:{'|'.join((*_MATHS.values(), *_FUNCTIONS.values()))})\()\w+\(.*\)")
+# a line that gives a variable a value, and not by a call that may write elsewhere
+_PURE = "|".join((*_MATHS.values(), *_FUNCTIONS.values()))
+_PUT = re.compile(
+    r" *(?:const \w+ )?(?P<name>\w+)(?:\[\])? [-+*/]?= "
+    rf"(?P<value>(?:(?:{_PURE})\(|(?!\w+\()).*);"
+)
 _OF_ANNOTATION = {"float": "float", "int": "int", "bool": "truth"}
 
 
@@ -212,8 +215,12 @@ class Function(Expressions):
             case ast.AugAssign(target=target, op=op, value=value):
                 amount = self.converted(self.number(value), self.number(target).kind)
                 self.lines.append(f"{self.target(target)} {operator_of(op)}= {amount};")
-            case ast.For(target=ast.Name(id=i), iter=over, body=body):
-                first, end = self.bounds(over)
+            case ast.For(
+                target=ast.Name(id=i),
+                iter=ast.Call(func=ast.Name(id="range"), args=[_] | [_, _] as given),
+                body=body,
+            ):
+                first, end = ["0", *(self.number(one).text for one in given)][-2:]
                 self.names[i] = Number(c_name(i), "int")
                 i = c_name(i)
                 self.indented(f"for (int {i} = {first}; {i} < {end}; {i}++) {{", body)
@@ -244,6 +251,8 @@ class Function(Expressions):
                 self.lines.append(f"return {self.converted(self.number(value), self.result)};")
             case ast.Expr(value=ast.Call() as call):
                 self.lines.append(f"{self.call(call, '')};")
+            case ast.For():
+                raise UntranslatableError("loops over something else than a range")
             case _:
                 raise UntranslatableError(f"has a statement {type(node).__name__}")
 
@@ -307,15 +316,6 @@ class Function(Expressions):
             case ast.Attribute():
                 self.written.add("f")
         return self.number(node).text
-
-    def bounds(self, node: ast.expr) -> tuple[str, str]:
-        """Return first and last of a range."""
-        match node:
-            case ast.Call(func=ast.Name(id="range"), args=[end]):
-                return "0", self.number(end).text
-            case ast.Call(func=ast.Name(id="range"), args=[first, end]):
-                return self.number(first).text, self.number(end).text
-        raise UntranslatableError("loops over something else than a range")
 
     # ---- calls -----------------------------------------------------------------------------------
 
@@ -421,23 +421,13 @@ def _words(*lines: str) -> set[str]:
 
 
 def _without_unread(lines: list[str]) -> list[str]:
-    """Return lines of C without those that give a value to a variable that no line reads; a call of
-    theirs, which may write elsewhere, stays.
+    """Return lines of C without those that give a variable that no line reads a value, but by a
+    call, which may write elsewhere.
     """
-    while True:
-        put = [_PUT.fullmatch(line) for line in lines]
-        read = _words(
-            *(one["value"] if one else line for one, line in zip(put, lines, strict=True))
-        )
-        kept = []
-        for one, line in zip(put, lines, strict=True):
-            if one is None or one["name"] in read:
-                kept.append(line)
-            elif _CALL.fullmatch(one["value"]):
-                kept.append(f"{one['indent']}{one['value']};")
-        if kept == lines:
-            return lines
-        lines = kept
+    put = [(_PUT.fullmatch(line), line) for line in lines]
+    read = _words(*(one["value"] if one else line for one, line in put))
+    kept = [line for one, line in put if one is None or one["name"] in read]
+    return lines if kept == lines else _without_unread(kept)
 
 
 def _bound(value: Value) -> Value | None:

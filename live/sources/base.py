@@ -1,7 +1,6 @@
 """What a source of messages is, and how its address is read."""
 
 from abc import ABC, abstractmethod
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
@@ -45,6 +44,7 @@ class Source(ABC):
     strict = False  # a first message that is malformed says that the stream is of another kind
     answers = False  # estimates are sent back
     link: Any = None  # a ``Link`` that messages come by, of a source that has one
+    expected = ""  # what must come, for the error of a stream from which nothing came
 
     def __init__(
         self, text: str, vehicle: Vehicle, tallies: Tallies, log_map: LogMap | None = None
@@ -117,10 +117,6 @@ class Source(ABC):
                 raise InputError(f"{self.name}: {why}") from why
             self.tallies.counts["malformed"] += 1
         return None
-
-    @abstractmethod
-    def expected(self) -> str:
-        """Return what must come and has not, for an error."""
 
     def send(self, output: Output) -> None:  # noqa: B027 - most senders want to know nothing
         """Tell the sender the estimate, where it wants to know.
@@ -214,11 +210,12 @@ def read_address(text: str, kind: str, options: tuple[str, ...]) -> Address:
         given = parse_qsl(split.query, keep_blank_values=True, strict_parsing=bool(split.query))
     except ValueError as error:
         raise InputError(f"{text}: no address: {error}") from error
-    for name, _ in given:
+    names = [name for name, _ in given]
+    for name in names:
         if name not in options:
             expected = ", ".join(options) if options else "none"
             raise InputError(f"{text}: unknown option {name!r}; expected {expected}")
-    repeated = [name for name, count in Counter(name for name, _ in given).items() if count > 1]
+    repeated = [name for name in names if names.count(name) > 1]
     if repeated:
         raise InputError(f"{text}: option {repeated[0]} stands there more than once")
     return Address(text, split.scheme, split.hostname or "", port, split.path, dict(given))

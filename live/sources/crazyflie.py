@@ -29,9 +29,7 @@ from .base import LARGEST_SHARE, Source, unwrapped
 _FULL = 65_535.0  # PWM
 _WRAP = 2**24  # ms, of a log's time stamps
 _POSE = (
-    ("stateEstimate.x", "float"),
-    ("stateEstimate.y", "float"),
-    ("stateEstimate.z", "float"),
+    *((f"stateEstimate.{axis}", "float") for axis in "xyz"),
     ("stateEstimateZ.quat", "uint32_t"),
 )
 _IMU = tuple((f"{sensor}.{axis}", "float") for sensor in ("gyro", "acc") for axis in "xyz")
@@ -57,7 +55,7 @@ class CrazyflieLog(Source):
         self._period = int(address.number("period", 10.0, least=10.0)) // 10 * 10
         self._imu = address.choice("imu", ("0", "1")) == "1"
         self._blocks: queue.SimpleQueue[tuple[Any, int]] = queue.SimpleQueue()  # and arrivals
-        self._problem = ""
+        self.expected = f"log blocks every {self._period} ms"
         self._over = threading.Event()
         self._cf: Any = None
         self._stamps: dict[str, int] = {}  # ms, the newest of each block
@@ -81,7 +79,9 @@ class CrazyflieLog(Source):
         self._cf = crazyflie.Crazyflie()
         self._cf.connected.add_callback(lambda uri: answers.put(""))
         self._cf.connection_failed.add_callback(
-            lambda uri, message: answers.put(_first_line(message) or "no answer")
+            lambda uri, message: answers.put(
+                str(message or "").strip().partition("\n")[0][:300] or "no answer"
+            )
         )
         self._cf.connection_lost.add_callback(self._lost)
         self._cf.open_link(self._uri)
@@ -116,7 +116,7 @@ class CrazyflieLog(Source):
                 raise InputError(f"{self.name}: the Crazyflie's log: {reason}") from error
 
     def _lost(self, uri: str, message: str) -> None:
-        self._problem = f"the link was lost: {str(message)[:200]}"
+        self.expected += f"; the link was lost: {str(message)[:200]}"
         self._over.set()
 
     def _stamp(self, kind: str, milliseconds: int) -> int:
@@ -169,13 +169,3 @@ class CrazyflieLog(Source):
             link.close()
         self._cf.close_link()
         self._cf = None
-
-    def expected(self) -> str:
-        """Return what must come."""
-        return f"log blocks every {self._period} ms" + (
-            f"; {self._problem}" if self._problem else ""
-        )
-
-
-def _first_line(message: object) -> str:
-    return str(message or "").strip().partition("\n")[0][:300]

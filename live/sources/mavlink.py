@@ -25,17 +25,17 @@ import time
 from typing import Any
 
 from ..filtering import Output
-from ..messages import Malformed, Sample
+from ..messages import SECOND, Malformed, Sample
 from .base import Source
 from .esc_status import add_esc_status
 from .links import make_link
-from .mavlink_answer import WrenchSender
+from .mavlink_answer import send_wrench
 from .mavlink_messages import POSES, MessageReader
 
 _AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
 _OURS = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
 _BAUD = 57_600  # of telemetry radios
-_SECOND = 1_000_000_000  # ns, between heartbeats
+_PLOTTED = 100_000_000  # ns, between values for plots
 _WANTED = (
     *POSES,
     "ATTITUDE_QUATERNION",
@@ -58,10 +58,9 @@ class Mavlink(Source):
         self.link = make_link(self.address, _BAUD)
         self._rate = self.address.number("rate", 0.0)
         self._reader = MessageReader(self.vehicle, self.address.choice("pose", ("", *POSES)))
-        self._sender = WrenchSender(self.vehicle)
         self._mav: Any = None
         self._requested = False
-        self._due_heartbeat = 0  # ns
+        self._due_heartbeat = self._due_plot = 0  # ns
 
     def open(self) -> None:
         """Open the link."""
@@ -76,7 +75,7 @@ class Mavlink(Source):
         """Return the messages that are there."""
         now = time.monotonic_ns()
         if now >= self._due_heartbeat and self.link.peer is not None:
-            self._due_heartbeat = now + _SECOND
+            self._due_heartbeat = now + SECOND
             d = self._dialect
             self._mav.heartbeat_send(
                 d.MAV_TYPE_ONBOARD_CONTROLLER, d.MAV_AUTOPILOT_INVALID, 0, 0, 0
@@ -120,10 +119,14 @@ class Mavlink(Source):
     def send(self, output: Output) -> None:
         """Send the wrench back, in north, east, down."""
         if self.link.peer is not None and output.row.has_pose:
-            self._sender.send(self._mav, output)
+            now = time.monotonic_ns()
+            plotted = now >= self._due_plot
+            self._due_plot = now + _PLOTTED if plotted else self._due_plot
+            send_wrench(self._mav, output, self.vehicle, plotted)
 
-    def expected(self) -> str:
-        """Return what must come."""
+    @property
+    def expected(self) -> str:  # type: ignore[override]
+        """What must come, and what came."""
         seen = self._reader.seen
         came = f" (came: {', '.join(sorted(seen))})" if seen else ""
         return (

@@ -7,7 +7,6 @@ external force. The wind is solved for in that linear equation: any other force 
 """
 
 import math
-import time
 from typing import Any
 
 import numpy as np
@@ -18,59 +17,44 @@ from ..filtering import Output
 from ..messages import Array
 from .mavlink_messages import HALF_TURN, WRAP
 
-_PLOTTED = 100_000_000  # ns between values for plots
 _TILTED = 0.2  # of the drag of a level vehicle, below which the rest is no measure of wind
 
 
-class WrenchSender:
-    """Sends estimates.
+def send_wrench(mav: Any, output: Output, vehicle: Vehicle, plotted: bool) -> None:
+    """Send an estimate with pymavlink's ``MAVLink``.
 
     Args:
+        mav: of pymavlink.
+        output: the estimate.
         vehicle: that flies; its declared drag makes a wind of the force.
+        plotted: whether what ground stations plot is due too.
+
+    Raises:
+        OSError: the link does not take it.
     """
-
-    def __init__(self, vehicle: Vehicle) -> None:
-        self._vehicle = vehicle
-        self._due_plot = 0  # ns
-
-    def send(self, mav: Any, output: Output) -> None:
-        """Send an estimate with pymavlink's ``MAVLink``.
-
-        Raises:
-            OSError: the link does not take it.
-        """
-        force = output.estimate.force * HALF_TURN
-        torque = output.estimate.torque * HALF_TURN
-        microseconds = max(round(1e6 * output.t), 0)
-        data = [*force, *torque, *output.std, output.estimate.nis, output.estimate.status_code]
-        padded = [float(x) for x in data] + [0.0] * (58 - len(data))
-        mav.debug_float_array_send(microseconds, b"wrench", 1, padded)
-        now = time.monotonic_ns()
-        if now < self._due_plot:
-            return
-        self._due_plot = now + _PLOTTED
-        milliseconds = (microseconds // 1000) % WRAP
-        for name, values in (("force", force), ("torque", torque)):
-            for axis, value in zip("ned", values, strict=True):
-                mav.named_value_float_send(milliseconds, f"{name}_{axis}".encode(), float(value))
-        wind = wind_of(self._vehicle, output)
-        if wind is not None:
-            velocity, std = wind[0] * HALF_TURN, wind[1]
-            horizontal = float(math.hypot(std[0], std[1]) / math.sqrt(2.0))
-            mav.wind_cov_send(
-                microseconds,
-                *(float(x) for x in velocity),
-                horizontal,
-                float(std[2]),
-                float(output.estimate.position[2]),
-                horizontal,
-                float(std[2]),
-            )
+    force, torque = output.wrench.reshape(2, 3) * HALF_TURN
+    microseconds = max(round(1e6 * output.t), 0)
+    data = [*force, *torque, *output.std, output.estimate.nis, output.estimate.status_code]
+    padded = [float(x) for x in data] + [0.0] * (58 - len(data))
+    mav.debug_float_array_send(microseconds, b"wrench", 1, padded)
+    if not plotted:
+        return
+    milliseconds = (microseconds // 1000) % WRAP
+    for name, values in (("force", force), ("torque", torque)):
+        for axis, value in zip("ned", values, strict=True):
+            mav.named_value_float_send(milliseconds, f"{name}_{axis}".encode(), float(value))
+    wind = _wind(vehicle, output)
+    if wind is not None:
+        velocity, std = wind
+        north, east = (velocity * HALF_TURN[:2]).tolist()
+        horizontal = float(math.hypot(*std) / math.sqrt(2.0))
+        height = float(output.estimate.position[2])
+        mav.wind_cov_send(microseconds, north, east, -0.0, horizontal, 0.0, height, horizontal, 0.0)
 
 
-def wind_of(vehicle: Vehicle, output: Output) -> tuple[Array, Array] | None:
-    """Return the wind (3,) in m/s, world, and its standard deviation (3,), of which the vertical
-    ones are zero: none is assumed; None where the vehicle declares no ``rotor_drag``.
+def _wind(vehicle: Vehicle, output: Output) -> tuple[Array, Array] | None:
+    """Return the horizontal wind (2,) in m/s, world, and its standard deviation (2,): none is
+    assumed to be vertical; None where the vehicle declares no ``rotor_drag``.
     """
     given = next((e.coefficients for e in vehicle.effects if e.name == "rotor_drag"), {})
     still = np.array([given.get("kdx", 0.0), given.get("kdy", 0.0), 0.0])
@@ -83,8 +67,5 @@ def wind_of(vehicle: Vehicle, output: Output) -> tuple[Array, Array] | None:
     if not level > 0.0 or float(np.linalg.eigvalsh(drag)[0]) < _TILTED * level:
         return None
     inverse = np.linalg.inv(drag)
-    wind, std = np.zeros(3), np.zeros(3)
-    wind[:2] = inverse @ output.estimate.force[:2]
     covariance = inverse @ output.estimate.covariance[15:17, 15:17] @ inverse.T
-    std[:2] = np.sqrt(np.diagonal(covariance))
-    return wind, std
+    return inverse @ output.estimate.force[:2], np.sqrt(np.diagonal(covariance))

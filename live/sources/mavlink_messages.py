@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.vehicle import Vehicle
+from ...identification.logs.flight_log import NORM_TOLERANCE
 from ...identification.logs.rotor_orders import ORDERS
 from ..messages import Array, Malformed, Sample
 from .base import LARGEST_SHARE, unwrapped
@@ -23,7 +24,6 @@ POSES = ("ATT_POS_MOCAP", "VISION_POSITION_ESTIMATE", "ODOMETRY", "LOCAL_POSITIO
 # s that better poses are waited for once one comes: at 5 Hz and more each kind has come by then
 _CHOOSING = 0.5
 _ATTITUDE_AGE = 0.1  # s over which an attitude is carried by its rates; it turns 1 rad
-_NORM_TOLERANCE = 0.02  # of a quaternion's length
 _PULSES = 1000.0, 2000.0  # us, where the motor curve states no range
 _STAMPS = (("time_usec", 1_000), ("usec", 1_000), ("time_boot_ms", 1_000_000))  # fields, their ns
 
@@ -73,7 +73,7 @@ class MessageReader:
         sample = Sample(kind, stamps[0] if stamps else None, arrival)
         if not reader(message, sample):
             return None
-        if not all(np.isfinite(part).all() for part in sample.parts):
+        if not all(np.isfinite(part).all() for part in sample.measured.values()):
             raise Malformed("a number that is not finite")
         return sample
 
@@ -92,7 +92,7 @@ class MessageReader:
             return False
         turn = np.array(quaternion, dtype=np.float64)
         length = float(np.linalg.norm(turn))
-        if not abs(length - 1.0) <= _NORM_TOLERANCE:
+        if not abs(length - 1.0) <= NORM_TOLERANCE:
             raise Malformed("no quaternion")
         position = np.array((m.x, m.y, m.z), dtype=np.float64)
         # world and body each turn about their own x axis: a quaternion's vector like a position
@@ -123,7 +123,7 @@ class MessageReader:
         """Keep an attitude for the positions that come without one."""
         quaternion = np.array([m.q1, m.q2, m.q3, m.q4], dtype=np.float64)
         rates = np.array([m.rollspeed, m.pitchspeed, m.yawspeed], dtype=np.float64)
-        good = abs(float(np.linalg.norm(quaternion)) - 1.0) <= _NORM_TOLERANCE
+        good = abs(float(np.linalg.norm(quaternion)) - 1.0) <= NORM_TOLERANCE
         if not (good and np.isfinite(rates).all()):
             raise Malformed("no attitude")
         if sample.stamp is not None:

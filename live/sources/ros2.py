@@ -10,7 +10,7 @@ voltage, imu), for messages that state their units. Published are ``windwrench/w
 import importlib
 import time
 from collections.abc import Mapping
-from functools import partial
+from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,6 @@ from ..messages import Sample
 from .base import Source
 from .ros_conversions import (
     ACCELERATION,
-    BUILT,
     WRENCH,
     TopicReader,
     acceleration_message,
@@ -71,6 +70,8 @@ class Ros2(Source):
                 f"{text}: rclpy is not there; expected a ROS 2 installation whose setup.bash was "
                 "sourced in this shell (it is not on PyPI)"
             )
+        topics = ", ".join(f"{topic} ({section})" for section, topic in self._topics.items())
+        self.expected = f"messages on {topics}"
         self._given = given
         self._node: Any = None
         self._executor: Any = None
@@ -102,11 +103,11 @@ class Ros2(Source):
                 partial(self._take, read),
                 qos.qos_profile_sensor_data,
             )
-        self._types = {name: get_message(name) for name in BUILT}
+        self._type_of = cache(get_message)
         self._publishers = (
-            self._node.create_publisher(self._types[WRENCH], "windwrench/wrench", 10),
+            self._node.create_publisher(get_message(WRENCH), "windwrench/wrench", 10),
             self._node.create_publisher(
-                self._types[ACCELERATION], "windwrench/external_acceleration", 10
+                get_message(ACCELERATION), "windwrench/external_acceleration", 10
             ),
         )
 
@@ -150,8 +151,8 @@ class Ros2(Source):
         if self._publishers is None or not output.row.has_pose:
             return
         wrench, acceleration = self._publishers
-        wrench.publish(wrench_message(self._types, output, self._frame))
-        acceleration.publish(acceleration_message(self._types, output, self._frame, self.vehicle))
+        wrench.publish(wrench_message(self._type_of, output, self._frame))
+        acceleration.publish(acceleration_message(self._type_of, output, self._frame, self.vehicle))
 
     def close(self) -> None:
         """Take the node down."""
@@ -160,8 +161,3 @@ class Ros2(Source):
             self._node, self._publishers = None, None
             if self._rclpy.ok():
                 self._rclpy.shutdown()
-
-    def expected(self) -> str:
-        """Return what must come."""
-        topics = ", ".join(f"{topic} ({section})" for section, topic in self._topics.items())
-        return f"messages on {topics}"

@@ -3,7 +3,7 @@
 Written against the fields alone, so that messages of rclpy and of rosbags do alike.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -15,11 +15,11 @@ from ...identification.logs.log_map import LogMap
 from ...identification.logs.readers.ros_messages import Fields, stamp
 from ..field_map import FieldMap
 from ..filtering import Output
-from ..messages import Array, Malformed, Sample
+from ..messages import SECOND, Array, Malformed, Sample
 
 WRENCH = "geometry_msgs/msg/WrenchStamped"
 ACCELERATION = "geometry_msgs/msg/AccelWithCovarianceStamped"
-_SECOND = 1_000_000_000  # ns
+TypeOf = Callable[[str], Any]  # from a type's name to its class, such as ``get_message``
 
 
 class TopicReader:
@@ -54,25 +54,23 @@ class TopicReader:
         except (IndexError, ValueError, AttributeError, TypeError) as error:
             raise Malformed(str(error)) from error
         found.stamp = found.stamp or None
-        if not found.parts:
+        if not found.measured:
             raise Malformed("nothing")
         return found
 
 
-def wrench_message(types: Mapping[str, Any], output: Output, frame: str) -> Any:
+def wrench_message(of: TypeOf, output: Output, frame: str) -> Any:
     """Return the external force and torque, N and Nm in the world, as a WrenchStamped."""
     estimate = output.estimate
-    return types[WRENCH](
-        header=_header(types, output, frame),
-        wrench=types["geometry_msgs/msg/Wrench"](
-            force=_vector(types, estimate.force), torque=_vector(types, estimate.torque)
+    return of(WRENCH)(
+        header=_header(of, output, frame),
+        wrench=of("geometry_msgs/msg/Wrench")(
+            force=_vector(of, estimate.force), torque=_vector(of, estimate.torque)
         ),
     )
 
 
-def acceleration_message(
-    types: Mapping[str, Any], output: Output, frame: str, vehicle: Vehicle
-) -> Any:
+def acceleration_message(of: TypeOf, output: Output, frame: str, vehicle: Vehicle) -> Any:
     """Return the acceleration that the wrench alone gives the vehicle, with its covariance, as an
     AccelWithCovarianceStamped: ROS has no wrench with a covariance.
 
@@ -88,36 +86,23 @@ def acceleration_message(
     stated = noise + np.diag(output.std**2 - np.diag(noise))  # with the vehicle's own uncertainty
     covariance = scale @ stated @ scale.T
     values = scale @ np.concatenate([estimate.force, estimate.torque])
-    accel = types["geometry_msgs/msg/Accel"](
-        linear=_vector(types, values[:3]), angular=_vector(types, values[3:])
+    accel = of("geometry_msgs/msg/Accel")(
+        linear=_vector(of, values[:3]), angular=_vector(of, values[3:])
     )
-    both = types["geometry_msgs/msg/AccelWithCovariance"](
+    both = of("geometry_msgs/msg/AccelWithCovariance")(
         accel=accel, covariance=covariance.reshape(36)
     )
-    return types[ACCELERATION](header=_header(types, output, frame), accel=both)
+    return of(ACCELERATION)(header=_header(of, output, frame), accel=both)
 
 
-def _vector(types: Mapping[str, Any], values: Array) -> Any:
+def _vector(of: TypeOf, values: Array) -> Any:
     x, y, z = (float(v) for v in values)
-    return types["geometry_msgs/msg/Vector3"](x=x, y=y, z=z)
+    return of("geometry_msgs/msg/Vector3")(x=x, y=y, z=z)
 
 
-def _header(types: Mapping[str, Any], output: Output, frame: str) -> Any:
+def _header(of: TypeOf, output: Output, frame: str) -> Any:
     ns = output.row.stamp
     if ns is None or ns < 0:
-        ns = max(round(output.t * _SECOND), 0)
-    time = types["builtin_interfaces/msg/Time"](sec=ns // _SECOND, nanosec=ns % _SECOND)
-    return types["std_msgs/msg/Header"](stamp=time, frame_id=frame)
-
-
-# what is built of what
-BUILT = (
-    "builtin_interfaces/msg/Time",
-    "std_msgs/msg/Header",
-    "geometry_msgs/msg/Vector3",
-    "geometry_msgs/msg/Wrench",
-    "geometry_msgs/msg/Accel",
-    "geometry_msgs/msg/AccelWithCovariance",
-    WRENCH,
-    ACCELERATION,
-)
+        ns = max(round(output.t * SECOND), 0)
+    time = of("builtin_interfaces/msg/Time")(sec=ns // SECOND, nanosec=ns % SECOND)
+    return of("std_msgs/msg/Header")(stamp=time, frame_id=frame)

@@ -15,10 +15,9 @@ from ...envs.fan_tracking import DECISION_TICKS, FanTrackingEnv
 from ...envs.plant import NOISE, TICK
 from ...envs.scenarios import SCENARIOS, draw_fan_path, find_scenario
 from ...runtime.errors import InputError
-from ..messages import Array, Sample
+from ..messages import SECOND, Array, Sample
 from .base import WAITS, Source
 
-_SECOND = 1_000_000_000  # ns
 _AT_ONCE = 0.05  # s of flight that are made up for at once, at most
 _BEHIND = 1.0  # s: a machine that is further behind flies on from now
 
@@ -27,6 +26,7 @@ class Simulated(Source):
     """A vehicle that flies in this process."""
 
     kind, options = "sim", ("seed", "speed")
+    expected = "a flight of the plant"
 
     def _prepare(self) -> None:
         self._scenario = find_scenario(self.address.path or "base", SCENARIOS)
@@ -65,7 +65,7 @@ class Simulated(Source):
             time.sleep(min(max(wait, 0.0), timeout))
             return []
         if due * TICK > _BEHIND * max(self._speed, 1.0):
-            self._begun += round((due - 1) * TICK / self._speed * _SECOND)
+            self._begun += round((due - 1) * TICK / self._speed * SECOND)
             due = 1
         due = min(due, max(1, round(_AT_ONCE * max(self._speed, 1.0) / TICK)))
         return [self._tick() for _ in range(due)]
@@ -87,7 +87,7 @@ class Simulated(Source):
         seen, battery = loop.seen, loop.battery
         sample = Sample(
             "row",
-            round(self._ticks * TICK * _SECOND),
+            round(self._ticks * TICK * SECOND),
             arrival,
             whole=True,
             position=loop.sample[4:7].copy() if seen else None,
@@ -107,7 +107,3 @@ class Simulated(Source):
         observation = np.array([*x[16:19], *x[13:16], x[8], self._command], dtype=np.float32)
         self._command = float(self._controller(observation, None)[0])
         self._loop.setpoint[4] = self._command
-
-    def expected(self) -> str:
-        """Return what must come."""
-        return "a flight of the plant"

@@ -25,6 +25,7 @@ class TextStream(Source):
     """Rows of a table that comes on standard input."""
 
     kind, paced, patience, strict = "csv", False, _PIPE_WAITS, True
+    expected = "rows of a table with a header"
 
     def _prepare(self) -> None:
         if self.address.path != "-":
@@ -94,11 +95,13 @@ class TextStream(Source):
                 f"a row of {len(fields)} field(s); expected {len(self._header)}, as many as the "
                 "header"
             )
-        values = {
-            name: self._number(name, field)
-            for name, field in zip(self._header, fields, strict=True)
-            if name
-        }
+        values: dict[str, float] = {}
+        for name, field in zip(self._header, fields, strict=True):
+            value = self._layout.number(field) if name else None
+            if value is not None:
+                values[name] = value
+            elif name:
+                raise Malformed(f"field {name}: {field[:60]!r} is not a number")
         sample = self._map.sample("row", values, arrival)
         sample.whole = True
         return sample
@@ -107,14 +110,5 @@ class TextStream(Source):
         """Take the header."""
         self._layout = TextLayout(next((mark for mark in (",", ";", "\t") if mark in text), " "))
         self._header = self._layout.names(text)
+        self.expected = f"rows of a table with {', '.join(self._header)}"
         self._map.check(self._header)
-
-    def _number(self, name: str, field: str) -> float:
-        value = self._layout.number(field)
-        if value is None:
-            raise Malformed(f"field {name}: {field[:60]!r} is not a number")
-        return value
-
-    def expected(self) -> str:
-        """Return what must come."""
-        return "rows of a table with " + ", ".join(self._header or ["a header"])

@@ -27,6 +27,7 @@ class UdpJson(Source):
     """Rows of JSON objects that come by UDP."""
 
     kind, options, strict = "udp-json", ("reply",), True
+    expected = "datagrams of JSON with t, px, py, pz, qw, qx, qy, qz and omega1 ... omega4"
 
     def _prepare(self) -> None:
         self.answers = self.address.choice("reply", ("0", "1")) == "1"
@@ -64,10 +65,6 @@ class UdpJson(Source):
         """Send the estimate to where the last datagram came from, if it wants to know."""
         if self.answers:
             self.link.write(json.dumps(as_fields(output)).encode())
-
-    def expected(self) -> str:
-        """Return what must come."""
-        return "datagrams of JSON with t, px, py, pz, qw, qx, qy, qz and omega1 ... omega4"
 
 
 def _objects(data: bytes) -> list[dict[str, Any]]:

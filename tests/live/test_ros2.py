@@ -69,13 +69,13 @@ def test_rotors_of_a_multi_array_need_a_unit():
 
 def test_the_wrench_and_its_twin_as_ros_writes_them():
     output = Pipeline().take(whole(flight())[:200]).outputs[-1]
-    wrench = wrench_message(STORE.types, output, "world")
+    wrench = wrench_message(STORE.types.__getitem__, output, "world")
     again = STORE.deserialize_cdr(STORE.serialize_cdr(wrench, WRENCH), WRENCH)
     got = [again.wrench.force.x, again.wrench.force.y, again.wrench.force.z]
     np.testing.assert_array_equal(got, output.estimate.force)
     assert again.wrench.torque.z == output.estimate.torque[2]
     assert (again.header.stamp.sec, again.header.stamp.nanosec) == (0, 995_000_000)
-    twin = acceleration_message(STORE.types, output, "world", VEHICLE)
+    twin = acceleration_message(STORE.types.__getitem__, output, "world", VEHICLE)
     twin = STORE.deserialize_cdr(STORE.serialize_cdr(twin, ACCELERATION), ACCELERATION)
     covariance = np.array(twin.accel.covariance).reshape(6, 6)
     np.testing.assert_allclose(np.sqrt(np.diag(covariance)[:3]), output.std[:3] / VEHICLE.mass)
