@@ -17,11 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..runtime.archives import check_archive
 from ..runtime.errors import InputError
 from ..runtime.file_limits import LIMITS
 from ..runtime.page_files import write_text
-from ..runtime.regular_files import read_bytes, read_json
+from ..runtime.regular_files import check_archive, read_bytes, read_json
 from ..runtime.whole_files import replaced
 from .features import Features, History
 from .observation import MAX_COMMAND

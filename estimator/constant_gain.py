@@ -9,12 +9,12 @@ heading, and the correction back.
 
 import math
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numba import carray
 
 from ..dynamics.rotation import attitude_error
+from ..runtime.addresses import pointer_to
 from ..runtime.compiled import Record, compiled, compiled_without_gil
 from ..runtime.errors import InputError
 from .error_state import fold
@@ -157,13 +157,8 @@ def _look_for_steady_state(f: Record) -> None:
 
 
 @compiled
-def _step_record(record: Record, parts: int, dt: float, voltage: float) -> int:
-    f = record[0]
-    return step(f, f.z, parts, dt, voltage)
-
-
-def _step_at(pointer: Any, parts: int, dt: float, voltage: float) -> int:
-    f = carray(pointer, 1, FILTER)[0]
+def _step_at(address: int, parts: int, dt: float, voltage: float) -> int:
+    f = carray(pointer_to(address), 1, FILTER)[0]
     return step(f, f.z, parts, dt, voltage)
 
 
@@ -184,8 +179,7 @@ class ConstantGainFilter(WrenchUKF):
         InputError: a setting is out of range, or the filter does not converge at hover.
     """
 
-    _compiled_step = staticmethod(_step_record)
-    _step_by_address = staticmethod(_step_at)
+    _step_at = staticmethod(_step_at)
     _no_imu = "correct_imu needs a covariance; use WrenchUKF"
     _converged: Array | None = None
 

@@ -7,11 +7,11 @@ rho]x) R for small errors.
 """
 
 import math
-from typing import Any
 
 from numba import carray
 
 from ..dynamics.model import apply_effects
+from ..runtime.addresses import pointer_to
 from ..runtime.compiled import Record, compiled
 from .bias_states import carry_with_jacobian
 from .covariance import add_noise, carry_by_jacobian
@@ -215,18 +215,14 @@ def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
 
 
 @compiled
-def _step_record(record: Record, parts: int, dt: float, voltage: float) -> int:
-    f = record[0]
-    return step_by(f, f.z, parts, dt, voltage, predict)
+def _step_with_biases_at(address: int, parts: int, dt: float, voltage: float) -> int:
+    f = carray(pointer_to(address), 1, FILTER)[0]
+    return step_with_biases_by(f, parts, dt, voltage, predict, carry_with_jacobian)
 
 
 @compiled
-def _step_with_biases(record: Record, parts: int, dt: float, voltage: float) -> int:
-    return step_with_biases_by(record[0], parts, dt, voltage, predict, carry_with_jacobian)
-
-
-def _step_at(pointer: Any, parts: int, dt: float, voltage: float) -> int:
-    f = carray(pointer, 1, FILTER)[0]
+def _step_at(address: int, parts: int, dt: float, voltage: float) -> int:
+    f = carray(pointer_to(address), 1, FILTER)[0]
     return step_by(f, f.z, parts, dt, voltage, predict)
 
 
@@ -239,6 +235,5 @@ class WrenchEKF(WrenchUKF):
     other, and where a step must cost less.
     """
 
-    _compiled_step = staticmethod(_step_record)
-    _compiled_step_with_biases = staticmethod(_step_with_biases)
-    _step_by_address = staticmethod(_step_at)
+    _step_at = staticmethod(_step_at)
+    _step_with_biases_at = staticmethod(_step_with_biases_at)

@@ -51,7 +51,6 @@ C: so phases are numbers, and conditions have an answer for each lane (``runtime
 
 import math
 from dataclasses import dataclass
-from enum import IntEnum
 
 import numpy as np
 
@@ -70,16 +69,10 @@ _LOST = 0.9  # of a prior's variance: known no better than that
 # of their own one in a hundred goes on from the one before by chance, and two in a row 1e-4
 AGREEING = 3
 
-
-class Phase(IntEnum):
-    """What a filter makes of measured poses: the memory of a step for the next."""
-
-    BELIEVING = 0  # the last one was taken in, or the filter restarted there
-    ONE_REFUSED = 1  # one alone was refused since
-    REFUSING = 2  # more were
-
-
-BELIEVING, ONE_REFUSED, REFUSING = map(float, Phase)  # as a record holds them, lanes too
+# Phases, what a filter makes of measured poses, as a record holds them, lanes too
+BELIEVING = 0.0  # the last pose was taken in, or the filter restarted there
+ONE_REFUSED = 1.0  # one alone was refused since
+REFUSING = 2.0  # more were
 
 # What is remembered of poses from one step to the next
 MEMORY = np.dtype(
@@ -153,8 +146,11 @@ def load_recovery(record: np.void, vehicle: Vehicle, gate: float | None, given: 
     weight = vehicle.weight
     record["gated"] = gate is not None
     # largest NIS that is taken in unseen, of three numbers and of six
-    jump_at = given.jump_at**2
-    record["alarm"] = jump_at if gate is None else [largest_nis(gate, dof) for dof in (3, 6)]
+    record["alarm"] = given.jump_at**2
+    if gate is not None:
+        from scipy.stats import chi2
+
+        record["alarm"] = chi2.ppf(gate, (3, 6))
     record["restart_at"] = given.restart_at**2
     record["patience"], record["give_up"] = given.patience, given.give_up
     torque = given.torque_std * weight * vehicle.arm_l
@@ -183,13 +179,6 @@ def load_recovery(record: np.void, vehicle: Vehicle, gate: float | None, given: 
     push = 2.0 * weight
     record["push"] = push * vehicle.arm_l / inertia, push / vehicle.mass
     record["response"] = given.response
-
-
-def largest_nis(probability: float, dof: int) -> float:
-    """Return the NIS below which a consistent measurement of ``dof`` numbers lies."""
-    from scipy.stats import chi2
-
-    return float(chi2.ppf(probability, dof))
 
 
 @compiled

@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..dynamics.model import lay_addresses, reset_model, without_addresses
 from ..dynamics.rotation import attitude_error, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
-from ..runtime.addresses import address_of
+from ..runtime.addresses import STEP, address_of, pointer_to
 from ..runtime.arguments import real_numbers
 from ..runtime.compiled import Record, compiled, compiled_inline, specialised
 from ..runtime.errors import InputError
@@ -105,7 +105,7 @@ def carry_on(f: Record, dt: float) -> None:
     root_of_twelve(f)
     propagate(f, f.x, dt, f.centre)
     _carry_linear(f, dt)
-    _pairs_with_effects(f, dt)
+    _pairs_in_turn(f, dt, 2 * PAIRS, propagate)
     add_pairs(f)
     add_more_pairs(f)
     _gather(f, dt)
@@ -144,11 +144,6 @@ def _pairs_in_turn(f: Record, dt: float, pairs: int, moved: Any) -> None:
             total = error[0, i] + error[1, i]
             E[j, i] = scale * total
             mean[i] += weight * total  # (26)
-
-
-@compiled
-def _pairs_with_effects(f: Record, dt: float) -> None:
-    _pairs_in_turn(f, dt, 2 * PAIRS, propagate)
 
 
 @compiled
@@ -308,8 +303,8 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
 
 
 @compiled
-def _step_record(record: Record, parts: int, dt: float, voltage: float) -> int:
-    f = record[0]
+def _step_at(address: int, parts: int, dt: float, voltage: float) -> int:
+    f = carray(pointer_to(address), 1, FILTER)[0]
     return step(f, f.z, parts, dt, voltage)
 
 
@@ -339,8 +334,9 @@ def step_with_biases_by(
 
 
 @compiled
-def _step_with_biases(record: Record, parts: int, dt: float, voltage: float) -> int:
-    return step_with_biases_by(record[0], parts, dt, voltage, predict, carry_with_points)
+def _step_with_biases_at(address: int, parts: int, dt: float, voltage: float) -> int:
+    f = carray(pointer_to(address), 1, FILTER)[0]
+    return step_with_biases_by(f, parts, dt, voltage, predict, carry_with_points)
 
 
 @compiled
@@ -357,11 +353,6 @@ def _add_doubt(record: Record, numbers: Array) -> None:
 def _doubt() -> Callable[..., None]:
     """Return ``_add_doubt`` as a call of 0.1 us."""
     return specialised(_add_doubt, np.zeros(1, FILTER), np.zeros(ESTIMATE_SIZE))
-
-
-def _step_at(pointer: Any, parts: int, dt: float, voltage: float) -> int:
-    f = carray(pointer, 1, FILTER)[0]
-    return step(f, f.z, parts, dt, voltage)
 
 
 _POSES = FILTER.fields["poses"][1]  # type: ignore[index]  # where their memory begins
@@ -395,9 +386,9 @@ class WrenchUKF:
         InputError: period or gate out of range.
     """
 
-    _compiled_step = staticmethod(_step_record)
-    _compiled_step_with_biases = staticmethod(_step_with_biases)
-    _step_by_address = staticmethod(_step_at)
+    # compiled functions of the record's address, which may also be called by their own address
+    _step_at = staticmethod(_step_at)
+    _step_with_biases_at = staticmethod(_step_with_biases_at)
     _no_imu = ""  # why a kind of filter takes no inertial measurements
 
     def __init__(
@@ -442,6 +433,7 @@ class WrenchUKF:
     def _bind(self) -> None:
         """Lay what Python reads and writes in a step over the record."""
         self._sample = Sample(self.record["z"][0])
+        self._address: int = self.record.ctypes.data
         self._now: Array = np.ndarray(ESTIMATE_SIZE, buffer=self.record, offset=ESTIMATE)
         # phase and strain, read at a third of an array's cost
         self._doubts = memoryview(np.ndarray(2, buffer=self.record, offset=_POSES))  # type: ignore[arg-type]
@@ -451,7 +443,7 @@ class WrenchUKF:
         return {
             name: value
             for name, value in self.__dict__.items()
-            if name not in ("_sample", "_now", "_doubts", "_call")
+            if name not in ("_sample", "_address", "_now", "_doubts", "_call")
         } | {"record": without_addresses(self.record)}
 
     def __setstate__(self, state: dict[str, object]) -> None:
@@ -536,7 +528,7 @@ class WrenchUKF:
         """
         if self.record[0]["imu"]["used"]:
             raise InputError("step_address: a filter that was given an IMU steps in Python only")
-        return address_of(self._step_by_address)
+        return address_of(self._step_at.py_func)  # type: ignore[attr-defined]
 
     @property
     def memory(self) -> tuple[NDArray[np.uint8], ...]:
@@ -669,11 +661,11 @@ class WrenchUKF:
         call = self._call
         if call is None:
             biases = self.record[0]["imu"]["used"]
-            step = self._compiled_step_with_biases if biases else self._compiled_step
+            step: Any = self._step_with_biases_at if biases else self._step_at
             if not self.record[0]["x"][3:7].any():
                 raise InputError(f"{type(self).__name__}: call reset before a step")
-            call = self._call = specialised(step, self.record, parts, dt, 0.0)
-        if call(self.record, parts, dt, self._voltage if voltage is None else voltage) < 0:
+            call = self._call = step.compile(STEP.args)
+        if call(self._address, parts, dt, self._voltage if voltage is None else voltage) < 0:
             raise self._sample.bad_quaternion()
         return self.estimate
 

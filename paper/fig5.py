@@ -18,7 +18,7 @@ import numpy as np
 
 from ..envs.plant import TICK
 from ..estimator import UKFTuning, WrenchEKF, WrenchUKF
-from .fig5_estimators import ERRORS, UKF_TUNED, Runner, runner, score, tune
+from .fig5_estimators import ERRORS, UKF_TUNED, score, states_of, tune
 from .fig5_flights import FLIGHTS, NOISES, PLANTS, Array, Flight, fly, vehicle_at
 from .fig5_picture import draw
 from .observer import NonlinearObserver, ObserverTuning
@@ -68,8 +68,8 @@ def run(seeds: int, progress: Progress, evaluations: int = 120) -> Result:
     scores: Scores = {}
     examples: dict[tuple[str, str], Array] = {}
     for (plant, flight, noise), flown in flights.items():
-        for name, run_over in _runners(plant, noise, tunings).items():
-            states = [run_over(f.samples) for f in flown]
+        for name, estimator in _estimators(plant, noise, tunings).items():
+            states = [states_of(estimator, f.samples) for f in flown]
             scored = [score(s, f) for s, f in zip(states, flown, strict=True)]
             scores[plant, flight, noise, name] = np.array(scored)
             if plant == "exact" and flight == "hover":
@@ -91,22 +91,22 @@ def run(seeds: int, progress: Progress, evaluations: int = 120) -> Result:
     )
 
 
-def _runners(plant: str, noise: str, tunings: Tunings) -> dict[str, Runner]:
+def _estimators(plant: str, noise: str, tunings: Tunings) -> dict[str, WrenchUKF]:
     """Return all our estimators, by name, for flights of a plant at a noise level."""
     vehicle = vehicle_at(noise)
     base = UKFTuning.for_vehicle(vehicle, TICK)
     low, observer_low = tunings[plant, "low"]
     # a filter is told how noisy its measurements are: that is no tuning
     low = replace(low, position_noise=base.position_noise, attitude_noise=base.attitude_noise)
-    runners = {"EKF 1 s": runner(WrenchEKF(vehicle, base, TICK))}
+    estimators: dict[str, WrenchUKF] = {"EKF 1 s": WrenchEKF(vehicle, base, TICK)}
     for way, (ukf, observer) in {
         "1 s": (base, ObserverTuning()),
         "low": (low, observer_low),
         "anew": tunings[plant, noise],
     }.items():
-        runners[f"UKF {way}"] = runner(WrenchUKF(vehicle, ukf, TICK))
-        runners[f"observer {way}"] = runner(NonlinearObserver(vehicle, observer, TICK))
-    return runners
+        estimators[f"UKF {way}"] = WrenchUKF(vehicle, ukf, TICK)
+        estimators[f"observer {way}"] = NonlinearObserver(vehicle, observer, TICK)
+    return estimators
 
 
 def ratio(rows: Array, rival: Array) -> tuple[float, float, float]:

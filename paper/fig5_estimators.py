@@ -23,27 +23,21 @@ _FACTOR = 2.0  # by which the optimiser's first simplex reaches out from the sta
 _REACH = float(np.log(20.0))
 _WORST = 1e3  # cost of an estimate that is not finite
 
-# From a flight's samples (n, 11) to the states (n, 20) after each; the first row is the start.
-Runner = Callable[[Array], Array]
-
-
 UKF_TUNED = ("motor_torque_noise", "torque_walk", "thrust_noise", "force_walk")
 # root mean squares of the error's length: N, N, Nm, Nm
 ERRORS = ("force_transient", "force_steady", "torque_transient", "torque_steady")
 
 
-def runner(estimator: WrenchUKF) -> Runner:
-    """Return the run of an estimator over a flight."""
-
-    def run(samples: Array) -> Array:
-        out = np.zeros((len(samples), STATE_SIZE))
-        estimator.reset(samples[0, 4:7], samples[0, 7:11])
-        for k in range(1, len(samples)):
-            row = samples[k]
-            out[k] = estimator.step(row[:4], row[4:7], row[7:11]).state
-        return out
-
-    return run
+def states_of(estimator: WrenchUKF, samples: Array) -> Array:
+    """Return the states (n, 20) of an estimator after each of a flight's samples (n, 11); the first
+    row is the start.
+    """
+    out = np.zeros((len(samples), STATE_SIZE))
+    estimator.reset(samples[0, 4:7], samples[0, 7:11])
+    for k in range(1, len(samples)):
+        row = samples[k]
+        out[k] = estimator.step(row[:4], row[4:7], row[7:11]).state
+    return out
 
 
 def score(states: Array, flight: Flight) -> list[float]:
@@ -60,13 +54,15 @@ def score(states: Array, flight: Flight) -> list[float]:
     return [*errors, float(np.mean(states[window(STEADY), NIS]))]
 
 
-def cost(run: Runner, flights: Sequence[Flight]) -> float:
+def cost(estimator: WrenchUKF, flights: Sequence[Flight]) -> float:
     """Return the mean over the flights of all four errors, each as a share of the step that was
     applied.
     """
     total = 0.0
     for flight in flights:
-        force_1, force_2, torque_1, torque_2, _ = score(run(flight.samples), flight)
+        force_1, force_2, torque_1, torque_2, _ = score(
+            states_of(estimator, flight.samples), flight
+        )
         total += (force_1 + force_2) / _FORCE_SIZE + (torque_1 + torque_2) / _TORQUE_SIZE
     return total / len(flights) if np.isfinite(total) else _WORST
 
@@ -125,7 +121,7 @@ def _best(
 
     simplex = np.vstack([np.zeros_like(centre), np.log(_FACTOR) * np.eye(len(centre))])
     result = minimize(
-        lambda offset: cost(runner(build(parameters(offset))), flights),
+        lambda offset: cost(build(parameters(offset)), flights),
         np.zeros(len(centre)),
         method="Nelder-Mead",
         options={

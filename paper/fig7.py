@@ -7,8 +7,8 @@ the bound: a command ``gain * torque`` is at most ``gain * tau_max``.
 """
 
 import math
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -52,28 +52,6 @@ NOISE_GAIN = 24.0  # at which each of them is let in alone
 Array = NDArray[np.float64]
 Path = Callable[[Array], Array]
 Flights = dict[float, dict[float, list[Episode]]]  # by rise time or fan speed, and by gain
-
-
-@dataclass(frozen=True)
-class Fastest:
-    """The fastest fan held with one gain and filter; speeds in m/s, 0 where none was."""
-
-    gain: float
-    rise_time: float
-    bound: float  # the least of gain * tau_max and the largest command
-    searches: tuple[float, ...]  # in the standard air, one a search
-    calm: float  # without gusts, disturbance and sensor noise: what lag alone allows
-    sudden: float  # calm, and the fan moves at full speed from the start
-
-    @property
-    def held(self) -> float:
-        """Mean of the searches in the standard air."""
-        return float(np.mean(self.searches))
-
-    @property
-    def held_interval(self) -> tuple[float, float]:
-        """Interval of 95 % of that mean."""
-        return interval(self.searches)
 
 
 def interval(values: Sequence[float]) -> tuple[float, float]:
@@ -179,25 +157,34 @@ def searches(env: FanTrackingEnv, gain: float, bound: float, seeds: int) -> tupl
     )
 
 
-def sweep(seeds: int, largest: float, progress: Progress) -> list[Fastest]:
+def sweep(seeds: int, largest: float, progress: Progress) -> list[dict[str, Any]]:
     """Find the fastest fan for each rise time and gain; ``largest`` is the jet's largest torque,
     Nm.
+
+    Speeds are in m/s, 0 where no fan was held. Calm air has no gusts, disturbance and sensor noise:
+    its speeds show what lag alone allows, and with a sudden start the fan moves at full speed from
+    the beginning.
     """
-    rows = []
+    rows: list[dict[str, Any]] = []
     for rise_time in RISE_TIMES:
         standard, calm = make_env(rise_time), make_env(rise_time, noises=())
         for gain in GAINS:
             bound = min(gain * largest, MAX_COMMAND)
-            # nothing is random in calm air: one flight says it all
+            found = searches(standard, gain, bound, seeds)
+            held = float(np.mean(found))
             rows.append(
-                Fastest(
-                    gain,
-                    rise_time,
-                    bound,
-                    searches(standard, gain, bound, seeds),
-                    fastest_held(calm, gain, bound, 1),
-                    fastest_held(calm, gain, bound, 1, start=0.0),
-                )
+                {
+                    "gain": gain,
+                    "rise_time_s": rise_time,
+                    "bound_m_s": bound,
+                    "held_m_s": held,
+                    "held_share_of_bound": held / bound,
+                    "held_share_of_bound_ci95": [end / bound for end in interval(found)],
+                    "held_m_s_by_search": found,
+                    # nothing is random in calm air: one flight says it all
+                    "calm_m_s": fastest_held(calm, gain, bound, 1),
+                    "calm_sudden_m_s": fastest_held(calm, gain, bound, 1, start=0.0),
+                }
             )
             progress(len(rows) / (len(GAINS) * len(RISE_TIMES)))
     return rows
@@ -230,20 +217,6 @@ def _tracking_figures(episodes: Sequence[Episode]) -> dict[str, float]:
         "rmse_m": float(np.mean([e.rmse for e in episodes])),
         "share_within_fan_radius": float(np.mean([e.offset < Fan().radius for e in episodes])),
         "lost": float(np.mean([e.lost for e in episodes])),
-    }
-
-
-def _fastest_figures(f: Fastest) -> dict[str, Any]:
-    return {
-        "gain": f.gain,
-        "rise_time_s": f.rise_time,
-        "bound_m_s": f.bound,
-        "held_m_s": f.held,
-        "held_share_of_bound": f.held / f.bound,
-        "held_share_of_bound_ci95": [end / f.bound for end in f.held_interval],
-        "held_m_s_by_search": f.searches,
-        "calm_m_s": f.calm,
-        "calm_sudden_m_s": f.sudden,
     }
 
 
@@ -305,7 +278,7 @@ def run(seeds: int, progress: Progress) -> Result:
         "speed_step_share_of_bound": (BRACKET[1] - BRACKET[0]) / 2**HALVINGS,
         "capture": capture_rows,
         "tracking": track_rows,
-        "fastest": [_fastest_figures(f) for f in fastest],
+        "fastest": fastest,
         "searches": REPEATS,
         "held_share_of_bound_with_one_noise": {
             noise: float(np.mean(shares)) for noise, shares in alone.items()
@@ -321,13 +294,13 @@ def run(seeds: int, progress: Progress) -> Result:
         fastest=fastest,
         alone={noise: (float(np.mean(found)), *interval(found)) for noise, found in alone.items()},
         best=[
-            max((f for f in fastest if f.rise_time == rise_time), key=lambda f: f.held)
+            max((f for f in fastest if f["rise_time_s"] == rise_time), key=lambda f: f["held_m_s"])
             for rise_time in RISE_TIMES
         ],
-        scatter=max(np.ptp(f.searches) / f.bound for f in fastest),
+        scatter=max(np.ptp(f["held_m_s_by_search"]) / f["bound_m_s"] for f in fastest),
         held=_share,
-        calm=[f.calm / f.bound for f in fastest],
-        sudden=[f.sudden / f.bound for f in fastest],
+        calm=[f["calm_m_s"] / f["bound_m_s"] for f in fastest],
+        sudden=[f["calm_sudden_m_s"] / f["bound_m_s"] for f in fastest],
         span=lambda shares: f"{min(shares):.0%} to {max(shares):.0%}",
         caught=float(np.mean([row["captured"] or 0.0 for row in capture_rows])),
         # the middle gain stands for the paper's controller
@@ -337,10 +310,10 @@ def run(seeds: int, progress: Progress) -> Result:
     return Result(figures, _traces(captures, tracks), picture, comparison, remarks)
 
 
-def _share(row: Fastest) -> str:
+def _share(row: Mapping[str, Any]) -> str:
     """Return the held share of the bound with its interval."""
-    low, high = row.held_interval
-    return f"{row.held / row.bound:.0%} [{low / row.bound:.0%}, {high / row.bound:.0%}]"
+    low, high = row["held_share_of_bound_ci95"]
+    return f"{row['held_share_of_bound']:.0%} [{low:.0%}, {high:.0%}]"
 
 
 def _traces(captures: Flights, tracks: Flights) -> Columns:

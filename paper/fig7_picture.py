@@ -17,9 +17,9 @@ _GAINS = {6.0: SERIES[2], 18.0: SERIES[1], 36.0: SERIES[3]}
 _RADIUS = 0.45  # m, of the fan
 # field of a row of the search -> line, its style, and its entry in the legend
 _HELD = (
-    ("held", "o-", {"lw": 2.2, "ms": 7}, "held, rise time {:g} s"),
-    ("calm", "^--", {"lw": 1, "ms": 5, "mfc": "white"}, "… in calm air"),
-    ("sudden", "s:", {"lw": 1, "ms": 4, "mfc": "white"}, "… in calm air, sudden start"),
+    ("held_m_s", "o-", {"lw": 2.2, "ms": 7}, "held, rise time {:g} s"),
+    ("calm_m_s", "^--", {"lw": 1, "ms": 5, "mfc": "white"}, "… in calm air"),
+    ("calm_sudden_m_s", "s:", {"lw": 1, "ms": 4, "mfc": "white"}, "… in calm air, sudden start"),
 )
 
 
@@ -27,7 +27,7 @@ _HELD = (
 def draw_tracking(
     captures: Mapping[float, Mapping[float, list[Episode]]],
     tracks: Mapping[float, Mapping[float, list[Episode]]],
-    fastest: Sequence[Any],
+    fastest: Sequence[Mapping[str, Any]],
     largest: float,
     at: float,
     held_offset: float,
@@ -37,7 +37,7 @@ def draw_tracking(
     Args:
         captures: flights by rise time (s) and gain, from 0.8 m off a fan that stands still.
         tracks: flights by fan speed (m/s) and gain, behind a fan that moves to and fro.
-        fastest: rows ``Fastest`` of the search for the fastest fan.
+        fastest: rows of ``fig7.sweep``.
         largest: the jet's largest torque, Nm.
         at: the offset where it acts, m.
         held_offset: offset that ends a flight of that search, m.
@@ -67,7 +67,7 @@ def draw_tracking(
     _speeds(figure.add_subplot(grid[3, :2]), fastest, largest)
     axes = figure.add_subplot(grid[3, 2])
     axes.axhline(100, color="black", lw=1.6)
-    _held(axes, fastest, lambda f: 100.0 / f.bound)
+    _held(axes, fastest, lambda f: 100.0 / f["bound_m_s"])
     axes.set(title="the same as a share of the bound", ylim=(0, 130), ylabel="% of the bound")
     axes.set_xlabel("gain k (m/s per Nm)")
     figure.suptitle(
@@ -125,22 +125,27 @@ def _torque(axes: Any, episode: Episode, largest: float) -> None:
     axes.set(xlabel="time (s)", ylabel=r"$\tau_z$ (mNm)", ylim=(-62, 90))
 
 
-def _held(axes: Any, fastest: Sequence[Any], scale: Any) -> list[Any]:
+def _interval(row: Mapping[str, Any]) -> list[float]:
+    """Return the ends, m/s, of the interval of the held speed."""
+    return [share * row["bound_m_s"] for share in row["held_share_of_bound_ci95"]]
+
+
+def _held(axes: Any, fastest: Sequence[Mapping[str, Any]], scale: Any) -> list[Any]:
     """Draw the speeds held over the gain for each rise time, times ``scale`` of their row; return
     what the legend names.
     """
     entries = []
-    for rise, colour in zip(sorted({f.rise_time for f in fastest}), SERIES[4:], strict=False):
-        some = [f for f in fastest if f.rise_time == rise]
+    for rise, colour in zip(sorted({f["rise_time_s"] for f in fastest}), SERIES[4:], strict=False):
+        some = [f for f in fastest if f["rise_time_s"] == rise]
         scales = np.array([scale(f) for f in some])
-        held = np.array([f.held for f in some])
-        low, high = np.array([f.held_interval for f in some]).T
+        held = np.array([f["held_m_s"] for f in some])
+        low, high = np.transpose([_interval(f) for f in some])
         for name, line, style, label in _HELD:
             entries.append(
                 axes.errorbar(
-                    [f.gain for f in some],
-                    scales * [getattr(f, name) for f in some],
-                    scales * [held - low, high - held] if name == "held" else None,
+                    [f["gain"] for f in some],
+                    scales * [f[name] for f in some],
+                    scales * [held - low, high - held] if name == "held_m_s" else None,
                     fmt=line,
                     color=colour,
                     elinewidth=1.4,
@@ -152,12 +157,12 @@ def _held(axes: Any, fastest: Sequence[Any], scale: Any) -> list[Any]:
     return entries
 
 
-def _speeds(axes: Any, fastest: Sequence[Any], largest: float) -> None:
+def _speeds(axes: Any, fastest: Sequence[Mapping[str, Any]], largest: float) -> None:
     """Draw the fastest fan held over the gain, beside the bound."""
-    gains = np.array(sorted({f.gain for f in fastest}))
+    gains = np.array(sorted({f["gain"] for f in fastest}))
     line = np.linspace(0.0, 1.08 * gains[-1], 200)
     bound = np.minimum(
-        line * largest, max(f.bound for f in fastest) if largest * gains[-1] > 1 else np.inf
+        line * largest, max(f["bound_m_s"] for f in fastest) if largest * gains[-1] > 1 else np.inf
     )
     label = r"bound $k\,\tau_{max}$, at most 1 m/s"
     entries = axes.plot(line, bound, color="black", lw=1.6, label=label)
@@ -165,11 +170,11 @@ def _speeds(axes: Any, fastest: Sequence[Any], largest: float) -> None:
     entries.append(axes.fill_between(line, bound, 2.0, color=PALE, lw=0, label=words))
     entries += _held(axes, fastest, lambda f: 1.0)
     for gain in gains:
-        some = sorted((f for f in fastest if f.gain == gain), key=lambda f: f.rise_time)
+        some = sorted((f for f in fastest if f["gain"] == gain), key=lambda f: f["rise_time_s"])
         axes.text(
             gain + 0.4,
-            min(f.held_interval[0] for f in some) - 0.06,
-            " / ".join(f"{f.held:.2f}" for f in some),
+            min(_interval(f)[0] for f in some) - 0.06,
+            " / ".join(f"{f['held_m_s']:.2f}" for f in some),
             ha="left" if gain < gains[-1] else "center",
         )
     # in the order drawn; a legend of its own making has bars with intervals last

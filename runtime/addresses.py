@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from .compiled import compiled
 
 Array = NDArray[np.float64]
-STEP = types.int64(types.voidptr, types.int64, types.float64, types.float64)
+STEP = types.int64(types.int64, types.int64, types.float64, types.float64)
 
 
 @cache
@@ -44,10 +44,10 @@ def call_step(
     signature = types.int64(types.int64, record, types.int64, types.float64, types.float64)
 
     def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        pointer, whole, real = ir.IntType(8).as_pointer(), ir.IntType(64), ir.DoubleType()
-        kind = ir.FunctionType(whole, [pointer, whole, real, real])
+        whole, real = ir.IntType(64), ir.DoubleType()
+        kind = ir.FunctionType(whole, [whole, whole, real, real])
         target = builder.inttoptr(arguments[0], kind.as_pointer())
-        return builder.call(target, [builder.bitcast(arguments[1], pointer), *arguments[2:]])
+        return builder.call(target, [builder.ptrtoint(arguments[1], whole), *arguments[2:]])
 
     return signature, generate
 

@@ -133,16 +133,6 @@ for _function, _name in ((math.sqrt, "sqrt"), (math.floor, "floor"), (abs, "fabs
     )
 
 
-def _lane_by_lane(builder: Any, function: Callable[..., Any], *given: Any) -> Any:
-    """Generate ``function`` of single numbers for each lane of those given."""
-    out = given[0]
-    for lane in range(WIDTH):
-        place = ir.Constant(ir.IntType(32), lane)
-        numbers = [builder.extract_element(values, place) for values in given]
-        out = builder.insert_element(out, function(*numbers), place)
-    return out
-
-
 def _of_library(name: str) -> Callable[..., Any]:
     """Return what generates a function of C's library lane by lane: rare, and so with the digits of
     single numbers.
@@ -151,8 +141,12 @@ def _of_library(name: str) -> Callable[..., Any]:
     def generate(builder: Any, *given: Any) -> Any:
         one = ir.DoubleType()
         kind = ir.FunctionType(one, [one] * len(given))
-        function = cgutils.get_or_insert_function(builder.module, kind, name)
-        return _lane_by_lane(builder, lambda *a: builder.call(function, a), *given)
+        function, out = cgutils.get_or_insert_function(builder.module, kind, name), given[0]
+        for lane in range(WIDTH):
+            place = ir.Constant(ir.IntType(32), lane)
+            numbers = [builder.extract_element(values, place) for values in given]
+            out = builder.insert_element(out, builder.call(function, numbers), place)
+        return out
 
     return generate
 

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from multiprocessing.managers import DictProxy, SyncManager
 from pathlib import Path
@@ -197,13 +197,41 @@ def each(
         InputError: as ``runtime.cluster.connected``, or the work fails on a cluster.
         Exception: what the work itself raises.
     """
-    if cluster is None:
-        local = _Local(work, jobs or os.cpu_count() or 1, most_seconds)
-        yield from _each(local, tasks, most_seconds, attempts, idle)
-        return
-    with connected(cluster) as ray:
-        crew = _OnCluster(ray, cluster, work, jobs, most_seconds)
-        yield from _each(crew, tasks, most_seconds, attempts, idle)
+    with nullcontext() if cluster is None else connected(cluster) as ray:
+        crew: _Local | _OnCluster = (
+            _Local(work, jobs or os.cpu_count() or 1, most_seconds)
+            if cluster is None
+            else _OnCluster(ray, cluster, work, jobs, most_seconds)
+        )
+        coming = iter(tasks)
+        again: deque[tuple[T, int]] = deque()
+        running: dict[Future[Any], tuple[T, int]] = {}
+        try:
+            while True:
+                while len(running) < crew.count and (task := next(coming, None)) is not None:
+                    running[crew.start(task)] = task, 1
+                if not running:
+                    if not again:
+                        return
+                    task, attempt = again.popleft()
+                    running[crew.start(task)] = task, attempt + 1
+                for future in crew.wait(running, _LOOK if idle else None):
+                    task, attempt = running.pop(future)
+                    error = future.exception()
+                    if error is None:
+                        yield task, future.result()
+                    elif isinstance(error, TimeoutError) and error.args[:1] == ("Task timeout",):
+                        yield task, Lost("time", f"it took more than {most_seconds:g} s")
+                    elif (words := _death(error)) is None:
+                        raise error
+                    elif attempt < attempts:
+                        again.append((task, attempt))
+                    else:
+                        yield task, Lost("died", words)
+                if idle:
+                    idle()
+        finally:
+            crew.end()
 
 
 def every(
@@ -223,44 +251,6 @@ def every(
             where = "this machine" if cluster is None else f"--cluster {cluster}"
             raise InputError(f"{where}: a task failed: {result.words}")
         yield task, result
-
-
-def _each(
-    crew: _Local | _OnCluster,
-    tasks: Iterable[T],
-    most_seconds: float | None,
-    attempts: int,
-    idle: Callable[[], None] | None,
-) -> Iterator[tuple[T, Any]]:
-    coming = iter(tasks)
-    again: deque[tuple[T, int]] = deque()
-    running: dict[Future[Any], tuple[T, int]] = {}
-    try:
-        while True:
-            while len(running) < crew.count and (task := next(coming, None)) is not None:
-                running[crew.start(task)] = task, 1
-            if not running:
-                if not again:
-                    return
-                task, attempt = again.popleft()
-                running[crew.start(task)] = task, attempt + 1
-            for future in crew.wait(running, _LOOK if idle else None):
-                task, attempt = running.pop(future)
-                error = future.exception()
-                if error is None:
-                    yield task, future.result()
-                elif isinstance(error, TimeoutError) and error.args[:1] == ("Task timeout",):
-                    yield task, Lost("time", f"it took more than {most_seconds:g} s")
-                elif (words := _death(error)) is None:
-                    raise error
-                elif attempt < attempts:
-                    again.append((task, attempt))
-                else:
-                    yield task, Lost("died", words)
-            if idle:
-                idle()
-    finally:
-        crew.end()
 
 
 def _death(error: BaseException) -> str | None:

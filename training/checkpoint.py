@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 import torch
 
-from ..runtime.archives import check_archive
 from ..runtime.errors import InputError
 from ..runtime.file_limits import LIMITS
-from ..runtime.regular_files import check_regular, open_regular
+from ..runtime.regular_files import check_archive, check_regular, open_regular
 from ..runtime.whole_files import replaced
 from .vec_env import FeatureVecEnv
 

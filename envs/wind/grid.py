@@ -18,10 +18,9 @@ from numba import carray
 from numpy.typing import ArrayLike
 
 from ...runtime.addresses import numbers_at, pointer_to
-from ...runtime.archives import check_archive
 from ...runtime.errors import InputError
 from ...runtime.extras import need
-from ...runtime.regular_files import read_bytes
+from ...runtime.regular_files import check_archive, read_bytes
 from ...runtime.whole_files import replaced
 from .field import Array, CompiledWind, Wind
 

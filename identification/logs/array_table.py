@@ -14,10 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from ...runtime.archives import check_archive
 from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS
-from ...runtime.regular_files import read_bytes
+from ...runtime.regular_files import check_archive, read_bytes
 from ...runtime.workers import SINGLE_THREADED
 from .table import WHAT, Array, Table, one_line
 
