@@ -37,6 +37,12 @@ def _reading(path: Path, what: str) -> Iterator[None]:
         raise InputError(f"{path}: cannot be read as {what}: {reason}") from error
 
 
+def _check_kind(path: Path, mode: int, what: str) -> None:
+    if not stat.S_ISREG(mode):
+        kind = next((name for test, name in _KINDS if test(mode)), "no regular file")
+        raise InputError(f"{path}: is {kind}; expected {what}, a regular file")
+
+
 def check_regular(path: Path, what: str, most: int | None = None) -> None:
     """Check that a path names a regular file, for libraries that open it by its name.
 
@@ -50,9 +56,7 @@ def check_regular(path: Path, what: str, most: int | None = None) -> None:
     """
     with _reading(path, what):
         found = path.stat()
-    if not stat.S_ISREG(found.st_mode):
-        kind = next((name for test, name in _KINDS if test(found.st_mode)), "no regular file")
-        raise InputError(f"{path}: is {kind}; expected {what}, a regular file")
+    _check_kind(path, found.st_mode, what)
     if most is not None and found.st_size > most:
         raise InputError(
             f"{path}: more than {most} bytes ({found.st_size}); expected {what}, no larger"
@@ -67,7 +71,14 @@ def open_regular(path: Path, what: str) -> BinaryIO:
     """
     check_regular(path, what)  # opening a device may already do something
     with _reading(path, what):
-        return path.open("rb")
+        # of a pipe that took its place meanwhile, nobody waits for the writer
+        file = os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb")
+    try:
+        _check_kind(path, os.fstat(file.fileno()).st_mode, what)
+    except InputError:
+        file.close()
+        raise
+    return file
 
 
 def read_bytes(path: Path, what: str, most: int) -> bytes:

@@ -150,12 +150,11 @@ def _run(
         a = acting[k]
         x, y, z = angular_acceleration_of(b, turn, (w[0], w[1], w[2]), thrust, nothing, effects)
         # of gyroscopic torque the rate half a step on counts, of this step's own acceleration
-        w2[0], w2[1], w2[2] = (
+        omega = (
             w[0] + half * (x + d[3]),
             w[1] + half * (y + d[4]),
             w[2] + half * (z + d[5]),
         )
-        omega = (w2[0], w2[1], w2[2])
         x, y, z = angular_acceleration_of(b, turn, omega, thrust, nothing, effects)
         model[k, 3], model[k, 4], model[k, 5] = x, y, z
         turning = (x + d[3], y + d[4], z + d[5])
@@ -164,7 +163,7 @@ def _run(
         for i in range(6):
             a[i] = before[i] = model[k, i] + d[i]
         for i in range(3):
-            at_position[k, i], at_velocity[k, i], at_rate[k, i] = mid[i], v2[i], w2[i]
+            at_position[k, i], at_velocity[k, i], at_rate[k, i] = mid[i], v2[i], omega[i]
             for j in range(3):
                 at_rotation[k, i, j] = r[i, j]
         for i in range(4):

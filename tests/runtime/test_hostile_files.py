@@ -25,6 +25,7 @@ from windwrench.dynamics import load_vehicle
 from windwrench.identification import read_log
 from windwrench.identification.logs import parquet_table, text_table
 from windwrench.identification.logs.flight_log import REQUIRED
+from windwrench.runtime import regular_files
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.file_limits import LIMITS
 from windwrench.runtime.regular_files import read_json
@@ -275,6 +276,13 @@ def test_blocks_of_a_text_join_without_a_seam(tmp_path, monkeypatch):
     monkeypatch.setattr(text_table, "LIMITS", replace(LIMITS, table_rows=99))
     with pytest.raises(InputError, match="more than 99 rows; expected one flight"):
         read_text(tmp_path, lines)
+
+
+def test_a_pipe_that_takes_the_place_of_a_file_is_refused_and_not_waited_for(tmp_path, monkeypatch):
+    os.mkfifo(tmp_path / "log")
+    monkeypatch.setattr(regular_files, "check_regular", lambda *_: None)  # it was a file then
+    with pytest.raises(InputError, match="log: is a pipe; expected a log, a regular file"):
+        regular_files.open_regular(tmp_path / "log", "a log")
 
 
 def read_text(folder, lines, end="\n"):
