@@ -164,9 +164,7 @@ class AxisFlight:
         count = 0
         for y, a, v, jumps in zip(self.measured, self.drive, self.rate, self.jumps, strict=True):
             rows = np.zeros((len(y), len(total)))
-            _respond(
-                y, a, v, jumps, self.jump_state, gains, found[3], self.period, found[:3], rows
-            )
+            _respond(y, a, v, jumps, self.jump_state, gains, found[3], self.period, found[:3], rows)
             total += rows[skip:].T @ rows[skip:]
             count += max(len(rows) - skip, 0)
         c = len(gains)
@@ -177,7 +175,7 @@ class AxisFlight:
         slope[c:-1, c:-1] = (np.array(steps) - found).T / STEP
         total = slope.T @ total @ slope
         # the gains are linear, so they are fitted at once; against gains that do the same
-        own = total[:c, :c] + 1e-9 * np.diag(np.diagonal(total)[:c] + 1e-300)
+        own = total[:c, :c] + np.diag(1e-9 * np.diagonal(total)[:c] + 1e-200)
         beside = np.linalg.solve(own, total[:c, c:])
         left = total[c:, c:] - total[:c, c:].T @ beside
         return _Fit(float(left[-1, -1]), max(count, 1), gains + beside[:, -1], left)
@@ -188,7 +186,8 @@ class _Fit:
     square: float  # of the innovations
     count: int
     gains: Array  # (c,) of the jumps, the likeliest ones
-    products: Array  # (4, 4) of what a unit of each part of the noise changes, and of the innovations
+    # (4, 4) of what a unit of each part of the noise changes, and of the innovations
+    products: Array
 
 
 def likeliest_noise(flight: AxisFlight, near: AxisNoise, begun: bool) -> tuple[AxisNoise, Array]:
@@ -214,9 +213,9 @@ def likeliest_noise(flight: AxisFlight, near: AxisNoise, begun: bool) -> tuple[A
     x, fit, damping = starts[best], fits[best], 1e-2
     for _ in range(STEPS):
         normal, right = fit.products[:-1, :-1], fit.products[:-1, -1]
-        normal = normal + np.diag(damping * np.diagonal(normal) + 1e-12 * fit.square)
+        normal = normal + np.diag(damping * np.diagonal(normal) + 1e-12 * fit.square + 1e-200)
         step = bounded_mode(normal, right, low - x, high - x)
-        if 0.5 * fit.count * float(right @ step) < AXIS.tolerance * fit.square:
+        if 0.5 * fit.count * float(right @ step) <= AXIS.tolerance * fit.square:
             break
         other = flight.fit(x + step, fit.gains)
         damping *= 0.2 if other.square < fit.square else 8.0
@@ -232,8 +231,9 @@ def _filter_of(noise: AxisNoise, period: float) -> Array:
 
 
 def _free(noise: AxisNoise) -> Array:
-    """Return a noise as what is searched (3,): logarithms of the disturbance's variance over the
-    pose's and of the correlation time, and the white acceleration's variance over the disturbance's.
+    """Return a noise as what is searched (3,): the logarithms of the disturbance's variance over
+    the pose's and of its correlation time, and the white acceleration's variance over the
+    disturbance's.
     """
     ratios = noise.disturbance / noise.pose, noise.white / noise.disturbance
     return np.array([2.0 * math.log(ratios[0]), math.log(noise.time), ratios[1] ** 2])
