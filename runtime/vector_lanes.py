@@ -175,34 +175,6 @@ for _extreme, _sign in _extremes:
     )
 
 
-@intrinsic
-def _select(_context: Any, condition: Any, a: Any, b: Any) -> Any:
-    truths = all(kind == ANSWERS or isinstance(kind, types.Boolean) for kind in (a, b))
-    result = ANSWERS if truths else LANES
-
-    def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
-        values = [
-            context.cast(builder, value, kind, result)
-            for value, kind in zip(arguments[1:], given.args[1:], strict=True)
-        ]
-        return builder.select(arguments[0], *values)
-
-    return result(condition, a, b), generate
-
-
-@intrinsic
-def _not(_context: Any, answers: Any) -> Any:
-    return answers(answers), lambda _context, builder, _signature, given: builder.not_(given[0])
-
-
-@intrinsic
-def _bits(_context: Any, answers: Any) -> Any:
-    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        return builder.zext(builder.bitcast(arguments[0], ir.IntType(WIDTH)), ir.IntType(64))
-
-    return types.int64(answers), generate
-
-
 def choose(condition: Any, a: Any, b: Any) -> Any:
     """Return ``a`` where the condition holds, else ``b``."""
     return a if condition else b
@@ -223,32 +195,24 @@ def any_of(condition: Any) -> bool:
     return bool(condition)
 
 
-@overload(choose, strict=False)
-def _choose(condition: Any, a: Any, b: Any) -> Any:
-    if condition == ANSWERS:
-        return lambda condition, a, b: _select(condition, a, b)
-    return lambda condition, a, b: a if condition else b
-
-
-@overload(opposite, strict=False)
-def _opposite(condition: Any) -> Any:
-    if condition == ANSWERS:
-        return lambda condition: _not(condition)
-    return lambda condition: not condition
-
-
-@overload(all_of, strict=False)
-def _all_of(condition: Any) -> Any:
-    if condition == ANSWERS:
-        return lambda condition: _bits(condition) == (1 << WIDTH) - 1
-    return lambda condition: bool(condition)
-
-
-@overload(any_of, strict=False)
-def _any_of(condition: Any) -> Any:
-    if condition == ANSWERS:
-        return lambda condition: _bits(condition) != 0
-    return lambda condition: bool(condition)
+_BITS = ir.IntType(WIDTH)
+# with single numbers each does what it says in Python
+for _question in (choose, opposite, all_of, any_of):
+    overload(_question, strict=False)(
+        lambda *given, question=_question: None if ANSWERS in given else question
+    )
+for _kind in (LANES, ANSWERS):
+    _define(choose, _kind, (ANSWERS, _kind, _kind), lambda builder, *given: builder.select(*given))
+_define(opposite, ANSWERS, (ANSWERS,), lambda builder, a: builder.not_(a))
+for _question, _sign, _least in ((all_of, "==", -1), (any_of, "!=", 0)):
+    _define(
+        _question,
+        types.boolean,
+        (ANSWERS,),
+        lambda builder, a, sign=_sign, least=_least: builder.icmp_signed(
+            sign, builder.bitcast(a, _BITS), _BITS(least)
+        ),
+    )
 
 
 def first_column(numbers: Any, i: int) -> int:
@@ -261,13 +225,6 @@ def first_column(numbers: Any, i: int) -> int:
     return 0
 
 
-@overload(first_column, strict=False)
-def _first_column(numbers: Any, i: Any) -> Any:
-    if numbers.dtype == LANES:
-        return lambda numbers, i: i
-    return lambda numbers, i: 0
-
-
 _BEYOND = 1 << 62  # a constant: compilers then see that single numbers never come there
 
 
@@ -278,11 +235,12 @@ def first_below(numbers: Any, i: int) -> int:
     return _BEYOND
 
 
-@overload(first_below, strict=False)
-def _first_below(numbers: Any, i: Any) -> Any:
-    if numbers.dtype == LANES:
-        return lambda numbers, i: i + 1
-    return lambda numbers, i: _BEYOND
+overload(first_column, strict=False)(
+    lambda numbers, i: (lambda numbers, i: i) if numbers.dtype == LANES else first_column
+)
+overload(first_below, strict=False)(
+    lambda numbers, i: (lambda numbers, i: i + 1) if numbers.dtype == LANES else first_below
+)
 
 
 def lanes_by(singly: Callable[..., Any], lanes: Callable[..., Any]) -> Callable[..., Any]:
@@ -352,11 +310,11 @@ def _shuffled(builder: Any, a: Any, b: Any, places: list[int]) -> Any:
     return builder.shuffle_vector(a, b, mask)
 
 
-@overload(corners, strict=False)
-def _corners(table: Any, i: Any, j: Any) -> Any:
-    if LANES in (i, j):
-        return lambda table, i, j: _corners_in_lanes(table, i, j)
-    return corners
+overload(corners, strict=False)(
+    lambda table, i, j: (
+        (lambda table, i, j: _corners_in_lanes(table, i, j)) if LANES in (i, j) else corners
+    )
+)
 
 
 class _LaneRecord(types.Record):
