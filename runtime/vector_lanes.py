@@ -275,39 +275,22 @@ def _corners_in_lanes(_context: Any, table: Any, i: Any, j: Any) -> Any:
     def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
         array = context.make_array(given.args[0])(context, builder, arguments[0])
         columns = cgutils.unpack_tuple(builder, array.shape, 2)[1]
-        whole, place = ir.IntType(64), ir.IntType(32)
         width = _splat(builder, builder.sitofp(columns, ir.DoubleType()), _VECTOR)
         first = builder.fptosi(
             builder.fadd(builder.fmul(arguments[1], width), arguments[2]),
-            ir.VectorType(whole, WIDTH),
+            ir.VectorType(columns.type, WIDTH),
         )
-        pair = ir.VectorType(ir.DoubleType(), 2)
-        out = []
-        for row in range(2):
-            parts = []
-            for lane in range(WIDTH):
-                k = builder.extract_element(first, ir.Constant(place, lane))
-                k = builder.add(k, columns) if row else k
-                where = builder.bitcast(builder.gep(array.data, [k]), pair.as_pointer())
-                parts.append(builder.load(where, align=8))
-            while len(parts) > 1:  # neighbours beside each other
-                parts = [
-                    _shuffled(builder, a, b, list(range(2 * a.type.count)))
-                    for a, b in zip(parts[::2], parts[1::2], strict=True)
-                ]
-            all_of_row = parts[0]
-            out += [
-                _shuffled(builder, all_of_row, all_of_row, [2 * n + side for n in range(WIDTH)])
-                for side in range(2)
-            ]
+        out = [ir.Constant(_VECTOR, ir.Undefined)] * 4
+        for lane in map(ir.IntType(32), range(WIDTH)):
+            above = builder.extract_element(first, lane)
+            for row, start in enumerate((above, builder.add(above, columns))):
+                for side in range(2):
+                    where = builder.gep(array.data, [builder.add(start, columns.type(side))])
+                    corner = 2 * row + side
+                    out[corner] = builder.insert_element(out[corner], builder.load(where), lane)
         return cgutils.pack_array(builder, out)
 
     return types.UniTuple(LANES, 4)(table, i, j), generate
-
-
-def _shuffled(builder: Any, a: Any, b: Any, places: list[int]) -> Any:
-    mask = ir.Constant(ir.VectorType(ir.IntType(32), len(places)), places)
-    return builder.shuffle_vector(a, b, mask)
 
 
 overload(corners, strict=False)(
