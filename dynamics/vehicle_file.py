@@ -40,9 +40,10 @@ def named_vehicle(name: str, log: object, otherwise: str = "") -> Vehicle:
     """
     if name not in preset_names():
         unknown = f"names the vehicle {name}, which does not come with the kit"
+        what = unknown if name else "the log does not name its vehicle"
         raise InputError(
-            f"{log}: {unknown if name else 'the log does not name its vehicle'}; expected --vehicle "
-            f"{', '.join(preset_names())} or the path of a YAML file{otherwise}"
+            f"{log}: {what}; expected --vehicle {', '.join(preset_names())} or the path of a YAML "
+            f"file{otherwise}"
         )
     return load_vehicle(name)
 
