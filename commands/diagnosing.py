@@ -1,6 +1,6 @@
 """The effects that a vehicle's model lacks, found from flight logs."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ from .terminal import command_line, console, results_folder, say, show_page, sho
 
 if TYPE_CHECKING:
     from ..identification.findings import Diagnosis
+    from ..identification.logs.example import Example
     from ..identification.logs.flight_log import FlightLog
 
 # share of a diagnosis' time at which its stages begin
@@ -45,17 +46,18 @@ def diagnose(
     """
     if example:
         from ..identification.logs.example import example_flight
-        from .example import conclude, introduce
 
         given = {"LOGS": logs, **{f"--{name}": x for name, x in vars(reading).items()}}
         given |= {"--test": test, "--rotor-faults": rotor_faults}
         if unwanted := [name for name, value in given.items() if value]:
             raise InputError(f"--example: has a log of its own; expected it without {unwanted[0]}")
         with example_flight() as flight:
-            introduce(flight)
+            console.print(f"{flight.what} ({flight.source})\nKnown before the diagnosis:")
+            for why in (*(known.why for known in flight.known), flight.unknown):
+                console.print(f"  * {why}")
             read = read_flights([flight.log], Reading(vehicle=flight.vehicle))
             result = _diagnose(read, [flight.log], without, out)
-        result["known"] = conclude(flight, result["effects"])
+        result["known"] = confronted(flight, result["effects"])
         show_page(out / "report.html", not no_open)
         return result
     if not logs:
@@ -67,6 +69,26 @@ def diagnose(
         return _rotor_faults(logs, reading, out)
     read = read_flights([*logs, *(test or [])], reading)
     return _diagnose(read, logs, without, out)
+
+
+def confronted(example: "Example", effects: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Say which effects that are known were found, by name or as what cannot be told from one, and
+    which others were named; return the former. Effects are as ``report.json`` names them.
+    """
+    rows, others = [], [str(effect["name"]) for effect in effects]
+    for known in example.known:
+        named = [
+            str(effect["name"])
+            for effect in effects
+            if {effect["name"], *effect["indistinguishable_from"]} & set(known.effects)
+        ]
+        found = f"found, as {' and '.join(named)}" if named else "not found"
+        console.print(f"{' or '.join(known.effects)}: known, and {found}.")
+        rows.append({"known": known.why, "effects": list(known.effects), "named": named})
+        others = [name for name in others if name not in named]
+    if others:
+        console.print(f"Also named, and nobody knows whether it is so: {', '.join(others)}.")
+    return rows
 
 
 def _diagnose(

@@ -37,27 +37,20 @@ def read_flights(
         InputError: a log cannot be read; or no vehicle is given, and the logs name none, none that
             comes with the kit, or several.
     """
-    from ..dynamics.vehicle_file import load_vehicle, preset_names
+    from ..dynamics.vehicle_file import load_vehicle, named_vehicle
 
     model = None if reading.vehicle is None else load_vehicle(reading.vehicle)
     flights = read_logs(paths, reading, model)
     if model is not None:
         return flights, model
-    expected = f"--vehicle {', '.join(preset_names())} or the path of a YAML file"
-    for path, flight in zip(paths, flights, strict=True):
-        if not flight.vehicle:
-            raise InputError(f"{path}: the log does not name its vehicle; expected {expected}")
-        if flight.vehicle != flights[0].vehicle:
+    named = [named_vehicle(x.vehicle, path) for path, x in zip(paths, flights, strict=True)]
+    for path, other in zip(paths, named, strict=True):
+        if other.name != named[0].name:
             raise InputError(
-                f"{path}: names the vehicle {flight.vehicle}, {paths[0]} names "
-                f"{flights[0].vehicle}; expected logs of one vehicle, or {expected}"
+                f"{path}: names the vehicle {other.name}, {paths[0]} names {named[0].name}; "
+                "expected logs of one vehicle, or --vehicle"
             )
-        if flight.vehicle not in preset_names():
-            raise InputError(
-                f"{path}: names the vehicle {flight.vehicle}, which does not come with the kit; "
-                f"expected {expected}"
-            )
-    return flights, load_vehicle(flights[0].vehicle)
+    return flights, named[0]
 
 
 def read_logs(

@@ -57,17 +57,11 @@ def train(
 
 
 def _sweep(jobs: "Sequence[Job]", told: str, cluster: str | None, out: Path) -> dict[str, Any]:
-    from ..training.sweep import run_job, run_jobs
+    from ..training.sweep import run_jobs
 
     folder = results_folder(out, runs=[job.name for job in jobs], cluster=cluster)
     with working(told, len(jobs)) as progress:
-        if cluster:
-            found = run_jobs(jobs, folder, cluster)
-        else:
-            found = []
-            for job in jobs:
-                found.append(run_job(job, folder))
-                progress(more=1)
+        found = run_jobs(jobs, folder, cluster, advance=lambda: progress(more=1))
     best_first = sorted(found, key=lambda run: float(run["validation_rmse_m"]))
     show_table(
         ("run", "validation RMSE (m)", "minutes"),

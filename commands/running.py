@@ -7,9 +7,7 @@ import inspect
 import json
 import platform
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import fields, is_dataclass
-from importlib import metadata
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,22 +17,11 @@ from .. import __version__
 from ..runtime.compile_notice import notice
 from ..runtime.page_files import write_text
 from ..runtime.plain_values import plain
+from ..runtime.provenance import package_versions
 from .options import check_values, declared
 from .terminal import DryRun, command_line, console, errors, run
 
 Work = TypeVar("Work", bound=Callable[..., Any])
-
-# what a result depends on
-_PACKAGES = (
-    "numpy",
-    "scipy",
-    "numba",
-    "mujoco",
-    "gymnasium",
-    "torch",
-    "stable-baselines3",
-    "sb3-contrib",
-)
 
 
 def expensive(work: Work) -> Work:
@@ -147,10 +134,6 @@ def write_run(path: Path, name: str, options: Mapping[str, Any]) -> None:
         kept = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         kept = {}
-    packages = {}
-    for package in _PACKAGES:
-        with suppress(metadata.PackageNotFoundError):
-            packages[package] = metadata.version(package)
     entry = {
         "command": command_line(),
         "seed": options.get("seed"),
@@ -158,7 +141,7 @@ def write_run(path: Path, name: str, options: Mapping[str, Any]) -> None:
         "windwrench": __version__,
         "python": platform.python_version(),
         "platform": platform.platform(),
-        "packages": packages,
+        "packages": package_versions(),
     }
     runs = {**(kept if isinstance(kept, dict) else {}), name: plain(entry)}
     write_text(json.dumps(runs, indent=1, sort_keys=True, allow_nan=False) + "\n", path)

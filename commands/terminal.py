@@ -3,6 +3,7 @@
 import os
 import shlex
 import sys
+import threading
 import webbrowser
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -15,17 +16,23 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
     SpinnerColumn,
+    Task,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
 from rich.segment import Segment
 from rich.table import Table
+from rich.text import Text
 
+from ..runtime.compile_notice import notice
 from ..runtime.errors import InputError
 from ..runtime.printable import printable
-from .bars import What, bars
+
+_LINE_EVERY = 10.0  # s between two lines on progress where no bar can move
 
 
 class _Terminal(Console):
@@ -151,10 +158,20 @@ def results_folder(out: Path, **plan: object) -> Path:
     return out
 
 
+class _What(ProgressColumn):
+    """What is being done; while functions are compiled, how many."""
+
+    def render(self, task: Task) -> Text:
+        """Return the text beside a bar."""
+        return Text(notice.words or task.description)
+
+
 @contextmanager
 def working(text: str, total: float = 1.0) -> Iterator[Callable[..., None]]:
     """Show what is being done and how long the rest will take; give a function that takes how much
     is done, another text, or how much more is done.
+
+    In a terminal a bar moves; elsewhere, such as in a log of a build, a line comes now and then.
 
     Args:
         text: says what is being done.
@@ -162,23 +179,45 @@ def working(text: str, total: float = 1.0) -> Iterator[Callable[..., None]]:
     """
     columns = (
         SpinnerColumn(),
-        What(),
+        _What(),
         BarColumn(),
         *([MofNCompleteColumn()] if total > 1.0 else []),
         TimeElapsedColumn(),
         TextColumn("left:"),
         TimeRemainingColumn(),
     )
-    with bars(*columns, console=errors) as progress:
-        task = progress.add_task(text, total=None)
+    moving, over = errors.is_terminal and not errors.quiet, threading.Event()
+    with Progress(*columns, console=errors, transient=True, disable=not moving) as progress:
+        progress.add_task(text, total=None)
+        (task,) = progress.tasks
+
+        def write_lines() -> None:
+            while not (over.wait(_LINE_EVERY) or task.finished):
+                errors.print(_line(task), highlight=False, soft_wrap=True)
 
         def report(
             done: float | None = None, text: str | None = None, more: float | None = None
         ) -> None:
             told = total if done is not None or more is not None else None
-            progress.update(task, total=told, completed=done, description=text, advance=more)
+            progress.update(task.id, total=told, completed=done, description=text, advance=more)
 
-        yield report
+        if not (moving or errors.quiet):
+            threading.Thread(target=write_lines, name="progress", daemon=True).start()
+        try:
+            yield report
+        finally:
+            over.set()
+
+
+def _line(task: Task) -> str:
+    """Return how far a task is, in words."""
+    done = ""
+    if task.total:
+        done = f", {task.completed / task.total:.0%}"
+        if task.total > 1.0:
+            done = f", {task.completed:.0f} of {task.total:.0f}"
+    left = f", {task.time_remaining:.0f} s left" if task.time_remaining else ""
+    return f"{notice.words or task.description}{done}, {task.elapsed or 0.0:.0f} s so far{left}"
 
 
 @contextmanager

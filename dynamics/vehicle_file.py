@@ -32,6 +32,22 @@ def preset_names() -> list[str]:
     )
 
 
+def named_vehicle(name: str, log: object, otherwise: str = "") -> Vehicle:
+    """Return the preset that a log names.
+
+    Raises:
+        InputError: there is none; ``otherwise`` names further ways to say which vehicle flew.
+    """
+    if name not in preset_names():
+        unknown = f"names the vehicle {name}, which does not come with the kit"
+        what = unknown if name else "the log does not name its vehicle"
+        raise InputError(
+            f"{log}: {what}; expected --vehicle {', '.join(preset_names())} or the path of a YAML "
+            f"file{otherwise}"
+        )
+    return load_vehicle(name)
+
+
 def name_in_log(vehicle: Vehicle, given: str) -> str:
     """Return the name by which a log states its vehicle; empty where a file's vehicle has the name
     of a preset, which is another vehicle.

@@ -143,6 +143,11 @@ def draw_trajectory(
     path = TRAJECTORIES[name](rng, t, ceiling if math.isfinite(ceiling) else _CEILING)
     fade = np.clip(t / _RAMP, 0.0, 1.0)[:, None]
     path = path[:1] + (path - path[:1]) * fade * fade * (3.0 - 2.0 * fade)
+    return setpoints_along(path, t)
+
+
+def setpoints_along(path: Array, t: Array) -> Array:
+    """Return the set points (n, 11) of a path (n, 4) in m and rad of yaw at times (n,) s."""
     speed = np.gradient(path, t, axis=0)
     acceleration = np.gradient(speed[:, :3], t, axis=0)
     return np.concatenate(

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from ..runtime.compiled import Record, compiled, compiled_for_vectors, compiled_inline
-from ..runtime.vector_lanes import all_of, choose, first_below, first_column, lanes_by
+from ..runtime.vector_lanes import all_of, choose, first_below, first_column
 from .estimate import Array
 from .filter_record import N
 
@@ -223,22 +223,9 @@ def _linear_rows(f: Record, dt: float, source: Array, out: Array, columns: int) 
 
 
 @compiled_for_vectors
-def _carry_linear_singly(f: Record, dt: float) -> None:
-    Y, Z = f.Y, f.Z
-    _linear_rows(f, dt, f.M, f.Y, 12)
-    for i in range(
-        0, N, 2
-    ):  # two rows at once: of one a compiler makes gather instructions, which are slow
-        for j in range(12):
-            Z[j, i] = Y[i, j]
-            Z[j, i + 1] = Y[i + 1, j]
-    _linear_rows(f, dt, f.Z, f.P, N)
-
-
-@compiled_for_vectors
-def _carry_linear_in_lanes(f: Record, dt: float) -> None:
-    """Do the same; without a copy of rows as columns, and without the attitude's columns, which
-    are zero.
+def carry_linear_part(f: Record, dt: float) -> None:
+    """Write ``M A'`` into ``Z`` and ``A M A'`` into P, where A is the linear part of the model at
+    ``f.centre_rotation``; the attitude's columns, which are zero, are not worked out.
     """
     P, Z = f.P, f.Z
     _linear_rows(f, dt, f.M, Z.T, 12)
@@ -246,10 +233,6 @@ def _carry_linear_in_lanes(f: Record, dt: float) -> None:
         for j in range(3):
             P[i, j] = 0.0
     _linear_rows(f, dt, Z[:, 3:], P[:, 3:], N - 3)
-
-
-# write ``A M A'`` into P, where A is the linear part of the model at ``f.centre_rotation``
-carry_linear_part = lanes_by(_carry_linear_singly, _carry_linear_in_lanes)
 
 
 @compiled_for_vectors

@@ -82,7 +82,6 @@ FILTER = np.dtype(
         ("centre_rotation", "f8", (3, 3)),
         ("S", "f8", (12, N)),  # columns of the root of P, one a row
         ("M", "f8", (12, 12)),
-        ("Y", "f8", (N, 12)),
         ("Z", "f8", (12, N)),
         ("H", "f8", (12, N)),  # pairs of sigma points after the step: their scaled half difference,
         ("E", "f8", (12, N)),  # and their scaled half sum, from the central one

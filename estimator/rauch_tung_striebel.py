@@ -60,7 +60,7 @@ def cross_covariance(f: Record) -> Array:
     """
     pairs = 6 if f.wrench_count == 0 else 12
     C: Array = f.S[:pairs].T @ f.H[:pairs]
-    C[6:] += f.Y.T
+    C[6:] += f.Z
     return C
 
 

@@ -3,7 +3,7 @@
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -22,12 +22,16 @@ from ..identification.logs.log_map import (
     load_map,
 )
 from ..identification.logs.magnitudes import Magnitudes
-from ..identification.logs.mapped_log import with_range
+from ..identification.logs.mapped_log import fitted, with_range
 from ..runtime.errors import InputError
 from .messages import SECOND, Array, Malformed, Sample
 
 _OUTSIDE = 0.01  # of a command's range, beyond which it is none of that range
 _LARGEST = Magnitudes().largest
+_OWN = (
+    "expected this kit's columns t, px, py, pz, qw, qx, qy, qz, omega1 ... omega4 (or cmd1 ... "
+    "cmd4), or --map, a file that says what the fields mean"
+)
 _FIELDS = {"rotors": "rotor_speeds", "commands": "command"}  # of a sample; others as the section
 
 
@@ -53,36 +57,16 @@ class FieldMap:
         self._sections = {name: self.map.ways(name) for name in self.map.sections}
         self._clocks = self.map.ways("time")
 
-    def check(self, names: Iterable[str]) -> None:
+    def check(self, names: Sequence[str]) -> None:
         """Check that the fields of all messages are there.
 
         Raises:
             InputError: one is missing.
         """
-        there = set(names)
-        clock = self.map.time.column
-        missing = [] if any(c.column in {*there, ""} for c in self._clocks) else [clock]
-        motors = False
-        for section, parts in self._sections.items():
-            part = next((part for part in parts if there & set(part.named)), parts[0])
-            if part.optional and not there & set(part.named):
-                continue
-            motors |= section in ("rotors", "commands")
-            missing += [name for name in part.named if name not in there]
-        if not motors:
-            rotors = self.map.rotors or self.map.commands
-            missing += [] if rotors is None else rotors.columns
-        if missing:
-            raise InputError(
-                f"{self.where}: no field {', '.join(missing)}; found "
-                f"{', '.join(sorted(there)[:30]) or 'none'}; expected "
-                + (
-                    "this kit's columns t, px, py, pz, qw, qx, qy, qz, omega1 ... omega4 (or "
-                    "cmd1 ... cmd4), or --map, a file that says what the fields mean"
-                    if self.map.is_own
-                    else f"those of the map {self.map.name}"
-                )
-            )
+        try:
+            fitted(names, self.where, self.map, None, "")
+        except InputError as error:
+            raise InputError(f"{error}; {_OWN}" if self.map.is_own else str(error)) from error
 
     def sample(self, kind: str, fields: Mapping[str, Any], arrival: int) -> Sample:
         """Return what a message holds.

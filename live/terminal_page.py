@@ -54,9 +54,7 @@ def _lines(session: Session) -> list[Text]:
         Text.assemble(
             "status   ",
             (status, "green" if good else "bold red" if silent else "yellow"),
-            f"   t {output.t:.2f} s   NIS {nis:.1f} (6 on average)"
-            if nis == nis
-            else f"   t {output.t:.2f} s",
+            f"   t {output.t:.2f} s{f'   NIS {nis:.1f} (6 on average)' if nis == nis else ''}",
             f"   restarts {session.filter.restarts}",
         ),
         Text("rates    " + ", ".join(f"{kind} {rate:.0f} Hz" for kind, rate in rates)),

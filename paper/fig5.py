@@ -10,17 +10,19 @@ The paper's comparison;
 * ``anew``: the optimiser's for each noise level.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure, SubFigure
 
 from ..envs.plant import TICK
 from ..estimator import UKFTuning, WrenchEKF, WrenchUKF
+from ..runtime.drawing import ESTIMATE, HELD_OUT, SERIES, new_figure, only_ticks, styled
 from .fig5_estimators import ERRORS, UKF_TUNED, score, states_of, tune
 from .fig5_flights import FLIGHTS, NOISES, PLANTS, Array, Flight, fly, vehicle_at
-from .fig5_picture import draw
 from .observer import NonlinearObserver, ObserverTuning
 from .result import Columns, Comparison, Progress, Result, compared, table
 
@@ -46,6 +48,16 @@ Scores = dict[tuple[str, str, str, str], Array]
 Ratios = dict[tuple[str, str, str, str, str], tuple[float, float, float]]
 # (plant, noise) -> the optimiser's
 Tunings = dict[tuple[str, str], tuple[UKFTuning, ObserverTuning]]
+
+_NOISE_COLOURS = {"low": SERIES[0], "high": SERIES[1]}
+_MARKERS = {"hover": "o", "yawing": "^"}
+_KINDS = tuple(product(NOISES, FLIGHTS))
+_LINES = {
+    "observer low": (SERIES[1], "observer, tuned at low noise"),
+    "observer anew": (SERIES[4], "observer, re-tuned"),
+    "UKF low": (ESTIMATE, "UKF, tuned at low noise"),
+}
+_PLANT_TITLES = {"exact": "exact plant", "disturbed": "standard plant (unmodelled disturbance)"}
 
 
 def run(seeds: int, progress: Progress, evaluations: int = 120) -> Result:
@@ -76,13 +88,7 @@ def run(seeds: int, progress: Progress, evaluations: int = 120) -> Result:
                 examples[noise, name] = states[0]
     progress(0.98)
     ratios = _ratios(scores)
-    picture = draw(
-        ratios,
-        [label for label, _, _ in PAIRS],
-        flights["exact", "hover", "low"][0].wrench,
-        examples,
-        seeds,
-    )
+    picture = draw(ratios, flights["exact", "hover", "low"][0].wrench, examples, seeds)
     return Result(
         _figures(scores, ratios, tunings, seeds),
         _columns(scores),
@@ -212,3 +218,75 @@ def _told(scores: Scores, ratios: Ratios, seeds: int) -> tuple[list[Comparison],
         steady=("force_steady", "torque_steady"),
         close=max(v[0] for key, v in ratios.items() if key[3] == anew) < 1.3,
     )
+
+
+@styled()
+def draw(
+    ratios: Ratios, truth: Array, examples: Mapping[tuple[str, str], Array], seeds: int
+) -> Figure:
+    """Draw estimates of the example flight over time beside the true wrench (n, 6), and who errs
+    how much less than whom; ``examples`` has the states (n, 20) by noise and estimator.
+    """
+    figure = new_figure(10.5)
+    parts: Any = figure.subfigures(3, 1)
+    top, middle, bottom = parts
+    _draw_examples(top, truth, examples)
+    for part, plant in ((middle, "disturbed"), (bottom, "exact")):
+        _draw_ratios(part, plant, ratios, seeds)
+    return figure
+
+
+def _draw_examples(
+    figure: SubFigure, truth: Array, examples: Mapping[tuple[str, str], Array]
+) -> None:
+    grid = figure.subplots(2, 2, sharex=True, sharey="row")
+    rows = slice(round(6.0 / TICK), round(13.0 / TICK))
+    t = TICK * np.arange(len(truth))[rows]
+    for column, noise in enumerate(NOISES):
+        for axes, true, state, label in (
+            (grid[0, column], 2, 18, r"force $f_z$ (N)"),
+            (grid[1, column], 3, 13, r"torque $\tau_x$ (Nm)"),
+        ):
+            for name, (colour, text) in _LINES.items():
+                axes.plot(t, examples[noise, name][rows, state], color=colour, lw=1.3, label=text)
+            axes.plot(t, truth[rows, true], color="black", lw=1.0, ls="--", label="true")
+            if column == 0:
+                axes.set_ylabel(label)
+        sizes = f"{1e3 * NOISES[noise].sigma_pos_m:g} mm, {NOISES[noise].sigma_att_rad:g} rad"
+        grid[0, column].set_title(f"{noise} noise ({sizes}): one hovering flight, exact plant")
+        grid[1, column].set_xlabel("time (s)")
+    grid[1, 0].legend(loc="lower right")
+
+
+def _draw_ratios(figure: SubFigure, plant: str, ratios: Ratios, seeds: int) -> None:
+    labels = [label for label, _, _ in PAIRS]
+    shown = [v for (p, *_), value in ratios.items() if p == plant for v in value]
+    lowest, highest = min([0.5, *shown]) / 1.1, max([2.0, *shown]) * 1.1
+    panels = figure.subplots(1, len(ERRORS), sharey=True)
+    figure.suptitle(
+        f"Ratio of RMSE, {_PLANT_TITLES[plant]}: in the green the first named errs less "
+        f"(95 % intervals, {seeds} seeds)",
+        x=0.01,
+        ha="left",
+    )
+    for axes, error in zip(panels, ERRORS, strict=True):
+        axes.set_xscale("log")
+        axes.set_xlim(lowest, highest)
+        axes.axvspan(lowest, 1.0, color=HELD_OUT, lw=0)
+        axes.axvline(1.0, color="black", lw=0.9)
+        for (i, label), (k, (noise, flight)) in product(enumerate(labels), enumerate(_KINDS)):
+            value, low, high = ratios[plant, flight, noise, label, error]
+            y, colour = i + 0.17 * (k - 1.5), _NOISE_COLOURS[noise]
+            axes.plot([low, high], [y, y], color=colour, lw=1.8)
+            axes.plot(value, y, _MARKERS[flight], color=colour, ms=5)
+        axes.set_ylim(len(labels) - 0.45, -0.55)
+        only_ticks(axes.xaxis, [v for v in (0.1, 0.2, 0.5, 1, 2, 5, 10) if lowest < v < highest])
+        title = error.replace("_", ", ") + (" state" if "steady" in error else "")
+        axes.set_title(title, loc="center")
+        axes.grid(axis="x", color="0.9", lw=0.6)
+        axes.set_axisbelow(True)
+    panels[0].set_yticks(range(len(labels)), labels)
+    for noise, flight in _KINDS:
+        label = f"{noise} noise, {flight}"
+        panels[-1].plot([], [], _MARKERS[flight], color=_NOISE_COLOURS[noise], label=label)
+    figure.legend(*panels[-1].get_legend_handles_labels(), loc="outside lower center", ncols=4)

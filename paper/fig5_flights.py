@@ -12,6 +12,7 @@ from ..dynamics import Vehicle, load_vehicle
 from ..dynamics.vehicle import Mocap
 from ..envs.closed_loop import ClosedLoop
 from ..envs.plant import NOISE, TICK, PlantSettings
+from ..envs.recording import setpoints_along
 from ..runtime.errors import InputError
 
 Array = NDArray[np.float64]
@@ -66,11 +67,7 @@ def setpoints(flight: str, t: Array) -> Array:
         path[:, 1] += fade * 0.8 * np.sin(0.9 * t + 1.0)
         path[:, 2] += fade * 0.2 * np.sin(0.7 * t)
         path[:, 3] = _START_YAW + TICK * np.cumsum(fade * (3.0 + 1.5 * np.sin(1.1 * t)))
-    speed = np.gradient(path, t, axis=0)
-    acceleration = np.gradient(speed[:, :3], t, axis=0)
-    return np.concatenate(
-        [path[:, :3], speed[:, :3], acceleration, path[:, 3:], speed[:, 3:]], axis=1
-    )
+    return setpoints_along(path, t)
 
 
 def fly(flight: str, noise: str, plant: str, seeds: Sequence[int]) -> list[Flight]:

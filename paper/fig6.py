@@ -10,15 +10,17 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from ..dynamics.vehicle_file import load_vehicle
 from ..envs.closed_loop import ClosedLoop
 from ..envs.fan import Fan
 from ..envs.plant import NOISE, TICK
+from ..runtime.drawing import BLACK, ESTIMATE, SERIES, TRUTH, new_figure, room_above, styled
 from ..runtime.errors import InputError
 from .calm_jet import calm_jet, strongest_torque
-from .fig6_picture import draw_map
 from .result import Columns, Progress, Result, compared, table
 
 TITLE = "The force and torque map of a fan's jet (Fig. 6)"
@@ -182,18 +184,9 @@ def run(seeds: int, progress: Progress) -> Result:
         "true_force_x_on_axis_N": float(profiles.truth[:, middle, 0].mean()),
         "hover_offset_rms_m": _rms(np.linalg.norm(maps.position[..., :2] - maps.points, axis=2)),
     }
-    picture = draw_map(
-        GRID_X,
-        GRID_Y,
-        felt_map,
-        true_map,
-        PROFILE_Y,
-        profiles.estimate,
-        profiles.truth,
-        calm_line,
-        inside=as_map(points, inside.astype(np.float64)) > 0,
-        correlations=(figures["correlation_force_x"], figures["correlation_torque_z"]),
-    )
+    cells = as_map(points, inside.astype(np.float64)) > 0
+    correlations = figures["correlation_force_x"], figures["correlation_torque_z"]
+    picture = draw(felt_map, true_map, profiles, calm_line, cells, correlations)
     comparison, remarks = compared(
         "fig6", globals(), f=figures, radius=fan.radius, peaks=peaks, points=len(points)
     )
@@ -218,3 +211,100 @@ def _columns(
                 block[f"{name}_mean_jet"] = calm[:, i]
             blocks.append(block)
     return table(blocks)
+
+
+@styled()
+def draw(
+    estimate: Array,
+    truth: Array,
+    profiles: Hovers,
+    calm: Array,
+    inside: NDArray[np.bool_],
+    correlations: tuple[float, float],
+) -> Figure:
+    """Draw the maps (seeds, 6, n, m), N and Nm, estimated and true, and the profiles beside the
+    mean jet's (k, 6); ``inside`` (n, m) count as jet, where the ``correlations`` of f_x and tau_z
+    are.
+    """
+    figure = new_figure(8.0)
+    grid = figure.subplots(3, 3, height_ratios=[1, 1, 1.05])
+    means = estimate.mean(axis=0), truth.mean(axis=0)
+    error = np.sqrt(np.mean((estimate - truth) ** 2, axis=0))
+    for row, axis, factor, unit, name in (
+        (0, 0, 1.0, "N", "force $f_x$"),
+        (1, 5, 1e3, "mNm", r"torque $\tau_z$"),
+    ):
+        limit = 1.05 * factor * max(float(np.abs(values[axis]).max()) for values in means)
+        for axes, wrench, kind in zip(grid[row], means, ("estimated", "true"), strict=False):
+            axes.set_title(f"{name} ({unit}), {kind}")
+            colours = {"cmap": "viridis" if row == 0 else "RdBu_r", "vmax": limit}
+            colours["vmin"] = 0.0 if row == 0 else -limit
+            _heat(axes, factor * wrench[axis], inside, **colours)
+            if row == 0:
+                arrows = {"angles": "xy", "scale": 2.2, "width": 0.008, "pivot": "tail"}
+                axes.quiver(GRID_X, GRID_Y, wrench[0].T, wrench[1].T, color="white", **arrows)
+        axes, largest = grid[row, 2], 1.5e3 * float(error[axis].max())
+        axes.set_title(f"RMS error, {name.split()[1]} (m{unit.removeprefix('m')})")
+        _heat(axes, 1e3 * error[axis], inside, cmap="Oranges", vmin=0.0, vmax=largest)
+        across = profiles.estimate, profiles.truth, calm
+        lines = [factor * flown[..., axis] for flown in across]
+        _profile(grid[2, row], f"{name.split()[1]} ({unit})", *lines)
+    _agreement(grid[2, 2], estimate, truth, inside, correlations)
+    figure.suptitle(
+        f"A fan's jet felt by a hovering quadrotor: 5 s a point, mean of {len(estimate)} flights.\n"
+        "Outlined: where the jet is (mean force above 0.05 N)"
+    )
+    return figure
+
+
+def _heat(axes: Any, values: Array, inside: NDArray[np.bool_], **colours: Any) -> None:
+    """Draw a map (n, m), a cell a point; outline the jet's cells."""
+    mesh = axes.pcolormesh(GRID_X, GRID_Y, values.T, shading="nearest", **colours)
+    axes.figure.colorbar(mesh, ax=axes, shrink=0.8)
+    size = GRID_X[1] - GRID_X[0], GRID_Y[1] - GRID_Y[0]
+    for i, j in np.argwhere(inside):
+        corner = (GRID_X[i] - size[0] / 2, GRID_Y[j] - size[1] / 2)
+        axes.add_patch(Rectangle(corner, *size, fill=False, ec="0.55", lw=0.6))
+    axes.add_patch(Rectangle((0.0, -0.45), 0.22, 0.9, color="0.35"))
+    arrow = {"arrowstyle": "->", "color": "0.35", "lw": 1.5}
+    axes.annotate("", (0.68, 0.0), (0.28, 0.0), arrowprops=arrow)
+    axes.text(0.0, -0.55, "fan", va="top")
+    axes.set(xlim=(-0.1, 4.27), ylim=(-1.77, 1.77), aspect="equal")
+    axes.set(xlabel="x (m), away from the fan", ylabel="y (m)")
+
+
+def _profile(axes: Any, label: str, estimate: Array, truth: Array, calm: Array) -> None:
+    """Draw a profile: mean and spread over the flights beside the truth."""
+    y, mean, spread = PROFILE_Y, estimate.mean(axis=0), estimate.std(axis=0)
+    band = {"color": ESTIMATE, "alpha": 0.2, "lw": 0}
+    axes.fill_between(y, mean - spread, mean + spread, label="± std over flights", **band)
+    axes.plot(y, calm, color=TRUTH, lw=3, label="mean jet")
+    axes.plot(y, truth.mean(axis=0), "--", color=BLACK, lw=1.2, label="true")
+    axes.plot(y, mean, "o-", color=ESTIMATE, ms=3.5, lw=1, label="estimated")
+    axes.axhline(0, color="black", lw=0.5)
+    axes.axvline(0, color="black", lw=0.5)
+    room_above(axes, 0.5)
+    axes.legend(loc="upper left")
+    axes.set(title=f"across, at x = 2.3 m: {label}", xlabel="y (m)", ylabel=label)
+
+
+def _agreement(
+    axes: Any,
+    estimate: Array,
+    truth: Array,
+    inside: NDArray[np.bool_],
+    correlations: tuple[float, float],
+) -> None:
+    """Draw estimate against truth at the jet's points, each quantity as a share of its largest."""
+    for axis, name, colour, correlation in zip(
+        (0, 5), ("$f_x$", r"$\tau_z$"), SERIES, correlations, strict=False
+    ):
+        largest = float(np.abs(truth[:, axis]).max())
+        x, y = (wrench[:, axis, inside].ravel() / largest for wrench in (truth, estimate))
+        label = f"{name}, correlation {correlation:.3f}"
+        axes.plot(x, y, ".", color=colour, ms=5, alpha=0.6, label=label)
+    axes.plot([-1.1, 1.1], [-1.1, 1.1], color="black", lw=0.7)
+    room_above(axes, 0.3)
+    axes.legend(loc="upper left")
+    axes.set_title("in the jet, shares of the largest")
+    axes.set(xlabel="true", ylabel="estimated")

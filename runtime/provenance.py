@@ -1,13 +1,29 @@
-"""How a page or a result came about: the command, the version and the commit of the code."""
+"""How a page or a result came about: the command, the versions and the commit of the code."""
 
 import subprocess
 from collections.abc import Iterable
+from contextlib import suppress
 from functools import cache
+from importlib import metadata
 from pathlib import Path
 
 from .. import __version__
 
 _ROOT = Path(__file__).resolve().parent.parent
+# what a result depends on
+_PACKAGES = (
+    *("stable-baselines3", "sb3-contrib", "torch", "numpy", "scipy", "numba"),
+    *("mujoco", "gymnasium"),
+)
+
+
+def package_versions() -> dict[str, str]:
+    """Return the versions of the packages that a result depends on, of those that are there."""
+    found = {}
+    for name in _PACKAGES:
+        with suppress(metadata.PackageNotFoundError):
+            found[name] = metadata.version(name)
+    return found
 
 
 @cache

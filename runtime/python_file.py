@@ -35,17 +35,9 @@ def import_file(path: str | Path, what: str) -> ModuleType:
         spec.loader.exec_module(module)
     except Exception as error:
         del sys.modules[name]
-        if isinstance(error, SyntaxError):
-            line = error.lineno
-        else:
-            line = next(
-                (
-                    f.lineno
-                    for f in reversed(traceback.extract_tb(error.__traceback__))
-                    if f.filename == name
-                ),
-                None,
-            )
+        frames = traceback.extract_tb(error.__traceback__)
+        lines = [f.lineno for f in frames if f.filename == name]
+        line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
         where = f", line {line}" if line else ""
         raise InputError(
             f"{path}{where}: {type(error).__name__}: {error}; expected {what}"

@@ -175,34 +175,6 @@ for _extreme, _sign in _extremes:
     )
 
 
-@intrinsic
-def _select(_context: Any, condition: Any, a: Any, b: Any) -> Any:
-    truths = all(kind == ANSWERS or isinstance(kind, types.Boolean) for kind in (a, b))
-    result = ANSWERS if truths else LANES
-
-    def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
-        values = [
-            context.cast(builder, value, kind, result)
-            for value, kind in zip(arguments[1:], given.args[1:], strict=True)
-        ]
-        return builder.select(arguments[0], *values)
-
-    return result(condition, a, b), generate
-
-
-@intrinsic
-def _not(_context: Any, answers: Any) -> Any:
-    return answers(answers), lambda _context, builder, _signature, given: builder.not_(given[0])
-
-
-@intrinsic
-def _bits(_context: Any, answers: Any) -> Any:
-    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        return builder.zext(builder.bitcast(arguments[0], ir.IntType(WIDTH)), ir.IntType(64))
-
-    return types.int64(answers), generate
-
-
 def choose(condition: Any, a: Any, b: Any) -> Any:
     """Return ``a`` where the condition holds, else ``b``."""
     return a if condition else b
@@ -223,32 +195,24 @@ def any_of(condition: Any) -> bool:
     return bool(condition)
 
 
-@overload(choose, strict=False)
-def _choose(condition: Any, a: Any, b: Any) -> Any:
-    if condition == ANSWERS:
-        return lambda condition, a, b: _select(condition, a, b)
-    return lambda condition, a, b: a if condition else b
-
-
-@overload(opposite, strict=False)
-def _opposite(condition: Any) -> Any:
-    if condition == ANSWERS:
-        return lambda condition: _not(condition)
-    return lambda condition: not condition
-
-
-@overload(all_of, strict=False)
-def _all_of(condition: Any) -> Any:
-    if condition == ANSWERS:
-        return lambda condition: _bits(condition) == (1 << WIDTH) - 1
-    return lambda condition: bool(condition)
-
-
-@overload(any_of, strict=False)
-def _any_of(condition: Any) -> Any:
-    if condition == ANSWERS:
-        return lambda condition: _bits(condition) != 0
-    return lambda condition: bool(condition)
+_BITS = ir.IntType(WIDTH)
+# with single numbers each does what it says in Python
+for _question in (choose, opposite, all_of, any_of):
+    overload(_question, strict=False)(
+        lambda *given, question=_question: None if ANSWERS in given else question
+    )
+for _kind in (LANES, ANSWERS):
+    _define(choose, _kind, (ANSWERS, _kind, _kind), lambda builder, *given: builder.select(*given))
+_define(opposite, ANSWERS, (ANSWERS,), lambda builder, a: builder.not_(a))
+for _question, _sign, _least in ((all_of, "==", -1), (any_of, "!=", 0)):
+    _define(
+        _question,
+        types.boolean,
+        (ANSWERS,),
+        lambda builder, a, sign=_sign, least=_least: builder.icmp_signed(
+            sign, builder.bitcast(a, _BITS), _BITS(least)
+        ),
+    )
 
 
 def first_column(numbers: Any, i: int) -> int:
@@ -261,13 +225,6 @@ def first_column(numbers: Any, i: int) -> int:
     return 0
 
 
-@overload(first_column, strict=False)
-def _first_column(numbers: Any, i: Any) -> Any:
-    if numbers.dtype == LANES:
-        return lambda numbers, i: i
-    return lambda numbers, i: 0
-
-
 _BEYOND = 1 << 62  # a constant: compilers then see that single numbers never come there
 
 
@@ -278,11 +235,12 @@ def first_below(numbers: Any, i: int) -> int:
     return _BEYOND
 
 
-@overload(first_below, strict=False)
-def _first_below(numbers: Any, i: Any) -> Any:
-    if numbers.dtype == LANES:
-        return lambda numbers, i: i + 1
-    return lambda numbers, i: _BEYOND
+overload(first_column, strict=False)(
+    lambda numbers, i: (lambda numbers, i: i) if numbers.dtype == LANES else first_column
+)
+overload(first_below, strict=False)(
+    lambda numbers, i: (lambda numbers, i: i + 1) if numbers.dtype == LANES else first_below
+)
 
 
 def lanes_by(singly: Callable[..., Any], lanes: Callable[..., Any]) -> Callable[..., Any]:
@@ -317,46 +275,29 @@ def _corners_in_lanes(_context: Any, table: Any, i: Any, j: Any) -> Any:
     def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
         array = context.make_array(given.args[0])(context, builder, arguments[0])
         columns = cgutils.unpack_tuple(builder, array.shape, 2)[1]
-        whole, place = ir.IntType(64), ir.IntType(32)
         width = _splat(builder, builder.sitofp(columns, ir.DoubleType()), _VECTOR)
         first = builder.fptosi(
             builder.fadd(builder.fmul(arguments[1], width), arguments[2]),
-            ir.VectorType(whole, WIDTH),
+            ir.VectorType(columns.type, WIDTH),
         )
-        pair = ir.VectorType(ir.DoubleType(), 2)
-        out = []
-        for row in range(2):
-            parts = []
-            for lane in range(WIDTH):
-                k = builder.extract_element(first, ir.Constant(place, lane))
-                k = builder.add(k, columns) if row else k
-                where = builder.bitcast(builder.gep(array.data, [k]), pair.as_pointer())
-                parts.append(builder.load(where, align=8))
-            while len(parts) > 1:  # neighbours beside each other
-                parts = [
-                    _shuffled(builder, a, b, list(range(2 * a.type.count)))
-                    for a, b in zip(parts[::2], parts[1::2], strict=True)
-                ]
-            all_of_row = parts[0]
-            out += [
-                _shuffled(builder, all_of_row, all_of_row, [2 * n + side for n in range(WIDTH)])
-                for side in range(2)
-            ]
+        out = [ir.Constant(_VECTOR, ir.Undefined)] * 4
+        for lane in map(ir.IntType(32), range(WIDTH)):
+            above = builder.extract_element(first, lane)
+            for row, start in enumerate((above, builder.add(above, columns))):
+                for side in range(2):
+                    where = builder.gep(array.data, [builder.add(start, columns.type(side))])
+                    corner = 2 * row + side
+                    out[corner] = builder.insert_element(out[corner], builder.load(where), lane)
         return cgutils.pack_array(builder, out)
 
     return types.UniTuple(LANES, 4)(table, i, j), generate
 
 
-def _shuffled(builder: Any, a: Any, b: Any, places: list[int]) -> Any:
-    mask = ir.Constant(ir.VectorType(ir.IntType(32), len(places)), places)
-    return builder.shuffle_vector(a, b, mask)
-
-
-@overload(corners, strict=False)
-def _corners(table: Any, i: Any, j: Any) -> Any:
-    if LANES in (i, j):
-        return lambda table, i, j: _corners_in_lanes(table, i, j)
-    return corners
+overload(corners, strict=False)(
+    lambda table, i, j: (
+        (lambda table, i, j: _corners_in_lanes(table, i, j)) if LANES in (i, j) else corners
+    )
+)
 
 
 class _LaneRecord(types.Record):

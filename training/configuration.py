@@ -94,34 +94,23 @@ def _like(old: Any, value: Any, where: str) -> Any:
 
 
 def _check(config: Config) -> None:
+    name, imitates = config["algorithm"], config["algorithm"] in IMITATIONS
     counts = {key: config[key] for key in _COUNTS if key in config}
     counts |= {f"validation.{key}": count for key, count in config["validation"].items()}
     for key, count in counts.items():
         if count < 1:
-            raise InputError(f"{config['algorithm']}: {key} must be at least 1, got {count}")
-    if config["activation"] not in ("relu", "tanh"):
-        activations = ("relu", "tanh")
-        raise unknown_name("activation", config["activation"], activations, config["algorithm"])
+            raise InputError(f"{name}: {key} must be at least 1, got {count}")
     if not all(isinstance(n, int) and n > 0 for n in config["net"]):
-        raise InputError(
-            f"{config['algorithm']}: net must list sizes of hidden layers, got {config['net']}"
-        )
-    imitates = config["algorithm"] in IMITATIONS
-    known = ("ukf", "constant-gain", "ukf-lanes")[: 2 if imitates else 3]
-    if config["estimator"] not in known:
-        raise unknown_name("estimator", config["estimator"], known, config["algorithm"])
-    features_of(config)
+        raise InputError(f"{name}: net must list sizes of hidden layers, got {config['net']}")
+    words = {"activation": ("relu", "tanh"), "estimator": ("ukf", "constant-gain", "ukf-lanes")}
     if imitates:
-        _check_imitation(config)
-
-
-def _check_imitation(config: Config) -> None:
-    name = config["algorithm"]
-    if config["says"] not in ("motion", "command"):
-        raise unknown_name("word", config["says"], ("motion", "command"), f"{name}: says")
-    if config["cell"] not in ("lstm", "gru", "none"):
-        raise unknown_name("cell", config["cell"], ("lstm", "gru", "none"), name)
-    for key in ("gains", "dampings"):
+        words["estimator"] = words["estimator"][:2]
+        words |= {"says": ("motion", "command"), "cell": ("lstm", "gru", "none")}
+    for key, known in words.items():
+        if config[key] not in known:
+            raise unknown_name(key, config[key], known, name)
+    features_of(config)
+    for key in ("gains", "dampings") if imitates else ():
         numbers = all(isinstance(x, int | float) for x in config[key])
         if not config[key] or not numbers:
             raise InputError(f"{name}: {key} must list numbers, got {config[key]}")

@@ -4,7 +4,6 @@ import platform
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, fields
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +15,12 @@ from ..evaluation.episodes import fly_episode
 from ..runtime.errors import InputError
 from ..runtime.forms import STRICT, checked
 from ..runtime.page_files import write_json
+from ..runtime.provenance import package_versions
 from ..runtime.regular_files import read_json
 from .configuration import Config, features_of
 from .seeds import FIRST_VALIDATION_SEED, validation_seeds
 from .training_envs import check_training_env, make_training_env
 
-_PACKAGES = ("stable-baselines3", "sb3-contrib", "torch", "numpy", "mujoco", "gymnasium", "numba")
 _SQUASHED = ("sac", "td3")  # algorithms whose policy sends its output through a tanh
 
 
@@ -76,13 +75,7 @@ def read_progress(folder: Path) -> Progress | None:
 
 def versions() -> dict[str, str]:
     """Return the versions that a policy was trained with."""
-    found = {"windwrench": __version__, "python": platform.python_version()}
-    for name in _PACKAGES:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            continue
-    return found
+    return {"windwrench": __version__, "python": platform.python_version(), **package_versions()}
 
 
 def origin(algorithm: str, scenario: str, seed: int, steps: int, activation: str) -> dict[str, Any]:

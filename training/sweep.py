@@ -92,24 +92,28 @@ def run_job(job: Job, folder: Path) -> dict[str, Any]:
 def run_jobs(
     jobs: Sequence[Job],
     folder: Path,
-    address: str,
+    address: str | None = None,
     work: Callable[..., dict[str, Any]] = run_job,
+    advance: Callable[[], None] = lambda: None,
 ) -> list[dict[str, Any]]:
-    """Do the runs of a sweep on a Ray cluster; return the result of each, in their order.
+    """Do the runs of a sweep; return the result of each, in their order.
 
-    A run whose process or machine is lost goes on elsewhere, from its last checkpoint.
+    On a cluster a run whose process or machine is lost goes on elsewhere, from its last checkpoint.
 
     Args:
         jobs: of ``jobs_of``.
         folder: of the results, which every machine sees.
-        address: of the cluster.
-        work: does one run in a worker process; called with the run and ``folder``.
+        address: of a Ray cluster; None: this process does one run after the other.
+        work: does one run; called with the run and ``folder``.
+        advance: called after each run.
 
     Raises:
         InputError: as ``runtime.workers.every``.
     """
-    found = {
-        job.name: one
-        for job, one in every(partial(work, folder=folder.resolve()), jobs, cluster=address)
-    }
+    do = partial(work, folder=folder if address is None else folder.resolve())
+    here = ((job, do(job)) for job in jobs)
+    found = {}
+    for job, one in here if address is None else every(do, jobs, cluster=address):
+        found[job.name] = one
+        advance()
     return [found[job.name] for job in jobs]

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ...dynamics.vehicle import Vehicle
-from ...dynamics.vehicle_file import dump_vehicle, load_vehicle, preset_names
+from ...dynamics.vehicle_file import dump_vehicle, load_vehicle, named_vehicle
 from ...runtime.code_digest import code_digest
 from ...runtime.errors import InputError
 from ...runtime.plain_values import as_text
@@ -104,10 +104,5 @@ def _read(log: FleetLog) -> tuple[FlightLog, Vehicle]:
     flight = read_log(log.path, log.reader, model, log.map, log.piece)
     if model is not None:
         return flight, model
-    if flight.vehicle not in preset_names():
-        named = f"names the vehicle {flight.vehicle}" if flight.vehicle else "names no vehicle"
-        raise InputError(
-            f"{log.path}: {named}; expected {', '.join(preset_names())}, or a vehicle from "
-            f"--vehicle, a manifest or a vehicle.yaml beside the log"
-        )
-    return flight, load_vehicle(flight.vehicle)
+    how = ", a manifest or a vehicle.yaml beside the log"
+    return flight, named_vehicle(flight.vehicle, log.path, how)

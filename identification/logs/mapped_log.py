@@ -71,7 +71,7 @@ def map_table(
     if log_map.is_own:
         log_map = replace(log_map, vehicle=vehicle_of_columns(table))
     vehicle = flown_vehicle(vehicle, log_map.vehicle)
-    log_map = fitted(table, log_map, vehicle, reader)
+    log_map = fitted(table.header, table.path, log_map, vehicle, reader)
     columns = table.read(log_map.wanted)
     if log_map.is_own and rows_apart(Samples(np.arange(float(table.rows)), columns), log_map):
         log_map = replace(log_map, rows="mixed")
@@ -295,15 +295,17 @@ def _order_note(order: tuple[int, int, int, int]) -> str:
     return f"{order_words(order)}{f' ({names[0]})' if names else ''}"
 
 
-def fitted(table: Table, log_map: LogMap, vehicle: Vehicle | None, reader: str) -> LogMap:
+def fitted(
+    names: Sequence[str], source: object, log_map: LogMap, vehicle: Vehicle | None, reader: str
+) -> LogMap:
     """Return a map with the ways to fill a section for which a table has the columns, without the
     optional sections that the table lacks, and with the range of its commands.
 
     Raises:
         InputError: it does not fit the table.
     """
-    header = set(table.header)
-    where = f"{table.path}: map {log_map.name}"
+    header = set(names)
+    where = f"{source}: map {log_map.name}"
     parts: dict[str, TimeColumn | Columns] = {"time": log_map.time, **log_map.sections}
     fitting = {
         section: [way for way in log_map.ways(section) if header.issuperset(way.named)]
@@ -317,13 +319,13 @@ def fitted(table: Table, log_map: LogMap, vehicle: Vehicle | None, reader: str) 
             whose = f"{section} (all or none)" if part.optional else section
             missing += [(name, whose) for name in absent]
     if missing:
-        lower, words = {name.lower(): name for name in table.header}, []
+        lower, words = {name.lower(): name for name in names}, []
         for name, section in missing[:8]:
             near = get_close_matches(name.lower(), lower, n=2, cutoff=0.6)
             hint = f" (like {' or '.join(lower[x] for x in near)})" if near else ""
             words.append(f"{name!r} of {section}{hint}")
         more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
-        found = ", ".join(table.header[:_SHOWN]) + (", ..." if table.header[_SHOWN:] else "")
+        found = ", ".join(names[:_SHOWN]) + (", ..." if names[_SHOWN:] else "")
         raise InputError(f"{where} does not fit: no column {', '.join(words)}{more}; found {found}")
     log_map = log_map.with_ways(fitting)
     check_whole(log_map, f"{where} does not fit")

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
-from ...dynamics.vehicle_file import load_vehicle, preset_names
 from ...runtime.errors import InputError, UnreadLogError
+from ..logs.commanded_speeds import flown_vehicle
 from ..logs.flight_log import FlightLog
 from ..logs.flight_phases import flew
 from ..logs.log_map import MAPS, map_names
@@ -108,8 +108,7 @@ def check_log(
             log = read_log(path, reader, vehicle, piece=piece)
             named = re.search(r"\(reader ([^()]+)\)$", log.source)
             read_by = f"the reader {named[1]}" if named else "this kit's own format"
-    if vehicle is None and log.vehicle in preset_names():
-        vehicle = load_vehicle(log.vehicle)
+    vehicle = flown_vehicle(vehicle, log.vehicle)
     guesses = guess.doubts if guess else ()
     doubts = [f"guessed: {f'{r.section} {r.field}'.rstrip()}: {r.why}" for r in guesses]
     doubts += [note for note in log.notes if note.startswith("warning")]

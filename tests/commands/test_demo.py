@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from windwrench.commands.example import confronted
+from windwrench.commands.diagnosing import confronted
 from windwrench.identification.logs.example import example_flight
 from windwrench.identification.logs.reading import read_log
 

@@ -75,7 +75,7 @@ def test_a_table_of_another_kind_by_its_map(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("t,px,py\n1,2,3\n", "no field pz, qw, qx, qy, qz, omega1"),
+        ("t,px,py\n1,2,3\n", "no column 'pz' of position, 'qw' of attitude"),
         (as_csv(flight())[:40], "expected"),
         ("t,px,py,pz,qw,qx,qy,qz,omega1,omega2,omega3,omega4\n1,2,x" + ",1" * 9, "not a number"),
         ("t,px,py,pz,qw,qx,qy,qz,omega1,omega2,omega3,omega4\n1,2\n", "row of 2 field"),
