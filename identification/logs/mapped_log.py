@@ -5,7 +5,7 @@ Of several ways to fill a section the first is taken whose columns are there and
 Each section of the map becomes a stream (``streams``). Where channels stand in rows of their own,
 the pose's rows are the log's, and the others are interpolated to them. Else rows of a table that
 hold neither a pose nor an inertial sensor's sample are left out, unless most rows have a pose,
-which the others then lost; a map of whole rows keeps them all. An attitude that is logged in other
+which the others then lost; the kit's own are all kept. An attitude that is logged in other
 rows than the position is interpolated to the position's.
 """
 
@@ -73,12 +73,12 @@ def map_table(
     vehicle = flown_vehicle(vehicle, log_map.vehicle)
     log_map = fitted(table, log_map, vehicle, reader)
     columns = table.read(log_map.wanted)
-    if log_map.is_own and rows_apart(Samples(np.arange(float(table.rows)), columns), log_map):
-        log_map = replace(log_map, rows="mixed")
+    samples = Samples(np.arange(float(table.rows)), columns)
+    strict = log_map.is_own and not rows_apart(samples, log_map)
     notes = [*table.notes, *log_map.notes, *([log_map.time.note] if log_map.time.note else [])]
-    if not log_map.is_own or log_map.rows == "mixed":
+    if not strict:
         notes.insert(0, f"columns: by the map {log_map.name}")
-    samples, words = rows_of(table, columns, log_map)
+    samples, words = rows_of(table, columns, log_map, strict)
     notes += words
     return recording_of(table.path, [samples], log_map, reader, notes, piece).log(vehicle)
 
@@ -110,6 +110,7 @@ def recording_of(
     recorded, of_clock = on_one_clock(path, recorded, piece)
     motors = (*log_map.ways("rotors"), *log_map.ways("commands"))
     poses = log_map.ways("position")
+    is_to_move = not log_map.is_own and any(map(log_map.ways, ("position", *_IMU)))
     log_map, sources = chosen(recorded, log_map)
     of_clock += [note for s in recorded if s.table for note in check_rows(s, log_map)]
     if not (log_map.rotors or log_map.commands or log_map.wrench):
@@ -145,8 +146,7 @@ def recording_of(
             streams[name] = replace(stream, t=stream.t - part.late)
             said.append(f"battery voltage put {part.late:g} s sooner, by which it is logged late")
     absent = [name for name in _IMU if readable(streams.get(name)) is None]
-    must_move = log_map.rows != "whole" or (poses and not log_map.is_own)
-    if log_map.position is None and absent and must_move:
+    if log_map.position is None and absent and is_to_move:
         expected = " or ".join(way.label for way in poses)
         expected = f"{expected}, with an attitude beside it" if poses else "a pose"
         raise InputError(
@@ -156,7 +156,7 @@ def recording_of(
     if log_map.position is None and not log_map.is_own:
         what = ": no position that changes, with an attitude beside it, was logged"
         said.append(f"no pose{what if poses else ' in the log'}")
-    if log_map.position is None and log_map.rows == "whole":  # all rows are the log's
+    if log_map.position is None and (absent or log_map.is_own):  # all rows are the log's
         t = recorded[0].t
         streams["position"] = Stream("pose", t, np.full((len(t), 7), np.nan))
     extra = {
@@ -189,7 +189,7 @@ def _pose(
     t = samples.t[keep]
     position = in_kit_units(log_map, "position", place, samples.values(place)[keep])
     placed: Mask = np.asarray(np.isfinite(position).all(axis=1))
-    if not placed.any() and log_map.rows != "whole":
+    if not placed.any() and not log_map.is_own:
         raise InputError(
             f"{path}: map {log_map.name}: position: no row has all of {', '.join(place.columns)}; "
             "expected some"
@@ -211,7 +211,7 @@ def _pose(
     turns = quaternions(turn, measured.values(turn))
     with np.errstate(over="ignore"):
         length = np.linalg.norm(turns, axis=1)
-    there = length > (-1.0 if log_map.rows == "whole" else NO_QUATERNION)
+    there = length > (-1.0 if log_map.is_own else NO_QUATERNION)
     off = np.flatnonzero(there & ~(np.abs(length - 1.0) <= NORM_TOLERANCE))
     if off.size:
         what = turn.topic or f"columns {', '.join(turn.columns)}"
@@ -248,16 +248,14 @@ def _pose(
 def _kept_rows(samples: Samples, log_map: LogMap, part: Columns) -> Mask:
     """Return which rows (N,) of a group are those of a section's stream: all messages. Of a table
     its own, where channels stand in rows of their own; else those with a position or an inertial
-    sensor's sample; all, where most have a position, which the others lost.
+    sensor's sample; all, where most have a position, which the others lost, and of the kit's own.
     """
-    everything: Mask = np.ones(len(samples.t), bool)
-    if log_map.rows == "whole" or samples.table is None:
-        return everything
-    if rows_apart(samples, log_map):
+    if samples.table is not None and rows_apart(samples, log_map):
         return samples.there(part)
     place = log_map.position
-    if place is not None and samples.has(place) and np.mean(samples.there(place)) > 0.5:
-        return everything
+    is_placed = place is not None and samples.has(place) and samples.there(place).mean() > 0.5
+    if samples.table is None or log_map.is_own or is_placed:
+        return np.ones(len(samples.t), bool)
     inertial = (place, log_map.accelerometer, log_map.gyro)
     there = [samples.there(one) for one in inertial if one is not None and samples.has(one)]
     return np.asarray(np.any(there, axis=0))
@@ -356,12 +354,12 @@ def chosen(recorded: Sequence[Samples], log_map: LogMap) -> tuple[LogMap, dict[s
     the first way whose columns are there, and hold measurements; a position with an attitude that
     goes with it. Optional sections of which there are none are left out.
     """
-    stated, usable = log_map.rows == "whole" or log_map.is_own, {}
+    usable = {}
     for section in log_map.sections:
         ways = [(way, s) for way in log_map.ways(section) for s in recorded if s.has(way)]
         # the only way that is there fills a section that must be filled
-        if len(ways) != 1 or not (stated or not ways[0][0].optional):
-            ways = [one for one in ways if _is_measured(section, *one, log_map.rows)]
+        if len(ways) != 1 or (ways[0][0].optional and not log_map.is_own):
+            ways = [one for one in ways if _is_measured(section, *one)]
         usable[section] = ways
     places, turns = usable.get("position", []), usable.get("attitude", [])
     pairs = [
@@ -378,9 +376,9 @@ def chosen(recorded: Sequence[Samples], log_map: LogMap) -> tuple[LogMap, dict[s
     ), samples
 
 
-def _is_measured(section: str, way: Columns, samples: Samples, rows: str) -> bool:
-    """Return whether a section's columns hold measurements: rotors that turn, a voltage, but of
-    ``messages`` a position that changes, and two samples of others.
+def _is_measured(section: str, way: Columns, samples: Samples) -> bool:
+    """Return whether a section's columns hold measurements: rotors that turn, a voltage, of a table
+    a position that changes, and two samples of others.
     """
     values = samples.values(way)
     values = values[np.isfinite(values).all(axis=1)]
@@ -388,6 +386,6 @@ def _is_measured(section: str, way: Columns, samples: Samples, rows: str) -> boo
         return bool(np.any(np.linalg.norm(values, axis=1) > NO_QUATERNION))
     if section in ("rotors", "battery"):
         return bool(np.any(values > 0.0 if section == "battery" else values != 0.0))
-    if section == "position" and rows != "messages" and len(values):
+    if section == "position" and samples.table is not None and len(values):
         return bool(np.any(np.ptp(values, axis=0) > 0.0))
     return len(values) > 1
