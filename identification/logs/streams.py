@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
+from ..motion.smoothing import resampled
 from .commanded_speeds import flown_vehicle, speeds_of_wrench, with_commanded_speeds
 from .flight_log import FlightLog, time_notes
 from .log_map import LogMap
@@ -58,7 +59,7 @@ class Stream:
         """Return the values (M, K) at times (M,) in s: a sample's own at its time, else linear
         between its neighbours; NaN beyond the first and the last, and where samples are missing.
         """
-        out = np.column_stack([np.interp(t, self.t, column) for column in self.values.T])
+        out = resampled(t, self.t, self.values)
         step = np.diff(self.t)
         after = np.clip(np.searchsorted(self.t, t), 1, len(self.t) - 1)
         there = step[after - 1] <= _SENSOR_GAP * float(np.median(step))
