@@ -18,7 +18,6 @@ from scipy.spatial.transform import Rotation
 from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import Vehicle
 from ..motion.signals import Signals
-from ..motion.smoothing import resampled
 
 # time offsets (s) of a log: by which the rotor speeds act later than they are logged, by which the
 # attitude is ahead of the position, and by which the velocity that acts is behind the position's (a
@@ -95,7 +94,7 @@ def with_time_offsets(signals: Signals, offsets: Mapping[str, float]) -> Signals
     if rotors != 0.0:
         n = np.arange(len(signals.t))
         at = n - rotors / signals.period
-        speeds = resampled(at, n, signals.rotor_speeds)
+        speeds = np.column_stack([np.interp(at, n, x) for x in signals.rotor_speeds.T])
         signals = replace(signals, rotor_speeds=speeds)
     if spread != 0.0:
         over = np.sqrt(spread) / signals.period
