@@ -73,13 +73,8 @@ def map_table(
     vehicle = flown_vehicle(vehicle, log_map.vehicle)
     log_map = fitted(table, log_map, vehicle, reader)
     columns = table.read(log_map.wanted)
-    samples = Samples(np.arange(float(table.rows)), columns)
-    strict = log_map.is_own and not rows_apart(samples, log_map)
-    notes = [*table.notes, *log_map.notes, *([log_map.time.note] if log_map.time.note else [])]
-    if not strict:
-        notes.insert(0, f"columns: by the map {log_map.name}")
-    samples, words = rows_of(table, columns, log_map, strict)
-    notes += words
+    samples, words = rows_of(table, columns, log_map)
+    notes = [*words, *table.notes, *log_map.notes, *filter(None, [log_map.time.note])]
     return recording_of(table.path, [samples], log_map, reader, notes, piece).log(vehicle)
 
 
@@ -219,18 +214,18 @@ def _pose(
             f"{path}: {what}, {measured.place(off[0])}: a quaternion of length "
             f"{length[off[0]]:.4g}; expected 1 within {NORM_TOLERANCE:g}"
         )
+    times, turns = measured.t[there], turns[there]
     if there.any():
-        turns = in_kit_axes(log_map, turn, turns[there])
-    attitude = Stream(turn.label, measured.t[there], turns)
-    steps = np.diff(attitude.t)
+        turns = in_kit_axes(log_map, turn, turns)
+    steps = np.diff(times)
     longest = max(_ATTITUDE_GAP, LONGEST_STEPS * float(np.median(steps))) if len(steps) else 0.0
-    pose[placed] = np.column_stack([position[placed], slerp(t[placed], attitude, longest)])
+    pose[placed] = np.column_stack([position[placed], slerp(t[placed], times, turns, longest)])
     if placed.any() and not np.isfinite(pose).all(axis=1).any():
         raise InputError(
             f"{path}: position and attitude do not overlap in time; expected both over the same "
             "flight"
         )
-    alone = int(np.sum(~np.isin(t[placed], attitude.t)))
+    alone = int(np.sum(~np.isin(t[placed], times)))
     if turned is samples and alone:
         notes.append(
             f"{alone} of {int(placed.sum())} positions stand in rows without an attitude, which "

@@ -33,31 +33,26 @@ _FEWEST = 10  # samples of a channel that tell in which rows it stands
 
 
 def rows_of(
-    table: Table, columns: Mapping[str, Array], log_map: LogMap, strict: bool
+    table: Table, columns: Mapping[str, Array], log_map: LogMap
 ) -> tuple[Samples, list[str]]:
     """Return what the map's columns hold, as they were written, and notes.
-
-    Args:
-        table: the table.
-        columns: that the map asks for (N,), by name.
-        log_map: what they mean.
-        strict: the kit's own rows, of which each must be whole and later than the one before.
 
     Raises:
         InputError: many times go back, they cannot be told apart, or are fewer than two; of the
             kit's own rows, one goes back, or a row lacks a number.
     """
     clock = log_map.time
-    notes = []
+    rows: Rows = np.arange(table.rows)
+    samples = Samples(rows / (clock.rate_hz or 1.0), columns, table=table, rows=rows)
+    strict = log_map.is_own and not rows_apart(samples, log_map)
+    notes = [] if strict else [f"columns: by the map {log_map.name}"]
     repeated = [name for name, count in Counter(table.header).items() if count > 1]
     if repeated:
         notes.append(f"columns that stand there more than once were not used: {repeated[:10]}")
-    rows: Rows = np.arange(table.rows)
     if not clock.column:
-        t = rows / clock.rate_hz + (clock.offset or 0.0)
         notes.append(f"time: rows at {clock.rate_hz:g} Hz, as the map says")
-        return Samples(t, columns, table=table, rows=rows), notes
-    samples = Samples(clock.raw(columns), columns, table=table, rows=rows)
+        return replace(samples, t=samples.t + (clock.offset or 0.0)), notes
+    samples = replace(samples, t=clock.raw(columns))
     if strict:
         _refuse(samples, clock.column, samples.t, ~np.isfinite(samples.t))
     samples = samples.cut(np.isfinite(samples.t))
