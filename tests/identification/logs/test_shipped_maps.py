@@ -38,6 +38,10 @@ def test_requests_of_crazypad_are_linear_in_thrust(read):
     assert log.commanded
     np.testing.assert_allclose(np.square(log.rotor_speeds) * VEHICLE.k, 0.2 * log.command)
     assert "onboard_acceleration" not in log.extra  # one of its three columns is missing
+    log = read("crazypad", curved, motor_m2_0to65535=7e4, vbat_V=np.nan)
+    assert log.command.max() == 1.0
+    assert log.voltage is None
+    assert any("40 motor command(s) beyond that range were set" in note for note in log.notes)
 
 
 def test_wrenches_of_crazyswarm2_become_rotor_speeds(read):
