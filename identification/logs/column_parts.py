@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..motion.smoothing import resampled, second_difference
 from .column_names import Group, Name, groups_of, named_alone, side_by_side, words
 from .magnitudes import likely_unit
 from .table import Array
@@ -89,12 +90,7 @@ class Numbers:
         times, values = self.rows(columns)
         if not len(times):
             return np.full((len(t), len(columns)), np.nan)
-        return np.column_stack([np.interp(t, times, x) for x in values.T])
-
-    def _bend(self, t: Array, columns: Sequence[str]) -> Array:
-        """Return the second differences (n, k) around times (n,)."""
-        before, at, after = (self.between(t + k * PARTS.window, columns) for k in (-1, 0, 1))
-        return np.asarray(before - 2.0 * at + after)
+        return resampled(t, times, values)
 
     def varies(self, column: str) -> bool:
         """Return whether a column takes more than a few values: no counter's and no switch's."""
@@ -140,7 +136,7 @@ class Numbers:
         times, attitude = self._attitude
         if min(len(times), len(self.rows(columns)[0])) < PARTS.fewest:
             return 0.0, ""
-        force, best = self._bend(times, columns).T, 0.0
+        force, best = second_difference(times, PARTS.window, *self.rows(columns)).T, 0.0
         for w, x, y, z in (attitude.T, attitude[:, [3, 0, 1, 2]].T):
             for sign in (1.0, -1.0):
                 tilt = x * z + sign * w * y, y * z - sign * w * x
@@ -164,7 +160,7 @@ class Numbers:
         if accelerometer:
             self.felt = [np.linalg.norm(self.between(self.clock, accelerometer), axis=1)]
         elif position:
-            force = self._bend(self.clock, position).T
+            force = second_difference(self.clock, PARTS.window, *self.rows(position)).T
             self.felt = [*force, *-force]
 
     def elasticity(self, values: Array) -> float:

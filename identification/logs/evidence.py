@@ -21,10 +21,17 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ...dynamics.vehicle import Vehicle
-from ..motion.smoothing import CUTOFFS, continuous, derivative, low_pass, resampled, unbroken
+from ..motion.smoothing import (
+    CUTOFFS,
+    continuous,
+    derivative,
+    low_pass,
+    resampled,
+    turning,
+    unbroken,
+)
 from .flight_log import FlightLog
 from .flight_phases import carrying
 from .log_map import UNITS
@@ -195,17 +202,16 @@ class Evidence:
         count = len(rows) * step * EVIDENCE.rate_hz
         every = np.ceil(count / EVIDENCE.most) / (EVIDENCE.rate_hz * period)
         pieces, totals = [], []
-        for part in unbroken(self._t, rows, max(EVIDENCE.gap, 3.5 * step)):
-            begin, end = self._t[part[0]], self._t[part[-1]]
-            if end - begin > EVIDENCE.shortest and len(part) > 8:
-                t = np.arange(begin, end, period)
-                edge = round(EVIDENCE.edge / period)
-                compared = np.arange(edge, len(t) - edge, max(1, round(every)))
-                piece = _Piece(part, t, period, compared)
-                total = piece.slow(piece.even(self._t, self._thrusts)) @ self._k
-                if np.isfinite(total).all():
-                    pieces.append(piece)
-                    totals.append(total)
+        gap = max(EVIDENCE.gap, 3.5 * step)
+        for part in unbroken(self._t, rows, gap, 8, EVIDENCE.shortest):
+            t = np.arange(self._t[part[0]], self._t[part[-1]], period)
+            edge = round(EVIDENCE.edge / period)
+            compared = np.arange(edge, len(t) - edge, max(1, round(every)))
+            piece = _Piece(part, t, period, compared)
+            total = piece.slow(piece.even(self._t, self._thrusts)) @ self._k
+            if np.isfinite(total).all():
+                pieces.append(piece)
+                totals.append(total)
         if not pieces:
             return []
         ends = np.cumsum([len(x) for x in totals])[:-1]
@@ -293,24 +299,20 @@ class Evidence:
             good, rotation = as_written(self._attitude, Reading(*attitude))
             quaternion = np.full((len(good), 4), np.nan)
             quaternion[good] = continuous(rotation.as_quat(scalar_first=True))
-        axes, turning = [], []
+        axes, turns = [], []
         for thrusts, p in self._each(self._driving):
             if quaternion is None:
                 assert self._gyro is not None
                 w = p.even(self._t, self._gyro)
-                matrices = np.zeros((len(w), 9))
+                matrices = np.zeros((len(w), 3, 3))
             else:
                 q = low_pass(p.even(self._t, quaternion), CUTOFFS.pose_hz, p.period)
-                q /= np.linalg.norm(q, axis=1, keepdims=True)
-                dq = derivative(q, p.period)
-                w = 2.0 * (q[:, :1] * dq[:, 1:] - dq[:, :1] * q[:, 1:])
-                w -= 2.0 * np.cross(q[:, 1:], dq[:, 1:])
-                matrices = Rotation.from_quat(q, scalar_first=True).as_matrix().reshape(-1, 9)
-            axes.append(p.slow(thrusts[:, 9:] * matrices)[p.compared])
+                matrices, w = turning(q, p.period)
+            axes.append(p.slow(thrusts[:, 9:] * matrices.reshape(-1, 9))[p.compared])
             products = np.einsum("ni,nj->nij", w, w).reshape(-1, 9)
             columns = np.column_stack([w, derivative(w, p.period), products])
-            turning.append(p.band(columns)[p.compared])
-        return np.concatenate(axes).reshape(-1, 3, 3), np.concatenate(turning)
+            turns.append(p.band(columns)[p.compared])
+        return np.concatenate(axes).reshape(-1, 3, 3), np.concatenate(turns)
 
     def _torques(self, reading: Reading) -> Array:
         """Return the torques (n, 3) in Nm that the motion needs, in the band of turning; without a

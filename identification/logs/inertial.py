@@ -17,7 +17,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation, Slerp
 
-from ..motion.smoothing import resampled
+from ..motion.smoothing import resampled, second_difference
 from .evidence import EVIDENCE, likelihood
 from .flight_log import ACCELEROMETER, GYRO, FlightLog
 from .magnitudes import MAGNITUDES
@@ -167,9 +167,10 @@ def _force_shares(
         sums, times = force[inside], t[inside]
         for _ in range(2):
             sums = cumulative_trapezoid(sums, times, axis=0, initial=0.0)
-        return _second_difference(middles, times, sums)
+        return second_difference(middles, INERTIAL.window, times, sums) / INERTIAL.window**2
 
-    needed, up, turned = _second_difference(middles, pose_times, position), np.zeros(3), None
+    up, turned = np.zeros(3), None
+    needed = second_difference(middles, INERTIAL.window, pose_times, position) / INERTIAL.window**2
     moves = np.linalg.norm(needed[:, :2], axis=1) > INERTIAL.moving
     if np.count_nonzero(moves) >= INERTIAL.fewest:
         in_body, in_world = (
@@ -187,13 +188,6 @@ def _force_shares(
         / _middle(needed)
         for r in (AS_DECLARED, *ACCELEROMETER_READINGS)
     ], turned
-
-
-def _second_difference(middles: Array, times: Array, values: Array) -> Array:
-    before, at, after = (
-        resampled(middles + k * INERTIAL.window, times, values) for k in (-1, 0, 1)
-    )
-    return np.asarray((after - 2.0 * at + before) / INERTIAL.window**2)
 
 
 def gravity_doubt(force: Array, gravity: float) -> str:

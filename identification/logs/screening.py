@@ -21,8 +21,8 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..motion.inertial_signals import inertial_pieces, reads_imu
-from ..motion.signals import SIGNALS
-from ..motion.smoothing import CUTOFFS, low_pass, runs_of, unbroken
+from ..motion.signals import SIGNALS, pose_pieces
+from ..motion.smoothing import CUTOFFS, low_pass, runs_of
 from .evidence import Evidence, departures
 from .excerpt import excerpt
 from .flight_log import FlightLog
@@ -31,10 +31,9 @@ from .inertial import INERTIAL, gravity_doubt, is_stuck
 from .magnitudes import MAGNITUDES, rotor_doubt, thrust_by_weight, time_doubt, within
 from .readings import Reading
 from .source_rates import MOTOR_RATES
-from .table import Array, Mask, Rows
+from .table import Array, Mask
 
 LEAST_SECONDS = 10.0  # of unbroken pose in flight
-_LEAST_PIECE = SIGNALS.shortest_piece  # s; a shorter piece is all edge to the filters
 _LEAST_RATE_HZ = 50.0
 _SLACK = 1.1  # of a period: jitter
 _AT_REST = 0.003  # of the weight: thrust below is no turning rotor, in whatever unit
@@ -136,7 +135,7 @@ def screen_log(
         hear(_pose_rate(log))
     hear(stuck_channels(log, vehicle))
     others: list[Reading] = []
-    if by_imu or _pieces(log):
+    if by_imu or pose_pieces(log):
         evidence = Evidence.of_log(excerpt([log])[0], vehicle, by_imu)
         others = departures(evidence)[:3]
     if others and not others[0].late:
@@ -288,12 +287,6 @@ def _pose_rate(log: FlightLog) -> Findings:
         )
 
 
-def _pieces(log: FlightLog) -> list[Rows]:
-    """Return the rows of each unbroken run of poses that is long enough to say something."""
-    runs = unbroken(log.t, np.flatnonzero(log.valid), max(0.1, 3.5 * log.period))
-    return [r for r in runs if len(r) > 8 and log.t[r[-1]] - log.t[r[0]] > _LEAST_PIECE]
-
-
 def _uneven_steps(log: FlightLog) -> Findings:
     """Check that the steps of the clock are even."""
     step = np.diff(log.t)
@@ -356,12 +349,12 @@ def _length(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
     thrust = low_pass(thrust, CUTOFFS.flying_hz, log.period)
     step = np.minimum(np.diff(log.t, append=log.t[-1] + log.period), max(0.1, 3.5 * log.period))
     step = np.where(carrying(thrust), step, 0.0)
-    pieces = _pieces(log)
+    pieces = pose_pieces(log)
     left = sum(float(step[piece[0] : piece[-1] + 1].sum()) for piece in pieces)
     whole, runs = float(step.sum()), len(runs_of(~log.valid))
     lost = f"the pose is lost in {runs} run(s), {int(np.sum(~log.valid))} of {len(log.t)} rows; "
     words = f"{lost if runs else ''}{left:.3g} of {whole:.3g} s of flight lie in unbroken runs of "
-    words += f"poses of more than {_LEAST_PIECE:g} s"
+    words += f"poses of more than {SIGNALS.shortest_piece:g} s"
     if not pieces or left < least - 1e-9:
         yield Refused(f"{words}; expected at least {least:g} s")
     if left < (1.0 - _LOST_SHARE) * whole:

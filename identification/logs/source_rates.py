@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..motion.smoothing import resampled
 from .table import Array, Rows
 
 
@@ -75,8 +76,7 @@ def between_samples(t: Array, values: Array, rate: float) -> Array:
         rate: at which it was, Hz.
     """
     beats = np.arange(t[0], t[-1], 1.0 / rate)
-    sampled = np.column_stack([np.interp(beats, t, column) for column in values.T])
-    off = 0.5 * np.diff(sampled, n=2, axis=0)
+    off = 0.5 * np.diff(resampled(beats, t, values), n=2, axis=0)
     return np.asarray(np.sqrt(np.mean(np.square(off), axis=0))) if len(off) else np.zeros(4)
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ...runtime.compiled import compiled
-from .smoothing import resampled
+from .smoothing import resampled, second_difference
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -355,12 +355,9 @@ def _heading(
     step = 2.0  # s: an IMU alone keeps a velocity's change over it, and a position shows it
     at = np.arange(times[0] + step, times[-1] - step, 0.5 * step)
 
-    def second_difference(t: Array, x: Array) -> Array:
-        a, b, c = (resampled(at + k * step, t, x[:, :2]) for k in (-1, 0, 1))
-        return np.asarray(a - 2.0 * b + c)
-
-    felt = second_difference(alone.t, alone.position) @ np.array([1.0, 1.0j])
-    seen = second_difference(positions.t, positions.values) @ np.array([1.0, 1.0j])
+    plane = np.array([1.0, 1.0j, 0.0])
+    felt = second_difference(at, step, alone.t, alone.position) @ plane
+    seen = second_difference(at, step, positions.t, positions.values) @ plane
     turned = alone.rotation[0] @ rotation[0].T
     zero = math.atan2(turned[1, 0] - turned[0, 1], turned[0, 0] + turned[1, 1])
     return float(np.angle(np.sum(np.conj(felt) * seen))) + zero

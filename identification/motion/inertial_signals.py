@@ -92,13 +92,7 @@ def inertial_pieces(log: FlightLog) -> list[NDArray[np.intp]]:
     if log.gyro is None or log.accelerometer is None:
         return []
     read = np.flatnonzero(np.isfinite(log.gyro[:, 0]) & np.isfinite(log.accelerometer[:, 0]))
-    if not len(read):
-        return []
-    return [
-        rows
-        for rows in unbroken(log.t, read, INERTIAL_SIGNALS.gap)
-        if len(rows) > 50 and log.t[rows[-1]] - log.t[rows[0]] > SIGNALS.shortest_piece
-    ]
+    return unbroken(log.t, read, INERTIAL_SIGNALS.gap, 50, SIGNALS.shortest_piece)
 
 
 def inertial_signals(log: FlightLog, gravity: float = 9.81) -> list[InertialSignals]:

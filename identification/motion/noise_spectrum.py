@@ -105,8 +105,8 @@ def _channels(log: FlightLog) -> Iterator[tuple[str, list[Array], float]]:
         if x is None or len(rows) <= NOISE_SPECTRUM.segment:
             continue
         period = float(np.median(np.diff(log.t[rows])))
-        pieces = unbroken(log.t, rows, NOISE_SPECTRUM.gap * period)
-        pieces = [piece for piece in pieces if len(piece) > NOISE_SPECTRUM.segment]
+        gap = NOISE_SPECTRUM.gap * period
+        pieces = unbroken(log.t, rows, gap, NOISE_SPECTRUM.segment)
         turning = name == "attitude"
         yield name, [turned(quaternion[r]) if turning else x[r] for r in pieces], period
 

@@ -12,11 +12,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
-from .smoothing import CUTOFFS, continuous, derivative, low_pass, resampled, unbroken
+from .smoothing import CUTOFFS, continuous, derivative, low_pass, resampled, turning, unbroken
 
 Array = NDArray[np.float64]
 
@@ -25,7 +24,7 @@ Array = NDArray[np.float64]
 class SignalSettings:
     """Which pieces of a log have signals."""
 
-    shortest_piece: float = 3.0  # s of unbroken pose
+    shortest_piece: float = 3.0  # s of unbroken pose; a shorter one is all edge to the filters
     gap: float = 0.1  # s without a pose, which ends a piece of a fast log
 
 
@@ -75,12 +74,7 @@ def log_signals(log: FlightLog, wide_hz: float = CUTOFFS.pose_hz) -> list[Signal
     Raises:
         InputError: no piece is longer than 3 s.
     """
-    seen = np.flatnonzero(log.valid)
-    out = [
-        _piece(log, piece, wide_hz)
-        for piece in unbroken(log.t, seen, max(SIGNALS.gap, 3.5 * log.period))
-        if len(piece) > 8 and log.t[piece[-1]] - log.t[piece[0]] > SIGNALS.shortest_piece
-    ]
+    out = [_piece(log, piece, wide_hz) for piece in pose_pieces(log)]
     if not out:
         raise InputError(
             f"{log.name}: no unbroken piece of pose is longer than {SIGNALS.shortest_piece:g} s"
@@ -88,23 +82,25 @@ def log_signals(log: FlightLog, wide_hz: float = CUTOFFS.pose_hz) -> list[Signal
     return out
 
 
+def pose_pieces(log: FlightLog) -> list[NDArray[np.intp]]:
+    """Return the rows of each unbroken run of poses that is long enough to say something."""
+    gap = max(SIGNALS.gap, 3.5 * log.period)
+    return unbroken(log.t, np.flatnonzero(log.valid), gap, 8, SIGNALS.shortest_piece)
+
+
 def _piece(log: FlightLog, rows: NDArray[np.intp], wide_hz: float) -> Signals:
     period = log.period
     t = np.arange(log.t[rows[0]], log.t[rows[-1]] + 0.5 * period, period)
     t = t[t <= log.t[rows[-1]]]
     q = resampled(t, log.t[rows], continuous(log.quaternion[rows]))
-    q = low_pass(q, wide_hz, period)
-    q /= np.linalg.norm(q, axis=1, keepdims=True)
-    dq = derivative(q, period)
-    w, v, dw, dv = q[:, :1], q[:, 1:], dq[:, :1], dq[:, 1:]
-    angular_velocity = 2.0 * (w * dv - dw * v - np.cross(v, dv))
+    rotation, angular_velocity = turning(low_pass(q, wide_hz, period), period)
     position = low_pass(resampled(t, log.t[rows], log.position[rows]), wide_hz, period)
     voltage = None if log.voltage is None else np.interp(t, log.t, log.voltage)
     return Signals(
         t,
         period,
         position,
-        Rotation.from_quat(q, scalar_first=True).as_matrix(),
+        rotation,
         derivative(position, period),
         derivative(position, period, 2),
         angular_velocity,

@@ -11,6 +11,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter, savgol_filter, sosfiltfilt
+from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 
@@ -93,9 +94,20 @@ def resampled(t: Array, times: Array, x: Array) -> Array:
     return np.column_stack([np.interp(t, times, column) for column in x.T])
 
 
-def unbroken(t: Array, rows: NDArray[np.intp], gap: float) -> list[NDArray[np.intp]]:
-    """Return the runs of ``rows`` between which no more than ``gap`` s pass."""
-    return np.split(rows, np.flatnonzero(np.diff(t[rows]) > gap) + 1)
+def second_difference(at: Array, step: float, t: Array, x: Array) -> Array:
+    """Return the second differences (n, k), over ``step`` s, of ``x`` (m, k) around times (n,)."""
+    before, middle, after = (resampled(at + k * step, t, x) for k in (-1, 0, 1))
+    return np.asarray(before - 2.0 * middle + after)
+
+
+def unbroken(
+    t: Array, rows: NDArray[np.intp], gap: float, count: int = 0, seconds: float = -1.0
+) -> list[NDArray[np.intp]]:
+    """Return the runs of ``rows`` between which no more than ``gap`` s pass, of those that have
+    more than ``count`` rows and last more than ``seconds`` s.
+    """
+    runs = np.split(rows, np.flatnonzero(np.diff(t[rows]) > gap) + 1)
+    return [run for run in runs if len(run) > count and t[run[-1]] - t[run[0]] > seconds]
 
 
 def runs_of(rows: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -113,6 +125,17 @@ def derivative(x: Array, period: float, order: int = 1) -> Array:
     200 Hz, would be a centre of mass that is off.
     """
     return np.asarray(savgol_filter(x, 5, 4, deriv=order, delta=period, axis=0))
+
+
+def turning(quaternion: Array, period: float) -> tuple[Array, Array]:
+    """Return the rotations (n, 3, 3), body to world, of smoothed quaternions (n, 4) of about length
+    1, and the angular velocity (n, 3) rad/s, body.
+    """
+    q = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
+    dq = derivative(q, period)
+    w, v, dw, dv = q[:, :1], q[:, 1:], dq[:, :1], dq[:, 1:]
+    rotation = Rotation.from_quat(q, scalar_first=True).as_matrix()
+    return rotation, 2.0 * (w * dv - dw * v - np.cross(v, dv))
 
 
 def turn_between(before: Array, after: Array) -> Array:

@@ -206,9 +206,8 @@ def _inertial(log: FlightLog, sources: Sources) -> Iterator[_Motion]:
     assert log.gyro is not None
     read = np.flatnonzero(np.isfinite(log.gyro[:, 0]))
     period = float(np.median(np.diff(log.t[read])))
-    for rows in unbroken(log.t, read, max(CHANNELS.gap, 3.5 * period)):
-        if len(rows) < 16 or log.t[rows[-1]] - log.t[rows[0]] < CHANNELS.shortest_piece:
-            continue
+    gap = max(CHANNELS.gap, 3.5 * period)
+    for rows in unbroken(log.t, read, gap, 15, CHANNELS.shortest_piece):
         t = np.arange(log.t[rows[0]], log.t[rows[-1]], period)
         rate = _sensor(log, log.gyro, t)
         force = None if log.accelerometer is None else _sensor(log, log.accelerometer, t)

@@ -24,9 +24,10 @@ FLOORS = (
     {"cli", "commands", "__main__"},
 )
 FLOOR = {room: height for height, rooms in enumerate(FLOORS) for room in rooms}
-# inside identification, from the ground up; what judges a log by the motion that it shows stands
-# above that motion
+# inside identification, from the ground up: arithmetic of series knows no log; what judges a log by
+# the motion that it shows stands above that motion
 STOREYS = (
+    {"motion.smoothing"},
     {"logs"},
     {"motion"},
     {"logs.evidence", "logs.inertial"},

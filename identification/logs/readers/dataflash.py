@@ -3,9 +3,9 @@
 Each message begins with A3 95 and its type's number. Type 128, FMT, states of a type its number,
 its length, its name, and the letters and names of its columns. pymavlink reads it, too: as Python
 objects, one by one, in 14 times the time, with a printed line for each byte that is damaged, and
-with 100 MB of disk.
-Here compiled code goes through a file, first to count and then to note the places of the messages
-that are wanted, and their columns are read at once, so that any file costs a bounded time.
+with 100 MB of disk. It opens 20 million empty messages in 161 s and 1.1 GB.
+Here compiled code goes through a file and notes the places of the messages, and the columns of
+those that are wanted are read at once, so that any file costs a bounded time.
 
 Ground stations turn such a log into text (``.log``): a message a line, its type's name first, FMT
 among them, and numbers in whole units.
@@ -31,7 +31,10 @@ _AS_TEXT = b"FMT, 128, 89, FMT,"  # stands in a log as text
 BEGINS = b"\xa3\x95|(?s:.*)" + _AS_TEXT
 WHAT = "an ArduPilot log (DataFlash .BIN)"
 _TEXTS = ("Name", "Message")  # columns, of PARM and MSG
+_HEAD = 3  # bytes of a message before its columns
 _FMT, _FMT_LENGTH = 128, 89
+_FORMAT = np.dtype("u1, u1, S4, S16, S64")  # number, length, name, letters and columns of a type
+_MOST_FORMATS = 100_000  # that are looked at
 _GATHERED = 10_000  # messages copied at a time
 # types of columns by their letters, those of ``struct`` among them; and what one unit is of
 # those that are no whole units
@@ -53,27 +56,25 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messa
     if _AS_TEXT in content[:4096]:
         return _of_text(path, content, wanted), 0
     data = np.frombuffer(content, np.uint8)
-    counts, nowhere = np.zeros(256, np.int64), np.empty(0, np.int64)
-    used = _walk(data, counts, -1, nowhere)
-
-    def places(number: int, most: int) -> NDArray[np.int64]:
-        found = np.empty(min(int(counts[number]), most), np.int64)
-        _walk(data, np.zeros(256, np.int64), number, found)
-        return found
-
-    kinds = {}
-    for place in places(_FMT, 100_000):
-        kind = _layout(data[place : place + _FMT_LENGTH].tobytes(), wanted)
-        if kind is not None:
-            kinds[kind[0]] = kind[1:]
+    most = len(data) // _HEAD
+    places, kinds = np.empty(most, np.int32), np.empty(most, np.uint8)
+    count, used = _walk(data, places, kinds)
+    places, kinds = places[:count], kinds[:count]  # take memory as they were filled
     found: dict[str, Messages] = {}
-    for number, (name, layout, units) in kinds.items():
-        count = int(counts[number])
-        check_count(f"{path}: {name}", count, LIMITS.table_rows, "messages")
-        if count:
-            found[name] = _rows(data, places(number, count), layout, units)
-    if not kinds and not counts[_FMT]:
+    formats = _rows(data, places[kinds == _FMT][:_MOST_FORMATS], _FORMAT)
+    if not len(formats):
         raise InputError(f"{path}: cannot be read as {WHAT}: no FMT message; expected some")
+    for number, (name, layout, units) in _layouts(formats, wanted).items():
+        of_kind = places[kinds == number]
+        check_count(f"{path}: {name}", len(of_kind), LIMITS.table_rows, "messages")
+        if len(of_kind):
+            rows = _rows(data, of_kind, layout)
+            with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
+                found[name] = {
+                    column: x if x.dtype.kind == "S" else x.astype(np.float64) * unit
+                    for column, unit in units.items()
+                    if (x := rows[column]).ndim == 1  # no list of numbers
+                }
     return found, len(data) - int(used)
 
 
@@ -116,74 +117,56 @@ def _numbers(texts: Sequence[bytes]) -> NDArray[np.float64]:
     return found
 
 
-def _rows(
-    data: Bytes, places: NDArray[np.int64], layout: np.dtype[Any], units: dict[str, float]
-) -> Messages:
-    """Return the columns of the messages (N,) that begin at places (N,): numbers in whole units, or
-    texts; lists of numbers are left out.
-    """
+def _rows(data: Bytes, places: NDArray[np.int32], layout: np.dtype[Any]) -> NDArray[Any]:
+    """Return the messages (N,) that begin at places (N,), by their layout."""
     block = np.empty((len(places), layout.itemsize), np.uint8)
-    within = np.arange(3, 3 + layout.itemsize)
+    within = np.arange(_HEAD, _HEAD + layout.itemsize)
     for first in range(0, len(places), _GATHERED):
         part = places[first : first + _GATHERED]
         block[first : first + _GATHERED] = data[part[:, None] + within]
-    rows = block.view(layout)[:, 0]
-    with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
-        return {
-            name: rows[name] if layout[name].kind == "S" else rows[name].astype(np.float64) * unit
-            for name, unit in units.items()
-            if rows[name].ndim == 1
-        }
+    return block.view(layout)[:, 0]
 
 
-def _layout(
-    message: bytes, wanted: Collection[str]
-) -> tuple[int, str, np.dtype[Any], dict[str, float]] | None:
-    """Return number, name, layout and units of the type that a FMT message describes; None where it
-    is not wanted, or does not describe what it says.
+def _layouts(
+    formats: NDArray[Any], wanted: Collection[str]
+) -> dict[int, tuple[str, np.dtype[Any], dict[str, float]]]:
+    """Return name, layout and units of the types that are wanted, by number; without those that
+    do not describe what they say.
     """
-    number, length = message[3], message[4]
-    name, letters, joined = (
-        message[begin:end].split(b"\0")[0].decode("ascii", "replace")
-        for begin, end in ((5, 9), (9, 25), (25, 89))
-    )
-    columns = joined.split(",")
-    known = all(letter in _TYPES for letter in letters) and all(columns)
-    if name not in wanted or not known or not len(letters) == len(columns) == len(set(columns)):
-        return None
-    layout = np.dtype([(c, _TYPES[letter]) for c, letter in zip(columns, letters, strict=True)])
-    units = [_UNITS.get(letter, 1.0) for letter in letters]
-    stated = number, name, layout, dict(zip(columns, units, strict=True))
-    return stated if layout.itemsize + 3 == length else None
+    found = {}
+    for number, length, *texts in formats.tolist():
+        name, letters, joined = (x.split(b"\0")[0].decode("ascii", "replace") for x in texts)
+        columns = joined.split(",")
+        known = all(letter in _TYPES for letter in letters) and all(columns)
+        if name not in wanted or not known or not len(letters) == len(columns) == len(set(columns)):
+            continue
+        layout = np.dtype(list(zip(columns, map(_TYPES.__getitem__, letters), strict=True)))
+        units = [_UNITS.get(letter, 1.0) for letter in letters]
+        if layout.itemsize + _HEAD == length:
+            found[number] = name, layout, dict(zip(columns, units, strict=True))
+    return found
 
 
 @compiled
-def _walk(data: Bytes, counts: NDArray[np.int64], number: int, places: NDArray[np.int64]) -> int:
-    """Go through all messages; count them by type, and note the places of the first of one type.
-
-    Return how many bytes they take. What is no message is passed byte by byte.
+def _walk(data: Bytes, places: NDArray[np.int32], kinds: Bytes) -> tuple[int, int]:
+    """Go through all messages; note their places and types. Return how many they are, and how many
+    bytes they take. What is no message is passed byte by byte.
     """
     lengths = np.zeros(256, np.int64)
-    lengths[128] = 89
-    place, used, noted = 0, 0, 0
-    while place + 3 <= len(data):
+    lengths[_FMT] = _FMT_LENGTH
+    place, used, count = 0, 0, 0
+    while place + _HEAD <= len(data):
         kind = data[place + 2]
         length = lengths[kind]
-        if (
-            data[place] != 0xA3
-            or data[place + 1] != 0x95
-            or length < 3
-            or place + length > len(data)
-        ):
+        is_begin = data[place] == 0xA3 and data[place + 1] == 0x95
+        if not is_begin or length < _HEAD or place + length > len(data):
             place += 1
             continue
-        if kind == 128:
+        if kind == _FMT:
             lengths[data[place + 3]] = data[place + 4]
-            lengths[128] = 89
-        counts[kind] += 1
-        if kind == number and noted < len(places):
-            places[noted] = place
-            noted += 1
+            lengths[_FMT] = _FMT_LENGTH
+        places[count], kinds[count] = place, kind
+        count += 1
         place += length
         used += length
-    return used
+    return count, used
