@@ -9,7 +9,7 @@ from windwrench.controllers.axis_models import PLACE, axis_models
 from windwrench.controllers.lqg import LQG
 from windwrench.controllers.wind_laws import PIDWithWrench
 from windwrench.controllers.wind_observation import TORQUE, WIND_OBSERVATION_SIZE, WIND_PERIOD
-from windwrench.dynamics import InputError, load_vehicle
+from windwrench.dynamics import load_vehicle
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.plant import TICK, PlantSettings
 
@@ -70,8 +70,3 @@ def _hovering():
     o = np.zeros(WIND_OBSERVATION_SIZE)
     o[20] = o[23] = 9.81
     return o
-
-
-def test_what_cannot_be_is_named():
-    with pytest.raises(InputError, match="effort must be above 0, got 0"):
-        LQG(effort=0.0)

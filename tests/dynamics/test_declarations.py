@@ -2,13 +2,13 @@
 points.
 """
 
+from dataclasses import replace
+
 import pytest
 
 from tests.support.own_effects import HOSE, joined
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.effects import (
-    Coefficient,
-    Effect,
     Family,
     Need,
     Role,
@@ -22,29 +22,8 @@ from windwrench.dynamics.effects.declaration import Found
 from windwrench.dynamics.effects.vanishing import does_nothing_alone
 
 
-def declared(**words):
-    coefficients = words.pop("coefficients", (Coefficient("x", "1", (0.1, 0.1), "share"),))
-    return Effect("mine", "body", coefficients, "test", "any flight", **words)
-
-
-@pytest.mark.parametrize(
-    "words", [{"family": "drags"}, {"role": "weight"}, {"needs": ("fast movement",)}]
-)
-def test_a_word_that_there_is_not_is_refused(words):
-    with pytest.raises(InputError, match=r"effect mine: unknown .*expected one of"):
-        declared(**words)
-
-
-def test_a_role_is_played_with_its_coefficients():
-    assert declared(role=Role.MASS).role == Role.MASS
-    assert declared(role="mass").role == Role.MASS
-    with pytest.raises(InputError, match="role delay: expected coefficient 1 in s, got 1"):
-        declared(role=Role.DELAY)
-    with pytest.raises(InputError, match="role inertia: expected coefficient 2 in 1, got none"):
-        declared(role=Role.INERTIA)
-
-
 def test_effects_are_looked_up_by_what_they_declare():
+    assert replace(get("mass"), role="mass").role == Role.MASS
     assert playing(Role.LAG, Role.MASS) == (*playing(Role.LAG), *playing(Role.MASS))
     assert playing(Role.MASS, among=["wind"]) == ()
     for family in Family:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.support.parameters import mostly_slow
-from windwrench.dynamics import EffectSetting, InputError, Mocap, load_vehicle
+from windwrench.dynamics import EffectSetting, Mocap, load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.plant import NOISE, TICK, PlantSettings
@@ -114,8 +114,3 @@ def test_a_bare_name_takes_the_sizes_of_the_vehicle():
 def test_coefficients_on_a_command_line():
     setting = parse_setting("rotor_drag:kdx=1e-4, kdy=2e-4")
     assert setting == EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 2e-4})
-
-
-def test_too_many_effects_are_refused():
-    with pytest.raises(InputError, match="at most"):
-        record_flight(VEHICLE, (parse_setting("constant_force"),) * 17, "hover", 1.0)

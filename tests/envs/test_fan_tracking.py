@@ -127,9 +127,3 @@ def test_a_given_fan_path_is_followed_for_20_s_and_then_the_fan_stands_still():
         assert seen["fan_velocity"] == pytest.approx(0.1 * np.cos(k * 0.08), abs=1e-3)
     assert infos[-1]["fan_y"] == pytest.approx(0.1 * np.sin(20.0))
     assert len({seen["fan_y"] for seen in infos[-5:]}) == 1
-
-
-def test_pictures_want_a_reset_and_a_render_mode():
-    for env in (FanTrackingEnv(render_mode="rgb_array"), FanTrackingEnv()):
-        with pytest.raises(InputError, match="reset" if env.render_mode else "render_mode"):
-            env.render()

@@ -8,7 +8,7 @@ import pytest
 from numba import njit
 
 from tests.support.vector_flights import fly, make
-from windwrench.dynamics import InputError, load_vehicle
+from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.lanes.flight import LOOPS, Blocks, fly_freely
@@ -77,19 +77,3 @@ def test_a_body_that_tumbles_moves_as_in_mujoco():
             mujoco.mj_step(model, data)
         np.testing.assert_allclose(blocks.loops["qpos"][0, :, lane], data.qpos, atol=1e-9)
         np.testing.assert_allclose(blocks.loops["qvel"][0, :, lane], data.qvel, atol=1e-8)
-
-
-@pytest.mark.parametrize(
-    ("given", "word"),
-    [
-        ({"estimator": "constant-gain"}, "constant-gain"),
-        ({"render_mode": "rgb_array"}, "render_mode"),
-        ({"effects": [EffectSetting("rotor_drag", {"kdx": 1e-4})]}, "effects"),
-        ({"plant": "vectors"}, "lanes"),
-    ],
-    ids=lambda given: next(iter(given)) if isinstance(given, dict) else "",
-)
-def test_what_does_not_fly_in_lanes_is_refused(given, word):
-    with pytest.raises(InputError, match=word) as refusal:
-        make(**{"num_envs": 2, "plant": "lanes"} | given)
-    assert "\n" not in str(refusal.value)

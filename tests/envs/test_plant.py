@@ -24,7 +24,6 @@ from windwrench.envs.plant import (
     sense,
 )
 from windwrench.envs.recording import TRAJECTORIES, record_flight
-from windwrench.runtime.errors import InputError
 
 QUIET = PlantSettings(
     disturbance_force=0.0, disturbance_torque=0.0, motor_lag=0.0, sensor_noise=False
@@ -85,11 +84,6 @@ def test_a_torque_step_turns_it_as_a_rigid_body(axis):
     np.testing.assert_allclose(angle, 0.5 * alpha * t**2, atol=alpha * TICK / SUBSTEPS * t[-1])
     others = [i for i in range(3) if i != axis]
     np.testing.assert_allclose(rows[:, [10 + i for i in others]], 0.0, atol=1e-12)
-
-
-def test_an_inertia_that_no_body_has_is_refused():
-    with pytest.raises(InputError, match="no body has the principal moments"):
-        load_world(replace(VEHICLE, inertia=np.diag([1e-3, 1e-3, 3e-3])))
 
 
 def test_the_motors_follow_their_commands_with_the_stated_lag():

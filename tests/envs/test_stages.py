@@ -6,7 +6,6 @@ import pytest
 
 from tests.support.vector_flights import TASKS, fly_alone, make
 from tests.support.vector_flights import fly as flown
-from windwrench.dynamics import InputError
 from windwrench.envs import FanTrackingEnv, Stage
 from windwrench.envs.closed_loop import STAGES
 
@@ -77,19 +76,3 @@ def test_stages_run_before_the_one_that_they_name_in_the_order_given():
     env.reset(seed=0)
     assert order[:4] == ["first", "second", "third", "last"]
     assert [name for name in env.loop.stages if name in STAGES] == list(STAGES)
-
-
-@pytest.mark.parametrize(
-    ("stages", "words"),
-    [
-        (lambda: [Stage("mine", print, before="sens")], "Did you mean 'sense'"),
-        (lambda: [Stage("mine", None, before="sense")], "run must be a function"),
-        (lambda: [Stage("steer", print, before="sense")], "there is one of this name"),
-        (lambda: [Stage("a", print, before="sense")] * 2, "there is one of this name"),
-    ],
-)
-def test_what_is_no_stage_is_named(stages, words):
-    with pytest.raises(InputError, match=words):
-        FanTrackingEnv("static", stages=stages()).reset(seed=0)
-    with pytest.raises(InputError, match=r"runs no stages of your own; plant='mujoco' does it"):
-        make(1, "lanes", stages=[Stage("mine", print, before="sense")])

@@ -1,11 +1,9 @@
 import numpy as np
-import pytest
 
 from windwrench.dynamics import load_vehicle
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.plant import NOISE, PlantSettings
 from windwrench.envs.suspended_load import SuspendedLoad
-from windwrench.runtime.errors import InputError
 
 VEHICLE = load_vehicle("ardrone2")
 STILL = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0, sensor_noise=False)
@@ -45,18 +43,3 @@ def test_reset_takes_the_load_off():
     loop.reset(np.random.default_rng(0), np.array([0.0, 0.0, 1.5]))
     loop.run(np.zeros((200, NOISE)))
     np.testing.assert_array_equal(loop.load_pull(), 0.0)
-
-
-@pytest.mark.parametrize(
-    "bad",
-    [
-        {"mass": 0.0},
-        {"length": -1.0},
-        {"drag": np.nan},
-        {"anchor": (0.0, np.inf, 0.0)},
-        {"anchor": (0.0, 0.0)},
-    ],
-)
-def test_bad_numbers_are_named(bad):
-    with pytest.raises(InputError, match=next(iter(bad))):
-        SuspendedLoad(**bad)

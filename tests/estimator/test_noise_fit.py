@@ -151,18 +151,6 @@ def test_short_logs_work_or_are_refused_in_one_line():
             fit_noise(VEHICLE, t, speeds, spoil, held)
 
 
-def test_bad_arrays_are_refused():
-    t, speeds, position, quaternion = flight(seconds=1.0)
-    for bad, words in (
-        ((t, speeds[:-1], position, quaternion), "rotor_speeds must have shape"),
-        ((t[::-1], speeds, position, quaternion), "increase strictly"),
-        ((t, np.where(speeds > 0, np.nan, 0), position, quaternion), "rotor_speeds must be finite"),
-        ((t, speeds, position, quaternion, t[:3]), "voltage must have shape"),
-    ):
-        with pytest.raises(InputError, match=words):
-            fit_noise(VEHICLE, *bad)
-
-
 def test_a_long_log_is_thinned_and_a_slow_one_is_scaled():
     log = flight(seconds=30.0)
     fit = fit_noise(VEHICLE, *log, settings=NoiseFitSettings(rows=2000))

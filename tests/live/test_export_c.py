@@ -32,7 +32,6 @@ from windwrench.dynamics.effects.base import ROTORS_SIZE, SAMPLE_SIZE, STATE_SIZ
 from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
 from windwrench.live.export_c.effect_code import exportable_effects
 from windwrench.live.export_c.precision import FUNCTIONS
-from windwrench.runtime.errors import InputError
 
 LARGEST = 0.01  # of a standard deviation
 QUICK = 2_000  # steps of each of five flights
@@ -321,25 +320,6 @@ def test_on_a_cortex_m4_it_says_the_same_within_its_limits(tmp_path):
             std = np.concatenate([getattr(e, f"std_{name}", [0.01] * 4) for name in parts])
             assert board.status[k - 1] == e.status
             assert np.all(np.abs(board.estimates[k - 1] - mine) < LARGEST * std)
-
-
-def test_what_cannot_be_exported_is_said_in_a_line():
-    model = load_vehicle("ardrone2")
-    for effect, why in (
-        ("latency", "earlier samples"),
-        ("clock_offset", "earlier measurements"),
-        ("fan_jet", "a table"),
-        ("slung_payload", "a motion of its own"),
-    ):
-        expected = rf"^ardrone2: effects: {effect} cannot .*{why}.*--effects none.*rotor_drag"
-        with pytest.raises(InputError, match=expected) as refused:
-            export_c(declaring(model, effect))
-        assert "\n" not in str(refused.value)
-    with pytest.raises(InputError, match="recurrent"):
-        exportable_policy("recurrent-ppo-0")
-    for wrong in ({"estimator": "kalman"}, {"precision": "half"}):
-        with pytest.raises(InputError, match=next(iter(wrong))):
-            export_c(model, **wrong)
 
 
 def test_names_cannot_end_the_comment_that_holds_them(tmp_path):

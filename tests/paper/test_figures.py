@@ -11,7 +11,7 @@ import pytest
 from windwrench.controllers import Hover
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.evaluation.episodes import fly_episode
-from windwrench.paper import NAMES, fig3, fig4, fig5, fig6, fig7
+from windwrench.paper import NAMES, fig3, fig4, fig5, fig7
 from windwrench.paper.fig5_flights import NOISES
 
 SHORT = {  # seeds, settings, and constants of the figure's module
@@ -171,11 +171,3 @@ def test_the_interval_is_student_s():
     # a standard deviation of 0.0707 over five, 2.776 of its errors of the mean
     assert (low, high) == pytest.approx((0.5 - 0.0878, 0.5 + 0.0878), abs=1e-4)
     assert fig7.interval([0.3]) == (0.3, 0.3)
-
-
-def test_bad_input_is_refused():
-    with pytest.raises(InputError, match="within 2 m"):
-        fig6.fly_points(np.array([[1.0, 0.0], [4.0, 0.0]]), 0)
-    for figure in (fig6, fig7):
-        with pytest.raises(InputError, match="at least one seed"):
-            figure.run(0, lambda share: None)

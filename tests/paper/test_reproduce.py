@@ -4,12 +4,10 @@ import gzip
 import json
 
 import numpy as np
-import pytest
 from matplotlib.figure import Figure
 
-from windwrench.dynamics import InputError
 from windwrench.paper import NAMES
-from windwrench.paper.reproduce import chosen, reproduce, write_page, write_result
+from windwrench.paper.reproduce import chosen, write_page, write_result
 from windwrench.paper.result import Comparison, Result
 from windwrench.runtime.provenance import commit, made_by
 
@@ -51,9 +49,4 @@ def test_the_page_shows_the_table_and_the_picture(tmp_path):
     assert made_by("windwrench reproduce fig3 --seeds 3", [commit()]) in page.splitlines()
     assert "A remark." in page
     assert "fig4" not in page
-
-
-def test_wrong_requests_are_named(tmp_path):
-    with pytest.raises(InputError, match="--seeds"):
-        reproduce(["fig6"], tmp_path, seeds=0)
     assert chosen("all") == list(NAMES)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.support.diagnoses import made_diagnosis, made_trace
-from windwrench.dynamics import EffectSetting, InputError, Mocap, Vehicle, load_vehicle
+from windwrench.dynamics import EffectSetting, Mocap, Vehicle, load_vehicle
 from windwrench.dynamics.effects.base import Coefficient, Effect
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.estimator import (
@@ -75,31 +75,6 @@ def test_repr_is_short_and_says_what_it_is():
     ):
         assert repr(thing).startswith(words)
         assert len(repr(thing)) < 160
-
-
-@pytest.mark.parametrize(
-    ("speeds", "position", "quaternion", "words"),
-    [
-        ("fast", *POSE, "expected rotor_speeds (4,) of rad/s, got str"),
-        (["1", "2", "3", "4"], *POSE, "rotor_speeds (4,) of rad/s, got a list of str"),
-        (None, *POSE, "rotor_speeds (4,) of rad/s, got NoneType"),
-        (376.0, *POSE, "rotor_speeds (4,) of rad/s, got 376"),
-        (np.ones(3), *POSE, "rotor_speeds (4,) of rad/s, got shape (3,)"),
-        ([[1.0], [1.0, 2.0]], *POSE, "got a list of list"),
-        (SPEEDS, {"x": 1}, POSE[1], "expected position (3,) in m or None, got dict"),
-        (SPEEDS, POSE[0], (1.0, 0.0), "expected quaternion (4,) or None, got shape (2,)"),
-        (SPEEDS, POSE[0], (2.0, 0.0, 0.0, 0.0), "quaternion must have length 1, got 2"),
-        ([376.0, 376.0, -1.0, 376.0], *POSE, "must not be negative, got -1 rad/s"),
-    ],
-)
-def test_a_wrong_argument_is_named_with_its_type(speeds, position, quaternion, words):
-    ukf, _ = filters()
-    before = ukf.estimate.state.copy()
-    with pytest.raises(InputError) as error:
-        ukf.step(speeds, position, quaternion)
-    assert words in str(error.value)
-    np.testing.assert_array_equal(ukf.estimate.state, before)
-    assert ukf.step(SPEEDS, *POSE).status == "tracking"
 
 
 @pytest.mark.parametrize(

@@ -214,11 +214,6 @@ def test_torque_that_loses_to_a_rate_that_stays_tells_no_inertia(crazyflie, comm
         identify(logs, crazyflie.mass, parse_geometry(None))
 
 
-def test_no_log_is_refused():
-    with pytest.raises(InputError, match="identify: no log is given; expected one or more"):
-        identify([], MASS, parse_geometry(str(ARM)))
-
-
 def test_rotors_in_another_order_are_refused(inertial):
     log, _ = inertial[0]
     wrong = replace(log, command=log.command[:, [3, 2, 1, 0]])
