@@ -1,8 +1,9 @@
-"""Trained policies as files: what they hold, how they fly, and what is refused."""
+"""Trained policies: what they see, what their files hold, how they fly, and what is refused."""
 
 import numpy as np
 import pytest
 
+from windwrench.controllers.features import Features
 from windwrench.controllers.registry import shipped_policies
 from windwrench.controllers.trained_policy import (
     TaskPolicy,
@@ -13,9 +14,10 @@ from windwrench.controllers.trained_policy import (
 from windwrench.dynamics import InputError
 from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.evaluation.benchmark import fly_all
-from windwrench.evaluation.episodes import fly_episode
+from windwrench.evaluation.episodes import FIRST_TEST_SEED, benchmark_seeds, fly_episode
 from windwrench.evaluation.leaderboard import leaderboard
 from windwrench.evaluation.tasks import TASKS, make_pilot
+from windwrench.training.seeds import FIRST_VALIDATION_SEED, training_seed, validation_seeds
 
 CARD = {
     "algorithm": "test",
@@ -150,3 +152,23 @@ def test_a_shipped_policy_of_two_axes_flies_better_than_hover():
     )
     assert learned < 0.7 * least
     assert all("gru-0" in shipped_policies(task) for task in TASKS if task != "FanTracking")
+
+
+def test_what_is_mirrored_is_known():
+    features = Features(("torque_z", "force_x", "path_y"), 2)
+    np.testing.assert_array_equal(features.mirrored, [-1, 1, -1, -1, 1, -1])
+
+
+def test_seeds_of_training_validation_and_test_never_meet():
+    training = [
+        training_seed(run, env, episode)
+        for run in range(40)
+        for env in range(8)
+        for episode in range(40)
+    ]
+    assert min(training) >= 0
+    assert max(training) < FIRST_VALIDATION_SEED
+    assert len(set(training)) > 0.98 * len(training)
+    validation = validation_seeds(100_000)
+    assert (validation[0], validation[-1]) == (FIRST_VALIDATION_SEED, FIRST_TEST_SEED - 1)
+    assert min(benchmark_seeds(0, 10_000)) > validation[-1]

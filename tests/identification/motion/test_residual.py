@@ -1,9 +1,12 @@
-"""The residual is Newton's and Euler's balance; by another body it is the same accelerations."""
+"""The motion that a log shows, and the residual, which is Newton's and Euler's balance."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from windwrench.dynamics import EffectSetting, load_vehicle
+from tests.support.flown import recorded
+from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import compile_effects
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals
@@ -41,3 +44,14 @@ def test_the_residual_is_newton_and_euler(flown):
     np.testing.assert_allclose(
         residual_wrench(flown, VEHICLE), np.column_stack([force, torque]), atol=1e-10
     )
+
+
+def test_a_gap_ends_a_piece_and_a_lost_sample_does_not():
+    log = recorded(seconds=12.0)
+    valid = np.ones(len(log.t), dtype=bool)
+    valid[500:503] = False
+    valid[1200:1300] = False
+    pieces = log_signals(replace(log, valid=valid))
+    assert [round(piece.t[-1] - piece.t[0], 1) for piece in pieces] == [6.0, 5.5]
+    with pytest.raises(InputError, match="3 s"):
+        log_signals(replace(log, valid=np.arange(len(log.t)) < 300))

@@ -1,10 +1,18 @@
-"""The streams on the grid: means are exact, and nothing is read where the model does not hold."""
+"""Rotor faults: the streams on the grid, simulated flights, and measured logs."""
+
+import json
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from tests.support.data_paths import data_file
+from tests.support.golden_identification import failing_flight
+from windwrench.cli import app
 from windwrench.dynamics import InputError
 from windwrench.identification.comparison.fault_channels import Channels, channels_of_log, sample
+from windwrench.identification.comparison.fault_detection import find_fault
+from windwrench.identification.comparison.words import fault_data, fault_headline
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.streams import Stream
 
@@ -47,3 +55,38 @@ def test_what_cannot_show_a_fault_is_refused():
     log = FlightLog(t, np.zeros((10, 3)), np.tile([1.0, 0, 0, 0], (10, 1)), np.ones((10, 4)))
     with pytest.raises(InputError, match="no gyro or no accelerometer"):
         channels_of_log(log)
+
+
+def test_a_failing_rotor_is_named_with_its_time():
+    found = find_fault(channels_of_log(failing_flight()))
+    assert found.likeliest == "3"
+    assert found.sure
+    assert found.onset[1] <= 9.0 <= found.onset[2]
+    assert found.onset[2] - found.onset[1] < 0.1
+    assert 0.2 < 1.0 - found.remaining[0] < 0.6
+    said = fault_headline(found)
+    assert "Rotor 3 (" in said
+    assert fault_data(found)["rotor"] == 3
+    assert json.dumps(fault_data(found))
+
+
+@pytest.mark.measured
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "commanded"),
+    [("TestCase_3_1000000002.ulg", 35.365), ("TestCase_3_2000000002.ulg", 54.416)],
+)
+def test_a_px4_log_names_the_motor_and_the_time(name, commanded, tmp_path):
+    """The fault's command is logged at 10 Hz: it came up to 0.1 s before what is logged."""
+    log = data_file(f"motor_faults/{name}")
+    result = CliRunner().invoke(
+        app, ["diagnose", str(log), "--rotor-faults", "--out", str(tmp_path)]
+    )
+    assert result.exit_code == 0, result.output
+    (found,) = json.loads((tmp_path / "rotor_faults.json").read_text(encoding="utf-8"))
+    assert found["found"] == "rotor 4"
+    assert found["motor"] == "PX4 motor 1"
+    assert found["sure"]
+    assert commanded - 0.12 < found["onset_s"] < commanded
+    assert found["remaining_ci95"][0] <= 0.2 <= found["remaining_ci95"][1]
+    assert (tmp_path / "rotor_faults.png").stat().st_size > 5000
