@@ -1,5 +1,5 @@
-"""The extended Kalman filter: its Jacobian against finite differences, its estimates against the
-unscented one.
+"""The extended Kalman filter's Jacobian against finite differences; that it is consistent,
+``test_consistency.py`` says.
 """
 
 from dataclasses import replace
@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.support.flights import PERIOD, begin, fly, yawing_flight
-from tests.support.model_flights import ANISOTROPIC
+from tests.support.flights import PERIOD
 from tests.support.reference_filters import KIT_ORDER
 from windwrench.dynamics import EffectSetting, load_vehicle
-from windwrench.estimator import WrenchUKF
 from windwrench.estimator.ekf import WrenchEKF, model_jacobian
 from windwrench.estimator.filter_record import drive, propagate
 from windwrench.estimator.reference import difference, displaced
@@ -75,24 +73,3 @@ def test_jacobian_equals_finite_differences(vehicle, rate):
         numeric[:, n] = (difference(high, centre) - difference(low, centre)) / (2 * size)
     assert np.abs(A).max() > 1
     assert np.allclose(F, numeric, rtol=0, atol=1e-8)
-
-
-def test_close_to_the_unscented_filter_over_a_yawing_flight():
-    flight = yawing_flight(VEHICLE, 1401, seed=3, substeps=5)
-    filters = [kind(VEHICLE, ANISOTROPIC, PERIOD) for kind in (WrenchUKF, WrenchEKF)]
-    for estimator in filters:
-        begin(estimator, flight)
-    estimates = [fly(estimator, flight, range(500, 520)) for estimator in filters]
-    pairs = list(zip(*estimates, strict=True))
-    for u, e in pairs[300:]:
-        assert np.abs(u.force - e.force).max() < 1e-3
-        assert np.abs(u.torque - e.torque).max() < 2e-5
-    deviations = np.sqrt([[np.diag(x.covariance) for x in pair] for pair in pairs[300:]])
-    np.testing.assert_allclose(deviations[:, 0], deviations[:, 1], rtol=5e-3)
-    errors = [np.r_[e.force - [0.3, -0.2, -0.1], e.torque - [0, 0, 0.02]] for _, e in pairs[700:]]
-    rms = np.sqrt(np.mean(np.square(errors), axis=0))
-    assert np.all(rms[:3] < 0.03)
-    assert np.all(rms[3:] < 2.4e-3)
-    assert np.isnan(pairs[505][1].nis)
-    nis = np.array([[u.nis, e.nis] for u, e in pairs[700:]])
-    np.testing.assert_allclose(nis[:, 0], nis[:, 1], rtol=1e-2, atol=1e-2)

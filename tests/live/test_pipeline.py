@@ -62,13 +62,6 @@ def offline(flown):
     return np.column_stack([found.t, found.force, found.torque])
 
 
-def test_a_stream_in_order_is_the_offline_filter():
-    flown = flight()
-    live = Pipeline().take(whole(flown))
-    np.testing.assert_allclose(live.wrench(), offline(flown), atol=1e-9, rtol=0)
-    assert not live.tallies.counts
-
-
 def test_a_tuning_that_is_too_slow_is_told_with_what_to_do():
     """A drag on fast waves: the default tuning is late, and one fitted to the flight less so; the
     figures are those of the log.

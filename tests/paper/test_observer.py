@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.support.flights import PERIOD, begin, fly, yawing_flight
+from tests.support.flights import PERIOD, fly, yawing_flight
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.paper import NonlinearObserver
 
@@ -33,11 +33,9 @@ def loaded_hover(observer, steps, force, torque):
 
 def errors_along(flight, missing=()):
     """Return force, torque, position, velocity and body-rate errors (steps, 15)."""
-    observer = NonlinearObserver(VEHICLE)
-    begin(observer, flight)
     true = {"force": [FORCE], "torque": [TORQUE], "position": flight["true_x"][1:]}
     true |= {"velocity": flight["velocity"][1:], "angular_velocity": flight["omega"][1:]}
-    found = fly(observer, flight, missing)
+    found = fly(NonlinearObserver(VEHICLE), flight, missing)
     return np.hstack([np.array([getattr(e, n) for e in found]) - x for n, x in true.items()])
 
 

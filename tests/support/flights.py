@@ -120,14 +120,17 @@ def yawing_flight(
     return {name: np.array(values) for name, values in out.items()}
 
 
-def begin(estimator, flight, *covariance):
+def begin(estimator, flight, covariance=None):
     """Start an estimator at the true state of a flight."""
-    start = (flight["true_x"][0], flight["true_q"][0], *(covariance or (None,)))
-    estimator.reset(*start, flight["velocity"][0], flight["omega"][0])
+    start = (flight[name][0] for name in ("true_x", "true_q"))
+    estimator.reset(*start, covariance, flight["velocity"][0], flight["omega"][0])
 
 
-def fly(estimator, flight, missing=()):
-    """Step an estimator through a flight, some poses missing; return its estimates after each."""
+def fly(estimator, flight, missing=(), covariance=None):
+    """Start an estimator and step it through a flight, some poses missing; return its estimates
+    after each step.
+    """
+    begin(estimator, flight, covariance)
     poses = zip(flight["position"], flight["quaternion"], strict=True)
     return [
         estimator.step(speeds, *((None, None) if k in missing else pose))
