@@ -1,19 +1,28 @@
-"""The motion that a log shows, and the residual, which is Newton's and Euler's balance."""
+"""The motion that a log shows, whether its pose was filtered, and the residual, which is Newton's
+and Euler's balance.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt
 
-from tests.support.flown import recorded
-from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from tests.support.flown import VEHICLE, recorded
+from windwrench.dynamics import EffectSetting, InputError, load_vehicle, preset_names
 from windwrench.dynamics.effects import compile_effects
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.motion.noise_spectrum import (
+    filtering_notes,
+    noise_spectra,
+    pose_was_filtered,
+)
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals
+from windwrench.studies.trials.logged_poses import FILTERS
 from windwrench.studies.trials.practice_flights import fly_practice
 
-DECLARED = load_vehicle("ardrone2")
-VEHICLE = DECLARED.with_effects(
+AMENDED = VEHICLE.with_effects(
     EffectSetting("mass", {"dm": 0.05}),
     EffectSetting("inertia", {"jx": 0.1, "jy": -0.2, "jz": 0.3}),
     EffectSetting("com_offset", {"cx": 0.01, "cy": 0.003, "cz": -0.02}),
@@ -22,18 +31,18 @@ VEHICLE = DECLARED.with_effects(
 
 @pytest.fixture(scope="module")
 def flown():
-    (signals,) = log_signals(fly_practice(DECLARED, seconds=6.0, seed=1))
+    (signals,) = log_signals(fly_practice(VEHICLE, seconds=6.0, seed=1))
     return signals
 
 
 def test_the_residual_is_newton_and_euler(flown):
-    body = compile_effects(VEHICLE).vehicle
+    body = compile_effects(AMENDED).vehicle
     rotors = body.rotor_wrench(flown.rotor_speeds)
     R, omega, alpha = flown.rotation, flown.angular_velocity, flown.angular_acceleration
     centre = np.cross(alpha, body.com) + np.cross(omega, np.cross(omega, body.com))
     acceleration = (
         flown.acceleration
-        + np.array([0.0, 0.0, VEHICLE.gravity])
+        + np.array([0.0, 0.0, AMENDED.gravity])
         + np.einsum("nij,nj->ni", R, centre)
     )
     force = body.mass * acceleration - R[:, :, 2] * rotors[:, :1]
@@ -42,7 +51,7 @@ def test_the_residual_is_newton_and_euler(flown):
     torque = alpha @ body.inertia.T + np.cross(omega, momentum)
     torque -= rotors[:, 1:] - np.cross(body.com, thrust)
     np.testing.assert_allclose(
-        residual_wrench(flown, VEHICLE), np.column_stack([force, torque]), atol=1e-10
+        residual_wrench(flown, AMENDED), np.column_stack([force, torque]), atol=1e-10
     )
 
 
@@ -55,3 +64,69 @@ def test_a_gap_ends_a_piece_and_a_lost_sample_does_not():
     assert [round(piece.t[-1] - piece.t[0], 1) for piece in pieces] == [6.0, 5.5]
     with pytest.raises(InputError, match="3 s"):
         log_signals(replace(log, valid=np.arange(len(log.t)) < 300))
+
+
+@pytest.fixture(scope="module", params=["excite", "hover"])
+def log(request):
+    return recorded(request.param, 15.0, 5)
+
+
+@pytest.mark.parametrize("name", list(FILTERS))
+def test_what_was_filtered_is_recognised_and_what_was_not_is_not(log, name):
+    filtered = FILTERS[name](log, VEHICLE)
+    assert pose_was_filtered(filtered) == (name != "as measured")
+    notes = filtering_notes(filtered)
+    assert [note.partition(" filtered before the log was written")[0] for note in notes] == (
+        [] if name == "as measured" else ["the position and attitude were"]
+    )
+    assert all("so the noise floor is a lower bound" in note for note in notes)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_white_noise_is_level(seed):
+    rng = np.random.default_rng(seed)
+    n = 2000
+    spin = 0.005 * rng.standard_normal((n, 3))
+    quaternion = np.column_stack([np.sqrt(1.0 - np.sum(spin**2, axis=1)), spin])
+    position = 0.001 * rng.standard_normal((n, 3)) + np.sin(np.arange(n) / 100.0)[:, None]
+    speeds = 400.0 + rng.standard_normal((n, 4))
+    noise = noise_spectra(FlightLog(np.arange(n) / 200.0, position, quaternion, speeds))
+    assert [x.channel for x in noise] == ["position", "attitude", "rotor speeds"]
+    for x in noise:
+        assert abs(x.slope) < 0.5
+        assert abs(x.fall - 1.0) < 0.25
+        assert not x.filtered
+
+
+def test_channels_are_asked_one_by_one(log):
+    rng = np.random.default_rng(1)
+    white = rng.standard_normal((len(log.t), 3))
+    gyro = np.full_like(white, np.nan)  # not read in every row
+    gyro[::2] = sosfilt(butter(2, 0.1, output="sos"), white[::2], axis=0)
+    made = replace(log, accelerometer=white, gyro=gyro)
+    (note,) = filtering_notes(made)
+    assert note.startswith("the gyro was filtered before the log was written")
+    assert "Its noise cannot be read from this log" in note
+    assert not pose_was_filtered(made)
+
+
+def test_a_log_that_is_short_or_still_says_nothing():
+    n = 300
+    still = FlightLog(
+        np.arange(n) / 100.0,
+        np.zeros((n, 3)),
+        np.tile([1.0, 0, 0, 0], (n, 1)),
+        np.full((n, 4), 400.0),
+    )
+    assert noise_spectra(still) == []
+    assert filtering_notes(still) == ()
+
+
+@pytest.mark.parametrize("vehicle", preset_names())
+@pytest.mark.parametrize("trajectory", ["hover", "fast"])
+def test_a_rotor_s_own_lag_is_no_filter(vehicle, trajectory):
+    log = recorded(trajectory, 15.0, 5, vehicle=load_vehicle(vehicle))
+    assert filtering_notes(log) == ()
+    smoothed = sosfilt(butter(1, 0.2, output="sos"), log.rotor_speeds, axis=0)
+    (note,) = filtering_notes(replace(log, rotor_speeds=np.abs(smoothed)))
+    assert note.startswith("the rotor speeds were filtered before the log was written")
