@@ -13,7 +13,7 @@ import pytest
 
 from tests.commands.conftest import recorded
 from tests.support.parameters import mostly_slow
-from tests.support.programs import started
+from tests.support.programs import started, until
 from windwrench.commands.terminal import console, show_table
 from windwrench.runtime.printable import printable
 from windwrench.runtime.whole_files import replaced
@@ -184,27 +184,20 @@ def processes_of(session):
     return found
 
 
-def assert_ends(session, seconds=20.0):
-    deadline = time.monotonic() + seconds
-    while processes_of(session) and time.monotonic() < deadline:
-        time.sleep(0.1)
-    assert processes_of(session) == []
-
-
 def test_the_workers_of_a_killed_run_end(tmp_path):
     (tmp_path / "work.py").write_text(WORK)
     run = started("work.py", cwd=tmp_path, of=())
-    while not ((tmp_path / "one").exists() and (tmp_path / "two").exists()):
-        assert run.poll() is None
-        time.sleep(0.05)
+    marks = tmp_path / "one", tmp_path / "two"
+    until(lambda: all(mark.exists() for mark in marks) or run.poll() is not None)
+    assert run.poll() is None
     os.kill(run.pid, signal.SIGKILL)  # alone: what becomes of its workers is the question
     run.wait()
-    assert_ends(run.pid)
+    until(lambda: not processes_of(run.pid))
 
 
 def test_a_reader_who_goes_away_costs_no_results(tmp_path):
     """As a pipe to ``head`` does: what is written comes before what is said."""
-    recorded(tmp_path / "flight.csv", "--trajectory", "gentle")
+    recorded(tmp_path / "flight.csv", "--trajectory", "gentle", seconds=4)
     words = ["estimate", "flight.csv", "--no-tune", "--out", "out"]
     run = started(*words, cwd=tmp_path, stdout=subprocess.PIPE)
     run.stdout.close()

@@ -209,20 +209,15 @@ def test_a_netcdf_of_another_order_and_without_a_time_is_read(tmp_path):
         ({"x": [0], "y": [0], "z": [0], "wind": np.full((1, 1, 1, 1, 3), np.nan)}, "finite numb"),
     ],
 )
-def test_a_spoiled_file_is_named(tmp_path, arrays, words):
-    path = tmp_path / "w.npz"
-    np.savez(path, **arrays)
-    with pytest.raises(InputError, match=words) as refused:
-        read_wind(path)
-    assert str(path) in str(refused.value)
-
-
-def test_what_is_no_file_of_winds_is_named(tmp_path):
-    (tmp_path / "w.npz").write_bytes(b"nothing")
-    (tmp_path / "w.txt").write_text("nothing")
-    for name, words in (("w.npz", "cannot be read"), ("w.txt", "npz or .nc"), ("x.nc", "no such")):
-        with pytest.raises(InputError, match=words):
+def test_a_spoiled_file_and_what_is_none_are_named(tmp_path, arrays, words):
+    np.savez(tmp_path / "a.npz", **arrays)
+    for name in ("w.npz", "w.txt"):
+        (tmp_path / name).write_text("nothing")
+    others = ("w.npz", "cannot be read"), ("w.txt", "npz or .nc"), ("x.nc", "no such file")
+    for name, said in (("a.npz", words), *others):
+        with pytest.raises(InputError, match=said) as refused:
             read_wind(tmp_path / name)
+        assert str(tmp_path / name) in str(refused.value)
 
 
 VEHICLE = load_vehicle("ardrone2")

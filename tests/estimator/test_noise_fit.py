@@ -104,7 +104,6 @@ def test_the_likelihood_is_that_of_the_filters_own_steps():
 
 
 def test_bounds_hold_where_there_is_no_noise_to_find():
-    """A log filtered before it was written: no noise floor."""
     quiet = UKFTuning(**dict.fromkeys((*WALKS, *NOISES), 1e-9))
     use = NoiseFitSettings()
     log, truth = flight(quiet, seconds=4.0, whole=True)
@@ -165,7 +164,6 @@ def test_declared_effects_are_part_of_the_model():
 
 
 def test_rise_times_are_those_of_the_filter():
-    """A step of the force and of the torque, fed to the filter itself."""
     assert np.allclose(rise_times(VEHICLE, UKFTuning(), PERIOD), 1.0, rtol=0.02)
     quick = replace(TRUE, thrust_noise=0.003, motor_torque_noise=3e-4)
     force, _ = rise_times(VEHICLE, quick, PERIOD)

@@ -87,15 +87,6 @@ def test_asynchronous_measurements_agree_with_regular_ones():
     np.testing.assert_allclose(np.diag(a.covariance), np.diag(b.covariance), rtol=0.08)
 
 
-def test_a_missing_measurement_is_a_prediction():
-    ukf, W, ends = WrenchUKF(VEHICLE), np.full(4, VEHICLE.hover_rate), []
-    for pose in ((None, None), (np.full(3, np.nan), np.full(4, np.nan))):
-        ukf.reset([0, 0, 1], [1, 0, 0, 0])
-        ends.append([ukf.step(W, *pose) for _ in range(20)][-1])
-    assert np.isnan([e.nis for e in ends]).all()
-    np.testing.assert_array_equal(*(e.covariance for e in ends))
-
-
 def begun(make, *arguments):
     """Return an estimator that has been started in a hover."""
     estimator = make(VEHICLE, *arguments)

@@ -36,11 +36,8 @@ def test_probability_of_improvement_counts_all_pairs_of_runs_task_by_task():
     assert probability_of_improvement(a, a) == 0.5
 
 
-def test_relative_change_is_of_the_means():
+def test_paired_wins_are_of_an_episode_and_changes_of_the_means():
     assert relative_change([[0.9, 0.9]], [[1.0, 1.0]]) == pytest.approx(-0.1)
-
-
-def test_paired_wins_compare_errors_on_the_same_episode():
     assert paired_wins([[1.0, 5.0], [3.0, 5.0]], [[2.0, 5.0]]) == (1 + 0.5 + 0 + 0.5) / 4
 
 

@@ -250,7 +250,6 @@ def test_an_imu_alone_shows_a_vertical_force(flown):
 
 
 def test_an_imu_beside_the_pose_is_smoothed(flown):
-    """Nearer to the truth than the filter with the same sensors."""
     smoothed = truth_rmse(estimate_log(flown, VEHICLE, smooth=True), flown)
     filtered = truth_rmse(estimate_log(flown, VEHICLE), flown)
     assert (smoothed[0] < filtered[0]).all()
@@ -278,7 +277,6 @@ def test_gyro_and_accelerometer_of_a_log_sharpen_its_estimate(flown):
 
 
 def test_a_tuning_needs_poses(flown):
-    """One line, and no numbers."""
     with pytest.raises(InputError, match="to fit a tuning to"):
         tune_to_log(pose_removed(flown), VEHICLE)
 

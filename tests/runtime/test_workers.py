@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.programs import said
+from tests.support.programs import said, until
 from windwrench.runtime.compile_notice import LINE, CompileNotice
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.interrupts import noted
@@ -42,12 +42,9 @@ def lives(process):
     return True
 
 
-def assert_ends(process):
-    deadline = time.monotonic() + 20.0
-    while lives(process) and time.monotonic() < deadline:
-        multiprocessing.active_children()  # takes note of those that are gone
-        time.sleep(0.05)
-    assert not lives(process)
+def has_ended(process):
+    multiprocessing.active_children()  # takes note of those that are gone
+    return not lives(process)
 
 
 def outcomes(tasks, count=1, limit=60.0):
@@ -61,7 +58,7 @@ def test_a_worker_stays_warm_and_alone(monkeypatch):
     assert {threads for _, (_, threads) in done} == {"1"}
     (process,) = {process for _, (process, _) in done}
     assert process != os.getpid()
-    assert_ends(process)  # with the work
+    until(lambda: has_ended(process))  # with the work
     assert "OPENBLAS_NUM_THREADS" not in os.environ
 
 
@@ -102,7 +99,7 @@ def test_a_worker_that_dies_while_it_waits_is_replaced():
     running = each(work, [0, 1], 60.0, 1)
     _, (process, _) = next(running)
     os.kill(process, signal.SIGKILL)
-    assert_ends(process)
+    until(lambda: has_ended(process))
     time.sleep(0.5)  # for the pool to see it
     (task, (other, _)) = next(running)
     assert (task, other == process) == (1, False)

@@ -11,7 +11,6 @@ import pytest
 from tests.training.tiny import TINY
 from windwrench.controllers.trained_policy import TrainedPolicy, load_policy
 from windwrench.dynamics import InputError
-from windwrench.evaluation.benchmark import fly_all
 from windwrench.training.configuration import ALGORITHMS, load_config
 
 pytest.importorskip("torch", reason="pip install 'windwrench[rl]'")
@@ -183,18 +182,3 @@ def test_sequences_in_one_call_are_those_of_sb3_contrib(starts):
     theirs, expected = RecurrentActorCriticPolicy._process_sequence(*given)
     torch.testing.assert_close(ours, theirs)
     torch.testing.assert_close(then, expected)
-
-
-@pytest.mark.slow
-def test_sac_learns_to_track_the_fan_in_four_thousand_decisions(tmp_path):
-    config = load_config(
-        "sac", ["steps=4000", "validation.every=1000", "validation.episodes=10", "checkpoint=4000"]
-    )
-    path = str(train(config, "base", 0, tmp_path))
-    assert read_progress(tmp_path).steps == [1000, 2000, 3000, 4000]
-    results = fly_all([path], ["base"], 20, seed=0, jobs=1)
-    hover, oracle, learned = (
-        np.mean([e.rmse for e in results[name, "base"]]) for name in ("hover", "oracle", path)
-    )
-    assert learned < hover - 0.5 * (hover - oracle)
-    assert not any(e.lost for e in results[path, "base"])

@@ -90,7 +90,7 @@ LAW = EffectSetting("body_drag", dict(dx=0.0, dy=0.0, dz=0.0, cx=DRAG, cy=DRAG, 
 VEHICLE = replace(load_vehicle("ardrone2"), effects=(LAW,))
 
 
-def flown(wind=(0.0, 0.0, 0.0), seconds=40.0, pose_noise=3e-4, imu=False, seed=1):
+def flown(wind=(0.0, 0.0, 0.0), seconds=25.0, pose_noise=3e-4, imu=False, seed=1):
     """A flight in which thrust and attitude are what the forces ask for; rotors by commands."""
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, seconds, 0.01)

@@ -8,14 +8,12 @@ import pytest
 from tests.support.imu_flights import imu_flight, pose_removed
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
-from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.priors import NUISANCE
 from windwrench.identification.diagnosis.regression import Flights
 from windwrench.identification.diagnosis.row_nuisances import answered, followers
 from windwrench.identification.diagnosis.row_ranking import rank_by_rows
 from windwrench.identification.diagnosis.rows import Rows
 from windwrench.identification.diagnosis.worth import worth
-from windwrench.identification.report.files import report_data
 from windwrench.runtime.errors import InputError
 from windwrench.studies.trials.logged_poses import FILTERS
 from windwrench.studies.trials.practice_flights import fly_practice
@@ -106,24 +104,6 @@ def size_like(x):
     return np.where(np.arange(len(x))[:, None] % 2 == 0, 1.0, -1.0) * np.ones_like(x)
 
 
-@pytest.mark.slow
-def test_a_weak_rotor_is_named_without_a_pose():
-    """With its size, by gyro and rotor speeds; what needs a pose is listed and not named."""
-    log = pose_removed(imu_flight(VEHICLE, (WEAK,), seconds=20.0))
-    found = diagnose([log], VEHICLE)
-    assert [effect.name for effect in found.effects] == ["rotor_efficiency"]
-    (effect,) = found.effects
-    assert effect.coefficients["e2"] == pytest.approx(-0.06, abs=0.005)
-    assert {"gyro", "rotor speeds"} <= set(effect.channels)
-    assert not {"position", "attitude"} & set(effect.channels)
-    assert {"world_tilt", "marker_offset", "clock_offset", "rotor_drag"} <= set(found.needs_pose)
-    data = report_data(found)
-    assert data["effects"][0]["channels"] == list(effect.channels)
-    assert any("An IMU alone does not show" in text for text in found.advice)
-    assert found.probabilities.names.keys() == {WEAK.name}
-    assert found.probabilities.names[WEAK.name] > 0.3
-
-
 def test_what_a_few_positions_add():
     """Drag is identifiable beside ten positions a second, and not by the IMU alone; effects on the
     pose itself are in neither.
@@ -138,7 +118,6 @@ def test_what_a_few_positions_add():
 
 
 def test_a_pose_and_an_imu_are_not_mixed():
-    """Logs of which one has no pose and another no IMU have nothing in common."""
     log = imu_flight(VEHICLE, seconds=5.0)
     with pytest.raises(InputError, match="expected the IMU in all of them"):
         Flights([pose_removed(log), replace(log, gyro=None, accelerometer=None)], VEHICLE)
