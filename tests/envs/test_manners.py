@@ -35,17 +35,12 @@ def seen(**kwargs):
     return np.array(rows)
 
 
-def test_a_normalised_observation_is_the_frame_over_fixed_scales():
-    np.testing.assert_array_equal(seen(normalize=True), seen() / np.float32(SCALES))
-    assert 0.05 < np.abs(seen(normalize=True)[:, [0, 5, 6, 7]]).mean() < 2.0
-
-
-def test_a_part_of_the_frame_lacks_the_force_along_the_jet():
-    np.testing.assert_array_equal(seen(observe="wrench-without-fx"), seen()[:, 1:])
-
-
-def test_the_history_holds_the_last_frames_and_begins_full():
-    frames, history = seen(), seen(observe="history")
+def test_views_are_the_frame_over_fixed_scales_a_part_of_it_and_the_last_ones():
+    """The history begins full."""
+    frames, history, scaled = seen(), seen(observe="history"), seen(normalize=True)
+    np.testing.assert_array_equal(scaled, frames / np.float32(SCALES))
+    assert 0.05 < np.abs(scaled[:, [0, 5, 6, 7]]).mean() < 2.0
+    np.testing.assert_array_equal(seen(observe="wrench-without-fx"), frames[:, 1:])
     padded = np.concatenate([np.repeat(frames[:1], FRAMES - 1, axis=0), frames])
     for k, row in enumerate(history):
         np.testing.assert_array_equal(row.reshape(FRAMES, 8), padded[k : k + FRAMES])

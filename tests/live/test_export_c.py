@@ -165,12 +165,11 @@ def test_compilers_find_nothing_to_say(estimator, tmp_path):
     model = declaring(model, *effects)
     names = {"ekf": "sac-0", "ukf": "tracker", "constant-gain": "lead"}
     policy = exportable_policy(names[estimator])
+    few = model.with_effects(model.effects[0])
     for number, exported in enumerate(
         (
             export_c(model, estimator, policy=policy),
-            export_c(load_vehicle("crazyflie"), estimator, gate=None),
-            export_c(model, estimator, policy=policy, precision="double"),
-            export_c(model.with_effects(model.effects[0]), estimator),
+            export_c(few, estimator, gate=None, policy=policy, precision="double"),
         )
     ):
         folder = write(exported, tmp_path / str(number))

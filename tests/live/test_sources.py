@@ -176,12 +176,9 @@ def test_what_is_no_table_and_no_datagram_is_refused(run, data, said):
     assert said in run(data).failed[0]
 
 
-def test_a_source_that_says_nothing_ends_in_what_was_expected():
+def test_a_source_that_says_nothing_and_a_second_one_at_its_address_end():
     said = "no message came within 0.2 s; expected datagrams of JSON"
     assert said in Sender(wait=0.2).end_by_itself()
-
-
-def test_two_streams_cannot_listen_at_one_address():
     sender = Sender()
     assert "cannot listen" in Running(f"udp-json://127.0.0.1:{sender.port}").end_by_itself()
     sender.end()

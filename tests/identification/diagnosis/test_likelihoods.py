@@ -173,7 +173,7 @@ def test_a_short_flight_names_nothing_surely():
 
 
 def test_the_accelerometer_is_read_beside_the_pose():
-    rows = Rows(Flights([flown(imu=True)], VEHICLE), {})
+    rows = Rows(Flights([flown(seconds=40.0, imu=True)], VEHICLE), {})
     assert rows.channels == 6
     left = rows.residual({})[rows.fit]
     # its bias is in its channels, and only there; the gust is in both
