@@ -53,7 +53,7 @@ def test_more_sessions_make_an_answer_surer_and_more_flights_of_one_do_not():
     rng = np.random.default_rng(4)
     moved = (0.06, -0.06, -0.06, 0.06)  # rotor 2 is asked for more
     chances = {(count, sessions): [] for count, sessions in ((1, 1), (6, 1), (1, 6))}
-    for _ in range(16):
+    for _ in range(40):
         after = drawn(rng, 1, moved)
         for count, sessions in chances:
             found = compare(after, drawn(rng, count, sessions=sessions))
