@@ -1,6 +1,19 @@
-"""The command export-c: its files, and what it refuses to replace or translate."""
+"""The commands export-c and identify, and a tuning as a file: what is written and refused."""
 
 import json
+import math
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from tests.identification.vehicle_fit.flown import ARM, MASS, inertial_flights
+from windwrench.commands.identifying import parse_window
+from windwrench.commands.tuning_file import load_tuning, save_tuning
+from windwrench.dynamics import load_vehicle
+from windwrench.envs.recording import record_flight
+from windwrench.estimator import UKFTuning
+from windwrench.identification.logs.flight_log import FlightLog, write_log
 
 FILES = {"windwrench_filter.h", "windwrench_filter.c", "main.c", "CMakeLists.txt"}
 
@@ -47,3 +60,73 @@ def test_declared_effects_are_in_it_unless_none_are_wanted(call, tmp_path):
         assert json.loads(text)["result"]["effects"] == effects
         source = (out / "windwrench_filter.c").read_text()
         assert ("effect_rotor_drag" in source) == bool(effects)
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    path = tmp_path_factory.mktemp("flights") / "flight.csv.gz"
+    ((flight, speeds),) = inertial_flights([3], seconds=12.0)
+    write_log(replace(flight, command=None, rotor_speeds=speeds), path)
+    return path
+
+
+def test_identify_writes_a_vehicle_that_loads(call, log, tmp_path):
+    out = tmp_path / "mine.yaml"
+    code, text, _ = call(
+        *("identify", f"{log}:1-11.5", "--mass", MASS, "--geometry", ARM, "--out", out),
+        *("--export", "gazebo"),
+    )
+    assert code == 0
+    assert load_vehicle(out).mass == MASS
+    data = json.loads((tmp_path / "mine.identify.json").read_text())
+    estimates = {e["name"]: e for e in data["estimates"]}
+    low, high = estimates["k"]["interval_95"]
+    assert low < estimates["k"]["value"] < high
+    assert data["flight_s"] == pytest.approx(10.5, abs=0.5)
+    assert (tmp_path / "mine.identify.png").read_bytes()[:4] == b"\x89PNG"
+    assert "<motorConstant>" in text
+    assert "95 % interval" in text
+
+
+def test_the_vehicle_predicts_flights_that_it_was_not_fitted_to(call, log, tmp_path):
+    known = load_vehicle("ardrone2")
+    for seed in (1, 2):
+        flown = FlightLog(**record_flight(known, trajectory="excite", seconds=12.0, seed=seed))
+        write_log(flown, tmp_path / f"{seed}.csv")
+    asked = ("identify", "1.csv", "--mass", known.mass, "--geometry", known.arm_l)
+    code, text, _ = call(*asked, "--test", "2.csv:2-11", "--out", "mine.yaml")
+    assert code == 0
+    assert "held out blocks" in text
+    assert "if nothing changes" in text
+    data = json.loads((tmp_path / "mine.identify.json").read_text())
+    for errors in (data["held_out_blocks"], data["prediction"]):
+        assert errors["starts"] > 20
+        for name in ("position", "velocity", "attitude", "body_rate"):
+            assert errors[name]["model"][-1] < 0.3 * errors[name]["if_nothing_changes"][-1]
+    assert (tmp_path / "mine.prediction.png").read_bytes()[:4] == b"\x89PNG"
+    code, _, error = call(*asked, "--test", log, "--out", "other.yaml")
+    assert code == 2
+    assert "flight: no unbroken piece of pose is longer than 3 s" in error
+    assert not (tmp_path / "other.yaml").exists()
+
+
+def test_a_part_of_a_log():
+    path, window = parse_window("a/b.csv:35-65.5")
+    assert (str(path), window) == ("a/b.csv", (35.0, 65.5))
+    assert parse_window("b.csv")[1] == (0.0, math.inf)
+
+
+TRUE = UKFTuning(force_walk=(0.02, 0.02, 0.008), thrust_noise=0.3)
+
+
+def test_a_tuning_is_kept_in_a_file_for_any_period(tmp_path):
+    path = tmp_path / "tuning.yaml"
+    save_tuning(TRUE, 0.01, path)
+    again = load_tuning(path, 0.01)
+    for field in fields(TRUE):
+        given = getattr(TRUE, field.name)
+        assert getattr(again, field.name) == pytest.approx(given, rel=1e-8)
+    halved = load_tuning(path, 0.005)
+    assert np.allclose(halved.force_walk, np.asarray(TRUE.force_walk) / 2**0.5)
+    assert halved.thrust_noise == pytest.approx(0.3 * 2**0.5)
+    assert halved.position_noise == TRUE.position_noise

@@ -4,7 +4,6 @@ import json
 import signal
 import subprocess
 import threading
-import time
 import urllib.error
 import urllib.request
 from io import StringIO
@@ -15,7 +14,7 @@ import pytest
 from tests.live.stream import Running, as_csv, flight
 from tests.live.test_pipeline import offline
 from tests.support.browser import browse, needs_browser
-from tests.support.programs import started
+from tests.support.programs import started, until
 from windwrench.cli import app
 from windwrench.identification.logs.reading import read_log
 from windwrench.live.terminal_page import page
@@ -129,8 +128,7 @@ def test_its_user_ends_it_and_loses_nothing(tmp_path):
     fed = as_csv(flight()).splitlines(keepends=True)[:701]
     running.stdin.write("".join(fed).encode())
     running.stdin.flush()
-    while len(lines) < len(fed) and running.poll() is None:
-        time.sleep(0.02)
+    until(lambda: len(lines) >= len(fed) or running.poll() is not None)
     running.send_signal(signal.SIGINT)
     said = running.stderr.read().decode()
     assert running.wait() == 130

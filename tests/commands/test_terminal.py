@@ -1,5 +1,5 @@
 """The command at the edges of its surroundings: terminals, full disks, encodings, interrupts,
-displays. Each ends in one clear line and the right exit code.
+displays and kills. Each ends in one clear line, the right exit code, and no half file or process.
 """
 
 import os
@@ -11,12 +11,17 @@ from pathlib import Path
 
 import pytest
 
+from tests.commands.conftest import recorded
 from tests.support.parameters import mostly_slow
-from tests.support.programs import started
+from tests.support.programs import started, until
 from windwrench.commands.terminal import console, show_table
 from windwrench.runtime.printable import printable
+from windwrench.runtime.whole_files import replaced
 
-pytestmark = pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux's devices")
+pytestmark = pytest.mark.skipif(
+    not (Path("/dev/full").exists() and Path("/proc/self/stat").exists()),
+    reason="needs Linux's devices and its /proc",
+)
 COMMAND = [sys.executable, "-m", "windwrench"]
 
 
@@ -150,3 +155,69 @@ def test_an_interrupt_ends_in_one_word_at_any_time(delay, tmp_path):
     said = child.communicate(timeout=60)[1]
     assert (child.returncode, said.strip().splitlines()[-1]) == (130, b"interrupted")
     assert b"Traceback" not in said
+
+
+WORK = """
+import time
+from pathlib import Path
+from windwrench.runtime.workers import every
+
+def work(mark):
+    Path(mark).touch()
+    time.sleep(600.0)
+
+if __name__ == "__main__":
+    list(every(work, ["one", "two"], jobs=2))
+"""
+
+
+def processes_of(session):
+    """Return those processes of a session that still run."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = path.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[3]) == session and fields[0] != "Z":
+            found.append(int(path.parent.name))
+    return found
+
+
+def test_the_workers_of_a_killed_run_end(tmp_path):
+    (tmp_path / "work.py").write_text(WORK)
+    run = started("work.py", cwd=tmp_path, of=())
+    marks = tmp_path / "one", tmp_path / "two"
+    until(lambda: all(mark.exists() for mark in marks) or run.poll() is not None)
+    assert run.poll() is None
+    os.kill(run.pid, signal.SIGKILL)  # alone: what becomes of its workers is the question
+    run.wait()
+    until(lambda: not processes_of(run.pid))
+
+
+def test_a_reader_who_goes_away_costs_no_results(tmp_path):
+    """As a pipe to ``head`` does: what is written comes before what is said."""
+    recorded(tmp_path / "flight.csv", "--trajectory", "gentle", seconds=4)
+    words = ["estimate", "flight.csv", "--no-tune", "--out", "out"]
+    run = started(*words, cwd=tmp_path, stdout=subprocess.PIPE)
+    run.stdout.close()
+    run.wait()
+    out = tmp_path / "out"
+    assert (out / "wrench.csv").read_bytes().endswith(b"\n")
+    assert (out / "wrench.png").read_bytes().endswith(b"IEND\xaeB`\x82")
+
+
+def test_what_a_killed_writer_left_is_swept_away(tmp_path):
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    (tmp_path / f".a.json.{gone.pid}.tmp").write_text("half")
+    (tmp_path / f".a.json.{os.getppid()}.tmp").write_text("someone's who still writes")
+    (tmp_path / ".a.json.tmp").write_text("not one of ours")
+    with replaced(tmp_path / "a.json") as partial:
+        partial.write_text("whole")
+    assert {p.name for p in tmp_path.iterdir()} == {
+        "a.json",
+        f".a.json.{os.getppid()}.tmp",
+        ".a.json.tmp",
+    }
+    assert (tmp_path / "a.json").read_text() == "whole"

@@ -1,8 +1,9 @@
-"""Trained policies as files: what they hold, how they fly, and what is refused."""
+"""Trained policies: what they see, what their files hold, how they fly, and what is refused."""
 
 import numpy as np
 import pytest
 
+from windwrench.controllers.features import Features
 from windwrench.controllers.registry import shipped_policies
 from windwrench.controllers.trained_policy import (
     TaskPolicy,
@@ -13,9 +14,10 @@ from windwrench.controllers.trained_policy import (
 from windwrench.dynamics import InputError
 from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.evaluation.benchmark import fly_all
-from windwrench.evaluation.episodes import fly_episode
+from windwrench.evaluation.episodes import FIRST_TEST_SEED, benchmark_seeds, fly_episode
 from windwrench.evaluation.leaderboard import leaderboard
 from windwrench.evaluation.tasks import TASKS, make_pilot
+from windwrench.training.seeds import FIRST_VALIDATION_SEED, training_seed, validation_seeds
 
 CARD = {
     "algorithm": "test",
@@ -123,20 +125,11 @@ def test_a_recurrent_policy_forgets_at_the_start_of_an_episode(kind, card, weigh
     assert [policy(observation)[0] for _ in range(3)] == first
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"scale": [1.0] * 26}, r"gru_input must have the shape \(15, 26\)"),
-        ({"largest": None}, "spoils an entry"),
-    ],
-)
-def test_a_card_that_does_not_fit_is_refused(change, words):
-    with pytest.raises(InputError, match=words):
-        TaskPolicy(TASK_CARD | change, recurrent("gru", 27, 5, 3))
-
-
-def test_a_policy_of_another_task_is_refused(tmp_path):
-    path = save_policy(TASK_CARD, recurrent("gru", 27, 5, 3), tmp_path / "mine.npz")
+def test_a_policy_of_another_task_or_size_is_refused(tmp_path):
+    weights = recurrent("gru", 27, 5, 3)
+    with pytest.raises(InputError, match=r"gru_input must have the shape \(15, 26\)"):
+        TaskPolicy(TASK_CARD | {"scale": [1.0] * 26}, weights)
+    path = save_policy(TASK_CARD, weights, tmp_path / "mine.npz")
     with pytest.raises(InputError, match="a policy of WindHover, not of WindTrajectory"):
         make_pilot(str(path), "WindTrajectory")
 
@@ -150,3 +143,23 @@ def test_a_shipped_policy_of_two_axes_flies_better_than_hover():
     )
     assert learned < 0.7 * least
     assert all("gru-0" in shipped_policies(task) for task in TASKS if task != "FanTracking")
+
+
+def test_what_is_mirrored_is_known():
+    features = Features(("torque_z", "force_x", "path_y"), 2)
+    np.testing.assert_array_equal(features.mirrored, [-1, 1, -1, -1, 1, -1])
+
+
+def test_seeds_of_training_validation_and_test_never_meet():
+    training = [
+        training_seed(run, env, episode)
+        for run in range(40)
+        for env in range(8)
+        for episode in range(40)
+    ]
+    assert min(training) >= 0
+    assert max(training) < FIRST_VALIDATION_SEED
+    assert len(set(training)) > 0.98 * len(training)
+    validation = validation_seeds(100_000)
+    assert (validation[0], validation[-1]) == (FIRST_VALIDATION_SEED, FIRST_TEST_SEED - 1)
+    assert min(benchmark_seeds(0, 10_000)) > validation[-1]

@@ -42,67 +42,43 @@ def wrench(
     bundle = compile_effects(vehicle)
     out, state = np.full(6, np.nan), np.full(STATE_SIZE, np.nan)
     state[ROTOR_ACCELERATION : ROTOR_ACCELERATION + 4] = acceleration
-    effect_wrench(
-        bundle.wrench_models,
-        bundle.wrench_coefficients,
-        bundle.constants,
-        body_record(bundle.vehicle)[0],
-        np.asarray(position, float),
-        R,
-        V,
-        omega,
-        speeds,
-        np.asarray(wind, float),
-        11.0,
-        0.0,
-        state,
-        out,
-    )
+    effects = bundle.wrench_models, bundle.wrench_coefficients, bundle.constants
+    place, wind = np.asarray(position, float), np.asarray(wind, float)
+    body = body_record(bundle.vehicle)[0]
+    effect_wrench(*effects, body, place, R, V, omega, speeds, wind, 11.0, 0.0, state, out)
     return out[:3], out[3:]
 
 
-class Rotors:
-    """A vehicle's rotor-input effects, called once a period."""
+class Called:
+    """A vehicle's effects on rotor speeds or on what is sensed, called once a period."""
 
+    def __init__(self, vehicle, kind):
+        bundle = compile_effects(vehicle)
+        models, size = getattr(bundle, f"{kind}_models"), getattr(bundle, f"{kind}_memory")
+        memory = np.zeros((len(models), size))
+        self.given = models, getattr(bundle, f"{kind}_coefficients"), bundle.constants, memory
+
+
+class Rotors(Called):
     def __init__(self, vehicle):
-        self.bundle = compile_effects(vehicle)
-        self.memory = np.zeros((len(self.bundle.rotor_models), self.bundle.rotor_memory))
+        super().__init__(vehicle, "rotor")
 
     def __call__(self, speeds, voltage=0.0, dt=PERIOD, time=0.0):
         rotors = np.zeros(ROTORS_SIZE)
         rotors[:4], rotors[ROTOR_TIME] = speeds, time
-        deliver(
-            self.bundle.rotor_models,
-            self.bundle.rotor_coefficients,
-            self.bundle.constants,
-            self.memory,
-            dt,
-            voltage,
-            rotors,
-        )
+        deliver(*self.given, dt, voltage, rotors)
         return rotors[:4]
 
 
-class Sensing:
-    """A vehicle's sensing effects, called once a period."""
-
+class Sensing(Called):
     def __init__(self, vehicle, direction):
-        self.bundle, self.direction = compile_effects(vehicle), direction
-        self.memory = np.zeros((len(self.bundle.sensing_models), self.bundle.sensing_memory))
+        super().__init__(vehicle, "sensing")
+        self.direction = direction
 
     def __call__(self, speeds, position, quaternion, parts=7, dt=PERIOD):
         sample = np.zeros(SAMPLE_SIZE)
         sample[:11] = np.concatenate([speeds, position, quaternion])
-        report(
-            self.bundle.sensing_models,
-            self.bundle.sensing_coefficients,
-            self.bundle.constants,
-            self.memory,
-            dt,
-            parts,
-            self.direction,
-            sample,
-        )
+        report(*self.given, dt, parts, self.direction, sample)
         return sample[:4], sample[4:7], sample[7:11]
 
 
@@ -361,71 +337,48 @@ def test_the_fan_jet_is_that_of_the_environment_without_gusts(heading):
     assert np.linalg.norm(out[:3]) > 0.1
 
 
-def test_motor_lag_is_the_exact_exponential():
-    tau = 0.035
+def test_motor_lag_is_the_exact_exponential_however_a_time_is_cut_up():
+    tau, rng = 0.035, np.random.default_rng(0)
     rotors = Rotors(setting("motor_lag", tau=tau))
     np.testing.assert_array_equal(rotors([400.0] * 4), [400.0] * 4)  # starts at the first rates
-    steps = np.array([rotors([500.0, 300.0, 400.0, 450.0]) for _ in range(20)])
-    share = 1 - np.exp(-PERIOD * np.arange(1, 21) / tau)
+    times = rng.uniform(0.001, 0.01, 20)
+    steps = np.array([rotors([500.0, 300.0, 400.0, 450.0], dt=dt) for dt in times])
+    share = 1 - np.exp(-np.cumsum(times) / tau)
     expected = 400.0 + share[:, None] * np.array([100.0, -100.0, 0.0, 50.0])
     np.testing.assert_allclose(steps, expected, rtol=1e-12)
 
 
-def test_motor_lag_does_not_depend_on_how_a_time_is_cut_up():
-    whole, halves = Rotors(setting("motor_lag", tau=0.04)), Rotors(setting("motor_lag", tau=0.04))
-    for rotors in (whole, halves):
-        rotors([400.0] * 4)
-    halves([500.0] * 4, dt=0.002)
-    np.testing.assert_allclose(
-        halves([500.0] * 4, dt=0.008), whole([500.0] * 4, dt=0.010), rtol=1e-12
-    )
+@pytest.mark.parametrize(
+    ("name", "size", "given", "share"),
+    [
+        ("battery_sag", {"n": 1.5}, {"voltage": 10.2}, (10.2 / VEHICLE.voltage_ref) ** 1.5),
+        ("battery_sag", {"n": 1.5}, {"voltage": VEHICLE.voltage_ref}, 1.0),
+        ("battery_sag", {"n": 1.5}, {"voltage": 0.0}, 1.0),  # not known
+        ("rotor_efficiency", {"e1": -0.1, "e3": 0.2}, {}, [0.9, 1.0, 1.2, 1.0]),
+        ("rotor_efficiency", {"e1": -1.0}, {}, [0.0, 1.0, 1.0, 1.0]),
+        ("thrust_scale", {"s": -0.05}, {}, 0.95),
+        ("thrust_curvature", {"a": 0.2}, {}, 1 + 0.2 * ((W / VEHICLE.hover_rate) ** 2 - 1)),
+        ("thrust_fade", {"rate": 1e-3}, {"time": 30.0}, 0.97),
+        ("thrust_fade", {"rate": 0.1}, {"time": 30.0}, 0.1),
+    ],
+)
+def test_the_thrust_that_a_rotor_effect_leaves(name, size, given, share):
+    thrust = np.square(Rotors(setting(name, **size))(W, **given) / W)
+    np.testing.assert_allclose(thrust, share + np.zeros(4), rtol=1e-12)
 
 
-def test_battery_sag_takes_thrust_by_a_power_of_the_voltage():
-    rotors = Rotors(setting("battery_sag", n=1.5))
-    voltage = 10.2
-    ratio = np.square(rotors(W, voltage) / W)
-    np.testing.assert_allclose(ratio, (voltage / VEHICLE.voltage_ref) ** 1.5, rtol=1e-12)
-    np.testing.assert_allclose(rotors(W, VEHICLE.voltage_ref), W, rtol=1e-15)
-    np.testing.assert_array_equal(rotors(W, 0.0), W)  # voltage not known
-
-
-def test_the_thrusts_that_rotor_effects_leave():
-    thrust = lambda vehicle, **more: np.square(Rotors(vehicle)(W, **more) / W)  # noqa: E731
-    np.testing.assert_allclose(
-        thrust(setting("rotor_efficiency", e1=-0.1, e3=0.2)), [0.9, 1.0, 1.2, 1.0], rtol=1e-14
-    )
-    np.testing.assert_allclose(thrust(setting("thrust_scale", s=-0.05)), 0.95, rtol=1e-14)
-    np.testing.assert_allclose(
-        thrust(setting("thrust_curvature", a=0.2)),
-        1 + 0.2 * ((W / VEHICLE.hover_rate) ** 2 - 1),
-        rtol=1e-14,
-    )
-    np.testing.assert_allclose(
-        thrust(setting("thrust_fade", rate=1e-3), time=30.0), 0.97, rtol=1e-14
-    )
-    np.testing.assert_allclose(thrust(setting("thrust_fade", rate=0.1), time=30.0), 0.1, rtol=1e-14)
-    still = Rotors(setting("rotor_efficiency", e1=-1.0))(W)
-    assert still[0] == 0.0
-
-
-@pytest.mark.parametrize("d", [0.0, 0.005, 0.0125, 0.1])
-@pytest.mark.parametrize("dt", [PERIOD, 0.01])
-def test_latency_is_a_pure_delay_between_samples_too(d, dt):
+@pytest.mark.parametrize(
+    ("d", "dt", "count"),  # the last at a rate that a memory of samples could not hold
+    [*((d, dt, 60) for d in (0.0, 0.005, 0.0125, 0.1) for dt in (PERIOD, 0.01)), (0.08, 1e-3, 999)],
+)
+def test_latency_is_a_pure_delay_between_samples_too(d, dt, count):
     rotors = Rotors(setting("latency", d=d))
-    for k in range(60):
+    for k in range(count):
         t = k * dt
         out = rotors(400.0 + 10.0 * t * np.array([1, -1, 2, 0]), dt=dt)
         np.testing.assert_allclose(
             out, 400.0 + 10.0 * max(t - d, 0.0) * np.array([1, -1, 2, 0]), rtol=1e-12
         )
-
-
-def test_latency_holds_at_a_rate_that_its_memory_could_not():
-    rotors = Rotors(setting("latency", d=0.08))
-    for k in range(1000):
-        out = rotors([400.0 + 10.0 * 0.001 * k] * 4, dt=0.001)
-    np.testing.assert_allclose(out, 400.0 + 10.0 * (0.999 - 0.08), rtol=1e-12)
 
 
 @pytest.mark.parametrize("d", [0.0013, 0.0125, 0.0311])
@@ -459,18 +412,14 @@ def rotation_of(q):
     return Rotation.from_quat(q, scalar_first=True)
 
 
-def test_a_tilted_world_turns_position_and_attitude():
+def test_a_tilted_world_turns_the_pose_and_a_marker_offset_moves_it_with_the_body():
     turn = Rotation.from_rotvec([0.1, -0.05, 0.0])
     speeds, position, q = Sensing(setting("world_tilt", ax=0.1, ay=-0.05), 1.0)(W, POSE, Q)
     np.testing.assert_array_equal(speeds, W)
     np.testing.assert_allclose(position, turn.apply(POSE), rtol=1e-12)
     np.testing.assert_allclose(rotation_of(q).as_matrix(), turn.as_matrix() @ R, atol=1e-14)
-
-
-def test_a_marker_offset_moves_the_position_with_the_body():
-    m = np.array([0.01, 0.02, -0.03])
-    _, position, q = Sensing(setting("marker_offset", mx=m[0], my=m[1], mz=m[2]), 1.0)(W, POSE, Q)
-    np.testing.assert_allclose(position, POSE + R @ m, rtol=1e-14)
+    _, position, q = Sensing(setting("marker_offset", mx=0.01, my=0.02, mz=-0.03), 1.0)(W, POSE, Q)
+    np.testing.assert_allclose(position, POSE + R @ [0.01, 0.02, -0.03], rtol=1e-14)
     np.testing.assert_array_equal(q, Q)
 
 
@@ -551,7 +500,7 @@ def test_a_clock_offset_counts_the_time_through_lost_poses():
             np.testing.assert_allclose(position[0], max(t - 0.02, 0.0), atol=1e-12)
 
 
-def test_inertia_is_scaled_about_each_axis():
+def test_the_body_is_changed_as_declared_and_nothing_else():
     vehicle = compile_effects(setting("inertia", jx=0.2, jz=-0.1)).vehicle
     np.testing.assert_allclose(
         np.diag(vehicle.inertia), np.diag(VEHICLE.inertia) * [1.2, 1.0, 0.9], rtol=1e-15
@@ -560,14 +509,8 @@ def test_inertia_is_scaled_about_each_axis():
     skew = replace(VEHICLE, inertia=np.array([[2e-3, 9e-4, 0], [9e-4, 2e-3, 0], [0, 0, 4e-3]]))
     with pytest.raises(InputError, match="inertia"):
         compile_effects(skew.with_effects(EffectSetting("inertia", {"jx": -0.85})))
-
-
-def test_mass_and_centre_of_mass_change_the_body_and_nothing_else():
-    vehicle = compile_effects(
-        VEHICLE.with_effects(
-            EffectSetting("mass", {"dm": 0.05}), EffectSetting("com_offset", {"cx": 0.01})
-        )
-    ).vehicle
+    mass = EffectSetting("mass", {"dm": 0.05})
+    vehicle = compile_effects(VEHICLE.with_effects(mass, offset((0.01, 0.0, 0.0)))).vehicle
     assert vehicle.mass == pytest.approx(VEHICLE.mass + 0.05)
     np.testing.assert_array_equal(vehicle.com, [0.01, 0, 0])
     np.testing.assert_array_equal(vehicle.inertia, VEHICLE.inertia)

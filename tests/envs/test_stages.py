@@ -1,17 +1,20 @@
-"""Stages of a user's own stand in the loop by their names."""
+"""The stages of the loop: a user's own by their names, what is late, and poses that are lost."""
+
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
 import pytest
 
-from tests.support.vector_flights import TASKS, fly_alone, make
-from tests.support.vector_flights import fly as flown
-from windwrench.dynamics import InputError
-from windwrench.envs import FanTrackingEnv, Stage
-from windwrench.envs.closed_loop import STAGES
+from tests.support.vector_flights import TASKS, fly, fly_alone, make
+from windwrench.dynamics import load_vehicle
+from windwrench.envs import SCENARIOS, FanTrackingEnv, Stage
+from windwrench.envs.closed_loop import STAGES, ClosedLoop
+from windwrench.envs.plant import PlantSettings
+from windwrench.envs.wind_scenarios import WIND_SCENARIOS
 
 
-def fly(name, **given):
+def alone(name, **given):
     return fly_alone(gym.make(f"windwrench/{name}-v0", **given), seed=3)
 
 
@@ -19,7 +22,7 @@ def fly(name, **given):
 def test_stage_by_stage_the_flight_is_that_of_the_compiled_call_bit_for_bit(name):
     seen = []
     watch = Stage("watch", lambda loop: seen.append(loop.ticks), before="estimate")
-    np.testing.assert_array_equal(fly(name, stages=[watch]), fly(name))
+    np.testing.assert_array_equal(alone(name, stages=[watch]), alone(name))
     assert seen[0] == -300
     assert np.all(np.diff(seen) == 1)
 
@@ -29,10 +32,10 @@ def test_so_it_flies_in_a_vector_of_environments():
         loop.applied[2] = -0.2
 
     given = {"stages": [Stage("push", push, before="actuate")]}
-    alone = [lambda: gym.make("windwrench/FanTracking-v0", **given)] * 2
-    many = flown(make(2, **given), 4)
-    np.testing.assert_array_equal(many, flown(gym.vector.SyncVectorEnv(alone), 4))
-    assert not np.array_equal(many, flown(make(2), 4))
+    single = [lambda: gym.make("windwrench/FanTracking-v0", **given)] * 2
+    many = fly(make(2, **given), 4)
+    np.testing.assert_array_equal(many, fly(gym.vector.SyncVectorEnv(single), 4))
+    assert not np.array_equal(many, fly(make(2), 4))
 
 
 def test_a_sensor_an_actuator_and_a_wind_of_one_s_own_change_the_flight():
@@ -46,19 +49,18 @@ def test_a_sensor_an_actuator_and_a_wind_of_one_s_own_change_the_flight():
     def push(loop):
         loop.applied[2] = -0.2
 
-    env = FanTrackingEnv("static", stages=[Stage("push", push, before="actuate")])
-    plain = FanTrackingEnv("static")
-    for one in (env, plain):
-        one.reset(seed=0)
-    pushed, free = (one.step(np.zeros(1))[4]["force"][2] for one in (env, plain))
+    def flying(*stage):
+        env = FanTrackingEnv("static", stages=[Stage(*stage)] if stage else [])
+        env.reset(seed=0)
+        return env
+
+    pushed, free = (
+        env.step(np.zeros(1))[4]["force"][2] for env in (flying("push", push, "actuate"), flying())
+    )
     assert pushed - free == pytest.approx(-0.2, abs=0.02)
-
-    env = FanTrackingEnv("static", stages=[Stage("offset", offset, before="estimate")])
-    env.reset(seed=0)
-    assert env.loop.state[0] - env.loop.position[0] == pytest.approx(0.02, abs=0.005)
-
-    env = FanTrackingEnv("static", stages=[Stage("stop", stop, before="actuate")])
-    env.reset(seed=0)
+    loop = flying("offset", offset, "estimate").loop
+    assert loop.state[0] - loop.position[0] == pytest.approx(0.02, abs=0.005)
+    env = flying("stop", stop, "actuate")
     height = env.loop.position[2]
     for _ in range(4):
         env.step(np.zeros(1))
@@ -79,17 +81,68 @@ def test_stages_run_before_the_one_that_they_name_in_the_order_given():
     assert [name for name in env.loop.stages if name in STAGES] == list(STAGES)
 
 
-@pytest.mark.parametrize(
-    ("stages", "words"),
-    [
-        (lambda: [Stage("mine", print, before="sens")], "Did you mean 'sense'"),
-        (lambda: [Stage("mine", None, before="sense")], "run must be a function"),
-        (lambda: [Stage("steer", print, before="sense")], "there is one of this name"),
-        (lambda: [Stage("a", print, before="sense")] * 2, "there is one of this name"),
-    ],
+VEHICLE = load_vehicle("ardrone2")
+QUIET = PlantSettings(motor_lag=0.0, sensor_noise=False)
+LATE = PlantSettings(
+    actuator_delay=0.01, pose_delay=0.015, imu_delay=0.02, dropout=0.2, dropout_burst=0.03
 )
-def test_what_is_no_stage_is_named(stages, words):
-    with pytest.raises(InputError, match=words):
-        FanTrackingEnv("static", stages=stages()).reset(seed=0)
-    with pytest.raises(InputError, match=r"runs no stages of your own; plant='mujoco' does it"):
-        make(1, "lanes", stages=[Stage("mine", print, before="sense")])
+
+
+def ticking(settings, ticks, **given):
+    """Yield a loop after each tick, with where it was before."""
+    rng = np.random.default_rng(3)
+    loop = ClosedLoop(VEHICLE, settings=settings, **given)
+    loop.reset(rng, np.array([0.0, 0.0, 1.0]))
+    loop.setpoint[:3] = 0.5, 0.2, 1.2
+    for _ in range(ticks):
+        before = loop.position.copy()
+        loop.run(rng.standard_normal((1, loop.noise_size)))
+        yield loop, before
+
+
+@pytest.mark.parametrize("ticks", [0, 1, 4, 20])
+def test_rotors_follow_commands_and_a_pose_is_one_of_so_many_ticks_ago(ticks):
+    late, largest = 0.005 * ticks, VEHICLE.omega_max
+    flown = [
+        (np.clip(loop.command, 0, largest), loop.unrounded.copy(), before, loop.sample[4:7].copy())
+        for loop, before in ticking(replace(QUIET, actuator_delay=late, pose_delay=late), 60)
+    ]
+    commands, speeds, places, measured = (np.array(part) for part in zip(*flown, strict=True))
+    np.testing.assert_array_equal(speeds[ticks:], commands[: 60 - ticks])
+    np.testing.assert_array_equal(measured[ticks:], places[: 60 - ticks])
+
+
+def test_an_accelerometer_tells_what_it_felt_so_many_ticks_ago():
+    felt, told = [], []
+    for loop, _ in ticking(replace(QUIET, imu_delay=0.015), 40, accelerometer=(0.0, 0.0)):
+        record = loop.record[0]
+        felt.append(record["plant"]["rotation"].T @ loop.world.xfrc[:3] / VEHICLE.mass)
+        told.append(record["flight"]["rotation"].T @ loop.specific)
+    np.testing.assert_allclose(told[3:], felt[:-3], atol=1e-9)
+    assert np.abs(np.array(told) - np.array(felt)).max() > 0.01
+
+
+def test_lost_poses_have_the_stated_share_and_come_in_runs_of_the_stated_length():
+    settings = PlantSettings(dropout=0.2, dropout_burst=0.03)
+    lost = ~np.array([loop.seen for loop, _ in ticking(settings, 20_000)])
+    runs = np.count_nonzero(lost[1:] & ~lost[:-1])
+    assert lost.mean() == pytest.approx(0.2, abs=0.03)
+    assert 0.005 * lost.sum() / runs == pytest.approx(0.03, rel=0.1)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_lanes_are_late_as_mujoco_is_with_delays_stated_and_drawn(task):
+    kind = (SCENARIOS if task.startswith("Fan") else WIND_SCENARIOS)["varied"]
+    drawn = replace(
+        kind.variation, actuator_delay=(0.0, 0.02), pose_delay=(0.0, 0.03), dropout=(0.0, 0.2)
+    )
+    flown = {}
+    for how, given in (
+        ("as stated", {"settings": LATE}),
+        ("as drawn", {"scenario": replace(kind, variation=drawn)}),
+        ("at once", {}),
+    ):
+        for plant in ("mujoco", "lanes"):
+            flown[how, plant] = fly(make(3, plant, task, **given), 6, seed=7)
+        np.testing.assert_allclose(flown[how, "lanes"], flown[how, "mujoco"], atol=2e-5)
+    assert np.abs(flown["as stated", "lanes"] - flown["at once", "lanes"]).max() > 1e-3

@@ -1,29 +1,37 @@
-"""The tasks beside FanTracking: interface, specification, physics, and what their laws reach."""
+"""The tasks: interface, specification, repeatability, physics, and how episodes start and end."""
 
 import re
+import subprocess
+import sys
+import warnings
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
 import windwrench  # noqa: F401  registers the environments
+from tests.support.vector_flights import fly_alone
+from windwrench.controllers import Admittance
 from windwrench.controllers import wind_observation as seen
-from windwrench.dynamics import EffectSetting, InputError
-from windwrench.envs.closed_loop import ClosedLoop
+from windwrench.dynamics import InputError, load_vehicle
+from windwrench.dynamics.vehicle import EffectSetting
+from windwrench.envs import FanTrackingEnv
 from windwrench.envs.fan_tracking_2d import FanTracking2DEnv
+from windwrench.envs.plant import NOISE
 from windwrench.envs.wind import GridWind, Uniform
-from windwrench.envs.wind_scenarios import START
 from windwrench.envs.wind_tasks import WindHoverEnv
+from windwrench.evaluation.episodes import fly_episode
 from windwrench.evaluation.tasks import TASKS
 
 
 @pytest.mark.parametrize("cls", [WindHoverEnv, FanTracking2DEnv])
 def test_the_docstring_s_tables_are_the_spaces(cls):
-    rows = re.findall(r"^\s+\| (\d+)(?:-(\d+))? +\|.*?\| (\d+(?:\.\d+)?) +\|", cls.__doc__, re.M)
     env = cls()
     size = env.observation_space.shape[0]
     limits = np.zeros(size)
     table = cls.__doc__.partition("## Observation space")[2].partition("##")[0]
-    for row in re.findall(r"^\s+\| (\d+)(?:-(\d+))? *\|(.*)\|", table, re.M):
+    rows = re.findall(r"^\s+\| (\d+)(?:-(\d+))? *\|(.*)\|", table, re.M)
+    for row in rows:
         first, last = int(row[0]), int(row[1] or row[0])
         limits[first : last + 1] = float(row[2].split("|")[1])
     assert rows
@@ -76,22 +84,6 @@ def test_a_bad_action_and_unknown_options_are_named(name, action):
         env.reset(options={"speed": 1})
 
 
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ({"estimator": "constant"}, "Did you mean 'constant-gain'"),
-        ({"normalize": 2}, "normalize must be True or False"),
-        ({"vehicle": "crazyfly"}, "Did you mean 'crazyflie'"),
-        ({"effects": [EffectSetting("drag", {})]}, "unknown effect 'drag'"),
-        ({"render_mode": "ansi"}, "human, rgb_array or None, got 'ansi'"),
-    ],
-)
-@pytest.mark.parametrize("name", ["FanTracking", "FanTracking2D", "WindTrajectory"])
-def test_bad_arguments_are_named(name, given, words):
-    with pytest.raises(InputError, match=words):
-        TASKS[name].environment(**given)
-
-
 def test_a_steady_wind_pushes_as_its_drag_says_and_all_see_it():
     env = WindHoverEnv("calm", winds=[Uniform((4.0, 0.0, 0.0))])
     env.reset(seed=0)
@@ -133,16 +125,113 @@ def test_a_lost_vehicle_ends_the_episode():
     assert info["lost"]
 
 
-def test_winds_that_nothing_can_hold_are_refused():
-    with pytest.raises(InputError, match="lost before the episode begins"):
-        WindHoverEnv("calm", winds=[Uniform((40.0, 0.0, 0.0))]).reset(seed=0)
+NAME = "windwrench/FanTracking-v0"
 
 
-def test_a_flight_in_wind_refuses_tables_of_another_shape():
-    from windwrench.dynamics import load_vehicle
+def test_stable_baselines_checker_finds_nothing():
+    checker = pytest.importorskip(
+        "stable_baselines3.common.env_checker", reason="pip install 'windwrench[rl]'"
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", ".*-v0 is out of date", DeprecationWarning)
+        checker.check_env(gym.make(NAME), warn=True)
 
-    flight = ClosedLoop(load_vehicle("ardrone2"))
-    with pytest.raises(InputError, match=r"reference must be finite numbers, shape \(n, 10\)"):
-        flight.reset(np.random.default_rng(0), START, reference=np.zeros((5, 3)))
-    with pytest.raises(InputError, match="expected a wind"):
-        flight.reset(np.random.default_rng(0), START, winds=["breeze"])
+
+def test_the_name_with_its_module_makes_it_without_an_import_from_any_folder(tmp_path):
+    code = (
+        "import gymnasium as gym, sys\n"
+        "env = gym.make('windwrench:windwrench/FanTracking-v0')\n"
+        "print(env.reset(seed=1)[0].shape)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.stdout.strip() == "(8,)", done.stderr
+
+
+def test_an_episode_and_numpy_s_global_random_state_leave_each_other_alone():
+    env = FanTrackingEnv("varied")
+    first = fly_alone(env, 15, 5)
+    np.random.seed(123)  # noqa: NPY002
+    expected = np.random.random(3)  # noqa: NPY002
+    np.random.seed(123)  # noqa: NPY002
+    np.testing.assert_array_equal(fly_alone(env, 15, 5), first)
+    np.testing.assert_array_equal(np.random.random(3), expected)  # noqa: NPY002
+
+
+@pytest.mark.parametrize(
+    "path", [lambda t: 0.0, lambda t: t[:-1], lambda t: np.full_like(t, np.nan)]
+)
+def test_after_a_bad_fan_path_which_is_named_there_is_no_step(path):
+    env = FanTrackingEnv(fan_path=path)
+    with pytest.raises(InputError, match="fan_path must return"):
+        env.reset(seed=0)
+    with pytest.raises(InputError, match="reset before step"):
+        env.step(np.zeros(1, np.float32))
+
+
+def test_a_filter_whose_state_is_no_number_starts_over():
+    env = FanTrackingEnv()
+    env.reset(seed=0)
+    env.step(np.zeros(1, np.float32))
+    env.loop.state[16] = np.nan
+    observation, _, lost, _, info = env.step(np.zeros(1, np.float32))
+    assert not lost
+    assert not info["lost"]
+    assert np.isfinite(env.loop.state[:19]).all()
+    assert observation in env.observation_space
+
+
+def test_a_generator_that_is_put_in_is_drawn_from():
+    env, twin = FanTrackingEnv(), FanTrackingEnv()
+    env.reset(seed=1)
+    twin.reset(seed=1)
+    env.np_random, other = (
+        np.random.Generator(np.random.SFC64(4)),
+        np.random.Generator(np.random.SFC64(4)),
+    )
+    env.step(np.zeros(1, np.float32))
+    twin.step(np.zeros(1, np.float32))
+    assert not np.array_equal(env.loop.state, twin.loop.state)
+    other.standard_normal((16, NOISE))
+    assert env.np_random.uniform() == other.uniform()
+
+
+VEHICLE = load_vehicle("ardrone2")
+HEAVY = EffectSetting("mass", {"dm": 0.06})
+
+
+def test_without_a_truth_the_true_vehicle_is_as_declared():
+    vehicle = VEHICLE.with_effects(EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}))
+    flown = [
+        fly_episode(FanTrackingEnv("varied", vehicle=vehicle, truth=truth), Admittance(), 5)
+        for truth in (None, vehicle, VEHICLE)
+    ]
+    assert np.array_equal(flown[0].observation, flown[1].observation)
+    assert not np.array_equal(flown[0].observation, flown[2].observation)
+
+
+def test_a_declared_mass_comes_into_the_world_once_and_the_flight_loop_knows_it():
+    heights = []
+    for model in (VEHICLE, VEHICLE.with_effects(HEAVY)):
+        env = FanTrackingEnv("static", vehicle=model, truth=VEHICLE, effects=(HEAVY,))
+        env.reset(seed=0)  # it settles for 1.5 s
+        body = env.loop.model.body("vehicle").id
+        assert env.loop.model.body_mass[body] == pytest.approx(0.525)
+        heights.append(float(env.loop.position[2] - env.fan.height))
+    assert heights[0] < -0.05
+    assert abs(heights[1]) < 0.3 * abs(heights[0])
+
+
+def test_a_given_fan_path_is_followed_for_20_s_and_then_the_fan_stands_still():
+    env = FanTrackingEnv("static", fan_path=lambda t: 0.1 * np.sin(t))
+    _, info = env.reset(seed=0)
+    assert info["fan_motion"] == "given"
+    infos = [env.step(np.zeros(1, np.float32))[4] for _ in range(260)]  # no time limit of its own
+    for k in (1, 2, 29, 249):
+        seen = infos[k - 1]
+        assert seen["fan_y"] == pytest.approx(0.1 * np.sin(k * 0.08 - 0.005), abs=1e-9)
+        assert seen["fan_velocity"] == pytest.approx(0.1 * np.cos(k * 0.08), abs=1e-3)
+    assert infos[-1]["fan_y"] == pytest.approx(0.1 * np.sin(20.0))
+    assert len({seen["fan_y"] for seen in infos[-5:]}) == 1

@@ -34,7 +34,7 @@ class Sheared:
         return np.column_stack([3.0 + 2.0 * y + time, 0.0 * y, 0.0 * y])
 
 
-def test_pyflyt_gets_the_same_field():
+def test_pyflyt_and_rotorpy_get_the_same_field():
     wind = Turbulence(0, 1.0, 2.0, (4, 0, 0))
     points = np.random.default_rng(7).uniform(-1, 1, (5, 3))
     # as Aviary makes and asks for it
@@ -42,9 +42,6 @@ def test_pyflyt_gets_the_same_field():
     for one in (field, PyFlytWind(wind)):
         np.testing.assert_array_equal(one(0.4, points), wind.velocity(points, 0.4))
         assert one(0.0, np.array([[0.0, 0.0, 1.0]] * 5)).shape == (5, 3)
-
-
-def test_rotorpy_gets_the_same_field():
     wind = FanWall(np.full(9, 4.0))
     seen = RotorPyWind(wind).update(0.4, np.array([2.0, 0.1, 1.2]))
     np.testing.assert_array_equal(seen, wind.velocity([[2.0, 0.1, 1.2]], 0.4)[0])

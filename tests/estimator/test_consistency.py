@@ -1,4 +1,8 @@
-"""Filters are as good as they say, on truth drawn from their own model."""
+"""Filters are as good as they say, on truth drawn from their own model, and stated deviations hold
+where vehicles are drawn from their stated uncertainty.
+"""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -6,8 +10,17 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.model_flights import ANISOTROPIC, WITH_EFFECTS, YAWED, simulate_model
 from windwrench.dynamics import load_vehicle
-from windwrench.estimator import UKFTuning, WrenchEKF, WrenchEstimate, WrenchUKF
+from windwrench.dynamics.vehicle import Uncertainty
+from windwrench.estimator import (
+    ConstantGainFilter,
+    UKFTuning,
+    WrenchEKF,
+    WrenchEstimate,
+    WrenchUKF,
+    WrenchUKFBatch,
+)
 from windwrench.estimator.consistency import chi2_band, nees, state_error
+from windwrench.estimator.model_uncertainty import factors_alone, factors_of
 
 VEHICLE = load_vehicle("ardrone2")
 
@@ -61,3 +74,71 @@ def test_band_holds_the_mean_as_often_as_it_says():
     assert (low, high) == pytest.approx((5.341, 6.697), abs=2e-3)
     means = np.random.default_rng(0).chisquare(6, (4000, 100)).mean(axis=1)
     assert np.mean((means > low) & (means < high)) == pytest.approx(0.95, abs=0.015)
+
+
+def drawn(vehicle, rng):
+    """Return a vehicle as it may be where ``vehicle`` is declared."""
+    known, normal = vehicle.uncertainty, rng.standard_normal
+    command = 1.0 + known.command * normal() if vehicle.omega_source == "commanded" else 1.0
+    return replace(
+        vehicle,
+        mass=vehicle.mass * (1.0 + known.mass * normal()),
+        k=vehicle.k * (1.0 + known.thrust * normal()) * (1.0 + known.rotor * normal(4)) * command,
+        p=vehicle.p * max(1.0 + known.torque * normal(), 0.1) * command,
+        inertia=vehicle.inertia * max(1.0 + known.inertia * normal(), 0.2),
+        arm_l=vehicle.arm_l * (1.0 + known.arm_l * normal()),
+    )
+
+
+@pytest.mark.parametrize("source", ["measured", "commanded"])
+def test_intervals_hold_what_they_say(source):
+    """95 % of 240 flights of drawn vehicles, three axes each, yawing and with changing thrust."""
+    vehicle, runs, steps = replace(VEHICLE, omega_source=source), 240, 400
+    tuning, error = UKFTuning(), np.empty((3, runs, 6))
+    for r in range(runs):
+        rng = np.random.default_rng(r)
+        true = drawn(vehicle, rng)
+        sway = 1.0 + rng.uniform(0.0, 0.3) * np.sin(0.015 * np.arange(steps) + rng.uniform(0, 6))
+        speeds = np.tile(true.hover_rate * np.sqrt(sway)[:, None], 4)
+        run = simulate_model(true, tuning, speeds, seed=r, **YAWED)
+        e = run.fly(WrenchUKF(vehicle, tuning))[-1]
+        error[0, r] = np.concatenate([e.torque - run.torque[-1], e.force - run.force[-1]])
+        error[1, r] = np.concatenate([e.std_torque, e.std_force])
+        error[2, r] = e.std[12:]
+    inside = np.abs(error[0]) < 1.96 * error[1]
+    torque, force = inside[:, :3].mean(), inside[:, 3:].mean()
+    assert 0.925 < torque < 0.975  # of 720: 0.016 is the deviation of a share of 0.95, twice
+    assert 0.915 < force < 0.98  # the axes of a force share one error of thrust
+    assert np.mean(np.abs(error[0]) < 1.96 * error[2]) < 0.8  # of noise alone
+
+
+@pytest.mark.parametrize("make", [WrenchUKF, WrenchEKF, ConstantGainFilter])
+def test_the_filter_stays_as_it_is_and_says_in_hover_what_follows_by_hand(make):
+    known = VEHICLE.uncertainty
+    exact, stated = make(replace(VEHICLE, uncertainty=Uncertainty())), make(VEHICLE)
+    for ukf in (exact, stated):
+        ukf.reset((0, 0, 1), (1, 0, 0, 0))
+    for _ in range(1000):
+        a, b = (u.step([VEHICLE.hover_rate] * 4, (0, 0, 1), (1, 0, 0, 0)) for u in (exact, stated))
+    np.testing.assert_array_equal(a.state, b.state)
+    np.testing.assert_array_equal(a.covariance, b.covariance)
+    np.testing.assert_array_equal(a.std_force, a.std[15:])
+    turn = VEHICLE.weight * VEHICLE.arm_l * known.rotor / 2.0
+    lift = VEHICLE.weight * np.sqrt(known.mass**2 + known.thrust**2 + known.rotor**2 / 4.0)
+    np.testing.assert_allclose(b.model_std, [turn, turn, 0, 0, 0, lift], rtol=1e-4, atol=1e-9)
+    np.testing.assert_array_equal(b.std_force, np.hypot(b.std[15:], b.model_std[3:]))
+
+
+def test_a_batch_says_the_same_and_the_parts_add_up():
+    batch, single = WrenchUKFBatch(VEHICLE, 2), WrenchUKF(VEHICLE)
+    pose = np.array([0.1, 0, 1]), np.array([0.8, 0.6, 0, 0])
+    batch.reset(*pose)
+    single.reset(*pose)
+    for k in range(50):
+        speeds = VEHICLE.hover_rate * np.array([1.0, 1.1, 1.0, 0.9 + 0.001 * k])
+        one = single.step(speeds, *pose)
+        both = batch.step(np.tile(speeds, (2, 1)), *(np.tile(x, (2, 1)) for x in pose))
+    np.testing.assert_array_equal(both.model_std, np.tile(one.model_std, (2, 1)))
+    assert (one.model_std > 0.0).all()
+    commanded = replace(VEHICLE, omega_source="commanded")
+    np.testing.assert_allclose(sum(factors_alone(commanded).values()), factors_of(commanded))

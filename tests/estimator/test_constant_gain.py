@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.support.flights import begin, fly, yawing_flight
+from tests.support.flights import fly, yawing_flight
 from tests.support.model_flights import ANISOTROPIC
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.estimator import ConstantGainFilter, WrenchUKF
@@ -40,10 +40,7 @@ def assert_close(a, b, share):
 
 def both(vehicle, flight, settled, missing=(), kind=ConstantGainFilter):
     """The estimates of the full filter and of this one along a flight, once both have settled."""
-    filters = WrenchUKF(vehicle), kind(vehicle)
-    for f in filters:
-        begin(f, flight)
-    return [fly(f, flight, missing)[settled:] for f in filters]
+    return [fly(f, flight, missing)[settled:] for f in (WrenchUKF(vehicle), kind(vehicle))]
 
 
 @pytest.fixture(scope="module")
@@ -124,15 +121,15 @@ def test_it_knows_the_declared_effects():
 def test_noise_of_its_own_on_every_axis_is_exact_at_hover():
     full, constant = WrenchUKF(VEHICLE, ANISOTROPIC), ConstantGainFilter(VEHICLE, ANISOTROPIC)
     rng, steps = np.random.default_rng(0), 3000
+    speeds = VEHICLE.rotor_speeds(1.02 * VEHICLE.weight, np.zeros(3))
+    position = [0.0, 0.0, 1.0] + 0.002 * rng.standard_normal((steps, 3))
     attitude = np.column_stack([np.ones(steps), 0.0025 * rng.standard_normal((steps, 3))])
-    flight = {
-        "rotors": np.tile(VEHICLE.rotor_speeds(1.02 * VEHICLE.weight, np.zeros(3)), (steps, 1)),
-        "position": [0.0, 0.0, 1.0] + 0.002 * rng.standard_normal((steps, 3)),
-        "quaternion": attitude / np.linalg.norm(attitude, axis=1, keepdims=True),
-    }
+    attitude /= np.linalg.norm(attitude, axis=1, keepdims=True)
+    found = []
     for f in (full, constant):
         f.reset([0, 0, 1], [1, 0, 0, 0])
-    assert_close(*(fly(f, flight)[2500:] for f in (full, constant)), 0.1)
+        found.append([f.step(speeds, *pose) for pose in zip(position, attitude, strict=True)])
+    assert_close(*(estimates[2500:] for estimates in found), 0.1)
     np.testing.assert_allclose(np.diag(constant.covariance), np.diag(full.covariance), rtol=1e-3)
 
 

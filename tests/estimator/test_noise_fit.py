@@ -104,7 +104,6 @@ def test_the_likelihood_is_that_of_the_filters_own_steps():
 
 
 def test_bounds_hold_where_there_is_no_noise_to_find():
-    """A log filtered before it was written: no noise floor."""
     quiet = UKFTuning(**dict.fromkeys((*WALKS, *NOISES), 1e-9))
     use = NoiseFitSettings()
     log, truth = flight(quiet, seconds=4.0, whole=True)
@@ -151,18 +150,6 @@ def test_short_logs_work_or_are_refused_in_one_line():
             fit_noise(VEHICLE, t, speeds, spoil, held)
 
 
-def test_bad_arrays_are_refused():
-    t, speeds, position, quaternion = flight(seconds=1.0)
-    for bad, words in (
-        ((t, speeds[:-1], position, quaternion), "rotor_speeds must have shape"),
-        ((t[::-1], speeds, position, quaternion), "increase strictly"),
-        ((t, np.where(speeds > 0, np.nan, 0), position, quaternion), "rotor_speeds must be finite"),
-        ((t, speeds, position, quaternion, t[:3]), "voltage must have shape"),
-    ):
-        with pytest.raises(InputError, match=words):
-            fit_noise(VEHICLE, *bad)
-
-
 def test_a_long_log_is_thinned_and_a_slow_one_is_scaled():
     log = flight(seconds=30.0)
     fit = fit_noise(VEHICLE, *log, settings=NoiseFitSettings(rows=2000))
@@ -177,7 +164,6 @@ def test_declared_effects_are_part_of_the_model():
 
 
 def test_rise_times_are_those_of_the_filter():
-    """A step of the force and of the torque, fed to the filter itself."""
     assert np.allclose(rise_times(VEHICLE, UKFTuning(), PERIOD), 1.0, rtol=0.02)
     quick = replace(TRUE, thrust_noise=0.003, motor_torque_noise=3e-4)
     force, _ = rise_times(VEHICLE, quick, PERIOD)

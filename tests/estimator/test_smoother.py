@@ -6,10 +6,9 @@
 import numpy as np
 import pytest
 
-from tests.support.flights import PERIOD
 from tests.support.model_flights import ANISOTROPIC, WITH_EFFECTS, YAWED, simulate_model
 from windwrench.dynamics import load_vehicle
-from windwrench.estimator import UKFTuning, WrenchUKF, rauch_tung_striebel, smoother
+from windwrench.estimator import UKFTuning, rauch_tung_striebel, smoother
 from windwrench.estimator.consistency import chi2_band, state_error
 from windwrench.estimator.row_steps import steps_between
 from windwrench.estimator.smoother import RecordingUKF
@@ -113,21 +112,6 @@ def test_blocks_change_nothing(block, monkeypatch):
     pieces = smooth(*log, covariance=True)
     assert np.array_equal(whole.state, pieces.state, equal_nan=True)
     assert np.array_equal(whole.covariance, pieces.covariance)
-
-
-def test_a_recording_filter_is_the_filter():
-    _, speeds, x, q = model_log(200)
-    x[40:50], q[45:60] = np.nan, np.nan
-    plain, recording = WrenchUKF(VEHICLE, None, PERIOD), RecordingUKF(VEHICLE, None, PERIOD)
-    for ukf in (plain, recording):
-        ukf.reset(x[0], q[0])
-    steps = [[ukf.step(speeds[k], x[k], q[k]) for k in range(1, 200)] for ukf in (plain, recording)]
-    for a, b in zip(*steps, strict=True):
-        np.testing.assert_array_equal(a.state, b.state)
-    found = recording.smooth()
-    np.testing.assert_array_equal(found.state[-1, :19], steps[0][-1].state[:19])
-    np.testing.assert_array_equal(found.nis[1:], [e.nis for e in steps[0]])
-    assert found.status[1:] == [e.status for e in steps[0]]
 
 
 @pytest.mark.parametrize("seed", [0, 2, 5])

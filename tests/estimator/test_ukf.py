@@ -1,14 +1,18 @@
-"""The wrench filter and its smoother against the literal ones, and what the filter must hold.
+"""The filters and the smoother against the literal ones, and what they must hold.
 
 A mass that is hung on, its rise time and its lateral force are ``tests/paper/test_figures.py``'s.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tests.support.flights import PERIOD, begin, fly, yawing_flight
 from tests.support.model_flights import ANISOTROPIC
 from tests.support.reference_filters import (
+    KIT_ORDER,
     ReferenceSmoother,
     as_reference,
     initial_covariance,
@@ -17,15 +21,15 @@ from tests.support.reference_filters import (
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import compile_effects
 from windwrench.estimator import (
-    ConstantGainFilter,
-    Recovery,
-    TimedFilter,
     UKFTuning,
     WrenchUKF,
     WrenchUKFBatch,
 )
-from windwrench.estimator.consistency import chi2_band
+from windwrench.estimator.ekf import WrenchEKF, model_jacobian
+from windwrench.estimator.filter_record import drive, propagate
+from windwrench.estimator.reference import difference, displaced
 from windwrench.estimator.smoother import RecordingUKF
+from windwrench.runtime.compiled import compiled
 
 VEHICLE = load_vehicle("ardrone2")
 OFFSET = EffectSetting("com_offset", {"cx": 0.01, "cy": -0.006, "cz": 0.02})
@@ -50,10 +54,9 @@ def test_filter_and_smoother_equal_the_literal_ones(effects, steps, wrench, yaw_
     fast = RecordingUKF(vehicle, ANISOTROPIC, PERIOD)
     acting = rotor_effects(vehicle, **wrench) if wrench else None
     slow = ReferenceSmoother(compile_effects(vehicle).vehicle, ANISOTROPIC, PERIOD, acting)
-    for estimator in (fast, slow):
-        begin(estimator, flight, initial_covariance())
+    begin(slow, flight, initial_covariance())
     missing = range(25, 40)
-    for k, e in enumerate(fly(fast, flight, missing), 1):
+    for k, e in enumerate(fly(fast, flight, missing, initial_covariance()), 1):
         slow.predict(flight["rotors"][k])
         if k not in missing:
             slow.correct(flight["position"][k], flight["quaternion"][k])
@@ -70,10 +73,9 @@ def test_filter_and_smoother_equal_the_literal_ones(effects, steps, wrench, yaw_
 def test_asynchronous_measurements_agree_with_regular_ones():
     """Two predictions by half, position and attitude one after the other: next to no difference."""
     flight = yawing_flight(VEHICLE, 300, seed=8)
-    whole, halves = WrenchUKF(VEHICLE, UKFTuning(), PERIOD), WrenchUKF(VEHICLE, UKFTuning(), PERIOD)
-    for ukf in (whole, halves):
-        begin(ukf, flight)
+    whole, halves = (WrenchUKF(VEHICLE, UKFTuning(), PERIOD) for _ in range(2))
     a = fly(whole, flight)[-1]
+    begin(halves, flight)
     for k in range(1, 300):
         for _ in range(2):
             halves.predict(flight["rotors"][k], PERIOD / 2)
@@ -85,59 +87,11 @@ def test_asynchronous_measurements_agree_with_regular_ones():
     np.testing.assert_allclose(np.diag(a.covariance), np.diag(b.covariance), rtol=0.08)
 
 
-def test_a_missing_measurement_is_a_prediction():
-    ukf, W, ends = WrenchUKF(VEHICLE), np.full(4, VEHICLE.hover_rate), []
-    for pose in ((None, None), (np.full(3, np.nan), np.full(4, np.nan))):
-        ukf.reset([0, 0, 1], [1, 0, 0, 0])
-        ends.append([ukf.step(W, *pose) for _ in range(20)][-1])
-    assert np.isnan([e.nis for e in ends]).all()
-    np.testing.assert_array_equal(*(e.covariance for e in ends))
-
-
 def begun(make, *arguments):
     """Return an estimator that has been started in a hover."""
     estimator = make(VEHICLE, *arguments)
     estimator.reset([0, 0, 1], [1, 0, 0, 0])
     return estimator
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: WrenchUKF(VEHICLE).step(np.ones(4), [0, 0, 1], [1, 0, 0, 0]), "call reset before"),
-        (lambda: WrenchUKF("ardrone2"), r"must be a Vehicle, such as load_vehicle\('ardrone2'\)"),
-        (lambda: UKFTuning(torque_walk=-1.0), "torque_walk"),
-        (lambda: UKFTuning(position_noise=(1, 2)), "position_noise"),
-        (lambda: UKFTuning(force_walk="a"), "force_walk"),
-        (lambda: Recovery(patience=-1.0), "patience"),
-        (lambda: WrenchUKF(VEHICLE, period=0.0), "period"),
-        (lambda: WrenchUKF(VEHICLE, gate=2.0), "gate"),
-        (lambda: WrenchUKF(VEHICLE).reset([0, 0], [1, 0, 0, 0]), "position"),
-        (lambda: WrenchUKF(VEHICLE).reset([0, 0, 0], [3, 0, 0, 0]), "length 1"),
-        (
-            lambda: WrenchUKF(VEHICLE).reset([0, 0, 0], [1, 0, 0, 0], -np.eye(18)),
-            "positive definite",
-        ),
-        (lambda: WrenchUKFBatch(VEHICLE, 0), "one vehicle or one for each of 0"),
-        (lambda: WrenchUKFBatch([VEHICLE, VEHICLE], 3), "one for each of 3, got 2"),
-        (lambda: WrenchUKFBatch(VEHICLE, 2).reset(np.zeros((3, 3)), [1, 0, 0, 0]), "position"),
-        (
-            lambda: WrenchUKFBatch(VEHICLE, 2).reset([0, 0, 0], [[1, 0, 0, 0], [3, 0, 0, 0]]),
-            r"length 1, got 3 \(filter 1\)",
-        ),
-        (lambda: RecordingUKF(VEHICLE).smooth(), "start"),
-        (lambda: begun(RecordingUKF).smooth().covariance, "covariance=True"),
-        (lambda: begun(RecordingUKF).correct_imu(np.zeros(3)), "inertial"),
-        (lambda: begun(ConstantGainFilter).correct_imu(gyro=[0, 0, 0]), "correct_imu"),
-        (lambda: TimedFilter(WrenchUKF(VEHICLE), horizon=0.0), "horizon"),
-        (lambda: chi2_band(0, 1), "chi2_band"),
-        (lambda: chi2_band(6, 0), "chi2_band"),
-        (lambda: chi2_band(6, 1, 1.0), "chi2_band"),
-    ],
-)
-def test_bad_settings_are_named(make, words):
-    with pytest.raises(InputError, match=words):
-        make()
 
 
 SPEEDS, POSITION = np.full((2, 4), 400.0), np.zeros((2, 3))
@@ -151,14 +105,65 @@ QUATERNION = np.tile([1.0, 0, 0, 0], (2, 1))
         ("step", (SPEEDS, POSITION[:, :2], QUATERNION), r"position \(2, 3\)"),
         ("step", (SPEEDS, POSITION, QUATERNION * [[1.0], [2.0]]), r"length 1, got 2 \(filter 1\)"),
         ("step", (SPEEDS, POSITION, QUATERNION, [1.0, 2.0, 3.0]), "voltage"),
+        ("step", (SPEEDS[0], POSITION[0], 2.0 * QUATERNION[0]), "length 1, got 2"),
         ("correct_imu", ([1, 2],), "gyro"),
         ("correct_imu", (None, [0, 0, np.nan]), "accelerometer"),
     ],
 )
 def test_bad_measurements_are_named_and_change_nothing(method, arguments, words):
-    estimator = begun(WrenchUKFBatch, 2) if method == "step" else begun(WrenchUKF)
+    estimator = begun(WrenchUKFBatch, 2) if np.ndim(arguments[0]) == 2 else begun(WrenchUKF)
     before, P = estimator.estimate.state, estimator.covariance
     with pytest.raises(InputError, match=words):
         getattr(estimator, method)(*arguments)
     np.testing.assert_array_equal(estimator.estimate.state, before)
     np.testing.assert_array_equal(estimator.covariance, P)
+
+
+@compiled
+def one_step(record, speeds, dt, A):
+    """Write the state after a step into ``centre``, and the Jacobian into ``A``."""
+    f = record[0]
+    drive(f, speeds, dt, 11.1)
+    propagate(f, f.x, dt, f.centre)
+    model_jacobian(f, dt, A, True)
+
+
+@pytest.mark.parametrize(
+    "vehicle",
+    [
+        VEHICLE,
+        VEHICLE.with_effects(OFFSET),
+        VEHICLE.with_effects(OFFSET, DRAG, GROUND),
+        replace(
+            VEHICLE,
+            inertia=np.array([[2.2e-3, 3e-4, -2e-4], [3e-4, 3e-3, 1e-4], [-2e-4, 1e-4, 4.8e-3]]),
+        ),
+    ],
+    ids=["plain", "offset", "effects", "full inertia"],
+)
+@pytest.mark.parametrize("rate", [0.0, 4.0])
+def test_jacobian_equals_finite_differences(vehicle, rate):
+    rng = np.random.default_rng(0)
+    ekf = WrenchEKF(vehicle)
+    x = np.zeros(20)
+    x[0:3] = [0.1, -0.2, 0.5]
+    x[3:7] = Rotation.random(rng=rng).as_quat(scalar_first=True)
+    x[7:10], x[10:13] = rng.standard_normal(3), rate * rng.standard_normal(3)
+    x[13:16], x[16:19] = 0.05 * rng.standard_normal(3), rng.standard_normal(3)
+    speeds, numeric, size = np.array([350.0, 380.0, 360.0, 400.0]), np.empty((18, 18)), 1e-5
+    start = x[KIT_ORDER]
+
+    def stepped(error):
+        A = np.zeros((12, 18))
+        ekf.record[0]["x"][KIT_ORDER] = displaced(start, error)
+        one_step(ekf.record, speeds, PERIOD, A)
+        return ekf.record[0]["centre"][KIT_ORDER], A
+
+    centre, A = stepped(np.zeros(18))
+    F = np.eye(18)
+    F[:12] += A
+    for n in range(18):
+        high, low = (stepped(s * size * np.eye(18)[n])[0] for s in (1.0, -1.0))
+        numeric[:, n] = (difference(high, centre) - difference(low, centre)) / (2 * size)
+    assert np.abs(A).max() > 1
+    assert np.allclose(F, numeric, rtol=0, atol=1e-8)

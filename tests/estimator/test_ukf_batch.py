@@ -1,11 +1,20 @@
-"""A batch of filters is as many single ones."""
+"""A batch of filters is as many single ones; inputs that no vehicle makes, numbers at the ends of
+what is stated, and what passes between Python and compiled code.
+"""
+
+import copy
+import gc
+import pickle
+import tracemalloc
 
 import numpy as np
 import pytest
 
 from tests.support.flights import yawing_flight
 from windwrench.dynamics import EffectSetting, load_vehicle
-from windwrench.estimator import WrenchUKF, WrenchUKFBatch
+from windwrench.envs.vector import TaskVectorEnv
+from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF, WrenchUKFBatch
+from windwrench.estimator.ekf import WrenchEKF
 
 VEHICLE = load_vehicle("ardrone2")
 COUNT, STEPS = 11, 150  # more than are side by side at once
@@ -107,3 +116,130 @@ def test_it_starts_from_what_is_given_and_coasts_as_single_filters_do(common, ea
         np.testing.assert_array_equal(batch.covariance[n], single.covariance)
     assert len(batch) == 3
     assert np.isnan(together[-1].nis).all()
+
+
+HOVER = np.full(4, VEHICLE.hover_rate)
+POSE = [0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0]
+QUATERNION = np.array([0.5, 0.1, -0.2, 0.8]) / np.linalg.norm([0.5, 0.1, -0.2, 0.8])
+ARGUMENTS = np.array([380.0, 390.0, 400.0, 410.0]), np.array([0.01, 0.0, 1.0]), QUATERNION
+FILTERS = {"ukf": WrenchUKF, "ekf": WrenchEKF, "constant-gain": ConstantGainFilter}
+
+
+@pytest.mark.parametrize("name", FILTERS)
+@pytest.mark.parametrize("speed", [1e9, 1e150])
+def test_one_rotor_speed_that_no_vehicle_has_changes_nothing(name, speed):
+    clean, spoiled = FILTERS[name](VEHICLE), FILTERS[name](VEHICLE)
+    clean.reset(*POSE)
+    spoiled.reset(*POSE)
+    odd = HOVER.copy()
+    odd[1] = speed
+    for k in range(60):
+        kept = clean.step(HOVER, *POSE).force
+        found = spoiled.step(odd if k == 30 else HOVER, *POSE).force
+    np.testing.assert_array_equal(found, kept)
+
+
+def test_masked_entries_are_not_measured():
+    ukf = WrenchUKF(VEHICLE)
+    ukf.reset(*POSE)
+    masked = np.ma.masked_array([5.0, 0.0, 1.0], mask=[True, False, False])
+    assert ukf.step(HOVER, masked, None).status == "coasting"
+    speeds = np.ma.masked_array(50.0 * HOVER, mask=True)
+    assert np.abs(ukf.step(speeds, *POSE).force).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", ["ukf", "ekf"])
+@pytest.mark.parametrize("noise", [1e-6, 1e-8, 1e-10])
+def test_the_covariance_stays_positive_with_a_noise_of_nanometres(name, noise):
+    one = FILTERS[name](VEHICLE, UKFTuning(position_noise=noise, attitude_noise=noise))
+    one.reset(*POSE)
+    for k in range(400):
+        estimate = one.step(HOVER, *(POSE if not 50 < k < 250 else (None, None)))
+        size = np.sqrt(np.diag(estimate.covariance))
+        assert size.min() > 0.0
+        assert np.linalg.eigvalsh(estimate.covariance / np.outer(size, size))[0] > -1e-12
+
+
+def test_steps_and_episodes_hold_on_to_nothing():
+    """Bytes that a filter and environments hold after five times as many steps: the least of three
+    times, since a leak grows in each.
+    """
+    ukf, envs = WrenchUKF(VEHICLE), TaskVectorEnv(2, scenario="base")
+    ukf.reset(*POSE)
+
+    def work():
+        envs.reset(seed=0)
+        for _ in range(5):
+            envs.step(np.zeros((2, 1), np.float32))
+        for _ in range(100):
+            ukf.step(HOVER, *POSE)
+
+    work()
+    tracemalloc.start()
+    try:
+        held = []
+        for _ in range(4):
+            for _ in range(5):
+                work()
+            gc.collect()
+            held.append(tracemalloc.get_traced_memory()[0])
+    finally:
+        tracemalloc.stop()
+    assert np.diff(held).min() < 20_000
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        list,
+        lambda a: np.repeat(a, 2)[::2],
+        lambda a: a.astype(">f8"),
+        lambda a: a.astype(np.longdouble),
+        lambda a: [np.array(v) for v in a],
+    ],
+    ids=["list", "strided", "big-endian", "long", "list of arrays"],
+)
+def test_any_form_of_the_same_numbers_gives_the_same_estimate(form):
+    states = []
+    for change in (np.asarray, form):
+        estimator = WrenchUKF(VEHICLE)
+        estimator.reset([0, 0, 1], QUATERNION)
+        for _ in range(5):
+            estimate = estimator.step(*(change(a) for a in ARGUMENTS))
+        states.append(estimate.state)
+    np.testing.assert_array_equal(*states)
+
+
+def pickled(one):
+    return pickle.loads(pickle.dumps(one))
+
+
+@pytest.mark.parametrize(
+    ("count", "duplicate"),
+    [(count, way) for count in (0, 11) for way in (copy.copy, copy.deepcopy, pickled)],
+)
+def test_a_copy_and_an_estimate_go_their_own_way(count, duplicate):
+    """A filter with an IMU and a gate, and a batch of more than are side by side at once."""
+    one = WrenchUKFBatch(VEHICLE, count) if count else WrenchUKF(VEHICLE, gate=0.999)
+    one.reset([0, 0, 1], QUATERNION)
+
+    def go_on(estimator):
+        if count:
+            return estimator.step(*(np.tile(values, (count, 1)) for values in ARGUMENTS))
+        estimator.step(*ARGUMENTS)
+        return estimator.correct_imu([0.1, 0.2, 0.3], [0.3, -0.2, 9.9])
+
+    first = go_on(one)
+    state, covariance, other = first.state.copy(), one.covariance, duplicate(one)
+    second = go_on(one)
+    assert not np.array_equal(second.state, state)
+    np.testing.assert_array_equal(second.state, one.estimate.state)
+    after, biases = one.covariance, None if count else one.covariance_with_biases
+    go_on(one)
+    np.testing.assert_array_equal(first.state, state)
+    np.testing.assert_array_equal(other.covariance, covariance)
+    np.testing.assert_array_equal(go_on(other).state, second.state)
+    np.testing.assert_array_equal(other.covariance, after)
+    if not count:
+        np.testing.assert_array_equal(first.covariance, covariance)
+        np.testing.assert_array_equal(other.covariance_with_biases, biases)

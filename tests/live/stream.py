@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from tests.support.programs import until
 from windwrench.dynamics import load_vehicle
 from windwrench.envs.recording import record_flight
 from windwrench.identification.logs.flight_log import FlightLog
@@ -130,14 +131,10 @@ class Running:
             self.failed.append(str(error))
 
     def until(self, so):
-        """Wait until it is so, or the stream has ended. A datagram that is lost, as where another
-        program takes the same port, would be waited for in vain: ten minutes are enough.
+        """Wait until it is so, or the stream has ended. A datagram may be lost, as where another
+        program takes the same port.
         """
-        for _ in range(300_000):
-            if so() or not self.thread.is_alive():
-                return
-            self.thread.join(0.002)
-        raise AssertionError("the stream has not taken what was sent")
+        until(lambda: so() or not self.thread.is_alive(), self.thread.join)
 
     def count(self, kind):
         """How many messages of a kind were taken."""

@@ -109,9 +109,12 @@ def test_gyro_and_accelerometer_come_in_si():
     np.testing.assert_allclose(row.accelerometer, [0.0, 0.0, 9.80665])
 
 
-def test_a_firmware_without_a_variable_is_told(monkeypatch):
+def test_a_firmware_without_a_variable_and_no_crazyflie_are_told(monkeypatch):
     monkeypatch.setattr(FakeLink, "variables", tuple(v for v in PLAIN if v[0] != "pm.vbat"))
     assert "Variable pm.vbat not in TOC" in run(lambda link, taken: None).failed[0]
+    source = make_source("crazyflie:nowhere://0", VEHICLE, None, Tallies())
+    with pytest.raises(InputError, match="no Crazyflie there: No driver found"):
+        source.open()
 
 
 def test_a_link_that_is_lost_ends_the_stream():
@@ -122,9 +125,3 @@ def test_a_link_that_is_lost_ends_the_stream():
     found = run(play)
     assert not found.failed
     assert len(found.outputs) == 50
-
-
-def test_no_crazyflie():
-    source = make_source("crazyflie:nowhere://0", VEHICLE, None, Tallies())
-    with pytest.raises(InputError, match="no Crazyflie there: No driver found"):
-        source.open()

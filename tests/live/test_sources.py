@@ -16,6 +16,8 @@ from windwrench.live.messages import Malformed
 from windwrench.live.sources.open import make_source
 from windwrench.live.tallies import Tallies
 
+OWN = "t,px,py,pz,qw,qx,qy,qz,omega1,omega2,omega3,omega4\n"
+
 
 def run_text(text, log_map=None, pieces=1):
     """Run a table through a pipe; return the stream that it was."""
@@ -70,25 +72,6 @@ def test_a_table_of_another_kind_by_its_map(tmp_path):
         np.testing.assert_allclose(sample.rotor_speeds, log.rotor_speeds[k])
         assert sample.voltage == log.voltage[k]
     assert run_text(text, wanted).session.estimates == 3
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("t,px,py\n1,2,3\n", "no column 'pz' of position, 'qw' of attitude"),
-        (as_csv(flight())[:40], "expected"),
-        ("t,px,py,pz,qw,qx,qy,qz,omega1,omega2,omega3,omega4\n1,2,x" + ",1" * 9, "not a number"),
-        ("t,px,py,pz,qw,qx,qy,qz,omega1,omega2,omega3,omega4\n1,2\n", "row of 2 field"),
-        (
-            "t,px,py,pz,qw,qx,qy,qz,omega1,omega2,omega3,omega4\n0,0,0,1,2,0,0,0" + ",9" * 4,
-            "length",
-        ),
-        ("", "no message came"),
-        (b"\x00\x01\x02" * 50_000, "a line of more than"),
-    ],
-)
-def test_a_table_that_is_none_is_refused(text, said):
-    assert said in run_text(text).failed[0]
 
 
 def test_a_bad_line_on_the_way_is_counted():
@@ -159,30 +142,43 @@ def test_what_is_missing_in_a_senders_count_is_lost_unless_it_was_late(wraps, nu
     assert lost == [0, 0, 3, 2, 2]
 
 
-@pytest.mark.parametrize(
-    ("data", "said"),
-    [
-        (b"hello", "expected a datagram of JSON"),
-        (b"[1, 2]", "an object"),
-        (b'{"t": 1, "px": 1, "py": 2}', "no field pz"),
-        (b'{"t": "soon", "px": 1}', "expected a time"),
-        (b'{"t": 1, "speed": 4}', "none of the fields"),
-        (b'{"t": 1, "omega1": "fast", "omega2": 1, "omega3": 1, "omega4": 1}', "expected a number"),
-        (b"[" * 5000, "expected a datagram of JSON"),
-    ],
-)
-def test_a_first_datagram_that_is_none_ends_the_stream(data, said):
+def first_datagram(data):
     sender = Sender()
     sender.send(data)
-    assert said in sender.end_by_itself()
+    sender.thread.join()
+    return sender.end()
 
 
-def test_a_source_that_says_nothing_ends_in_what_was_expected():
+@pytest.mark.parametrize(
+    ("run", "data", "said"),
+    [
+        (run_text, "t,px,py\n1,2,3\n", "no field pz, qw, qx, qy, qz, omega1"),
+        (run_text, as_csv(flight())[:40], "expected"),
+        (run_text, OWN + "1,2,x" + ",1" * 9, "not a number"),
+        (run_text, OWN + "1,2\n", "row of 2 field"),
+        (run_text, OWN + "0,0,0,1,2,0,0,0" + ",9" * 4, "length"),
+        (run_text, "", "no message came"),
+        (run_text, b"\x00\x01\x02" * 50_000, "a line of more than"),
+        (first_datagram, b"hello", "expected a datagram of JSON"),
+        (first_datagram, b"[1, 2]", "an object"),
+        (first_datagram, b'{"t": 1, "px": 1, "py": 2}', "no field pz"),
+        (first_datagram, b'{"t": "soon", "px": 1}', "expected a time"),
+        (first_datagram, b'{"t": 1, "speed": 4}', "none of the fields"),
+        (
+            first_datagram,
+            b'{"t": 1, "omega1": "fast", "omega2": 1, "omega3": 1, "omega4": 1}',
+            "expected a number",
+        ),
+        (first_datagram, b"[" * 5000, "expected a datagram of JSON"),
+    ],
+)
+def test_what_is_no_table_and_no_datagram_is_refused(run, data, said):
+    assert said in run(data).failed[0]
+
+
+def test_a_source_that_says_nothing_and_a_second_one_at_its_address_end():
     said = "no message came within 0.2 s; expected datagrams of JSON"
     assert said in Sender(wait=0.2).end_by_itself()
-
-
-def test_two_streams_cannot_listen_at_one_address():
     sender = Sender()
     assert "cannot listen" in Running(f"udp-json://127.0.0.1:{sender.port}").end_by_itself()
     sender.end()

@@ -1,18 +1,23 @@
-"""The paper's figures, each in a short form: what the paper says of it is seen, and all of its
-result can be written.
+"""The paper's figures, each in a short form: what the paper says of it is seen, all of its result
+can be written, and a page shows it.
 """
 
+import gzip
 import json
 from importlib import import_module
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from windwrench.controllers import Hover
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.evaluation.episodes import fly_episode
-from windwrench.paper import NAMES, fig3, fig4, fig5, fig6, fig7
+from windwrench.paper import NAMES, fig3, fig4, fig5, fig7
 from windwrench.paper.fig5_flights import NOISES
+from windwrench.paper.reproduce import chosen, write_page, write_result
+from windwrench.paper.result import Comparison, Result
+from windwrench.runtime.provenance import commit, made_by
 
 SHORT = {  # seeds, settings, and constants of the figure's module
     "fig3": (1, {"seconds": 15.0}, {}),
@@ -155,27 +160,53 @@ def test_without_scikit_learn(monkeypatch):
         fig3.fit_clusters(np.zeros((3, 1, 10, 2)))
 
 
-def test_rise_time_of_a_first_order_lag():
+def test_a_rise_time_a_ratio_and_an_interval_are_those_of_their_definitions():
     time = np.arange(0.01, 20.0, 0.01)
     response = -0.52 * np.where(time < 7.0, 0.0, 1.0 - np.exp(-(time - 7.0) / 0.4))
     assert fig4.rise_time(time, response) == pytest.approx(0.4 * np.log(9.0), abs=1e-3)
-
-
-def test_a_ratio_of_paired_errors_has_a_tight_interval_where_the_errors_go_together():
-    hard = np.linspace(1.0, 5.0, 20)
+    hard = np.linspace(1.0, 5.0, 20)  # errors that go together have a tight interval
     assert fig5.ratio(2.0 * hard, hard) == pytest.approx((2.0, 2.0, 2.0))
-
-
-def test_the_interval_is_student_s():
     low, high = fig7.interval([0.4, 0.5, 0.6, 0.5, 0.5])
     # a standard deviation of 0.0707 over five, 2.776 of its errors of the mean
     assert (low, high) == pytest.approx((0.5 - 0.0878, 0.5 + 0.0878), abs=1e-4)
     assert fig7.interval([0.3]) == (0.3, 0.3)
 
 
-def test_bad_input_is_refused():
-    with pytest.raises(InputError, match="within 2 m"):
-        fig6.fly_points(np.array([[1.0, 0.0], [4.0, 0.0]]), 0)
-    for figure in (fig6, fig7):
-        with pytest.raises(InputError, match="at least one seed"):
-            figure.run(0, lambda share: None)
+def small_result(value=1.0):
+    figure = Figure()
+    figure.subplots().plot([0, value])
+    return Result(
+        {"value": np.float64(value), "gone": float("nan")},
+        {
+            "x": np.array([1, 2, 3]),
+            "y": np.array([0.1234567, np.nan, 2.0]),
+            "name": np.array(list("abc")),
+        },
+        figure,
+        [Comparison("a value (m)", "about 1", f"{value:.2f}")],
+        ["A remark."],
+    )
+
+
+def test_a_result_is_a_table_its_figures_and_a_picture(tmp_path):
+    write_result("fig0", "A title", 3, small_result(), tmp_path)
+    names = sorted(p.name for p in tmp_path.iterdir())
+    assert names == ["fig0.csv.gz", "fig0.json", "fig0.png", "fig0.svg"]
+    kept = json.loads((tmp_path / "fig0.json").read_text())
+    assert kept["figures"] == {"value": 1.0, "gone": None}
+    assert kept["commit"] == commit()
+    table = gzip.decompress((tmp_path / "fig0.csv.gz").read_bytes())
+    assert table == b"x,y,name\n1,0.123457,a\n2,,b\n3,2.0,c\n"
+
+
+def test_the_page_shows_the_table_and_the_picture(tmp_path):
+    write_result("fig3", "A title", 3, small_result(), tmp_path / "out")
+    write_page(["fig3", "fig4"], tmp_path / "out", tmp_path / "page.md")
+    page = (tmp_path / "page.md").read_text()
+    assert "| a value (m) | about 1 | 1.00 |" in page
+    assert "![A title](out/fig3.png)" in page
+    assert "[CSV](out/fig3.csv.gz)" in page
+    assert made_by("windwrench reproduce fig3 --seeds 3", [commit()]) in page.splitlines()
+    assert "A remark." in page
+    assert "fig4" not in page
+    assert chosen("all") == list(NAMES)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.support.flights import PERIOD, begin, fly, yawing_flight
-from windwrench.dynamics import EffectSetting, InputError, load_vehicle
-from windwrench.paper import NonlinearObserver, ObserverTuning
+from tests.support.flights import PERIOD, fly, yawing_flight
+from windwrench.dynamics import EffectSetting, load_vehicle
+from windwrench.paper import NonlinearObserver
 
 VEHICLE = load_vehicle("ardrone2")
 FORCE, TORQUE = np.array([0.3, -0.2, -0.1]), np.array([0.0, 0.0, 0.02])  # of yawing_flight
@@ -33,11 +33,9 @@ def loaded_hover(observer, steps, force, torque):
 
 def errors_along(flight, missing=()):
     """Return force, torque, position, velocity and body-rate errors (steps, 15)."""
-    observer = NonlinearObserver(VEHICLE)
-    begin(observer, flight)
     true = {"force": [FORCE], "torque": [TORQUE], "position": flight["true_x"][1:]}
     true |= {"velocity": flight["velocity"][1:], "angular_velocity": flight["omega"][1:]}
-    found = fly(observer, flight, missing)
+    found = fly(NonlinearObserver(VEHICLE), flight, missing)
     return np.hstack([np.array([getattr(e, n) for e in found]) - x for n, x in true.items()])
 
 
@@ -103,22 +101,3 @@ def test_declared_effects_are_not_a_wrench():
     # the wrench that cancels drag and the offset thrust in a steady translation
     np.testing.assert_allclose(force[False][0], pull, rtol=1e-6)
     np.testing.assert_allclose(np.abs(force[False][3:5]), np.abs(torque), rtol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: ObserverTuning(force_gain=-1.0), "force_gain"),
-        (lambda: ObserverTuning(torque_gain=(1.0, 2.0)), "torque_gain"),
-        (lambda: ObserverTuning(attitude_cutoff_hz=(1.0, 2.0, 3.0)), "attitude_cutoff_hz"),
-        (lambda: NonlinearObserver(VEHICLE, period=0.0), "period"),
-        (lambda: NonlinearObserver(VEHICLE).reset([0, 0], [1, 0, 0, 0]), "position"),
-        (
-            lambda: NonlinearObserver(VEHICLE).step([1, 2, 3, 4], [0, 0, 1], [2, 0, 0, 0]),
-            "quaternion",
-        ),
-    ],
-)
-def test_bad_input_is_named(make, words):
-    with pytest.raises(InputError, match=words):
-        make()

@@ -1,13 +1,36 @@
-"""What describes the package for others says the same as the package."""
+"""What describes the package, what Python shows of it, and what is kept of results: little, in one
+form each, shown by a page that says what made it.
+"""
 
+import dataclasses
+import inspect
 import json
 import re
 import tomllib
+from importlib import import_module
 
+import numpy as np
+import pytest
 import yaml
 
 import windwrench
+from tests.support.diagnoses import made_diagnosis, made_trace
 from tests.support.paths import ROOT
+from tests.support.programs import said
+from windwrench.dynamics import EffectSetting, Mocap, Vehicle, load_vehicle
+from windwrench.dynamics.effects.base import Coefficient, Effect
+from windwrench.dynamics.vehicle import MotorCurve
+from windwrench.estimator import (
+    NoiseFit,
+    NoiseFitSettings,
+    Recovery,
+    TimedFilter,
+    UKFTuning,
+    WrenchUKF,
+    WrenchUKFBatch,
+)
+from windwrench.identification import FlightLog
+from windwrench.paper import ObserverTuning
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 CONDA_NAMES = {"mujoco": "mujoco-python", "matplotlib": "matplotlib-base"}
@@ -40,3 +63,155 @@ def test_the_conda_recipe_needs_what_the_project_needs():
     (script,) = recipe["build"]["entry_points"]
     name, _, target = script.partition(" = ")
     assert PROJECT["scripts"] == {name: target}
+
+
+MOST = 5_400_000  # bytes, of all that git keeps of docs/ beside its films
+MOST_OF_FILMS = 3_000_000  # bytes, of these: a reader of README waits for them
+PICTURES = {".png", ".gif", ".jpg", ".webp", ".mp4", ".svg"}
+PAGES_OF_COMMANDS = (  # a line that says how the page was made, once or once a section
+    "reproduction.md",
+    "leaderboard.md",
+    "speed.md",
+    "trust.md",
+    "identify.md",
+    "tutorials/live.md",
+)
+MADE = re.compile(
+    r"^Made by `(?:windwrench|python -m studies\.)[^`]+`, "
+    r"windwrench \d[\w.]*, commits? ([0-9a-f, ]+)\.$",
+    re.M,
+)
+
+
+def git(*words):
+    return said("git", *words, cwd=ROOT)
+
+
+@pytest.fixture(scope="module")
+def tracked():
+    """What git keeps of docs/, and what lies there that it does not ignore."""
+    if not (ROOT / ".git").exists():
+        pytest.skip("needs a checkout: what is kept is what git tracks")
+    names = git("ls-files", "-z", "--cached", "--others", "--exclude-standard", "--", "docs")
+    return [path for name in names.split("\0") if name and (path := ROOT / name).is_file()]
+
+
+def test_docs_are_small(tracked):
+    films = {path: path.stat().st_size for path in tracked if path.suffix == ".gif"}
+    others = {path: path.stat().st_size for path in tracked if path not in films}
+    for sizes, most in ((others, MOST), (films, MOST_OF_FILMS)):
+        largest = sorted(sizes, key=sizes.__getitem__, reverse=True)[:5]
+        assert sum(sizes.values()) <= most, [f"{p.name}: {sizes[p]}" for p in largest]
+
+
+def test_a_figure_is_kept_once(tracked):
+    pictures = [path for path in tracked if path.suffix in PICTURES]
+    kept = [path.with_suffix("").as_posix() for path in pictures]
+    assert len(kept) == len(set(kept))
+    contents = [path.read_bytes() for path in pictures]
+    assert len(contents) == len(set(contents))
+    assert {path.suffix for path in pictures} <= {".png", ".gif"}
+
+
+def test_every_picture_and_data_file_is_used(tracked):
+    """By a page or README with its name."""
+    pages = [ROOT / "README.md", *(path for path in tracked if path.suffix == ".md")]
+    linked = {
+        (page.parent / target).resolve()
+        for page in pages
+        for target in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8"))
+        if "://" not in target
+    }
+    site = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    linked |= {ROOT / "docs" / name for name in re.findall(r"[\w/]+\.css", site)}
+    unused = [
+        path.relative_to(ROOT).as_posix()
+        for path in tracked
+        if path.suffix not in (".md", ".py") and path not in linked
+    ]
+    assert not unused
+
+
+@pytest.mark.parametrize("name", PAGES_OF_COMMANDS)
+def test_a_page_says_the_commit_that_made_it(tracked, name):
+    found = MADE.findall((ROOT / "docs" / name).read_text(encoding="utf-8"))
+    assert found
+    if git("rev-parse", "--is-shallow-repository").strip() == "true":
+        pytest.skip("a shallow clone does not have the commits")
+    for commit in {one for line in found for one in line.split(", ")}:
+        git("merge-base", "--is-ancestor", commit, "HEAD")
+
+
+def test_every_page_with_a_command_s_line_is_listed(tracked):
+    pages = [path for path in tracked if path.suffix == ".md"]
+    made = {
+        path.relative_to(ROOT / "docs").as_posix()
+        for path in pages
+        if MADE.search(path.read_text(encoding="utf-8"))
+    }
+    assert made == set(PAGES_OF_COMMANDS)
+
+
+DOCUMENTED = (
+    *(Coefficient, Effect, EffectSetting, Mocap, MotorCurve, Vehicle),
+    *(NoiseFit, NoiseFitSettings, ObserverTuning, Recovery),
+    *(UKFTuning, FlightLog),
+)
+VEHICLE = load_vehicle("ardrone2")
+POSE = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0))
+SPEEDS = np.full(4, VEHICLE.hover_rate)
+
+
+@pytest.mark.parametrize("kind", DOCUMENTED, ids=lambda kind: kind.__name__)
+def test_help_says_what_each_field_is(kind):
+    text = inspect.getdoc(kind)
+    if kind is Vehicle and dataclasses.fields(kind):
+        assert "mass: kg." in text
+    described = set(re.findall(r"^ {4}(\w+): \S", text.split("Attributes:")[1], re.MULTILINE))
+    own = [f for f in dataclasses.fields(kind) if f.name in kind.__annotations__]
+    assert {f.name for f in own} - described == set()
+
+
+def filters():
+    ukf = WrenchUKF(VEHICLE)
+    ukf.reset(*POSE)
+    batch = WrenchUKFBatch(VEHICLE, 2)
+    batch.reset(*POSE)
+    return ukf, batch
+
+
+def test_repr_is_short_and_says_what_it_is():
+    ukf, batch = filters()
+    assert repr(ukf) == "<WrenchUKF of ardrone2: period 0.005 s, tracking>"
+    assert repr(batch) == "<WrenchUKFBatch of 2 x ardrone2: period 0.005 s>"
+    estimate = ukf.step(SPEEDS, *POSE)
+    assert repr(estimate).startswith("<WrenchEstimate tracking: force (")
+    assert " Nm, NIS " in repr(estimate)
+    assert "coasting" in repr(ukf.step(SPEEDS))
+    assert repr(batch.step(np.tile(SPEEDS, (2, 1)))) == "<WrenchEstimate of 2: 2 coasting>"
+    assert "0 late, 0 too late: <WrenchUKF" in repr(TimedFilter(ukf))
+    made = made_diagnosis(made_trace(5.0))
+    log = FlightLog(np.arange(3.0), np.zeros((3, 3)), np.tile(POSE[1], (3, 1)), np.ones((3, 4)))
+    for thing, words in (
+        (VEHICLE, "<Vehicle ardrone2: 0.465 kg, arm 0.126"),
+        (made, "<Diagnosis explained: rotor_drag; force error "),
+        (made.traces[0], "Trace(log='flight', period=0.04)"),
+        (made.signatures[0], "Signature(effect='rotor_drag', channel='Fx', regressor="),
+        (log, "<FlightLog without a name: 3 samples, 0 to 2 s>"),
+    ):
+        assert repr(thing).startswith(words)
+        assert len(repr(thing)) < 160
+
+
+@pytest.mark.parametrize(
+    "package",
+    ["", ".controllers", ".dynamics", ".envs", ".estimator", ".identification", ".paper"],
+)
+def test_a_prompt_shows_public_names_and_their_short_types(package):
+    module = import_module(f"windwrench{package}")
+    assert dir(module) == sorted(module.__all__)
+    for name in dir(module):
+        kind = getattr(module, name)
+        for function in (kind, *vars(kind).values()) if inspect.isclass(kind) else (kind,):
+            if inspect.isfunction(function) and not function.__name__.startswith("__"):
+                assert len(str(inspect.signature(function))) < 400, (name, function)

@@ -1,14 +1,20 @@
-"""Workers that stay warm: one that dies or takes too long costs its own task alone."""
+"""Workers that stay warm, interrupts that are not lost, and a first call that tells its wait."""
 
 import multiprocessing
 import os
 import signal
+import sys
 import time
+import weakref
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
+from tests.support.programs import said, until
+from windwrench.runtime.compile_notice import LINE, CompileNotice
 from windwrench.runtime.errors import InputError
+from windwrench.runtime.interrupts import noted
 from windwrench.runtime.workers import Lost, each, every
 
 
@@ -36,12 +42,9 @@ def lives(process):
     return True
 
 
-def assert_ends(process):
-    deadline = time.monotonic() + 20.0
-    while lives(process) and time.monotonic() < deadline:
-        multiprocessing.active_children()  # takes note of those that are gone
-        time.sleep(0.05)
-    assert not lives(process)
+def has_ended(process):
+    multiprocessing.active_children()  # takes note of those that are gone
+    return not lives(process)
 
 
 def outcomes(tasks, count=1, limit=60.0):
@@ -55,7 +58,7 @@ def test_a_worker_stays_warm_and_alone(monkeypatch):
     assert {threads for _, (_, threads) in done} == {"1"}
     (process,) = {process for _, (process, _) in done}
     assert process != os.getpid()
-    assert_ends(process)  # with the work
+    until(lambda: has_ended(process))  # with the work
     assert "OPENBLAS_NUM_THREADS" not in os.environ
 
 
@@ -96,7 +99,7 @@ def test_a_worker_that_dies_while_it_waits_is_replaced():
     running = each(work, [0, 1], 60.0, 1)
     _, (process, _) = next(running)
     os.kill(process, signal.SIGKILL)
-    assert_ends(process)
+    until(lambda: has_ended(process))
     time.sleep(0.5)  # for the pool to see it
     (task, (other, _)) = next(running)
     assert (task, other == process) == (1, False)
@@ -124,3 +127,75 @@ def test_an_interrupt_ends_the_processes_at_once():
 def test_a_task_that_dies_each_time_ends_all():
     with pytest.raises(InputError, match=r"this machine: a task failed: .* SIGKILL"):
         list(every(work, [0, "dies"], 1))
+
+
+class Thing:
+    """Something to be collected."""
+
+
+def lose(things):
+    """Have an interrupt come within the callback of something that is collected."""
+    reference = weakref.ref(things[0], lambda _: signal.raise_signal(signal.SIGINT))
+    things.clear()
+    time.sleep(5.0)
+    assert reference() is None
+
+
+def swallow(_):
+    """Have an interrupt come within code that goes on whatever happens, as imports in C do."""
+    with suppress(BaseException):
+        signal.raise_signal(signal.SIGINT)
+    time.sleep(5.0)
+
+
+@pytest.mark.parametrize("loses", [lose, swallow])
+def test_one_that_is_lost_comes_again_until_it_has_an_answer(loses):
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with noted() as came:
+            with pytest.raises(KeyboardInterrupt):
+                loses([Thing()])
+            assert came()
+            time.sleep(0.1)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@pytest.fixture
+def told():
+    """A notice whose time never comes by itself."""
+    notice = CompileNotice(patience=1e6)
+    yield notice
+    if notice._timer is not None:
+        notice._timer.cancel()
+
+
+def test_a_long_wait_is_told_once(told, capsys):
+    told.begin()
+    told.begin()
+    told._tell()
+    told.begin()
+    told._tell()
+    assert capsys.readouterr().err == f"{LINE}\n"
+
+
+def test_a_short_wait_and_a_quiet_one_are_not_told(told, capsys):
+    told.begin()
+    told.end()
+    told._tell()
+    told.quiet = True
+    told.begin()
+    told._tell()
+    assert capsys.readouterr().err == ""
+
+
+def test_numba_tells_what_it_compiles_and_not_what_it_loads(tmp_path):
+    (tmp_path / "loops.py").write_text(
+        "from windwrench.runtime.compiled import compiled, notice\n"
+        "@compiled\ndef double(x):\n    return 2 * x\n"
+        "begun = []\nnotice.begin = lambda: begun.append('double')\n"
+        "print(double(3), begun)\n"
+    )
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    runs = [said(sys.executable, "loops.py", cwd=tmp_path, env=environment) for _ in range(2)]
+    assert runs == ["6 ['double']\n", "6 []\n"]

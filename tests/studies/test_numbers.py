@@ -1,15 +1,22 @@
-"""Every page that is made of kept results says what they say, and figures in prose are those of
-results.
+"""Every page that is made of kept results says what they say; figures in prose are those of
+results, and probabilities those of kept flights.
 """
 
 import json
+from dataclasses import asdict
 
 import pytest
 
 from tests.support.paths import ROOT
+from windwrench.identification.diagnosis.unknown import UNKNOWN
 from windwrench.studies import pages as rendering
 from windwrench.studies import quotes as quoting
+from windwrench.studies.kept_results import kept
 from windwrench.studies.pages import missing_sources
+from windwrench.studies.probabilities.__main__ import plan, plan_of_other_logs
+from windwrench.studies.probabilities.calibration import RESULTS, flights_of
+from windwrench.studies.probabilities.fitting import fit
+from windwrench.studies.probabilities.flights import KINDS, WAYS_TO_LOG
 
 QUOTES, NOT_RESULTS = quoting.read_quotes()
 
@@ -68,3 +75,24 @@ def test_a_quote_of_a_row_that_is_not_there_is_refused(tmp_path):
 
 def test_modules_that_pages_name_are_there():
     assert missing_sources() == []
+
+
+def test_the_weights_in_use_are_those_of_the_kept_flights():
+    found = fit(flights_of(kept(RESULTS["first"])))
+    for name, value in asdict(UNKNOWN).items():
+        assert getattr(found, name) == pytest.approx(value, abs=0.02), name
+
+
+def test_a_run_has_flights_of_both_and_none_twice():
+    tasks = plan(20, 20, 0, 3, "other.py")
+    assert len(set(tasks)) == len(tasks)
+    assert {t[1] for t in tasks if t[0] == "own"} >= {"single", "pair", "nothing", "left out"}
+    assert {t[1] for t in tasks if t[0] == "other.py"} == {"catalogue", "left out"}
+
+
+def test_other_logs_are_of_all_ways_and_none_is_flown_twice():
+    tasks = plan_of_other_logs(20, 0, 1000, "other.py")
+    assert len(set(tasks)) == len(tasks) == 60
+    assert {t[3] for t in tasks} == set(WAYS_TO_LOG[1:])
+    assert {t[3] for t in tasks if t[0] == "other.py"} == {"filtered"}
+    assert {t[1] for t in tasks if t[0] == "own"} == set(KINDS)

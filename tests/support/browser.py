@@ -20,26 +20,7 @@ needs_browser = pytest.mark.skipif(
 
 # A window cannot be as narrow as a telephone, a frame in it can. Whatever goes wrong before it is
 # looked at is kept.
-_FRAME = """<!DOCTYPE html><meta charset="utf-8"><body style="margin:0">
-<iframe id="page" {sandbox} style="border:0;width:{width}px;height:1000px" srcdoc="{page}"></iframe><pre id="found"></pre>
-<script>{script}</script>"""
-_LOOK = """
-addEventListener("load", async () => {
-  const page = document.getElementById("page").contentDocument, root = page.documentElement;
-  const box = element => element.getBoundingClientRect();
-  const name = element => element.tagName + " " + element.textContent.trim().slice(0, 40);
-  const label = element => element.closest("[aria-label]")?.getAttribute("aria-label");
-  document.getElementById("found").textContent = JSON.stringify({
-    width: root.clientWidth, scroll_width: root.scrollWidth, height: root.scrollHeight,
-    wide: [...page.body.querySelectorAll("*")].filter(e => box(e).right > root.clientWidth + 1).map(name),
-    missing: [...page.images].filter(i => !i.naturalWidth).map(i => i.src),
-    pictures: [...page.querySelectorAll("canvas, noscript img")].map(s => ({alt: s.alt || label(s), width: box(s).width, height: box(s).height})),
-    background: getComputedStyle(page.body).backgroundColor, ink: getComputedStyle(page.body).color,
-    text: page.body.innerText,
-    done: await (async (page, view) => { ACT })(page, document.getElementById("page").contentWindow),
-  });
-});
-"""
+_FRAME = Path(__file__).with_name("browser_frame.html").read_text(encoding="utf-8")
 
 
 def browse(address, profile, *options):
@@ -65,7 +46,7 @@ def look(page, width, folder, dark=False, act="", scripts=True):
         _FRAME.format(
             width=width,
             page=html.escape(page),
-            script=_LOOK.replace("ACT", act),
+            act=act,
             sandbox="" if scripts else 'sandbox="allow-same-origin"',
         ),
         encoding="utf-8",

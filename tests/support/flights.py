@@ -12,12 +12,8 @@ def cross(a, b):
 
 
 def multiply(a, b):
-    return np.array(
-        [
-            a[0] * b[0] - a[1:] @ b[1:],
-            *(a[0] * b[1:] + b[0] * a[1:] + cross(a[1:], b[1:])),
-        ]
-    )
+    vector = a[0] * b[1:] + b[0] * a[1:] + cross(a[1:], b[1:])
+    return np.array([a[0] * b[0] - a[1:] @ b[1:], *vector])
 
 
 def matrix(q):
@@ -58,59 +54,33 @@ def yawing_flight(
     force, torque = np.asarray(force, float), np.asarray(torque, float)
     x, v = np.array([0.0, 0.0, 1.5]), np.zeros(3)
     q, w = np.array([np.cos(np.pi / 3), 0, 0, np.sin(np.pi / 3)]), np.array([0.0, 0.0, yaw_rate])
-    mixing = np.linalg.inv(
-        np.array(
-            [
-                vehicle.k,
-                vehicle.arm_l * vehicle.k * [1, 1, -1, -1],
-                vehicle.arm_l * vehicle.k * [-1, 1, 1, -1],
-                vehicle.p * [1, -1, 1, -1],
-            ]
-        )
-    )
-    inverse = np.linalg.inv(vehicle.inertia)
-    out = {
-        name: []
-        for name in ("rotors", "position", "quaternion", "velocity", "omega", "true_q", "true_x")
-    }
+    turns = vehicle.arm_l * vehicle.k * [[1, 1, -1, -1], [-1, 1, 1, -1]]
+    mixing = np.array([vehicle.k, *turns, vehicle.p * [1, -1, 1, -1]])
+    unmixing, inverse = np.linalg.inv(mixing), np.linalg.inv(vehicle.inertia)
+    names = ("rotors", "position", "quaternion", "velocity", "omega", "true_q", "true_x")
+    out = {name: [] for name in names}
     for k in range(steps):
         t = k * PERIOD
         target = np.array([np.sin(1.3 * t), 0.8 * np.sin(0.9 * t + 1), 1.5 + 0.2 * np.sin(0.7 * t)])
-        speed = np.array(
-            [1.3 * np.cos(1.3 * t), 0.72 * np.cos(0.9 * t + 1), 0.14 * np.cos(0.7 * t)]
-        )
-        a = (
-            4 * (target - x)
-            + 3.5 * (speed - v)
-            + np.array([0, 0, vehicle.gravity])
-            - force / vehicle.mass
-        )
+        speed = [1.3 * np.cos(1.3 * t), 0.72 * np.cos(0.9 * t + 1), 0.14 * np.cos(0.7 * t)]
+        a = 4 * (target - x) + 3.5 * (speed - v) + [0, 0, vehicle.gravity] - force / vehicle.mass
         R = matrix(q)
         up = a / np.linalg.norm(a)
         tilt = R.T @ cross(R[:, 2], up)
         rate = np.array([0, 0, yaw_rate * (1 + 0.5 * np.sin(1.1 * t))])
         alpha = 110 * tilt * [1, 1, 0] - 18 * (w - rate) * [1, 1, 0.4]
         moment = vehicle.inertia @ alpha + cross(w, vehicle.inertia @ w) - R.T @ torque
-        squares = mixing @ np.array([vehicle.mass * a @ R[:, 2], *moment])
-        W = np.sqrt(np.maximum(squares, 1e3))
-        c, M = vehicle.k * W**2, vehicle.p * W**2
-        moment = np.array(
-            [
-                vehicle.arm_l * (c[0] + c[1] - c[2] - c[3]),
-                vehicle.arm_l * (-c[0] + c[1] + c[2] - c[3]),
-                M[0] - M[1] + M[2] - M[3],
-            ]
-        )
-        h = PERIOD / substeps
+        squares = np.maximum(unmixing @ np.array([vehicle.mass * a @ R[:, 2], *moment]), 1e3)
+        (thrust, *moment), h = mixing @ squares, PERIOD / substeps
         for _ in range(substeps):
             R = matrix(q)
-            acc = (R @ [0, 0, c.sum()] + force) / vehicle.mass - [0, 0, vehicle.gravity]
+            acc = (R @ [0, 0, thrust] + force) / vehicle.mass - [0, 0, vehicle.gravity]
             alpha = inverse @ (moment + R.T @ torque - cross(w, vehicle.inertia @ w))
             x, v = x + h * v + h * h / 2 * acc, v + h * acc
             q, w = multiply(q, turn_by(h * (w + h / 2 * alpha))), w + h * alpha
             q = q / np.sqrt(q @ q)
         error = turn_by(sigma_attitude * rng.standard_normal(3))
-        out["rotors"].append(W)
+        out["rotors"].append(np.sqrt(squares))
         out["true_x"].append(x)
         out["true_q"].append(q)
         out["position"].append(x + sigma_position * rng.standard_normal(3))
@@ -120,14 +90,17 @@ def yawing_flight(
     return {name: np.array(values) for name, values in out.items()}
 
 
-def begin(estimator, flight, *covariance):
+def begin(estimator, flight, covariance=None):
     """Start an estimator at the true state of a flight."""
-    start = (flight["true_x"][0], flight["true_q"][0], *(covariance or (None,)))
-    estimator.reset(*start, flight["velocity"][0], flight["omega"][0])
+    start = (flight[name][0] for name in ("true_x", "true_q"))
+    estimator.reset(*start, covariance, flight["velocity"][0], flight["omega"][0])
 
 
-def fly(estimator, flight, missing=()):
-    """Step an estimator through a flight, some poses missing; return its estimates after each."""
+def fly(estimator, flight, missing=(), covariance=None):
+    """Start an estimator and step it through a flight, some poses missing; return its estimates
+    after each step.
+    """
+    begin(estimator, flight, covariance)
     poses = zip(flight["position"], flight["quaternion"], strict=True)
     return [
         estimator.step(speeds, *((None, None) if k in missing else pose))

@@ -5,7 +5,6 @@ change of a log is meant, and say in the commit which of the two numbers is righ
 """
 
 import json
-import os
 import tempfile
 import warnings
 import zlib
@@ -37,17 +36,11 @@ VEHICLES = {  # by folder; a path is that of a file beside the logs
     "flights": "vehicle.yaml",
     "racer": "vehicle.yaml",
 }
-MAPS = {"crazypad": "crazypad", "racer": "racer", "idsia": "written"}  # a second way to read
-# a map as a user writes one, of a table whose columns no reader knows
-WRITTEN = """
-time: {column: t, unit: s}
-position: {columns: [x_mocap, y_mocap, z_mocap], unit: m}
-attitude: {columns: [qx, qy, qz, qw], order: xyzw}
-rotors: {columns: [m1_erpm, m2_erpm, m3_erpm, m4_erpm], order: crazyflie, unit: eRPM, pole_pairs: 6}
-battery: {column: Vbat, unit: V}
-accelerometer: {columns: [ax, ay, az], unit: m/s2}
-gyro: {columns: [wx, wy, wz], unit: rad/s}
-"""
+MAPS = {  # a second way to read; one as a user writes it, of a table whose columns no reader knows
+    "crazypad": "crazypad",
+    "racer": "racer",
+    "idsia": EXCERPTS / "written.yaml",
+}
 FORM_MAPS = {"crazyflie_csv": "cflib", "racer": "racer"}
 
 
@@ -100,20 +93,8 @@ def recorded(case):
     return _recorded(path, way, vehicle_of(path), MAPS.get(path.parent.name), path.parent)
 
 
-def _map(name):
-    if name != "written":
-        return name
-    path = _written()
-    path.write_text(WRITTEN, encoding="utf-8")
-    return path
-
-
-def _written():
-    return Path(tempfile.gettempdir()) / f"windwrench-{os.getpid()}.yaml"
-
-
 def _without_paths(text, folder):
-    return text.replace(f"{folder}/", "").replace(str(_written()), "written.yaml")
+    return text.replace(f"{folder}/", "").replace(f"{EXCERPTS}/", "")
 
 
 def _recorded(path, way, vehicle, map_name, folder):
@@ -121,7 +102,7 @@ def _recorded(path, way, vehicle, map_name, folder):
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            log = read_log(path, vehicle=flown, map=_map(map_name) if way == "map" else None)
+            log = read_log(path, vehicle=flown, map=map_name if way == "map" else None)
     except InputError as error:
         return {"error": _without_paths(str(error), folder)}
     kept = {"vehicle": log.vehicle, "commanded": log.commanded, "arrays": {}}

@@ -92,84 +92,62 @@ def simulate_model(
     start[VELOCITY], start[RATE] = velocity, angular_velocity
     rng = np.random.default_rng(seed)
     steps = len(speeds)
-    process = rng.standard_normal((steps, 12))
-    for n, deviation in enumerate(
-        (tuning.motor_torque_noise, tuning.thrust_noise, tuning.torque_walk, tuning.force_walk)
-    ):
-        process[:, 3 * n : 3 * n + 3] *= np.asarray(deviation, dtype=np.float64)
+    # of a step: rotor torque and force, the walks of torque and force, attitude (16) and position
+    noise = np.hstack([rng.standard_normal((steps, 12)), rng.standard_normal((steps, 6))])
+    noise *= _deviations(
+        *(tuning.motor_torque_noise, tuning.thrust_noise, tuning.torque_walk, tuning.force_walk),
+        *(np.asarray(tuning.attitude_noise) / 4.0, tuning.position_noise),
+    )
     if push is not None:
-        process[:, 6:] += push
-    measurement = rng.standard_normal((steps, 6))
-    measurement[:, :3] *= np.asarray(tuning.attitude_noise, dtype=np.float64) / 4.0  # (16)
-    measurement[:, 3:] *= np.asarray(tuning.position_noise, dtype=np.float64)
-    states, measured = np.empty((steps, 20)), np.empty((steps, 7))
-    imu, biases = _inertial_noise(tuning, steps, seed)
+        noise[:, 6:12] += push
+    out = np.empty((steps, 33))
+    out[:, 27:], biases = _inertial_noise(tuning, steps, seed)
     record = filter_record(vehicle, tuning, period)
     drawn = rng.multivariate_normal(np.zeros(N), P, method="cholesky")
     unmix = np.ascontiguousarray(np.linalg.inv(vehicle.mixing)[:, 1:]) @ vehicle.inertia * rate_gain
     _simulate(
-        record,
-        start,
-        drawn,
-        speeds,
-        unmix,
-        vehicle.omega_max,
-        process,
-        measurement,
-        period,
-        vehicle.voltage_ref,
-        states,
-        measured,
-        imu,
+        *(record, start, drawn, speeds, unmix, vehicle.omega_max, noise, period),
+        *(vehicle.voltage_ref, out),
     )
+    states = out[:, :20].copy()
     return ModelRun(
         start=(start[POSITION], start[QUATERNION], P, start[VELOCITY], start[RATE]),
         rotor_speeds=speeds,
-        measured_position=measured[:, :3],
-        measured_quaternion=measured[:, 3:],
+        measured_position=out[:, 20:23].copy(),
+        measured_quaternion=out[:, 23:27].copy(),
         state=states,
         torque=states[:, TORQUE],
         force=states[:, FORCE],
-        gyro=imu[:, :3],
-        accelerometer=imu[:, 3:],
+        gyro=out[:, 27:30].copy(),
+        accelerometer=out[:, 30:].copy(),
         gyro_bias=biases[:, :3],
         accelerometer_bias=biases[:, 3:],
     )
 
 
+def _deviations(*each):
+    """Return deviations of three axes each, stated as one number or three, side by side."""
+    return np.concatenate([np.broadcast_to(deviation, 3) for deviation in each])
+
+
 def _inertial_noise(tuning, steps, seed):
     """Return what gyro and accelerometer (K, 6) measure beside the truth, and the biases in it."""
     rng = np.random.default_rng([seed, 1])
-
-    def deviations(gyro, accelerometer):
-        return np.concatenate([np.broadcast_to(gyro, 3), np.broadcast_to(accelerometer, 3)])
-
     walk = rng.standard_normal((steps, BIASES))
-    walk *= deviations(tuning.gyro_bias_walk, tuning.accelerometer_bias_walk)
-    walk[0] += rng.standard_normal(BIASES) * deviations(
+    walk *= _deviations(tuning.gyro_bias_walk, tuning.accelerometer_bias_walk)
+    walk[0] += rng.standard_normal(BIASES) * _deviations(
         tuning.gyro_bias_std, tuning.accelerometer_bias_std
     )
     biases = np.cumsum(walk, axis=0)
     white = rng.standard_normal((steps, BIASES))
-    return biases + white * deviations(tuning.gyro_noise, tuning.accelerometer_noise), biases
+    return biases + white * _deviations(tuning.gyro_noise, tuning.accelerometer_noise), biases
 
 
 @compiled
-def _simulate(
-    record,
-    start,
-    error,
-    speeds,
-    rate_loop,
-    fastest,
-    process,
-    measurement,
-    dt,
-    voltage,
-    states,
-    measured,
-    imu,
-):
+def _simulate(record, start, error, speeds, rate_loop, fastest, noises, dt, voltage, out):
+    """Write state, measured pose and IMU, which holds its own noise, of each step: (K, 20 + 7 + 6).
+    ``noises`` (K, 12 + 6) are those of the step and of the pose.
+    """
     f = record[0]
     x, after = f.x, f.next
     inertial = np.empty(6)
@@ -183,7 +161,7 @@ def _simulate(
         x[13 + i] = error[12 + i]
         x[16 + i] = error[15 + i]
     for k in range(len(speeds)):
-        noise = process[k]
+        noise, state, pose, imu = noises[k], out[k, :20], out[k, 20:27], out[k, 27:]
         for i in range(4):
             square = speeds[k, i] * speeds[k, i]
             for j in range(3):
@@ -209,13 +187,13 @@ def _simulate(
         for i in range(19):
             x[i] = after[i]
         f.time += dt
-        states[k] = x
-        quaternion_from_mrp(measurement[k, 0:3], f.q)
-        quaternion_multiply(f.q, x[3:7], measured[k, 3:7])
+        state[:] = x
+        quaternion_from_mrp(noise[12:15], f.q)
+        quaternion_multiply(f.q, x[3:7], pose[3:7])
         for i in range(3):
-            measured[k, i] = x[i] + measurement[k, 3 + i]
+            pose[i] = x[i] + noise[15 + i]
         # the accelerometer feels the step's noise: the torque's is in the rotors' wrench already
         expected_imu(f, x, inertial)
         for i in range(3):
-            imu[k, i] += inertial[i]
-            imu[k, 3 + i] += inertial[3 + i] + noise[3 + i] / f.body.mass
+            imu[i] += inertial[i]
+            imu[3 + i] += inertial[3 + i] + noise[3 + i] / f.body.mass

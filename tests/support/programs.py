@@ -1,7 +1,19 @@
-"""Programs that tests start."""
+"""Programs that tests start, and what they wait for."""
 
 import subprocess
 import sys
+import time
+
+
+def until(so, wait=time.sleep):
+    """Wait until it is so: for 300,000 looks, ten minutes or more. They are counted: on a busy
+    machine any time may pass between two.
+    """
+    for _ in range(300_000):
+        if so():
+            return
+        wait(0.002)
+    raise AssertionError("what was waited for has not come")
 
 
 def said(*words, **options):

@@ -4,6 +4,7 @@ states, tick by tick: an independent reference for their faster one.
 
 import numpy as np
 import scipy.linalg
+import scipy.signal
 
 from windwrench.controllers.flight import FlightGains
 from windwrench.controllers.jet_map import COUNT, FIRST, STEP, jet_map
@@ -13,15 +14,11 @@ TICKS = 16
 
 
 def kalman_gain(inertia, white, walk, measured, period):
-    """The gain that a Kalman filter of (place, rate, wrench) converges to, by letting it."""
+    """A step of (place, rate, wrench), and the gain that a Kalman filter of it converges to."""
     A = np.array([[1.0, period, 0.0], [0.0, 1.0, period / inertia], [0.0, 0.0, 1.0]])
     Q = np.diag([0.0, (period / inertia * white) ** 2, walk**2])
-    P = np.diag([measured**2, 1.0, 1.0])
-    for _ in range(4000):
-        P = A @ P @ A.T + Q
-        K = P[:, 0] / (P[0, 0] + measured**2)
-        P = P - np.outer(K, P[0])
-    return A, K
+    P = scipy.linalg.solve_discrete_are(A.T, np.eye(3)[:, :1], Q, [[measured**2]])
+    return A, P[:, 0] / (P[0, 0] + measured**2)
 
 
 def estimated(wrench, inertia, noise, measured, period, rng):
@@ -42,12 +39,9 @@ def estimated(wrench, inertia, noise, measured, period, rng):
 
 def lasting(rng, shape, time, period):
     """Noise of unit variance (n, ticks) that lasts over ``time`` s."""
-    keep = np.exp(-period / time)
-    a = np.empty(shape)
-    a[:, 0] = rng.standard_normal(shape[0])
-    for k in range(1, shape[1]):
-        a[:, k] = keep * a[:, k - 1] + np.sqrt(1 - keep**2) * rng.standard_normal(shape[0])
-    return a
+    keep, drawn = np.exp(-period / time), rng.standard_normal(shape)
+    drawn[:, 1:] *= np.sqrt(1 - keep**2)
+    return scipy.signal.lfilter([1.0], [1.0, -keep], drawn)
 
 
 def observations(fan, briefing, rng, settle=300, turns=True):

@@ -1,17 +1,25 @@
-"""Training: configurations, the update, exact resumption, and policies that fly as the learner
-would.
+"""Training: configurations, the update, exact resumption and what is refused of a spoiled folder,
+policies that fly as the learner would, and environments as stable-baselines3 sees them.
 """
 
+import io
 import json
+import os
+import pickle
+import shutil
+import zipfile
 
 import gymnasium as gym
 import numpy as np
 import pytest
 
 from tests.training.tiny import TINY
+from windwrench.controllers.features import Features, History
 from windwrench.controllers.trained_policy import TrainedPolicy, load_policy
 from windwrench.dynamics import InputError
-from windwrench.evaluation.benchmark import fly_all
+from windwrench.envs.fan_tracking import FanTrackingEnv
+from windwrench.envs.scenarios import SCENARIOS
+from windwrench.envs.vector import TaskVectorEnv
 from windwrench.training.configuration import ALGORITHMS, load_config
 
 pytest.importorskip("torch", reason="pip install 'windwrench[rl]'")
@@ -25,7 +33,7 @@ from windwrench.training.configuration import features_of
 from windwrench.training.learners import make_learner, weights_of
 from windwrench.training.run import card_of, read_progress
 from windwrench.training.train import train
-from windwrench.training.training_envs import make_training_envs
+from windwrench.training.training_envs import MixedFanTracking, make_training_envs
 from windwrench.training.vec_env import FeatureVecEnv
 
 LEARNERS = ["sac", "td3", "ppo", "recurrent-ppo"]
@@ -185,16 +193,203 @@ def test_sequences_in_one_call_are_those_of_sb3_contrib(starts):
     torch.testing.assert_close(then, expected)
 
 
-@pytest.mark.slow
-def test_sac_learns_to_track_the_fan_in_four_thousand_decisions(tmp_path):
-    config = load_config(
-        "sac", ["steps=4000", "validation.every=1000", "validation.episodes=10", "checkpoint=4000"]
+SHORT = [*TINY, "steps=120", "learner.learning_starts=20", "learner.buffer_size=500"]
+NAMES = ("checkpoint.pt", "training.json")
+
+
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("stopped") / "run"
+    train(load_config("sac", SHORT), "base", 0, folder, stop_after=60)
+    return folder
+
+
+def packed(data):
+    """Return an archive with the same members, packed."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(data)) as old, zipfile.ZipFile(out, "w", 8) as new:
+        for name in old.namelist():
+            new.writestr(name, old.read(name))
+    return out.getvalue()
+
+
+def with_state(change):
+    """Return what spoils a checkpoint by changing what it holds."""
+
+    def spoil(data):
+        state = torch.load(io.BytesIO(data), weights_only=True)
+        out = io.BytesIO()
+        torch.save(change(state), out)
+        return out.getvalue()
+
+    return spoil
+
+
+def with_text(**changes):
+    return with_state(
+        lambda state: {**state, "text": json.dumps({**json.loads(state["text"]), **changes})}
     )
-    path = str(train(config, "base", 0, tmp_path))
-    assert read_progress(tmp_path).steps == [1000, 2000, 3000, 4000]
-    results = fly_all([path], ["base"], 20, seed=0, jobs=1)
-    hover, oracle, learned = (
-        np.mean([e.rmse for e in results[name, "base"]]) for name in ("hover", "oracle", path)
+
+
+SPOILED = {
+    "empty": lambda data: b"",
+    "cut in the middle": lambda data: data[: len(data) // 2],
+    "a pickle": lambda data: pickle.dumps({"parameters": 1}),
+    "deep": lambda data: b"[" * 100_000,
+}
+CHECKPOINTS = {
+    "packed": packed,
+    "no mapping": with_state(lambda state: [1, 2]),
+    "lacks an entry": with_state(
+        lambda state: {name: value for name, value in state.items() if name != "counters"}
+    ),
+    "a text for tensors": with_state(lambda state: {**state, "replay": "none"}),
+    "a tensor of no memory": with_state(
+        lambda state: {**state, "numpy": torch.zeros(1, dtype=torch.int64).expand(10**9)}
+    ),
+    "episodes of other environments": with_text(episode=[0, 0, 0]),
+    "progress of another kind": with_text(extra={"steps": 3}),
+    "progress that is a list": with_text(extra=[1]),
+    "no generator": with_text(numpy=["MT19937"]),
+    "counters of another kind": with_state(lambda state: {**state, "counters": 5}),
+}
+CASES = [(name, how) for name in NAMES for how in SPOILED] + [
+    ("checkpoint.pt", how) for how in CHECKPOINTS
+]
+
+
+@pytest.mark.parametrize(("name", "how"), CASES, ids=[f"{n}, {h}" for n, h in CASES])
+def test_a_spoiled_file_is_named_in_one_line(name, how, stopped, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(stopped, folder)
+    path = folder / name
+    path.write_bytes((SPOILED | CHECKPOINTS)[how](path.read_bytes()))
+    with pytest.raises(InputError) as refused:
+        train(load_config("sac", SHORT), "base", 0, folder)
+    message = str(refused.value)
+    assert message.startswith((f"{path}: ", f"{folder}: "))
+    assert len(message) < 700
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_pipe_in_its_place_is_refused_at_once(name, stopped, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(stopped, folder)
+    (folder / name).unlink()
+    os.mkfifo(folder / name)
+    with pytest.raises(InputError, match=f"{name}: is a pipe"):
+        train(load_config("sac", SHORT), "base", 0, folder)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "7", '{"steps": 1}', '{"steps": ["a"]}', '{"x": 1}'])
+def test_progress_of_another_kind_is_refused(text, tmp_path):
+    (tmp_path / "progress.json").write_text(text)
+    with pytest.raises(InputError, match=r"progress\.json: "):
+        read_progress(tmp_path)
+
+
+FEATURES = Features(("torque_z", "force_x", "velocity_y", "command"), 3)
+
+
+def seed_of(environment, episode):
+    return 100 * environment + episode
+
+
+def make(count, limit, scenario="static"):
+    return FeatureVecEnv(TaskVectorEnv(count, limit, scenario=scenario), FEATURES, seed_of)
+
+
+def away(seed):
+    """The direction in which the vehicle stands off the axis."""
+    _, info = FanTrackingEnv("static").reset(seed=seed)
+    return float(np.sign(info["offset"]))
+
+
+def lone_flight(seed, commands, scenario="static"):
+    """Features, rewards and losses of a single environment, computed by itself."""
+    env, history = FanTrackingEnv(scenario), History(FEATURES, 1)
+    observation, info = env.reset(seed=seed)
+    history.restart(FEATURES.frames(observation[None]), [0])
+    seen, rewards = [history.flat()[0]], []
+    for command in commands:
+        observation, reward, lost, _, info = env.step(np.array([command], dtype=np.float32))
+        history.push(FEATURES.frames(observation[None]))
+        seen.append(history.flat()[0])
+        rewards.append(reward)
+        if lost:
+            break
+    return np.array(seen), np.array(rewards), info["lost"]
+
+
+def test_each_environment_ends_by_itself_with_its_own_last_observation():
+    limit = 30
+    env, direction = make(3, limit), away(seed_of(1, 0))
+    first, _, lost = lone_flight(seed_of(1, 0), [direction] * limit)
+    assert lost
+    gone = len(first) - 1
+    assert 5 < gone < limit
+    seen = env.reset()
+    np.testing.assert_array_equal(seen[1], first[0])
+    still, _, _ = lone_flight(seed_of(0, 0), [0.0] * limit)
+    for k in range(1, limit + 1):
+        seen, _, dones, infos = env.step(
+            np.array([[0.0], [direction if k <= gone else 0.0], [0.0]])
+        )
+        assert dones.tolist() == [k == limit, k == gone, k == limit]
+        assert ["terminal_observation" in info for info in infos] == dones.tolist()
+        if k == gone:
+            np.testing.assert_array_equal(infos[1]["terminal_observation"], first[-1])
+            assert infos[1]["TimeLimit.truncated"] is False
+            assert infos[1]["episode"]["l"] == gone
+            np.testing.assert_array_equal(
+                seen[1], lone_flight(seed_of(1, 1), [])[0][0]
+            )  # its next episode's first
+            np.testing.assert_array_equal(seen[0], still[k])  # nobody else's changed
+        if k == limit:
+            for i in (0, 2):
+                assert infos[i]["TimeLimit.truncated"] is True
+            np.testing.assert_array_equal(infos[0]["terminal_observation"], still[-1])
+            np.testing.assert_array_equal(seen[0], lone_flight(seed_of(0, 1), [])[0][0])
+    assert not np.array_equal(infos[0]["terminal_observation"], infos[2]["terminal_observation"])
+
+
+def test_a_vehicle_lost_at_the_last_moment_was_lost_not_out_of_time():
+    direction = away(seed_of(0, 0))
+    gone = len(lone_flight(seed_of(0, 0), [direction] * 60)[0]) - 1
+    env = make(1, gone)
+    env.reset()
+    for _ in range(gone):
+        _, _, dones, infos = env.step(np.array([[direction]]))
+    assert dones[0]
+    assert infos[0]["TimeLimit.truncated"] is False
+
+
+def test_rewards_are_weighted_terms():
+    commands = [0.5, -0.5, 0.2]
+    _, rewards, _ = lone_flight(seed_of(0, 0), commands)
+    env = make(1, 50)
+    env.reset()
+    np.testing.assert_allclose(
+        [env.step(np.array([[c]]))[1][0] for c in commands], rewards, rtol=1e-6
     )
-    assert learned < hover - 0.5 * (hover - oracle)
-    assert not any(e.lost for e in results[path, "base"])
+    squared = FeatureVecEnv(
+        TaskVectorEnv(1, 50, scenario="static"),
+        FEATURES,
+        seed_of,
+        {"tracking": 0.0, "change": 0.0, "squared": 1.0},
+    )
+    squared.reset()
+    assert squared.step(np.array([[0.0]]))[1][0] == pytest.approx(-0.64, abs=0.1)  # about 0.8 m off
+
+
+def test_the_scenario_of_a_mixed_episode_says_nothing_of_its_motion():
+    env = MixedFanTracking(("base", "fast"), estimator="constant-gain")
+    moved = {"base": set(), "fast": set()}
+    for seed in range(60):
+        _, info = env.reset(seed=seed)
+        moved["base" if env.scenario is SCENARIOS["base"] else "fast"].add(info["fan_motion"])
+    assert moved == {
+        "base": {"sine", "triangle", "ramp", "still"},
+        "fast": {"sine", "triangle", "ramp"},
+    }

@@ -10,10 +10,9 @@ from typer.testing import CliRunner
 from tests.support.data_paths import excerpt
 from tests.support.flown import VEHICLE, recorded
 from windwrench.cli import app
-from windwrench.dynamics import InputError
 from windwrench.identification.comparison.change import NOWHERE, SOMETHING_ELSE, compare
 from windwrench.identification.comparison.sessions import SCATTER, difference
-from windwrench.identification.comparison.trim import Trim, trim_of, trim_of_log
+from windwrench.identification.comparison.trim import Trim, trim_of_log
 from windwrench.identification.comparison.words import change_headline, write_change
 
 ROTORS = (
@@ -144,19 +143,6 @@ def test_simulated_changes_are_named_without_a_true_model(effects, place, tmp_pa
     assert place in said["headline"]
     assert picture.stat().st_size > 5000
     assert compare(before, before).place == NOWHERE
-
-
-def test_flights_that_say_nothing_are_refused():
-    t = 0.01 * np.arange(500)
-    with pytest.raises(InputError, match="0 s of calm flight; expected at least 3 s"):
-        trim_of("log.csv", t, np.ones((500, 4)), np.zeros(500, dtype=bool))
-    with pytest.raises(InputError, match="expected four positive numbers"):
-        trim_of("log.csv", t, np.zeros((500, 4)), np.ones(500, dtype=bool))
-    with pytest.raises(InputError, match="at least one flight in each"):
-        compare([], [Trim("a", np.ones(4), 5.0)])
-    log = recorded("gentle", 12.0)
-    with pytest.raises(InputError, match="flight: 0 s of calm flight"):
-        trim_of_log(replace(log, rotor_speeds=0.0 * log.rotor_speeds), VEHICLE)
 
 
 def test_another_battery_voltage_makes_the_total_less_certain():

@@ -1,5 +1,7 @@
 """The rows of flights with measured rotors: torques, a pose that was filtered, and an IMU alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from windwrench.identification.diagnosis.row_nuisances import answered, follower
 from windwrench.identification.diagnosis.row_ranking import rank_by_rows
 from windwrench.identification.diagnosis.rows import Rows
 from windwrench.identification.diagnosis.worth import worth
+from windwrench.runtime.errors import InputError
 from windwrench.studies.trials.logged_poses import FILTERS
 from windwrench.studies.trials.practice_flights import fly_practice
 
@@ -99,3 +102,22 @@ def test_a_share_of_what_follows_disturbances_counts_as_one(weak):
 def size_like(x):
     """Return alternating rows of the shape of ``x`` with a standard deviation of one."""
     return np.where(np.arange(len(x))[:, None] % 2 == 0, 1.0, -1.0) * np.ones_like(x)
+
+
+def test_what_a_few_positions_add():
+    """Drag is identifiable beside ten positions a second, and not by the IMU alone; effects on the
+    pose itself are in neither.
+    """
+    log = imu_flight(VEHICLE, seconds=15.0, trajectory="fast")
+    alone, placed = (Flights([pose_removed(log, n)], VEHICLE) for n in (0, 20))
+    pose_effects = {"world_tilt", "marker_offset", "clock_offset", "attitude_gain"}
+    assert pose_effects <= alone.needs_pose & placed.needs_pose
+    assert {"rotor_drag", "wind", "fan_jet"} <= alone.needs_pose
+    assert "rotor_drag" not in placed.not_identifiable
+    assert not {"rotor_efficiency", "motor_lag", "inertia"} & alone.not_identifiable
+
+
+def test_a_pose_and_an_imu_are_not_mixed():
+    log = imu_flight(VEHICLE, seconds=5.0)
+    with pytest.raises(InputError, match="expected the IMU in all of them"):
+        Flights([pose_removed(log), replace(log, gyro=None, accelerometer=None)], VEHICLE)

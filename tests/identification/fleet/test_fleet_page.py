@@ -5,6 +5,7 @@ searches.
 import csv
 import json
 import re
+from pathlib import Path
 
 import pytest
 
@@ -118,27 +119,13 @@ def test_a_browser_shows_the_page(folder, tmp_path, width, dark):
     assert found["text"].count("drifts") == 1
 
 
-_CLICKS = """<script>{
-const box = document.querySelector("input");
-const left = table => [...document.querySelectorAll(table + " tbody tr")].filter(r => !r.hidden);
-const shown = table => left(table).map(row => row.cells[1].textContent);
-const type = text => { box.value = text; box.dispatchEvent(new Event("input")); };
-const told = [];
-type("alpha flight1"); told.push(shown("#flights"));
-type("DIED"); told.push([shown("#flights").length, shown("#refused").length]);
-type("");
-const heads = [...document.querySelectorAll("#flights th button")];
-const head = heads.find(button => button.textContent === "Flight");
-head.click(); told.push(shown("#flights").slice(0, 3));
-head.click(); told.push(shown("#flights").slice(0, 3));
-document.title = "told " + JSON.stringify(told);
-document.body.prepend(document.title);
-}</script></body>"""
+CLICKS = Path(__file__).with_name("clicks.js").read_text(encoding="utf-8")
 
 
 @needs_browser
 def test_the_page_sorts_and_searches(folder, tmp_path):
-    page = (folder / "fleet.html").read_text(encoding="utf-8").replace("</body>", _CLICKS)
+    page = (folder / "fleet.html").read_text(encoding="utf-8")
+    page = page.replace("</body>", f"<script>{{{CLICKS}}}</script></body>")
     found = look(page, 1200, tmp_path)
     told = re.search(r"told (\[.*\])", found["text"])[1]
     assert json.loads(told) == [

@@ -1,0 +1,87 @@
+"""Rotor faults: the streams on the grid, simulated flights, and measured logs."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from tests.support.data_paths import data_file
+from tests.support.golden_identification import failing_flight
+from windwrench.cli import app
+from windwrench.dynamics import InputError
+from windwrench.identification.comparison.fault_channels import Channels, channels_of_log, sample
+from windwrench.identification.comparison.fault_detection import find_fault
+from windwrench.identification.comparison.words import fault_data, fault_headline
+from windwrench.identification.logs.streams import Stream
+
+
+def hover(seconds=8.0, rate=200.0, command_rate=200.0, **changed):
+    rng = np.random.default_rng(0)
+    t, u = np.arange(0.0, seconds, 1.0 / rate), np.arange(0.0, seconds, 1.0 / command_rate)
+    streams = {
+        "gyro": 0.01 * rng.standard_normal((len(t), 3)),
+        "accelerometer": np.tile([0.0, 0.0, 9.81], (len(t), 1)),
+        "command": np.full((len(u), 4), 0.4),
+    } | changed
+    times = {"command": u}
+    return Channels("hover.csv", *(Stream(k, times.get(k, t), x) for k, x in streams.items()))
+
+
+def test_nothing_is_read_behind_a_clipped_gyro_or_an_impact():
+    t = np.arange(0.0, 8.0, 0.005)
+    clipped = np.zeros((len(t), 3))
+    clipped[:, 0] = np.clip(40.0 * (t - 6.0), 0.0, 500.0 * np.pi / 180.0)
+    samples = sample(hover(gyro=clipped))
+    assert samples.ended == "the gyro was at its limit"
+    assert samples.t[-1] == pytest.approx(6.0 + 8.73 / 40.0, abs=0.03)
+    hit = np.tile([0.0, 0.0, 9.81], (len(t), 1))
+    hit[t > 7.0, 1] = 90.0
+    samples = sample(hover(accelerometer=hit))
+    assert samples.ended == "the vehicle hit something"
+    assert samples.t[-1] < 7.0
+    turning = np.zeros((len(t), 3))
+    turning[:, 2] = 2.0  # a steady turn is no clipped gyro
+    assert sample(hover(gyro=turning)).ended == ""
+
+
+def test_what_cannot_show_a_fault_is_refused():
+    with pytest.raises(InputError, match=r"hover\.csv: 0 s in flight; expected at least 3 s"):
+        sample(hover(seconds=1.4))
+    with pytest.raises(InputError, match="fewer than ten samples"):
+        sample(hover(seconds=0.04))
+
+
+def test_a_failing_rotor_is_named_with_its_time():
+    found = find_fault(channels_of_log(failing_flight()))
+    assert found.likeliest == "3"
+    assert found.sure
+    assert found.onset[1] <= 9.0 <= found.onset[2]
+    assert found.onset[2] - found.onset[1] < 0.1
+    assert 0.2 < 1.0 - found.remaining[0] < 0.6
+    said = fault_headline(found)
+    assert "Rotor 3 (" in said
+    assert fault_data(found)["rotor"] == 3
+    assert json.dumps(fault_data(found))
+
+
+@pytest.mark.measured
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "commanded"),
+    [("TestCase_3_1000000002.ulg", 35.365), ("TestCase_3_2000000002.ulg", 54.416)],
+)
+def test_a_px4_log_names_the_motor_and_the_time(name, commanded, tmp_path):
+    """The fault's command is logged at 10 Hz: it came up to 0.1 s before what is logged."""
+    log = data_file(f"motor_faults/{name}")
+    result = CliRunner().invoke(
+        app, ["diagnose", str(log), "--rotor-faults", "--out", str(tmp_path)]
+    )
+    assert result.exit_code == 0, result.output
+    (found,) = json.loads((tmp_path / "rotor_faults.json").read_text(encoding="utf-8"))
+    assert found["found"] == "rotor 4"
+    assert found["motor"] == "PX4 motor 1"
+    assert found["sure"]
+    assert commanded - 0.12 < found["onset_s"] < commanded
+    assert found["remaining_ci95"][0] <= 0.2 <= found["remaining_ci95"][1]
+    assert (tmp_path / "rotor_faults.png").stat().st_size > 5000

@@ -1,0 +1,146 @@
+"""Parts of a diagnosis, each by itself: what carries a finding, what may stand for another, where a
+search starts, and delays of rotors.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.support.flown import VEHICLE, recorded
+from tests.support.own_effects import HOSE, joined
+from windwrench.dynamics import EffectSetting, load_vehicle
+from windwrench.identification.diagnosis.carrying_channels import ORDER, carrying_channels
+from windwrench.identification.diagnosis.commanded_rotors import COMMANDED, in_flight_by_thrust
+from windwrench.identification.diagnosis.composite import composites
+from windwrench.identification.diagnosis.log_offsets import LAG_ASYMMETRY
+from windwrench.identification.diagnosis.ranking import rank
+from windwrench.identification.diagnosis.regression import Flights
+from windwrench.identification.diagnosis.starting_points import starting_points
+from windwrench.identification.diagnosis.turning_delay import turning_delay
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.motion.signals import log_signals
+from windwrench.identification.motion.smoothing import low_pass
+from windwrench.studies.trials.practice_flights import fly_practice
+
+CASES = {
+    "constant_torque": ({"tx": 0.01, "ty": 0.01, "tz": 0.0}, {"attitude"}, {"rotor speeds"}),
+    "rotor_drag": ({"kdx": 1e-4, "kdy": 1e-4}, {"position", "attitude", "rotor speeds"}, set()),
+    "battery_sag": ({"n": 1.0}, {"position", "rotor speeds", "battery voltage"}, {"gyro"}),
+    "mass": ({"dm": 0.05}, {"position"}, {"battery voltage"}),
+}
+
+
+@pytest.mark.parametrize("effect", CASES)
+def test_channels_are_those_of_the_trace_and_of_the_model(effect):
+    coefficients, carried, others = CASES[effect]
+    log = recorded(seconds=12.0, **{effect: coefficients})
+    found = carrying_channels(Flights([log], VEHICLE), {effect: coefficients}, effect)
+    assert carried <= set(found)
+    assert not others & set(found)
+    assert list(found) == [channel for channel in ORDER if channel in found]
+
+
+LIGHTER = {"mass": {"dm": -0.1 * VEHICLE.mass}}
+WEAKER = {"thrust_scale": {"s": -0.1}}
+SLUGGISH = {"inertia": {"jx": -0.1, "jy": -0.1, "jz": -0.1}}
+STIFFER = {"inertia": {"jx": 0.1, "jy": 0.1, "jz": 0.1}}
+
+
+@pytest.mark.parametrize(
+    ("setting", "third"),
+    [
+        (LIGHTER | WEAKER, "inertia"),
+        (WEAKER | SLUGGISH, "mass"),
+        (LIGHTER | SLUGGISH, "thrust_scale"),
+        (LIGHTER | STIFFER, ""),
+        (LIGHTER, ""),
+    ],
+)
+def test_two_that_change_alike_may_be_a_third(setting, third):
+    std = {effect: dict.fromkeys(values, 0.002) for effect, values in setting.items()}
+    found = composites(VEHICLE, setting, std)
+    assert len(found) == bool(third)
+    assert all(third in sentence.split(": ")[1] for sentence in found)
+
+
+STARTS = "starting_points=lambda flights: [{'a': 0.15, 'w': 1.25 + 0.125 * i} for i in range(60)]"
+
+
+def test_of_many_starts_those_are_tried_that_resemble_the_flight(tmp_path):
+    (tmp_path / "hose.py").write_text(HOSE.replace("# more", STARTS))
+    with joined(tmp_path):
+        hose = EffectSetting("hose", {"a": 0.3, "w": 5.0})
+        flights = Flights([fly_practice(VEHICLE, (hose,), "hover", 15.0, seed=1)], VEHICLE)
+        starts = starting_points("hose", flights, flights.residual({}), {})
+    assert len(starts) < 10
+    assert abs(starts[0]["w"] - 5.0) < 0.19
+
+
+def still(seconds=10.0, rate=200.0, speeds=None):
+    n = round(seconds * rate) + 1
+    return FlightLog(
+        np.arange(n) / rate,
+        np.tile([0.0, 0.0, 1.0], (n, 1)),
+        np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)),
+        np.full((n, 4), VEHICLE.hover_rate) if speeds is None else speeds,
+    )
+
+
+def test_only_the_time_in_the_air_counts():
+    log = still(20.0)
+    speeds = log.rotor_speeds.copy()
+    speeds[(log.t < 4.0) | (log.t > 15.0)] *= 0.3
+    found = in_flight_by_thrust(still(20.0, speeds=speeds), VEHICLE)
+    # taking off and landing last beyond
+    assert found.t[0] == pytest.approx(4.0 + COMMANDED.take_off, abs=0.5)
+    assert found.t[-1] == pytest.approx(15.0 - COMMANDED.take_off, abs=0.5)
+    whole = in_flight_by_thrust(log, VEHICLE)
+    assert len(whole.t) == len(log.t)
+
+
+def flown_signals(vehicle, **effects):
+    return log_signals(recorded(seed=3, vehicle=vehicle, **effects))
+
+
+@pytest.mark.parametrize("vehicle", ["ardrone2", "crazyflie"])
+def test_the_delay_that_was_flown(vehicle):
+    model = load_vehicle(vehicle)
+    found = turning_delay(flown_signals(model, latency={"d": 0.035}), model)
+    assert found is not None
+    assert found.seconds == pytest.approx(0.035, abs=0.004)
+    assert found.std < 0.004
+
+
+def test_moments_of_another_flight_show_no_delay():
+    model = load_vehicle("ardrone2")
+    pieces = [
+        replace(s, rotor_speeds=np.ascontiguousarray(s.rotor_speeds[::-1]))
+        for s in flown_signals(model)
+    ]
+    assert turning_delay(pieces, model) is None
+    assert turning_delay([], model) is None
+
+
+TAU, APART = 0.03, 0.008  # s: 22 ms up, 38 ms down
+
+
+def unevenly_lagging(commanded):
+    """A flight, and its log with the commands that such a lag turns into its rotor speeds."""
+    log = recorded(seed=3)
+    speeds = low_pass(log.rotor_speeds, 12.0, log.period)
+    rate = np.gradient(speeds, log.period, axis=0)
+    tau = np.where(rate > 0.0, TAU - APART, TAU + APART)
+    return replace(log, rotor_speeds=speeds + tau * rate if commanded else speeds)
+
+
+def test_a_lag_that_is_uneven_leaves_no_mass():
+    """The mass is that of a fit to the rotor speeds themselves, which are smoothed here."""
+    library = ["motor_lag", "mass"]
+    known = rank(Flights([unevenly_lagging(commanded=False)], VEHICLE), library).ranking.sets[0]
+    found = rank(Flights([unevenly_lagging(commanded=True)], VEHICLE), library)
+    assert found.setting["motor_lag"]["tau"] == pytest.approx(TAU, abs=0.006)
+    apart, _ = found.posterior.nuisances()[LAG_ASYMMETRY]
+    assert 0.5 * APART < apart < 1.5 * APART
+    off = [x.coefficients.get("mass", {"dm": 0.0})["dm"] for x in (found.ranking.sets[0], known)]
+    assert abs(off[0] - off[1]) < 0.001 * VEHICLE.mass

@@ -1,0 +1,204 @@
+"""The motion that a log shows, by its poses or by an IMU, whether its pose was filtered, and the
+residual, which is Newton's and Euler's balance.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfilt
+from scipy.spatial.transform import Rotation
+
+from tests.support.flown import VEHICLE, recorded
+from windwrench.dynamics import EffectSetting, InputError, load_vehicle, preset_names
+from windwrench.dynamics.effects import compile_effects
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.motion.inertial_fusion import Readings, fuse
+from windwrench.identification.motion.noise_spectrum import (
+    filtering_notes,
+    noise_spectra,
+    pose_was_filtered,
+)
+from windwrench.identification.motion.residual import residual_wrench
+from windwrench.identification.motion.signals import log_signals
+from windwrench.studies.trials.logged_poses import FILTERS
+from windwrench.studies.trials.practice_flights import fly_practice
+
+AMENDED = VEHICLE.with_effects(
+    EffectSetting("mass", {"dm": 0.05}),
+    EffectSetting("inertia", {"jx": 0.1, "jy": -0.2, "jz": 0.3}),
+    EffectSetting("com_offset", {"cx": 0.01, "cy": 0.003, "cz": -0.02}),
+)
+
+
+@pytest.fixture(scope="module")
+def flown():
+    (signals,) = log_signals(fly_practice(VEHICLE, seconds=6.0, seed=1))
+    return signals
+
+
+def test_the_residual_is_newton_and_euler(flown):
+    body = compile_effects(AMENDED).vehicle
+    rotors = body.rotor_wrench(flown.rotor_speeds)
+    R, omega, alpha = flown.rotation, flown.angular_velocity, flown.angular_acceleration
+    centre = np.cross(alpha, body.com) + np.cross(omega, np.cross(omega, body.com))
+    acceleration = (
+        flown.acceleration
+        + np.array([0.0, 0.0, AMENDED.gravity])
+        + np.einsum("nij,nj->ni", R, centre)
+    )
+    force = body.mass * acceleration - R[:, :, 2] * rotors[:, :1]
+    momentum = omega @ body.inertia.T
+    thrust = rotors[:, :1] * [0.0, 0.0, 1.0]
+    torque = alpha @ body.inertia.T + np.cross(omega, momentum)
+    torque -= rotors[:, 1:] - np.cross(body.com, thrust)
+    np.testing.assert_allclose(
+        residual_wrench(flown, AMENDED), np.column_stack([force, torque]), atol=1e-10
+    )
+
+
+def test_a_gap_ends_a_piece_and_a_lost_sample_does_not():
+    log = recorded(seconds=12.0)
+    valid = np.ones(len(log.t), dtype=bool)
+    valid[500:503] = False
+    valid[1200:1300] = False
+    pieces = log_signals(replace(log, valid=valid))
+    assert [round(piece.t[-1] - piece.t[0], 1) for piece in pieces] == [6.0, 5.5]
+    with pytest.raises(InputError, match="3 s"):
+        log_signals(replace(log, valid=np.arange(len(log.t)) < 300))
+
+
+@pytest.fixture(scope="module", params=["excite", "hover"])
+def log(request):
+    return recorded(request.param, 15.0, 5)
+
+
+@pytest.mark.parametrize("name", list(FILTERS))
+def test_what_was_filtered_is_recognised_and_what_was_not_is_not(log, name):
+    filtered = FILTERS[name](log, VEHICLE)
+    assert pose_was_filtered(filtered) == (name != "as measured")
+    notes = filtering_notes(filtered)
+    assert [note.partition(" filtered before the log was written")[0] for note in notes] == (
+        [] if name == "as measured" else ["the position and attitude were"]
+    )
+    assert all("so the noise floor is a lower bound" in note for note in notes)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_white_noise_is_level(seed):
+    rng = np.random.default_rng(seed)
+    n = 2000
+    spin = 0.005 * rng.standard_normal((n, 3))
+    quaternion = np.column_stack([np.sqrt(1.0 - np.sum(spin**2, axis=1)), spin])
+    position = 0.001 * rng.standard_normal((n, 3)) + np.sin(np.arange(n) / 100.0)[:, None]
+    speeds = 400.0 + rng.standard_normal((n, 4))
+    noise = noise_spectra(FlightLog(np.arange(n) / 200.0, position, quaternion, speeds))
+    assert [x.channel for x in noise] == ["position", "attitude", "rotor speeds"]
+    for x in noise:
+        assert abs(x.slope) < 0.5
+        assert abs(x.fall - 1.0) < 0.25
+        assert not x.filtered
+
+
+def test_channels_are_asked_one_by_one(log):
+    rng = np.random.default_rng(1)
+    white = rng.standard_normal((len(log.t), 3))
+    gyro = np.full_like(white, np.nan)  # not read in every row
+    gyro[::2] = sosfilt(butter(2, 0.1, output="sos"), white[::2], axis=0)
+    made = replace(log, accelerometer=white, gyro=gyro)
+    (note,) = filtering_notes(made)
+    assert note.startswith("the gyro was filtered before the log was written")
+    assert "Its noise cannot be read from this log" in note
+    assert not pose_was_filtered(made)
+
+
+def test_a_log_that_is_short_or_still_says_nothing():
+    n = 300
+    still = FlightLog(
+        np.arange(n) / 100.0,
+        np.zeros((n, 3)),
+        np.tile([1.0, 0, 0, 0], (n, 1)),
+        np.full((n, 4), 400.0),
+    )
+    assert noise_spectra(still) == []
+    assert filtering_notes(still) == ()
+
+
+@pytest.mark.parametrize("vehicle", preset_names())
+@pytest.mark.parametrize("trajectory", ["hover", "fast"])
+def test_a_rotor_s_own_lag_is_no_filter(vehicle, trajectory):
+    log = recorded(trajectory, 15.0, 5, vehicle=load_vehicle(vehicle))
+    assert filtering_notes(log) == ()
+    smoothed = sosfilt(butter(1, 0.2, output="sos"), log.rotor_speeds, axis=0)
+    (note,) = filtering_notes(replace(log, rotor_speeds=np.abs(smoothed)))
+    assert note.startswith("the rotor speeds were filtered before the log was written")
+
+
+PERIOD, GRAVITY = 0.005, 9.81
+GYRO_BIAS, FORCE_BIAS = np.array([0.01, -0.02, 0.015]), np.array([0.05, -0.1, 0.08])
+
+
+@pytest.fixture(scope="module")
+def motion():
+    """Waves in a room for 40 s, tilted towards the acceleration, from a heading of 2 rad; sensors
+    with white noise and biases.
+    """
+    t = np.arange(0.0, 40.0, PERIOD)
+    wave = np.array([0.9, 0.7, 1.3])
+    position = np.sin(np.outer(t, wave)) * [1.0, 1.5, 0.2]
+    velocity = np.cos(np.outer(t, wave)) * [1.0, 1.5, 0.2] * wave
+    acceleration = -position * wave**2
+    felt = acceleration + np.array([0.0, 0.0, GRAVITY])
+    up = felt.copy()
+    up /= np.linalg.norm(up, axis=1)[:, None]
+    heading = 2.0 + 0.5 * np.sin(0.3 * t)
+    forward = np.column_stack([np.cos(heading), np.sin(heading), np.zeros_like(t)])
+    left = np.cross(up, forward)
+    left /= np.linalg.norm(left, axis=1)[:, None]
+    rotation = np.stack([np.cross(left, up), left, up], axis=2)
+    turned = Rotation.from_matrix(rotation)
+    rate = (turned[:-1].inv() * turned[1:]).as_rotvec() / PERIOD
+    rate = np.vstack([rate[:1], 0.5 * (rate[1:] + rate[:-1]), rate[-1:]])
+    rng = np.random.default_rng(0)
+    force = turned.inv().apply(felt)
+    return {
+        "t": t,
+        "position": position,
+        "velocity": velocity,
+        "rotation": rotation,
+        "gyro": rate + GYRO_BIAS + 0.005 * rng.standard_normal(rate.shape),
+        "force": force + FORCE_BIAS + 0.1 * rng.standard_normal(force.shape),
+        "noise": rng.standard_normal(position.shape),
+    }
+
+
+def tilt_error(rotation, truth):
+    """Angle (rad) between the verticals of two attitudes, in body axes."""
+    return np.linalg.norm(rotation[:, 2] - truth[:, 2], axis=1)
+
+
+def test_an_imu_alone_keeps_the_vertical(motion):
+    """Tilt within some mrad, as it says; heading from zero, and velocity not known."""
+    fused = fuse(motion["t"], motion["gyro"], motion["force"], GRAVITY, (0.005, 0.1))
+    at = np.searchsorted(motion["t"], fused.t - 1e-9)
+    error = tilt_error(fused.rotation, motion["rotation"][at])
+    assert np.sqrt(np.mean(error**2)) < 0.02
+    assert np.mean(error < 2.5 * np.hypot(fused.std[:, 0], fused.std[:, 1])) > 0.95
+    assert abs(Rotation.from_matrix(fused.rotation[0]).as_euler("ZYX")[0]) < 0.1
+    assert (fused.std[:, 3:6] > 4.0).all()
+
+
+def test_ten_positions_a_second_show_heading_velocity_and_biases(motion):
+    every = slice(None, None, 20)
+    placed = motion["position"][every] + 0.002 * motion["noise"][every]
+    positions = Readings(motion["t"][every], placed, 0.002)
+    fused = fuse(motion["t"], motion["gyro"], motion["force"], GRAVITY, (0.005, 0.1), positions)
+    at = np.searchsorted(motion["t"], fused.t - 1e-9)
+    off = Rotation.from_matrix(
+        np.swapaxes(motion["rotation"][at], 1, 2) @ fused.rotation
+    ).as_rotvec()
+    assert np.abs(off).max() < 0.02
+    z = (fused.velocity - motion["velocity"][at]) / fused.std[:, 3:6]
+    assert 0.3 < np.sqrt(np.mean(z**2)) < 2.0
+    assert np.abs(fused.gyro_bias[len(at) // 2] - GYRO_BIAS).max() < 0.002
+    assert np.abs(fused.accelerometer_bias[len(at) // 2] - FORCE_BIAS).max() < 0.03
