@@ -26,7 +26,7 @@ from ..motion.sensing_effects import undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, log_signals
 from ..motion.smoothing import continuous, turn_between, turned
-from .axis_filter import AXIS, AxisFlight, AxisNoise, likeliest_noise, steady_noise
+from .axis_filter import AXIS, AxisNoise, likeliest_noise, steady_noise
 from .causal_filter import Poses, Track, run, sensitivities
 from .discrepancy import changing_columns, discrepancy_columns, variables
 from .log_offsets import (
@@ -221,9 +221,17 @@ class Likelihood:
             ]
             now = self.noise[axis]
             own = [np.ascontiguousarray(x[:, axis, say]) for x in jumps]
-            flight = AxisFlight(measured, drives, rates, self.period, own, jump_state[say])
             found, gains = likeliest_noise(
-                flight, replace(now, white=max(float(white[axis]), now.white)), begun
+                measured,
+                drives,
+                rates,
+                self.period,
+                max(float(white[axis]), now.white),
+                now.pose,
+                now.disturbance,
+                own,
+                jump_state[say],
+                now.time if begun else None,
             )
             out.append(found)
             for x, jump in zip(known, own, strict=True):

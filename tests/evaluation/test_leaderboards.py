@@ -55,11 +55,11 @@ def flown():
 
 
 def tolerance(controller):
-    """Return by what part of a number, and by how much, another processor may differ: between two
-    that were tried laws by 1e-7, and policies, whose sums of single precision each orders by
-    itself, by 2.1 % of an end of an interval.
+    """Return by what part of a number, and by how much, another processor may differ: of three that
+    were tried a law in turbulence by 5e-5, and policies, whose sums of single precision each orders
+    by itself, by 2.1 % of an end of an interval.
     """
-    return (5e-2, 1e-2) if re.search(r"^(sac|gru|recurrent)", controller) else (1e-6, 1e-9)
+    return (5e-2, 1e-2) if re.search(r"^(sac|gru|recurrent)", controller) else (2e-4, 1e-9)
 
 
 @pytest.mark.parametrize("task", mostly_slow(TASKS, lambda task: task != "WindTrajectory"))
