@@ -335,7 +335,7 @@ def _picture(kept: Mapping[str, tuple[FlightLog, Diagnosis]], path: Path) -> Non
                     label=words,
                 )
             panel.set_title(f"{name.split('_')[0]}, {axis}" + (", mean removed" if i < 2 else ""))
-    panels[0, 0].legend()
+    panels[0, 2].legend(loc="center")
     figure.supylabel("residual (m/s2)")
     figure.supxlabel("time in the air (s)")
     write_png(figure, path)
