@@ -1,6 +1,7 @@
 """Rotor faults: the streams on the grid, simulated flights, and measured logs."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -50,6 +51,9 @@ def test_what_cannot_show_a_fault_is_refused():
         sample(hover(seconds=1.4))
     with pytest.raises(InputError, match="fewer than ten samples"):
         sample(hover(seconds=0.04))
+    for absent in ("gyro", "accelerometer"):
+        with pytest.raises(InputError, match="no gyro or no accelerometer"):
+            channels_of_log(replace(failing_flight(), **{absent: None}))
 
 
 def test_a_failing_rotor_is_named_with_its_time():
