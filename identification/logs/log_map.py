@@ -13,6 +13,9 @@ columns the log has, with numbers in them.
 * ``notes``: said of every log
 * ``world``: enu (z up; also nwu, flu), ned (z down; also frd), y_up (motion capture)
 * ``body``: flu (forward, left, up), frd (forward, right, down) or y_up (forward, up, right)
+* ``rows``, of a table: mixed (default: fields may be empty where a channel has no sample) or whole
+  (every field of a pose is filled, or all are empty; times strictly increase; every row is one of
+  the log's); messages, of a recording, as mixed, and a position that stands still is one
 * ``stray_rows``: how many rows at the start are dropped, at most, where a gap follows them
 * ``time``: column (numbers, dates or times of day), unit (s, ms, us, ns, min), nanoseconds (column
   beside one of whole seconds), offset (s; default: the flight begins at 0); or rate_hz alone, where
@@ -28,7 +31,7 @@ columns the log has, with numbers in them.
   those at front-left, rear-left, rear-right, front-right), unit (rad/s, rpm, Hz, eRPM with
   pole_pairs)
 * ``commands``: columns, order, unit (us, normalised, duty, percent, dshot, counts), range (what
-  stands for 0 and for full command; a command beyond is set to its end);
+  stands for 0 and for full command), clip (true: a command beyond the range is set to its end);
   what a vehicle without a motor curve is assumed to make of them: thrust_factor (f of the relative
   thrust f u^2 + (1 - f) u) or thrust (N a motor, the coefficients of the count's powers 0, 1, 2, at
   full_voltage, and thrust_source, who found them)
@@ -48,7 +51,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import (
@@ -231,6 +234,7 @@ class Commands(Columns):
     range: _Range | None = None  # None: the vehicle's motor curve states it
     thrust_factor: Annotated[Number, Field(ge=0.0, le=1.0)] = 1.0
     thrust_span: tuple[Number, Number] = (0.0, 1.0)  # commands at which u is 0 and 1
+    clip: _Truth = False
     thrust: tuple[Number, ...] = ()  # N a motor, of the count's powers 0, 1, 2
     full_voltage: Positive = 1.0  # V, at which ``thrust`` holds
     thrust_source: str = ""  # who found ``thrust``
@@ -321,6 +325,7 @@ class LogMap:
     recognise: tuple[str, ...] = ()
     name: str = ""  # where it comes from: a shipped map's name or a file
     notes: tuple[str, ...] = ()
+    rows: Literal["mixed", "whole", "messages"] = "mixed"
     stray_rows: Annotated[int, Field(ge=0)] = 0
     extra: Mapping[str, Annotated[Columns, _section(0)]] = field(default_factory=dict)
     # further ways to fill a section (``time`` among them), in their order

@@ -5,7 +5,7 @@ Of several ways to fill a section the first is taken whose columns are there and
 Each section of the map becomes a stream (``streams``). Where channels stand in rows of their own,
 the pose's rows are the log's, and the others are interpolated to them. Else rows of a table that
 hold neither a pose nor an inertial sensor's sample are left out, unless most rows have a pose,
-which the others then lost; the kit's own are all kept. An attitude that is logged in other
+which the others then lost; a map of whole rows keeps them all. An attitude that is logged in other
 rows than the position is interpolated to the position's.
 """
 
@@ -73,8 +73,13 @@ def map_table(
     vehicle = flown_vehicle(vehicle, log_map.vehicle)
     log_map = fitted(table.header, table.path, log_map, vehicle, reader)
     columns = table.read(log_map.wanted)
+    if log_map.is_own and rows_apart(Samples(np.arange(float(table.rows)), columns), log_map):
+        log_map = replace(log_map, rows="mixed")
+    notes = [*table.notes, *log_map.notes, *([log_map.time.note] if log_map.time.note else [])]
+    if not log_map.is_own or log_map.rows == "mixed":
+        notes.insert(0, f"columns: by the map {log_map.name}")
     samples, words = rows_of(table, columns, log_map)
-    notes = [*words, *table.notes, *log_map.notes, *filter(None, [log_map.time.note])]
+    notes += words
     return recording_of(table.path, [samples], log_map, reader, notes, piece).log(vehicle)
 
 
@@ -105,7 +110,6 @@ def recording_of(
     recorded, of_clock = on_one_clock(path, recorded, piece)
     motors = (*log_map.ways("rotors"), *log_map.ways("commands"))
     poses = log_map.ways("position")
-    is_to_move = not log_map.is_own and any(map(log_map.ways, ("position", *_IMU)))
     log_map, sources = chosen(recorded, log_map)
     of_clock += [note for s in recorded if s.table for note in check_rows(s, log_map)]
     if not (log_map.rotors or log_map.commands or log_map.wrench):
@@ -141,7 +145,8 @@ def recording_of(
             streams[name] = replace(stream, t=stream.t - part.late)
             said.append(f"battery voltage put {part.late:g} s sooner, by which it is logged late")
     absent = [name for name in _IMU if readable(streams.get(name)) is None]
-    if log_map.position is None and absent and is_to_move:
+    must_move = log_map.rows != "whole" or (poses and not log_map.is_own)
+    if log_map.position is None and absent and must_move:
         expected = " or ".join(way.label for way in poses)
         expected = f"{expected}, with an attitude beside it" if poses else "a pose"
         raise InputError(
@@ -151,7 +156,7 @@ def recording_of(
     if log_map.position is None and not log_map.is_own:
         what = ": no position that changes, with an attitude beside it, was logged"
         said.append(f"no pose{what if poses else ' in the log'}")
-    if log_map.position is None and (absent or log_map.is_own):  # all rows are the log's
+    if log_map.position is None and log_map.rows == "whole":  # all rows are the log's
         t = recorded[0].t
         streams["position"] = Stream("pose", t, np.full((len(t), 7), np.nan))
     extra = {
@@ -184,7 +189,7 @@ def _pose(
     t = samples.t[keep]
     position = in_kit_units(log_map, "position", place, samples.values(place)[keep])
     placed: Mask = np.asarray(np.isfinite(position).all(axis=1))
-    if not placed.any() and not log_map.is_own:
+    if not placed.any() and log_map.rows != "whole":
         raise InputError(
             f"{path}: map {log_map.name}: position: no row has all of {', '.join(place.columns)}; "
             "expected some"
@@ -206,7 +211,7 @@ def _pose(
     turns = quaternions(turn, measured.values(turn))
     with np.errstate(over="ignore"):
         length = np.linalg.norm(turns, axis=1)
-    there = length > (-1.0 if log_map.is_own else NO_QUATERNION)
+    there = length > (-1.0 if log_map.rows == "whole" else NO_QUATERNION)
     off = np.flatnonzero(there & ~(np.abs(length - 1.0) <= NORM_TOLERANCE))
     if off.size:
         what = turn.topic or f"columns {', '.join(turn.columns)}"
@@ -214,18 +219,18 @@ def _pose(
             f"{path}: {what}, {measured.place(off[0])}: a quaternion of length "
             f"{length[off[0]]:.4g}; expected 1 within {NORM_TOLERANCE:g}"
         )
-    times, turns = measured.t[there], turns[there]
     if there.any():
-        turns = in_kit_axes(log_map, turn, turns)
-    steps = np.diff(times)
+        turns = in_kit_axes(log_map, turn, turns[there])
+    attitude = Stream(turn.label, measured.t[there], turns)
+    steps = np.diff(attitude.t)
     longest = max(_ATTITUDE_GAP, LONGEST_STEPS * float(np.median(steps))) if len(steps) else 0.0
-    pose[placed] = np.column_stack([position[placed], slerp(t[placed], times, turns, longest)])
+    pose[placed] = np.column_stack([position[placed], slerp(t[placed], attitude, longest)])
     if placed.any() and not np.isfinite(pose).all(axis=1).any():
         raise InputError(
             f"{path}: position and attitude do not overlap in time; expected both over the same "
             "flight"
         )
-    alone = int(np.sum(~np.isin(t[placed], times)))
+    alone = int(np.sum(~np.isin(t[placed], attitude.t)))
     if turned is samples and alone:
         notes.append(
             f"{alone} of {int(placed.sum())} positions stand in rows without an attitude, which "
@@ -243,14 +248,16 @@ def _pose(
 def _kept_rows(samples: Samples, log_map: LogMap, part: Columns) -> Mask:
     """Return which rows (N,) of a group are those of a section's stream: all messages. Of a table
     its own, where channels stand in rows of their own; else those with a position or an inertial
-    sensor's sample; all, where most have a position, which the others lost, and of the kit's own.
+    sensor's sample; all, where most have a position, which the others lost.
     """
-    if samples.table is not None and rows_apart(samples, log_map):
+    everything: Mask = np.ones(len(samples.t), bool)
+    if log_map.rows == "whole" or samples.table is None:
+        return everything
+    if rows_apart(samples, log_map):
         return samples.there(part)
     place = log_map.position
-    is_placed = place is not None and samples.has(place) and samples.there(place).mean() > 0.5
-    if samples.table is None or log_map.is_own or is_placed:
-        return np.ones(len(samples.t), bool)
+    if place is not None and samples.has(place) and np.mean(samples.there(place)) > 0.5:
+        return everything
     inertial = (place, log_map.accelerometer, log_map.gyro)
     there = [samples.there(one) for one in inertial if one is not None and samples.has(one)]
     return np.asarray(np.any(there, axis=0))
@@ -351,12 +358,12 @@ def chosen(recorded: Sequence[Samples], log_map: LogMap) -> tuple[LogMap, dict[s
     the first way whose columns are there, and hold measurements; a position with an attitude that
     goes with it. Optional sections of which there are none are left out.
     """
-    usable = {}
+    stated, usable = log_map.rows == "whole" or log_map.is_own, {}
     for section in log_map.sections:
         ways = [(way, s) for way in log_map.ways(section) for s in recorded if s.has(way)]
         # the only way that is there fills a section that must be filled
-        if len(ways) != 1 or (ways[0][0].optional and not log_map.is_own):
-            ways = [one for one in ways if _is_measured(section, *one)]
+        if len(ways) != 1 or not (stated or not ways[0][0].optional):
+            ways = [one for one in ways if _is_measured(section, *one, log_map.rows)]
         usable[section] = ways
     places, turns = usable.get("position", []), usable.get("attitude", [])
     pairs = [
@@ -373,9 +380,9 @@ def chosen(recorded: Sequence[Samples], log_map: LogMap) -> tuple[LogMap, dict[s
     ), samples
 
 
-def _is_measured(section: str, way: Columns, samples: Samples) -> bool:
-    """Return whether a section's columns hold measurements: rotors that turn, a voltage, of a table
-    a position that changes, and two samples of others.
+def _is_measured(section: str, way: Columns, samples: Samples, rows: str) -> bool:
+    """Return whether a section's columns hold measurements: rotors that turn, a voltage, but of
+    ``messages`` a position that changes, and two samples of others.
     """
     values = samples.values(way)
     values = values[np.isfinite(values).all(axis=1)]
@@ -383,6 +390,6 @@ def _is_measured(section: str, way: Columns, samples: Samples) -> bool:
         return bool(np.any(np.linalg.norm(values, axis=1) > NO_QUATERNION))
     if section in ("rotors", "battery"):
         return bool(np.any(values > 0.0 if section == "battery" else values != 0.0))
-    if section == "position" and samples.table is not None and len(values):
+    if section == "position" and rows != "messages" and len(values):
         return bool(np.any(np.ptp(values, axis=0) > 0.0))
     return len(values) > 1

@@ -74,12 +74,14 @@ def readable(stream: Stream | None) -> Stream | None:
     return None if found is None or len(found.t) < 2 else found
 
 
-def slerp(t: Array, times: Array, values: Array, longest: float = np.inf) -> Array:
-    """Return attitudes (M, 4), scalar first, at times (M,) in s, of those (N, 4) at ``times``; NaN
-    before the first, after the last, and within a gap of more than ``longest`` s. Samples at all of
-    the times are returned as they are, whatever their length.
+def slerp(t: Array, attitude: Stream, longest: float = np.inf) -> Array:
+    """Return attitudes (M, 4), scalar first, at times (M,) in s; NaN before the first sample, after
+    the last, and within a gap of more than ``longest`` s. Samples at all of the times are returned
+    as they are, whatever their length.
     """
     out = np.full((len(t), 4), np.nan)
+    good = np.linalg.norm(attitude.values, axis=1) > 0.5  # False where NaN
+    times, values = attitude.t[good], attitude.values[good]
     after = np.searchsorted(times, t)
     exact = np.isin(t, times)
     if exact.all():
@@ -273,8 +275,8 @@ def _rows(
         reach = max(0.6 * _step(t), 0.5 * _step(seen.t) / _OWN_ROWS)
         near = np.unique(near[np.abs(t[near] - seen.t) <= reach])
         near = near[(t[near] >= seen.t[0]) & (t[near] <= seen.t[-1])]
-        placed[near, :3] = resampled(t[near], seen.t, seen.values[:, :3])
-        placed[near, 3:] = slerp(t[near], seen.t, seen.values[:, 3:])
+        placed[near, :3] = Stream(pose.name, seen.t, seen.values[:, :3]).at(t[near])
+        placed[near, 3:] = slerp(t[near], Stream(pose.name, seen.t, seen.values[:, 3:]))
     rows += (
         f"; the pose of {pose.name}, {1.0 / _step(pose.t):.4g} Hz, stands in the nearest of them"
     )

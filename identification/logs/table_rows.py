@@ -12,7 +12,7 @@ import numpy as np
 
 from ...runtime.errors import InputError
 from .channels import Samples
-from .log_map import UNITS, LogMap
+from .log_map import UNITS, Columns, LogMap
 from .table import Array, Mask, Rows, Table
 
 _STRAY_GAP = 5.0  # median time steps; shorter gaps leave no stray rows
@@ -21,12 +21,6 @@ _STRAY_GAP = 5.0  # median time steps; shorter gaps leave no stray rows
 _LONGEST_GAP = 0.06
 LONGEST_STEPS = 3.5
 _FINITE = "a finite number"
-_INTERPOLATED = ("rotors", "commands", "wrench", "force", "torque")
-_OWN_LIMITS = {  # of the kit's own columns, from 0 on
-    "rotors": (np.inf, "a rotor speed (its direction is the vehicle's spin) of at least 0"),
-    "commands": (1.0, "a motor command from 0 to 1"),
-    "battery": (np.inf, "a voltage of at least 0"),
-}
 _BACK = 0.2  # share of the steps that go back, above which times are none
 _DENSE = 0.5  # share of the rows from which on a channel counts as one of every row
 _FEWEST = 10  # samples of a channel that tell in which rows it stands
@@ -38,44 +32,38 @@ def rows_of(
     """Return what the map's columns hold, as they were written, and notes.
 
     Raises:
-        InputError: many times go back, they cannot be told apart, or are fewer than two; of the
-            kit's own rows, one goes back, or a row lacks a number.
+        InputError: many times go back, they cannot be told apart, or are fewer than two; of whole
+            rows, one goes back, or a row lacks a number.
     """
-    clock = log_map.time
-    rows: Rows = np.arange(table.rows)
-    samples = Samples(rows / (clock.rate_hz or 1.0), columns, table=table, rows=rows)
-    strict = log_map.is_own and not rows_apart(samples, log_map)
-    notes = [] if strict else [f"columns: by the map {log_map.name}"]
+    clock, is_whole = log_map.time, log_map.rows == "whole"
+    notes = []
     repeated = [name for name, count in Counter(table.header).items() if count > 1]
     if repeated:
         notes.append(f"columns that stand there more than once were not used: {repeated[:10]}")
+    rows: Rows = np.arange(table.rows)
     if not clock.column:
+        t = rows / clock.rate_hz + (clock.offset or 0.0)
         notes.append(f"time: rows at {clock.rate_hz:g} Hz, as the map says")
-        return replace(samples, t=samples.t + (clock.offset or 0.0)), notes
-    samples = replace(samples, t=clock.raw(columns))
-    if strict:
+        return Samples(t, columns, table=table, rows=rows), notes
+    samples = Samples(clock.raw(columns), columns, table=table, rows=rows)
+    if is_whole:
         _refuse(samples, clock.column, samples.t, ~np.isfinite(samples.t))
     samples = samples.cut(np.isfinite(samples.t))
     if len(samples.t) < len(rows):
         notes.append(f"{len(rows) - len(samples.t)} row(s) without a time were left out")
-    first, count = np.flatnonzero(np.diff(samples.t, prepend=np.nan) != 0.0), len(samples.t)
-    if len(first) < count and not strict:
-        notes.append(f"{count - len(first)} row(s) repeat a time and were joined to the one row")
-        joined = {name: _last_of(column, first) for name, column in samples.columns.items()}
-        samples = replace(samples.cut(np.append(first[1:], count) - 1), columns=joined)
-    raw = samples.t
-    if len(raw) < 2:
+    if len(samples.t) < 2:
         raise InputError(
-            f"{table.path}: column {clock.column}: {len(raw)} time(s); expected at least two"
+            f"{table.path}: column {clock.column}: {len(samples.t)} time(s); expected at least two"
         )
+    raw = samples.t
     step = np.diff(raw)
-    back = np.flatnonzero(step <= 0.0)
-    if back.size and (strict or back.size > _BACK * len(step)):
+    back = np.flatnonzero(step <= 0.0 if is_whole else step < 0.0)
+    if back.size and (is_whole or back.size > _BACK * len(step)):
         i, unit = int(back[0]), clock.unit
         raise InputError(
             f"{table.path}: column {clock.column}, {samples.place(i + 1)}: {raw[i + 1]:.9g} {unit} "
             f"{'goes back from' if step[i] else 'repeats the time'} {raw[i]:.9g} {unit} of the row "
-            f"before; expected {'strictly ' if strict else ''}increasing times"
+            f"before; expected {'strictly ' if is_whole else ''}increasing times"
         )
     begin = raw[0] if clock.offset is None else 0.0
     t = (raw - begin) * UNITS["time"][clock.unit] + (clock.offset or 0.0)
@@ -85,10 +73,16 @@ def rows_of(
             f"{clock.unit} cannot be told apart; expected those of one flight"
         )
     samples = replace(samples, t=t)
-    if strict:
+    if is_whole:
         _check_whole(samples, log_map)
-    stray, words = _stray_rows(samples.t, log_map.stray_rows)
-    return samples.cut(slice(stray, None)), notes + words
+        stray, words = _stray_rows(t, log_map.stray_rows)
+        return samples.cut(slice(stray, None)), notes + words
+    first = np.flatnonzero(np.diff(raw, prepend=np.nan) != 0.0)
+    if len(first) < len(t):
+        notes.append(f"{len(t) - len(first)} row(s) repeat a time and were joined to the one row")
+        joined = {name: _last_of(column, first) for name, column in samples.columns.items()}
+        samples = replace(samples.cut(np.append(first[1:], len(t)) - 1), columns=joined)
+    return samples, notes
 
 
 def _refuse(samples: Samples, name: str, column: Array, bad: Mask, expected: str = _FINITE) -> None:
@@ -103,22 +97,24 @@ def _refuse(samples: Samples, name: str, column: Array, bad: Mask, expected: str
 
 
 def _check_whole(samples: Samples, log_map: LogMap) -> None:
-    """Raise InputError where a row has a part of a pose, or of a sensor's three values, or lacks a
-    true wrench; ``check_rows`` looks at gaps of motors and of the voltage.
+    """Raise InputError where a row has a part of a pose, or of a sensor's three values, or lacks
+    another number; ``check_rows`` looks at gaps of motors and of the voltage.
     """
 
-    def columns_of(*names: str) -> dict[str, Array]:
-        parts = [log_map.sections[name] for name in names if name in log_map.sections]
-        return {name: samples.columns[name] for part in parts for name in part.named}
+    def names_of(*parts: Columns | None) -> list[str]:
+        return [name for part in parts if part is not None for name in part.named]
 
-    for sections in (("position", "attitude"), ("accelerometer",), ("gyro",)):
-        columns = columns_of(*sections)
-        there = np.any([~np.isnan(column) for column in columns.values()], axis=0)
-        expected = f"{_FINITE}; only {', '.join(columns)} together may be empty"
-        for name, column in columns.items():
+    def check(names: list[str], there: Mask | bool, expected: str) -> None:
+        for name in names:
+            column = samples.columns[name]
             _refuse(samples, name, column, ~np.isfinite(column) & there, expected)
-    for name, column in columns_of("force", "torque").items():
-        _refuse(samples, name, column, ~np.isfinite(column))
+
+    pose = names_of(log_map.position, log_map.attitude)
+    for names in (pose, names_of(log_map.accelerometer), names_of(log_map.gyro)):
+        there = np.any([~np.isnan(samples.columns[name]) for name in names], axis=0)
+        check(names, there, f"{_FINITE}; only {', '.join(names)} together may be empty")
+    others = names_of(log_map.wrench, log_map.force, log_map.torque, *log_map.extra.values())
+    check([name for name in others if name not in pose], True, _FINITE)
 
 
 def _stray_rows(t: Array, most: int) -> tuple[int, list[str]]:
@@ -161,7 +157,7 @@ def rows_apart(samples: Samples, log_map: LogMap) -> bool:
 
 
 def check_rows(samples: Samples, log_map: LogMap) -> list[str]:
-    """Return notes on the gaps of motors, of a true wrench, and of the kit's own voltage.
+    """Return notes on the gaps of motors, of a true wrench, and of whole rows' voltage.
 
     Args:
         samples: of a table.
@@ -170,11 +166,10 @@ def check_rows(samples: Samples, log_map: LogMap) -> list[str]:
     Raises:
         InputError: a number is none that a flight has, or a gap is long; the message names the row.
     """
-    limits = _OWN_LIMITS if log_map.is_own else {}
+    is_whole, rotors, commands = log_map.rows == "whole", log_map.rotors, log_map.commands
+    battery = log_map.battery if is_whole else None
     filled, slow = [], []
-    for section, part in log_map.sections.items():
-        if section not in (*_INTERPOLATED, *limits):
-            continue
+    for part in filter(None, (rotors, commands, battery, log_map.force, log_map.torque)):
         read = np.flatnonzero(np.isfinite(samples.values(part)).any(axis=1))
         inside = samples.cut(slice(read[0], read[-1] + 1)) if len(read) else samples
         for name, column in zip(part.columns, inside.values(part).T, strict=True):
@@ -184,9 +179,18 @@ def check_rows(samples: Samples, log_map: LogMap) -> list[str]:
                 slow.append(f"{name} {count} of {len(column)}")
             elif count < len(column):
                 filled.append(f"{name} {len(column) - count} (over up to {gap:.3g} s)")
-            if section in limits:
-                most, words = limits[section]
-                _refuse(inside, name, column, (column < 0.0) | (column > most), words)
+    limits: list[tuple[Columns, float, float, str]] = []
+    if battery is not None:
+        limits.append((battery, 0.0, np.inf, "a voltage of at least 0"))
+    if log_map.is_own and rotors is not None:
+        words = "a rotor speed (its direction is the vehicle's spin) of at least 0"
+        limits.append((rotors, 0.0, np.inf, words))
+    if is_whole and commands is not None and commands.range and not commands.clip:
+        low, high = sorted(commands.range)
+        limits.append((commands, low, high, f"a motor command from {low:g} to {high:g}"))
+    for part, low, high, words in limits:
+        for name, column in zip(part.columns, samples.values(part).T, strict=True):
+            _refuse(samples, name, column, (column < low) | (column > high), words)
     notes = ["missing values interpolated: " + ", ".join(filled)] if filled else []
     if slow:
         notes.append(

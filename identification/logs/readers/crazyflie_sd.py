@@ -87,7 +87,7 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
     there, _ = chosen(events, log_map)
     if there.position is None and (there.gyro is None or there.accelerometer is None):
         # as CrazyPAD's logs: rows of motor commands, which compare flights
-        log_map = replace(there, gyro=None, accelerometer=None)
+        log_map = replace(there, rows="whole", gyro=None, accelerometer=None)
         notes.append(
             "no pose, no gyro and no accelerometer in the log: it shows how the rotors share the "
             "work, and nothing else"

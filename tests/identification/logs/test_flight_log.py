@@ -83,20 +83,6 @@ def test_a_long_gap_of_a_rotor_is_refused_with_its_line(path):
         read_log(write_text(path, rows))
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "expected"),
-    [("cmd2", "1.5", "a motor command from 0 to 1"), ("vbat", "-1", "a voltage of at least 0")],
-)
-def test_a_number_beyond_its_range_is_refused_with_its_line(path, rows, name, value, expected):
-    for row in rows:
-        row |= dict.fromkeys(("cmd1", "cmd2", "cmd3", "cmd4"), "0.5") | {"vbat": "11"}
-    change(rows, 3, **{name: value})
-    with pytest.raises(
-        InputError, match=f"column {name}, row 4 .line 5. is {value}; .* {expected}"
-    ):
-        read_log(write_text(path, rows))
-
-
 def change(rows, k, **fields):
     rows[k].update(fields)
     return rows

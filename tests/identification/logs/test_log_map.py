@@ -82,6 +82,7 @@ def test_each_map_that_ships_is_a_map(name):
         ({"rotors": {**GOOD["rotors"], "unit": "eRPM"}}, "eRPM without pole_pairs"),
         ({"rotors": {**GOOD["rotors"], "signs": [1, -1]}}, "signs of 4 times 1 or -1, got .1, -1"),
         ({"extra": {"sent": {"columns": []}}}, "extra.sent must have some columns of the table"),
+        ({"rows": "some"}, "rows must be mixed, whole or messages, got 'some'"),
         (
             {"gyro": {"columns": ["a", "b", "c"], "unit": "raw"}},
             "gyro has unit raw without a sc",
@@ -190,7 +191,11 @@ def test_channels_in_rows_of_their_own_meet_at_the_poses_times(tmp_path, own, st
     path = tmp_path / "a.csv"
     path.write_text("\n".join([",".join(["t", *header]), *lines]))
     found = load_map("windwrench")
-    log = read_log(path) if own else map_table(open_table(path), replace(found, name="m"))
+    log = (
+        read_log(path)
+        if own
+        else map_table(open_table(path), replace(found, name="m", rows="mixed"))
+    )
     np.testing.assert_allclose(np.diff(log.t), 0.01)
     assert log.valid.all()
     assert len(log.t) >= 195
