@@ -99,6 +99,7 @@ class Unexplained:
     vehicle: Vehicle  # as it is declared
     typical: Coefficients  # typical sizes of the effect's coefficients for this vehicle
     fixed: Coefficients  # coefficients of the effect that the vehicle's file states already
+    beside: frozenset[Family]  # families of the vehicle's other effects, declared and found
     centre: Array  # (3,) m, world, about which the vehicle flew
     position: Array  # (n, 3) m, world
     velocity: Array  # (n, 3) m/s, world

@@ -35,7 +35,8 @@ def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
 
 def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
     """Return winds along the mean force, and along the part of the force that goes like a slow
-    wind's part of a drag: a wind does nothing without a drag, nor this drag without a wind.
+    wind's part of a drag: a wind does nothing without a drag, nor this drag without a wind. Where
+    the vehicle has another drag, a wind may act on this one alone.
 
     That is, for the wind w, |v| w + v (v . w) / |v|, beside which a steady force may act.
     """
@@ -50,15 +51,12 @@ def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
     slope = np.linalg.lstsq(
         np.column_stack([with_wind.reshape(-1, 2), steady]), force.ravel(), rcond=None
     )[0][:2]
+    own = [(scale * speed, drag) for scale in (0.5, 1.0, 2.0)]
+    other = [(speed, 0.0)] if Family.DRAG in flights.beside else []
     return [
-        {
-            "wx": scale * speed * math.cos(heading),
-            "wy": scale * speed * math.sin(heading),
-            "wz": 0.0,
-            "cd": drag,
-        }
+        {"wx": size * math.cos(heading), "wy": size * math.sin(heading), "wz": 0.0, "cd": cd}
         for heading in (math.atan2(y, x) for x, y in (force.mean(axis=0), slope))
-        for scale in (0.5, 1.0, 2.0)
+        for size, cd in (*own, *other)
     ]
 
 

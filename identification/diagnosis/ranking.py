@@ -58,7 +58,7 @@ def rank(
     """
 
     def beside(setting: Setting) -> tuple[Likelihood, Starts]:
-        return Likelihood(flights, setting, near), starts_of(flights, library, setting)
+        return Likelihood(flights, setting, near), starts_of(flights, library, setting, {})
 
     near = Likelihood(flights, {})
     best, starts = nothing = near, starts_of(flights, library, {})
@@ -107,12 +107,15 @@ def _whole_library(base: Base) -> dict[Column, float]:
     return {names[i]: float(x) for i, x in zip(chosen, coefficients, strict=True)}
 
 
-def starts_of(flights: Flights, library: Sequence[str], setting: Setting) -> Starts:
-    """Return columns of whole effects, with the coefficients of each: lags and delays, and effects
-    whose coefficients do nothing one by one.
+def starts_of(
+    flights: Flights, library: Sequence[str], setting: Setting, *others: Setting
+) -> Starts:
+    """Return columns of whole effects that are not in a setting, with the coefficients of each:
+    lags and delays, and effects whose coefficients do nothing one by one. These start from what the
+    setting leaves unexplained, and what ``others`` do: an effect may act in the place of another.
     """
     out: dict[Column, Mapping[str, float]] = {}
-    residual: Array | None = None
+    residuals: list[Array] = []
     for effect in library:
         if effect in setting:
             continue
@@ -124,9 +127,10 @@ def starts_of(flights: Flights, library: Sequence[str], setting: Setting) -> Sta
             continue
         if not flights.is_nonlinear(effect):
             continue
-        if residual is None:
-            residual = flights.residual(setting)
+        residuals = residuals or [flights.residual(x) for x in (setting, *others)]
         stated = flights.stated(effect)
-        for i, start in enumerate(starting_points(effect, flights, residual, stated)):
+        beside = [*setting, *(e.name for e in flights.vehicle.effects)]
+        found = [x for y in residuals for x in starting_points(effect, flights, y, stated, beside)]
+        for i, start in enumerate(found):
             out[effect, f"{START_PREFIX}{i}"] = {**start, **stated}
     return out

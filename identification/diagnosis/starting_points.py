@@ -6,7 +6,7 @@ flights, resembles the residual most.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,7 +32,11 @@ STARTING = StartingSettings()
 
 
 def starting_points(
-    effect: str, flights: Flights, residual: Array, stated: Mapping[str, float]
+    effect: str,
+    flights: Flights,
+    residual: Array,
+    stated: Mapping[str, float],
+    beside: Iterable[str] = (),
 ) -> list[dict[str, float]]:
     """Return the coefficients from which a fit of an effect starts.
 
@@ -41,6 +45,7 @@ def starting_points(
         flights: where it is looked for.
         residual: that they leave (rows, 6).
         stated: coefficients that the vehicle's file fixes.
+        beside: other effects that act.
     """
     declared = get(effect).starting_points
     if declared is None:
@@ -56,6 +61,7 @@ def starting_points(
                     for c in get(effect).coefficients
                 },
                 stated,
+                frozenset(get(e).family for e in beside if e),
                 position.mean(axis=0),
                 position[seen],
                 flights.at_rows("velocity")[seen],

@@ -14,7 +14,7 @@ from windwrench.identification.diagnosis.carrying_channels import ORDER, carryin
 from windwrench.identification.diagnosis.commanded_rotors import COMMANDED, in_flight_by_thrust
 from windwrench.identification.diagnosis.composite import composites
 from windwrench.identification.diagnosis.log_offsets import LAG_ASYMMETRY
-from windwrench.identification.diagnosis.ranking import rank
+from windwrench.identification.diagnosis.ranking import rank, starts_of
 from windwrench.identification.diagnosis.regression import Flights
 from windwrench.identification.diagnosis.starting_points import starting_points
 from windwrench.identification.diagnosis.turning_delay import turning_delay
@@ -77,6 +77,21 @@ def test_of_many_starts_those_are_tried_that_resemble_the_flight(tmp_path):
     assert abs(starts[0]["w"] - 5.0) < 0.19
 
 
+@pytest.mark.parametrize("beside", [[], ["rotor_drag"]])
+def test_a_wind_may_act_on_another_drag_alone(beside):
+    flights = Flights([recorded(seconds=12.0)], VEHICLE)
+    starts = starting_points("wind", flights, flights.residual({}), {}, beside)
+    assert any(start["cd"] == 0.0 for start in starts) == bool(beside)
+
+
+def test_an_effect_may_start_in_the_place_of_another():
+    """A force that is known already leaves nothing of the wind that would explain it."""
+    force = {"constant_force": {"fx": 0.3, "fy": 0.0, "fz": 0.0}}
+    flights = Flights([recorded(seconds=12.0, **force)], VEHICLE)
+    found = starts_of(flights, ["wind"], force, {}).values()
+    assert any(start["wx"] > 3.0 * abs(start["wy"]) for start in found)
+
+
 def still(seconds=10.0, rate=200.0, speeds=None):
     n = round(seconds * rate) + 1
     return FlightLog(
@@ -128,7 +143,7 @@ TAU, APART = 0.03, 0.008  # s: 22 ms up, 38 ms down
 def unevenly_lagging(commanded):
     """A flight, and its log with the commands that such a lag turns into its rotor speeds."""
     log = recorded(seed=3)
-    speeds = low_pass(log.rotor_speeds, 12.0, log.period)
+    speeds = low_pass(log.rotor_speeds, 30.0, log.period)  # slower, a lag would make up for it
     rate = np.gradient(speeds, log.period, axis=0)
     tau = np.where(rate > 0.0, TAU - APART, TAU + APART)
     return replace(log, rotor_speeds=speeds + tau * rate if commanded else speeds)
