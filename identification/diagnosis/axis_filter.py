@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from ...runtime.compiled import compiled, compiled_for_vectors
+from .evidence import bounded_mode
 
 Array = NDArray[np.float64]
 
@@ -27,9 +27,12 @@ class AxisSettings:
     first_time: float = 0.4  # s, correlation time at which a search begins
     # s, correlation times: gusts last 0.1 to 2 s; what lasts longer is no disturbance
     times: tuple[float, float] = (0.03, 2.0)
+    tolerance: float = 0.02  # nats, by which the last step of the search changes the likelihood
 
 
 AXIS = AxisSettings()
+STEPS = 40  # of the search, at most
+STEP = 1e-3  # of what is searched, for derivatives
 
 
 @dataclass(frozen=True)
@@ -83,134 +86,168 @@ def steady(strength: float, time: float, white: float, period: float, gain: Arra
 
 
 @compiled_for_vectors
-def _products(
+def _respond(
     measured: Array,
     drive: Array,
     rate: float,
     jumps: Array,
     jump_state: np.ndarray,
+    gains: Array,
     keep: float,
     period: float,
     gain: Array,
-    skip: int,
     out: Array,
 ) -> None:
-    """Add to ``out`` (c + 1, c + 1) the products of what ``jumps`` (n, c) change in the predictions
-    of one axis' pose, and of its innovations (last), from sample ``skip`` on.
+    """Write to ``out`` (n, c + 5) what changes the predictions of one axis' pose: a unit of each
+    of ``gains`` (c,) on ``jumps`` (n, c), of each of the filter's ``gain`` (3,), and of ``keep``;
+    and the innovations (last).
 
     ``jump_state`` (c,) says which state a unit of each adds to before the pose of sample k is read:
     0 the pose, 1 its rate, 2 the disturbance.
     """
     c = jumps.shape[1]
-    state, row = np.zeros((3, c + 1)), np.empty(c + 1)
-    state[0, c], state[1, c] = measured[0], rate
+    last = c + 4
+    state = np.zeros((3, c + 5))
+    state[0, last], state[1, last] = measured[0], rate
     half = 0.5 * period * period
     for k in range(1, len(measured)):
-        a = drive[k - 1]
-        for j in range(c + 1):
-            g = state[2, j] + (a if j == c else 0.0)
+        state[2, last] += drive[k - 1]
+        for j in range(c + 5):
+            g = state[2, j]
             state[0, j] += period * state[1, j] + half * g
             state[1, j] += period * g
+        state[2, last] -= drive[k - 1]
+        for j in range(c + 5):
             state[2, j] *= keep
+        state[2, c + 3] += state[2, last] / keep
         for j in range(c):
             state[jump_state[j], j] += jumps[k, j]
-        for j in range(c):
-            row[j] = state[0, j]
-        row[c] = measured[k] - state[0, c]
-        for j in range(c):
-            state[0, j] -= gain[0] * row[j]
-            state[1, j] -= gain[1] * row[j]
-            state[2, j] -= gain[2] * row[j]
-        state[0, c] += gain[0] * row[c]
-        state[1, c] += gain[1] * row[c]
-        state[2, c] += gain[2] * row[c]
-        if k >= skip:
-            for i in range(c + 1):
-                for j in range(c + 1):
-                    out[i, j] += row[i] * row[j]
+            state[jump_state[j], last] += gains[j] * jumps[k, j]
+        for j in range(c + 4):
+            out[k, j] = state[0, j]
+        e = measured[k] - state[0, last]
+        out[k, last] = e
+        for i in range(3):
+            for j in range(c + 4):
+                state[i, j] -= gain[i] * out[k, j]
+            state[i, c + i] += e
+            state[i, last] += gain[i] * e
 
 
-def likeliest_noise(
-    measured: Sequence[Array],
-    drive: Sequence[Array],
-    rate: Sequence[float],
-    period: float,
-    white: float,
-    pose: float,
-    disturbance: float,
-    jumps: Sequence[Array],
-    jump_state: NDArray[np.intp],
-    time: float | None = None,
-) -> tuple[AxisNoise, Array]:
-    """Return the noise of one axis at maximum likelihood, and the gains (c,) of the jumps beside
-    it.
+@dataclass(frozen=True, eq=False)
+class AxisFlight:
+    """One axis of the pieces of a flight.
 
-    Args:
+    Attributes:
         measured: pose of each piece (n,), m or rad.
         drive: acceleration (n,) that the model says acts from each sample to the next.
         rate: the pose's rate at the start of each piece.
         period: s.
-        white: standard deviation of the white acceleration that is known: the rotors' rounding.
-        pose: standard deviation of the pose at which the search begins.
-        disturbance: that of the disturbance.
         jumps: (n, c) of each piece, what a unit of each gain adds to the state before the pose of
             sample k is read. What else is known of a disturbance leaves less of it to the pose.
         jump_state: (c,) the state: 0 the pose, 1 its rate, 2 the disturbance.
-        time: s, correlation time of the disturbance at which the search begins, where the noise is
-            roughly known; default: it is not.
+        held: (c,) an innovation's standard deviation over that of each gain before the flight is
+            seen. Rotor speeds that are nearly predicted would have gains without limit.
     """
-    skip = round(AXIS.settling_time / period)
-    count = max(sum(len(x) - skip for x in measured), 1)
-    gain = np.empty(3)
 
-    def sums(strength: float, time: float, shaken: float) -> tuple[float, Array]:
-        steady(strength, time, shaken, period, gain)
-        keep = math.exp(-period / time)
-        total = np.zeros((len(jump_state) + 1,) * 2)
-        for y, a, v, x in zip(measured, drive, rate, jumps, strict=True):
-            _products(y, a, v, x, jump_state, keep, period, gain, skip, total)
-        # against gains that do the same
-        normal = total[:-1, :-1] + 1e-9 * np.diag(np.diagonal(total)[:-1] + 1e-300)
-        gains: Array = np.asarray(np.linalg.solve(normal, total[:-1, -1]))
-        return float(total[-1, -1] - total[-1, :-1] @ gains), gains
+    measured: Sequence[Array]
+    drive: Sequence[Array]
+    rate: Sequence[float]
+    period: float
+    jumps: Sequence[Array]
+    jump_state: NDArray[np.intp]
+    held: Array
 
-    def loss(x: Array) -> float:
-        inside = np.clip(x, low, high)
-        beyond = float(np.abs(x - inside).sum())
-        return count * (math.log(max(sums(*np.exp(inside).tolist())[0], 1e-300)) + beyond)
+    def fit(self, x: Array, gains: Array) -> "_Fit":
+        """Return the fit of a noise ``x`` (3,), with derivatives at ``gains`` (c,) of the jumps."""
+        noise = _noise(x, 1.0, self.period)
+        found = _filter_of(noise, self.period)
+        skip = round(AXIS.settling_time / self.period)
+        total = np.zeros((len(gains) + 5,) * 2)
+        count = 0
+        for y, a, v, jumps in zip(self.measured, self.drive, self.rate, self.jumps, strict=True):
+            rows = np.zeros((len(y), len(total)))
+            _respond(
+                y, a, v, jumps, self.jump_state, gains, found[3], self.period, found[:3], rows
+            )
+            total += rows[skip:].T @ rows[skip:]
+            count += max(len(rows) - skip, 0)
+        c = len(gains)
+        # of the filter by its noise
+        steps = [_filter_of(_noise(y, 1.0, self.period), self.period) for y in x + STEP * np.eye(3)]
+        slope = np.zeros((c + 5, c + 4))
+        slope[:c, :c], slope[-1, -1] = np.eye(c), 1.0
+        slope[c:-1, c:-1] = (np.array(steps) - found).T / STEP
+        total = slope.T @ total @ slope
+        # the prior of the gains is one more measurement of each
+        known = np.column_stack([np.eye(c), np.zeros((c, 3)), -gains]) * self.held[:, None]
+        total += known.T @ known
+        # the gains are linear, so they are fitted at once
+        beside = np.linalg.solve(total[:c, :c], total[:c, c:])
+        left = total[c:, c:] - total[:c, c:].T @ beside
+        return _Fit(float(left[-1, -1]), max(count, 1), gains + beside[:, -1], left)
 
-    begun = np.array(
-        [
-            2.0 * math.log(disturbance / pose),
-            math.log(time or AXIS.first_time),
-            2.0 * math.log(max(white, 1e-3 * disturbance) / pose),
-        ]
-    )
-    low, high = begun - 16.0, begun + 16.0
-    low[1], high[1] = np.log(AXIS.times)
-    begun = np.clip(begun, low, high)
-    best = minimize(
-        loss,
-        begun,
-        method="Nelder-Mead",
-        options={
-            "initial_simplex": begun
-            + (0.7 if time else 2.0)
-            * np.vstack([np.zeros(3), np.diag(np.where(begun >= high, -1.0, 1.0))]),
-            # a white noise that is far below the rest has no likeliest value
-            "xatol": 0.3,
-            "fatol": 0.2,  # nats
-            "maxfev": 160,
-        },
-    )
-    strength, lasting, shaken = np.exp(np.clip(best.x, low, high)).tolist()
-    left, gains = sums(strength, lasting, shaken)
-    innovation = math.sqrt(left / count)
-    noise = innovation / math.sqrt(steady(strength, lasting, shaken, period, gain))
-    found = steady_noise(
-        noise, noise * math.sqrt(strength), lasting, noise * math.sqrt(shaken), period
-    )
-    return found, gains
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    square: float  # of the innovations
+    count: int
+    gains: Array  # (c,) of the jumps, the likeliest ones
+    products: Array  # (4, 4) of what a unit of each part of the noise changes, and of the innovations
+
+
+def likeliest_noise(flight: AxisFlight, near: AxisNoise, begun: bool) -> tuple[AxisNoise, Array]:
+    """Return the noise of one axis at maximum likelihood, and the gains (c,) of the jumps beside
+    it, by Levenberg and Marquardt's method.
+
+    Args:
+        flight: the axis.
+        near: the noise at which the search begins.
+        begun: whether that noise is roughly known.
+    """
+    x = _free(near)
+    # the last is at most some ten thousand, where a white acceleration alone acts
+    low = np.array([x[0] - 16.0, math.log(AXIS.times[0]), 0.0])
+    high = np.array([x[0] + 16.0, math.log(AXIS.times[1]), 1e4])
+    tried = [[0.0, 0.0, 0.0]]
+    if not begun:
+        tried = [[y, z, 0.0] for y in (-4.0, 0.0, 4.0) for z in (-1.6, 0.0, 1.6)]
+    none = np.zeros(len(flight.jump_state))
+    starts = [np.clip(x + step, low, high) for step in tried]
+    fits = [flight.fit(start, none) for start in starts]
+    best = min(range(len(fits)), key=lambda i: fits[i].square)
+    x, damping = starts[best], 1e-2
+    fit = flight.fit(x, fits[best].gains)  # derivatives are those at the gains
+    for _ in range(STEPS):
+        normal, right = fit.products[:-1, :-1], fit.products[:-1, -1]
+        normal = normal + np.diag(damping * np.diagonal(normal) + 1e-12 * fit.square)
+        step = bounded_mode(normal, right, low - x, high - x)
+        if 0.5 * fit.count * float(right @ step) < AXIS.tolerance * fit.square:
+            break
+        other = flight.fit(x + step, fit.gains)
+        damping *= 0.2 if other.square < fit.square else 8.0
+        if other.square < fit.square:
+            x, fit = x + step, other
+    pose = math.sqrt(fit.square / fit.count) / _noise(x, 1.0, flight.period).innovation
+    return _noise(x, pose, flight.period), fit.gains
+
+
+def _filter_of(noise: AxisNoise, period: float) -> Array:
+    """Return the gain of a steady filter, and how much of a disturbance one period keeps (4,)."""
+    return np.array([*noise.gain, math.exp(-period / noise.time)])
+
+
+def _free(noise: AxisNoise) -> Array:
+    """Return a noise as what is searched (3,): logarithms of the disturbance's variance over the
+    pose's and of the correlation time, and the white acceleration's variance over the disturbance's.
+    """
+    ratios = noise.disturbance / noise.pose, noise.white / noise.disturbance
+    return np.array([2.0 * math.log(ratios[0]), math.log(noise.time), ratios[1] ** 2])
+
+
+def _noise(x: Array, pose: float, period: float) -> AxisNoise:
+    disturbance = pose * math.exp(0.5 * x[0])
+    return steady_noise(pose, disturbance, math.exp(x[1]), disturbance * math.sqrt(x[2]), period)
 
 
 def steady_noise(

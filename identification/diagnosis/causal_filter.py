@@ -80,6 +80,7 @@ def _run(
     begun: Array,
     gain: Array,
     keep: Array,
+    aside: Array,
     known: Array,
     at_position: Array,
     at_rotation: Array,
@@ -176,16 +177,27 @@ def _run(
             w[i] += period * acting[k, 3 + i]
             d[i] *= keep[i]
             d[3 + i] *= keep[3 + i]
+        # what the attitude says of the motion aside, which a wrong tilt has pulled
+        lift = u[0] * b[21]
+        for i in range(3):
+            e = lift * (r[i, 0] * innovations[k, 4] - r[i, 1] * innovations[k, 3])
+            p[i] += aside[i, 0] * e
+            v[i] += aside[i, 1] * e
+            d[i] += aside[i, 2] * e
         _turn(q2, step, q)
 
 
-def run(poses: Poses, vehicle: Vehicle, noise: tuple[AxisNoise, ...], known: Array) -> Track:
+def run(
+    poses: Poses, vehicle: Vehicle, noise: tuple[AxisNoise, ...], aside: Array, known: Array
+) -> Track:
     """Return a piece as the filter with a vehicle's model and six axes' noise sees it.
 
     Args:
         poses: the piece.
         vehicle: with the model.
         noise: of each axis.
+        aside: (3, 3) gain of position, velocity and disturbance of each axis, per unit of what an
+            attitude's innovation turns of the rotors' acceleration.
         known: (n, 6, 3) what is added to pose, rate and disturbance of each axis before the pose of
             sample k is read.
     """
@@ -206,6 +218,7 @@ def run(poses: Poses, vehicle: Vehicle, noise: tuple[AxisNoise, ...], known: Arr
         np.concatenate([poses.velocity, poses.angular_velocity]),
         np.array([x.gain for x in noise]),
         np.exp(-poses.period / np.array([x.time for x in noise], dtype=np.float64)),
+        aside,
         known,
         *(getattr(out, field.name) for field in fields(out)[1:]),
     )
@@ -218,6 +231,7 @@ def sensitivities(
     period: float,
     gain: Array,
     keep: Array,
+    aside: Array,
     pull: Array,
     rate: Array,
     acting: Array,
@@ -233,6 +247,7 @@ def sensitivities(
         period: s.
         gain: (6, 3) of the axes.
         keep: (6,) what is left of a disturbance after a period.
+        aside: (3, 3) of ``run``.
         pull: (n, 3, 2) by how much the acceleration (world) grows with an error of the attitude
             about body x and y.
         rate: (n, 3) angular velocity.
@@ -289,3 +304,10 @@ def sensitivities(
                 )
                 state[3 + i, 1, j] += period * g
                 state[3 + i, 2, j] *= keep[3 + i]
+        for i in range(3):
+            px, py = pull[k, i, 0], pull[k, i, 1]
+            for j in range(c):
+                x = px * out[k, 3, j] + py * out[k, 4, j]
+                state[i, 0, j] -= aside[i, 0] * x
+                state[i, 1, j] -= aside[i, 1] * x
+                state[i, 2, j] -= aside[i, 2] * x

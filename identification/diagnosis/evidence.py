@@ -114,16 +114,14 @@ def _evidence(
         right[i], lo[i], hi[i] = slopes[at[i]], low[at[i]], high[at[i]]
     factor = np.linalg.cholesky(normal)
     inverse = np.linalg.inv(normal)
-    held = np.zeros(n, dtype=np.bool_)
-    mode[:] = np.dot(inverse, right)
-    _bound(normal, right, lo, hi, mode, held)
+    mode[:] = bounded_mode(normal, right, lo, hi)
     value = 0.0
     for i in range(n):
         slope = right[i]
         for j in range(n):
             slope -= normal[i, j] * mode[j]
         value += 0.5 * mode[i] * (right[i] + slope) - math.log(factor[i, i])
-        if held[i]:
+        if mode[i] <= lo[i] or mode[i] >= hi[i]:
             # int_0^inf exp(-s t - h t^2 / 2) dt over the whole normal integral of curvature h
             value += _log_tail(abs(slope) / math.sqrt(normal[i, i]))
         value -= math.log(max(_normal(hi[i]) - _normal(lo[i]), 1e-12))
@@ -149,11 +147,11 @@ def _log_tail(z: float) -> float:
 
 
 @compiled
-def _bound(
-    normal: Array, right: Array, low: Array, high: Array, mode: Array, held: NDArray[np.bool_]
-) -> None:
-    """Move the mode within all bounds at once; write which coefficients are held at one."""
+def bounded_mode(normal: Array, right: Array, low: Array, high: Array) -> Array:
+    """Return the maximum (n,) of ``right @ x - x @ normal @ x / 2`` within bounds."""
     n = len(right)
+    mode = np.linalg.solve(normal, right)
+    held = np.zeros(n, dtype=np.bool_)
     for _ in range(3 * n):
         worst, most = 0, 0.0
         for i in range(n):
@@ -188,8 +186,7 @@ def _bound(
                 inner[a, b] = normal[i, free[b]]
         if len(free):
             mode[free] = np.linalg.solve(inner, rest)
-    for i in range(n):
-        mode[i] = min(max(mode[i], low[i]), high[i])
+    return np.minimum(np.maximum(mode, low), high)
 
 
 def tempering(blocks: Array, chosen: Index) -> float:

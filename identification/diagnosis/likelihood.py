@@ -26,7 +26,7 @@ from ..motion.sensing_effects import undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, log_signals
 from ..motion.smoothing import continuous, turn_between, turned
-from .axis_filter import AXIS, AxisNoise, likeliest_noise, steady_noise
+from .axis_filter import AXIS, AxisFlight, AxisNoise, likeliest_noise, steady_noise
 from .causal_filter import Poses, Track, run, sensitivities
 from .discrepancy import changing_columns, discrepancy_columns, variables
 from .log_offsets import (
@@ -39,6 +39,7 @@ from .priors import (
     BETWEEN,
     GAIN,
     MODEL_ERROR,
+    PRIORS,
     ROUNDED,
     UNKNOWN,
     WHOLE_PREFIX,
@@ -67,7 +68,7 @@ STATES = (0, 1, 2)  # of an axis: pose, rate, disturbance
 SIDEWAYS = 0.01
 
 
-NOISE_ROUNDS = 2  # of the noise and of the flight as it is seen with it
+NOISE_ROUNDS = 3  # of the noise and of the flight as it is seen with it
 FIRST_DISTURBANCE = 0.3  # m/s2 and rad/s2, at which the search for the noise begins
 
 
@@ -114,11 +115,13 @@ class Likelihood:
         self.noise: tuple[AxisNoise, ...] = near.noise if near else self._first_noise()
         # (n, 6, 3) of each piece, what rotors' innovations say of it
         self.known: list[Array] = near.known if near else [np.zeros((n, 6, 3)) for n in lengths]
-        self.tracks = self._run(self.noise, self.known)
+        # what an attitude's innovation says of the position's filter
+        self.aside: Array = near.aside if near else np.zeros((3, 3))
+        self.tracks = self._run()
         self.answers: list[Array] = same.answers if same else self._rotor_innovations()
-        for i in range(0 if same else 1 if near else NOISE_ROUNDS):
-            self.noise, self.known = self._likeliest(begun=near is not None or i > 0)
-            self.tracks = self._run(self.noise, self.known)
+        for i in range(0 if same else 2 if near else NOISE_ROUNDS):
+            self.noise, self.aside, self.known = self._likeliest(begun=near is not None or i > 0)
+            self.tracks = self._run()
             self.answers = self._rotor_innovations()
         self.signals = [
             _signals(piece, track) for piece, track in zip(self.pieces, self.tracks, strict=True)
@@ -136,15 +139,21 @@ class Likelihood:
         if not self._acting:
             self._add_what_any_flight_may_have()
 
-    def _run(self, noise: tuple[AxisNoise, ...], known: Sequence[Array]) -> list[Track]:
+    def _run(self) -> list[Track]:
         return [
-            run(piece, self.vehicle, noise, x) for piece, x in zip(self.pieces, known, strict=True)
+            run(piece, self.vehicle, self.noise, self.aside, known)
+            for piece, known in zip(self.pieces, self.known, strict=True)
         ]
 
     def _rotor_innovations(self) -> list[Array]:
         return rotor_innovations(list(zip(self.pieces, self.tracks, strict=True)))
 
     # Noise
+
+    @property
+    def _units(self) -> Array:
+        """What a unit of acceleration makes of an axis' states in a period."""
+        return np.array([self.period**2, self.period, 1.0])
 
     def _first_noise(self) -> tuple[AxisNoise, ...]:
         floor = sensor_noise(self.flights.logs[0], self.vehicle)
@@ -194,9 +203,10 @@ class Likelihood:
 
     def _likeliest(
         self, explained: Sequence[Array] | None = None, begun: bool = True
-    ) -> tuple[tuple[AxisNoise, ...], list[Array]]:
-        """Return the likeliest noise of each axis, and what the rotors' innovations add to the
-        states of each piece (n, 6, 3); ``explained`` (n, 2, 6) is what is known to move the pose,
+    ) -> tuple[tuple[AxisNoise, ...], Array, list[Array]]:
+        """Return the likeliest noise of each axis, what attitudes' innovations do aside
+        (``causal_filter.run``), and what the rotors' innovations add to the states of each piece
+        (n, 6, 3); ``explained`` (n, 2, 6) is what is known to move the pose,
         and to accelerate, beside the model. ``begun``: whether this noise is roughly known.
         """
         angles = [np.vstack([np.zeros(3), turned(piece.quaternion)]) for piece in self.pieces]
@@ -205,6 +215,7 @@ class Likelihood:
         # rotors that answer a gust before the pose shows it leave less of it unknown
         _, jumps, jump_state = self._jumps()
         known = [np.zeros((len(x), 6, 3)) for x in jumps]
+        aside = np.zeros((3, 3))
         for axis in range(6):
             say = [j for j in range(len(jump_state)) if any(x[:, axis, j].any() for x in jumps)]
             measured = [
@@ -221,24 +232,22 @@ class Likelihood:
             ]
             now = self.noise[axis]
             own = [np.ascontiguousarray(x[:, axis, say]) for x in jumps]
+            held = now.innovation / np.array(PRIORS.gains)[jump_state[say]]
+            flight = AxisFlight(measured, drives, rates, self.period, own, jump_state[say], held)
             found, gains = likeliest_noise(
-                measured,
-                drives,
-                rates,
-                self.period,
-                max(float(white[axis]), now.white),
-                now.pose,
-                now.disturbance,
-                own,
-                jump_state[say],
-                now.time if begun else None,
+                flight, replace(now, white=max(float(white[axis]), now.white)), begun
             )
             out.append(found)
-            for x, jump in zip(known, own, strict=True):
+            every = np.zeros(len(jump_state))
+            every[say] = gains
+            if axis < 3:
+                aside[axis] = every[-3:] * self._units
+            every[-3:] = 0.0
+            for x, jump in zip(known, jumps, strict=True):
                 for state in STATES:
-                    at = jump_state[say] == state
-                    x[:, axis, state] = jump[:, at] @ gains[at]
-        return tuple(out), known
+                    at = jump_state == state
+                    x[:, axis, state] = jump[:, axis, at] @ every[at]
+        return tuple(out), aside, known
 
     def gusts(self) -> tuple[Disturbance, ...]:
         """Return the disturbance of each channel, of which the rotors show a part: a flight loop
@@ -381,8 +390,8 @@ class Likelihood:
         whole library the noise is that of a flight of which everything is known.
         """
         out = copy(self)
-        out.noise, known = self._likeliest(self._explained(coefficients))
-        heard = self._run(out.noise, known)
+        out.noise, out.aside, out.known = self._likeliest(self._explained(coefficients))
+        heard = out._run()
         out.tracks = [
             replace(track, innovations=x.innovations)
             for track, x in zip(self.tracks, heard, strict=True)
@@ -441,10 +450,9 @@ class Likelihood:
         Thrust and torques say something of the axes that they drive. And a loop that rolls or
         pitches the vehicle has seen where it is, and what pushes it aside.
         """
-        kinds = (*(f"axis {axis}" for axis in DRIVEN), "roll aside", "pitch aside")
+        kinds = (*(f"axis {axis}" for axis in DRIVEN), "roll aside", "pitch aside", "tilt")
         names: list[Column] = [("", f"{GAIN} {kind} {state}") for kind in kinds for state in STATES]
         out = []
-        units = np.array([self.period**2, self.period, 1.0])
         tilt = SIDEWAYS * self.flights.vehicle.gravity
         for found, track in zip(self.answers, self.tracks, strict=True):
             rotation = track.rotation
@@ -458,7 +466,9 @@ class Likelihood:
                     directions[:, axis, i] = found[:, i]
             for i, axis in ((1, 1), (2, 0)):
                 directions[:, :3, 3 + i] = tilt * found[:, i, None] * rotation[:, :, axis]
-            jumps = directions[..., None] * units
+            pull = track.rotors[:, :1, None] * rotation[:, :, 1::-1] * [-1.0, 1.0]
+            directions[1:, :3, -1] = np.einsum("nij,nj->ni", pull, track.innovations[:, 3:5])[:-1]
+            jumps = directions[..., None] * self._units
             out.append(jumps.reshape(len(found), 6, len(names)))
         return names, out, np.tile(STATES, len(kinds))
 
@@ -492,6 +502,7 @@ class Likelihood:
                     self.period,
                     gain,
                     keep,
+                    self.aside,
                     pull[at],
                     track.angular_velocity[at],
                     x,
