@@ -398,7 +398,8 @@ def _still(name: str, t: Array, rows: Mask, channel: Array, sisters: Array, name
     still = np.append(False, np.all(np.diff(channel, axis=0) == 0.0, axis=1)) & rows
     changes = np.cumsum(np.diff(sisters, axis=0, prepend=sisters[:1]) != 0.0, axis=0)
     for first, end in runs_of(still):
-        if np.min(changes[end - 1] - changes[first]) < _SISTERS_CHANGE:
+        lasts = t[end - 1] - t[first] >= _STILL
+        if lasts and np.min(changes[end - 1] - changes[first]) < _SISTERS_CHANGE:
             still[first:end] = False
     if found := _stretches(still, t, _STILL):
         wrong = "what depends on it there is wrong if its sensor hung"
