@@ -28,12 +28,9 @@ from .estimate import (
 from .filter_record import N
 from .model_uncertainty import follow_back, variances
 from .rauch_tung_striebel import LINK, step_back, step_with_link
-from .ukf import WrenchUKF, step
+from .ukf import CALL, WrenchUKF, step
 
 _BLOCK = 1024  # steps in memory at a time: 10 MB
-_EVENT = np.dtype(  # a call: rotor speeds and pose, parts of the pose, s, V
-    [("z", "f8", (11,)), ("parts", "i8"), ("dt", "f8"), ("voltage", "f8")]
-)
 
 
 @compiled
@@ -91,18 +88,18 @@ class RecordingUKF(WrenchUKF):
 
     def _prepare(self) -> None:
         """Keep nothing yet."""
-        self._kept = bytearray()  # of ``_EVENT``
+        self._kept = bytearray()  # of ``CALL``
         self._starts: dict[int, np.ndarray] = {}  # event: the memory (1,) after a reset
 
     @property
     def events(self) -> int:
         """How many calls were kept."""
-        return len(self._kept) // _EVENT.itemsize
+        return len(self._kept) // CALL.itemsize
 
     def _begin(self) -> None:
         """Keep a start; no smoothing crosses one."""
         self._starts[self.events] = self.record.copy()
-        self._kept += bytes(_EVENT.itemsize)
+        self._kept += bytes(CALL.itemsize)
 
     def _run(self, parts: int, dt: float, voltage: float | None) -> WrenchEstimate:
         z = self._sample.z.tobytes()
@@ -110,6 +107,11 @@ class RecordingUKF(WrenchUKF):
         volts = self._voltage if voltage is None else voltage
         self._kept += z + struct.pack("=qdd", parts, dt, volts)
         return estimate
+
+    def keep(self, calls: np.ndarray) -> np.ndarray:
+        """Keep calls (n,) that ``make_calls`` made, none of them of an IMU; return their events."""
+        self._kept += calls.tobytes()
+        return np.arange(self.events - len(calls), self.events)
 
     def smooth(self, at: ArrayLike | None = None, covariance: bool = False) -> WrenchEstimate:
         """Return the smoothed estimates (M,) after each event up to now, or after the events
@@ -127,7 +129,7 @@ class RecordingUKF(WrenchUKF):
         """
         if 0 not in self._starts:
             raise InputError("RecordingUKF: the first call must be a start of the filter, reset")
-        events = np.frombuffer(bytes(self._kept), dtype=_EVENT)
+        events = np.frombuffer(bytes(self._kept), dtype=CALL)
         numbers = np.zeros((self.events, ESTIMATE_SIZE if covariance else WITHOUT_COVARIANCE))
         std = np.empty((self.events, N))
         begins = sorted(self._starts)
