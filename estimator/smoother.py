@@ -26,20 +26,11 @@ from .estimate import (
     WrenchEstimate,
 )
 from .filter_record import N
-from .model_uncertainty import follow_back, variances
+from .model_uncertainty import LOAD, follow_back, variances
 from .rauch_tung_striebel import LINK, step_back, step_with_link
-from .ukf import CALL, WrenchUKF, step
+from .ukf import CALL, WrenchUKF, make_calls
 
 _BLOCK = 1024  # steps in memory at a time: 10 MB
-
-
-@compiled
-def _forward(record: np.ndarray, events: np.ndarray) -> None:
-    f = record[0]
-    for k in range(len(events)):
-        event = events[k]
-        f.z[:] = event.z  # a step brings its quaternion to length 1 in place
-        step(f, f.z, event.parts, event.dt, event.voltage)
 
 
 @compiled
@@ -49,7 +40,7 @@ def _forward_with_links(
     f = record[0]
     for k in range(len(events)):
         event = events[k]
-        f.z[:] = event.z
+        f.z[:] = event.z  # a step brings its quaternion to length 1 in place
         step_with_link(f, f.z, event.parts, event.dt, event.voltage, links[1 + k])
         numbers[k, STATUS], numbers[k, RESTARTS] = f.status, f.restarts
 
@@ -152,7 +143,8 @@ class RecordingUKF(WrenchUKF):
         for first in range(begin + 1, end, _BLOCK):
             here = slice(first, min(first + _BLOCK, end))
             blocks.append((here, record.copy()))
-            _forward(record, events[here])
+            calls, loads = events[here], np.empty((here.stop - first, *LOAD))
+            make_calls(record, calls, np.arange(len(calls)), numbers[here], std[here], loads)
         links = np.zeros(1 + min(_BLOCK, end - begin), dtype=LINK)
         for here, memory in reversed(blocks):
             links["x"][0], links["load"][0] = memory["x"][0], memory["load"][0]

@@ -19,7 +19,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from copy import deepcopy
-from functools import cache
 from typing import Any, Self
 
 import numpy as np
@@ -32,7 +31,7 @@ from ..dynamics.rotation import attitude_error, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
 from ..runtime.addresses import STEP, address_of, pointer_to
 from ..runtime.arguments import real_numbers
-from ..runtime.compiled import Record, compiled, compiled_inline, specialised
+from ..runtime.compiled import Record, compiled, compiled_inline
 from ..runtime.errors import InputError
 from ..runtime.vector_lanes import all_of, any_of, choose, first_below, first_column, lanes_by
 from .bias_states import (
@@ -362,12 +361,6 @@ def _add_doubt(record: Record, variances: Array) -> None:
         variances[i] += f.poses.strain * variances[i] + f.mean[i]
 
 
-@cache
-def _doubt() -> Callable[..., None]:
-    """Return ``_add_doubt`` as a call of 0.1 us."""
-    return specialised(_add_doubt, np.zeros(1, FILTER), np.zeros(ESTIMATE_SIZE)[_VARIANCES])
-
-
 @compiled
 def make_calls(
     record: Record, calls: np.ndarray, rows: np.ndarray, numbers: Array, std: Array, loads: Array
@@ -630,7 +623,7 @@ class WrenchUKF:
         """
         numbers, doubts = self._now.copy(), self._doubts
         if doubts[0] > BELIEVING or doubts[1] > _STRAINED:
-            _doubt()(self.record, numbers[_VARIANCES])
+            _add_doubt(self.record, numbers[_VARIANCES])
         return WrenchEstimate(numbers)
 
     def step(

@@ -318,7 +318,7 @@ def _calls(log: FlightLog, rows: Rows, ukf: WrenchUKF, with_imu: bool) -> tuple[
     for part, sensor in enumerate(sensors):
         if sensor is not None:
             imu[:, 3 * part : 3 * part + 3] = np.nan_to_num(sensor[rows])
-            read += IMU_PARTS[part] * np.isfinite(sensor[rows, 0])
+            read += IMU_PARTS[part] * np.isfinite(sensor[rows]).all(axis=1)
     carried, posed = np.repeat(rows, list(map(len, steps))), rows[log.valid[rows]]
     to = np.concatenate([carried, rows[read > 0], posed])
     calls = np.zeros(len(to), dtype=CALL)
