@@ -202,10 +202,9 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
     times = log.t if by_imu or log.valid.sum() < 2 else log.t[log.valid]
     if doubt := time_doubt(float(np.median(np.diff(times)))):
         yield Refused(doubt)
+    carried = carrying(np.square(speeds).max(axis=1))
     for i, column in enumerate(speeds.T):
-        if stopped := _stretches(
-            (column == 0.0) & carrying(np.square(speeds).max(axis=1)), log.t, _STOPPED
-        ):
+        if stopped := _stretches((column == 0.0) & carried, log.t, _STOPPED):
             yield Fault(f"omega{i + 1} {zero}, for {stopped}; {all_four}")
     most = _most_rad_s(log, vehicle)
     if (above := np.argwhere(speeds > most)).size:
