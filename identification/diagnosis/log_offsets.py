@@ -92,7 +92,7 @@ def with_time_offsets(signals: Signals, offsets: Mapping[str, float]) -> Signals
         )
     )
     if rotors != 0.0:
-        n = np.arange(len(signals.t))
+        n = np.arange(len(signals.t), dtype=np.float64)
         speeds = resampled(n - rotors / signals.period, n, signals.rotor_speeds)
         signals = replace(signals, rotor_speeds=speeds)
     if spread != 0.0:

@@ -325,8 +325,9 @@ class Evidence:
         driven = self._inertia @ turn
         products = np.cross(turn[:, None, :], driven[:, :, None], axis=0).reshape(3, 9)
         each, columns = np.hstack([driven, products]), self._motion(*reading.attitude)[1][..., 3:]
-        needed = np.vstack([along, each[:2] @ columns[:, 0].T, each[2] @ columns[:, 1].T])
-        return needed - needed.mean(axis=1, keepdims=True)
+        needed: Array = np.vstack([along, each[:2] @ columns[:, 0].T, each[2] @ columns[:, 1].T])
+        needed -= needed.mean(axis=1, keepdims=True)
+        return needed
 
     def _balances(self, *moves: Any) -> tuple[float, float, Array]:
         """Return what a reading's motion says whatever the rotors: the share of the horizontal
