@@ -26,23 +26,11 @@ from .estimate import (
     WrenchEstimate,
 )
 from .filter_record import N
-from .model_uncertainty import follow_back, variances
+from .model_uncertainty import LOAD, follow_back, variances
 from .rauch_tung_striebel import LINK, step_back, step_with_link
-from .ukf import WrenchUKF, step
+from .ukf import CALL, WrenchUKF, make_calls
 
 _BLOCK = 1024  # steps in memory at a time: 10 MB
-_EVENT = np.dtype(  # a call: rotor speeds and pose, parts of the pose, s, V
-    [("z", "f8", (11,)), ("parts", "i8"), ("dt", "f8"), ("voltage", "f8")]
-)
-
-
-@compiled
-def _forward(record: np.ndarray, events: np.ndarray) -> None:
-    f = record[0]
-    for k in range(len(events)):
-        event = events[k]
-        f.z[:] = event.z  # a step brings its quaternion to length 1 in place
-        step(f, f.z, event.parts, event.dt, event.voltage)
 
 
 @compiled
@@ -52,7 +40,7 @@ def _forward_with_links(
     f = record[0]
     for k in range(len(events)):
         event = events[k]
-        f.z[:] = event.z
+        f.z[:] = event.z  # a step brings its quaternion to length 1 in place
         step_with_link(f, f.z, event.parts, event.dt, event.voltage, links[1 + k])
         numbers[k, STATUS], numbers[k, RESTARTS] = f.status, f.restarts
 
@@ -91,18 +79,18 @@ class RecordingUKF(WrenchUKF):
 
     def _prepare(self) -> None:
         """Keep nothing yet."""
-        self._kept = bytearray()  # of ``_EVENT``
+        self._kept = bytearray()  # of ``CALL``
         self._starts: dict[int, np.ndarray] = {}  # event: the memory (1,) after a reset
 
     @property
     def events(self) -> int:
         """How many calls were kept."""
-        return len(self._kept) // _EVENT.itemsize
+        return len(self._kept) // CALL.itemsize
 
     def _begin(self) -> None:
         """Keep a start; no smoothing crosses one."""
         self._starts[self.events] = self.record.copy()
-        self._kept += bytes(_EVENT.itemsize)
+        self._kept += bytes(CALL.itemsize)
 
     def _run(self, parts: int, dt: float, voltage: float | None) -> WrenchEstimate:
         z = self._sample.z.tobytes()
@@ -110,6 +98,11 @@ class RecordingUKF(WrenchUKF):
         volts = self._voltage if voltage is None else voltage
         self._kept += z + struct.pack("=qdd", parts, dt, volts)
         return estimate
+
+    def keep(self, calls: np.ndarray) -> np.ndarray:
+        """Keep calls (n,) that ``make_calls`` made, none of them of an IMU; return their events."""
+        self._kept += calls.tobytes()
+        return np.arange(self.events - len(calls), self.events)
 
     def smooth(self, at: ArrayLike | None = None, covariance: bool = False) -> WrenchEstimate:
         """Return the smoothed estimates (M,) after each event up to now, or after the events
@@ -127,7 +120,7 @@ class RecordingUKF(WrenchUKF):
         """
         if 0 not in self._starts:
             raise InputError("RecordingUKF: the first call must be a start of the filter, reset")
-        events = np.frombuffer(bytes(self._kept), dtype=_EVENT)
+        events = np.frombuffer(bytes(self._kept), dtype=CALL)
         numbers = np.zeros((self.events, ESTIMATE_SIZE if covariance else WITHOUT_COVARIANCE))
         std = np.empty((self.events, N))
         begins = sorted(self._starts)
@@ -150,7 +143,8 @@ class RecordingUKF(WrenchUKF):
         for first in range(begin + 1, end, _BLOCK):
             here = slice(first, min(first + _BLOCK, end))
             blocks.append((here, record.copy()))
-            _forward(record, events[here])
+            calls, loads = events[here], np.empty((here.stop - first, *LOAD))
+            make_calls(record, calls, np.arange(len(calls)), numbers[here], std[here], loads)
         links = np.zeros(1 + min(_BLOCK, end - begin), dtype=LINK)
         for here, memory in reversed(blocks):
             links["x"][0], links["load"][0] = memory["x"][0], memory["load"][0]

@@ -19,19 +19,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from copy import deepcopy
-from functools import cache
 from typing import Any, Self
 
 import numpy as np
 from numba import carray
 from numpy.typing import ArrayLike, NDArray
 
+from ..dynamics.effects import compile_effects
 from ..dynamics.model import lay_addresses, reset_model, without_addresses
 from ..dynamics.rotation import attitude_error, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
 from ..runtime.addresses import STEP, address_of, pointer_to
 from ..runtime.arguments import real_numbers
-from ..runtime.compiled import Record, compiled, compiled_inline, specialised
+from ..runtime.compiled import Record, compiled, compiled_inline
 from ..runtime.errors import InputError
 from ..runtime.vector_lanes import all_of, any_of, choose, first_below, first_column, lanes_by
 from .bias_states import (
@@ -58,11 +58,14 @@ from .covariance import (
 from .error_state import displace, error_from, fold, symmetrise
 from .estimate import (
     ESTIMATE_SIZE,
+    MODEL,
     NIS,
     POSITION,
     QUATERNION,
     RATE,
+    RESTARTS,
     STATE_SIZE,
+    STATUS,
     VELOCITY,
     WITHOUT_COVARIANCE,
     Array,
@@ -85,6 +88,12 @@ from .recovery import BELIEVING, NOISE, Recovery, after_prediction, believable, 
 from .sample import Sample, check_sample, undo_first_pose, undo_sensing
 from .sigma_points import PAIRS, errors_of_points, halve_pairs, propagate_points, spread_points
 from .tuning import UKFTuning
+
+# A call of a filter: rotor speeds and pose, which parts of the pose there are, s, V; or gyro and
+# accelerometer, and which of both
+CALL = np.dtype([("z", "f8", (11,)), ("parts", "i8"), ("dt", "f8"), ("voltage", "f8")])
+IMU_PARTS = 4, 8  # gyro and accelerometer, beside the parts of a pose
+_VARIANCES = slice(WITHOUT_COVARIANCE, None, N + 1)  # of an estimate's numbers
 
 
 @compiled
@@ -339,24 +348,51 @@ def _step_with_biases_at(address: int, parts: int, dt: float, voltage: float) ->
     return step_with_biases_by(f, parts, dt, voltage, predict, carry_with_points)
 
 
+_POSES = FILTER.fields["poses"][1]  # type: ignore[index]  # where their memory begins
+_STRAINED = 0.01  # of a variance: less is not told
+
+
 @compiled
-def _add_doubt(record: Record, numbers: Array) -> None:
-    """Add to the variances in an estimate's ``numbers`` what refused and unlikely poses add."""
+def _add_doubt(record: Record, variances: Array) -> None:
+    """Add to an estimate's variances (18,) what refused and unlikely poses add."""
     f = record[0]
     doubted_variance(f, f.mean)
     for i in range(N):
-        place = WITHOUT_COVARIANCE + (N + 1) * i
-        numbers[place] += f.poses.strain * numbers[place] + f.mean[i]
+        variances[i] += f.poses.strain * variances[i] + f.mean[i]
 
 
-@cache
-def _doubt() -> Callable[..., None]:
-    """Return ``_add_doubt`` as a call of 0.1 us."""
-    return specialised(_add_doubt, np.zeros(1, FILTER), np.zeros(ESTIMATE_SIZE))
-
-
-_POSES = FILTER.fields["poses"][1]  # type: ignore[index]  # where their memory begins
-_STRAINED = 0.01  # of a variance: less is not told
+@compiled
+def make_calls(
+    record: Record, calls: np.ndarray, rows: np.ndarray, numbers: Array, std: Array, loads: Array
+) -> int:
+    """Make calls (n,) of an unscented filter, and write into the row of each what it leads to:
+    numbers (N, 28) and standard deviations (N, 18) of an estimate, and what the vehicle's
+    uncertainty scales (N, 7, 3); return how many there were up to a quaternion that is no rotation.
+    """
+    f = record[0]
+    for k, row in enumerate(rows):
+        call, used = calls[k], 0
+        f.z[:] = call.z
+        gyro, accelerometer = call.parts & IMU_PARTS[0] != 0, call.parts & IMU_PARTS[1] != 0
+        if gyro or accelerometer:
+            if f.imu.used == 0:
+                begin_imu(record)
+            take_in_imu(record, f.z[:6], gyro, accelerometer)
+        elif f.imu.used > 0:
+            used = step_with_biases_by(
+                f, call.parts, call.dt, call.voltage, predict, carry_with_points
+            )
+        else:
+            used = step(f, f.z, call.parts, call.dt, call.voltage)
+        if used < 0:
+            return k
+        numbers[row, :STATE_SIZE], numbers[row, MODEL], loads[row] = f.x, f.model, f.load
+        numbers[row, STATUS], numbers[row, RESTARTS] = f.status, f.restarts
+        std[row] = np.diag(f.P)
+        if f.poses.phase > BELIEVING or f.poses.strain > _STRAINED:
+            _add_doubt(record, std[row])
+        std[row] = np.sqrt(std[row])
+    return len(calls)
 
 
 class WrenchUKF:
@@ -448,7 +484,7 @@ class WrenchUKF:
 
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
-        lay_addresses(self.record[0], self.vehicle)
+        lay_addresses(self.record[0], compile_effects(self.vehicle))
         self._bind()
 
     def __copy__(self) -> Self:
@@ -587,7 +623,7 @@ class WrenchUKF:
         """
         numbers, doubts = self._now.copy(), self._doubts
         if doubts[0] > BELIEVING or doubts[1] > _STRAINED:
-            _doubt()(self.record, numbers)
+            _add_doubt(self.record, numbers[_VARIANCES])
         return WrenchEstimate(numbers)
 
     def step(

@@ -27,6 +27,8 @@ from ..estimator.estimate import (
 from ..estimator.model_uncertainty import LOAD, NAMES, factors_alone, variances_along
 from ..estimator.noise_fit import consistency_of
 from ..estimator.row_steps import steps_between
+from ..estimator.sample import Sample, convert
+from ..estimator.ukf import CALL, IMU_PARTS, make_calls
 from ..runtime.errors import InputError
 from .inertial_wrench import inertial_wrench
 from .logs.flight_log import FlightLog
@@ -36,6 +38,7 @@ from .logs.tables import write_csv
 from .motion.inertial_signals import reads_imu
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
 T = TypeVar("T")
 
 # probability beyond which a pose is asked whether it jumped: one good pose in 10,000 is, at 200 Hz
@@ -146,23 +149,17 @@ def _estimate(
     loads = np.zeros((count, *LOAD))
     events = np.zeros(count, dtype=np.int64)  # of a recording filter: the one that ends a row
     ukf.reset(log.position[first], log.quaternion[first])
-    # an estimate that overflows is refused below
-    with np.errstate(over="ignore", invalid="ignore"):
-        for k in range(first, count):
-            if k % _REPORTED == 0:
-                report(k / count)
-            if k > first:
-                predict_to_row(ukf, log, k)
-                if not smooth:
-                    _take_in_imu(ukf, log, k)
-                if log.valid[k]:
-                    ukf.correct(log.position[k], log.quaternion[k])
-            estimate = ukf.estimate
-            numbers[k], std[k] = estimate.numbers[:WITHOUT_COVARIANCE], estimate.std
-            loads[k] = ukf.record["load"][0]
-            if isinstance(ukf, RecordingUKF):
-                events[k] = ukf.events - 1
-    numbers[:first], std[:first] = numbers[first], std[first]
+    numbers[: first + 1] = ukf.estimate.numbers[:WITHOUT_COVARIANCE]
+    std[: first + 1] = ukf.estimate.std
+    for begin in range(first + 1, count, _REPORTED):
+        report(begin / count)
+        rows = np.arange(begin, min(begin + _REPORTED, count))
+        calls, to = _calls(log, rows, ukf, not smooth)
+        made = make_calls(ukf.record, calls, to, numbers, std, loads)
+        if made < len(calls):
+            raise Sample(calls["z"][made]).bad_quaternion()
+        if isinstance(ukf, RecordingUKF):
+            events[to] = ukf.keep(calls)
     broken = ~np.isfinite(np.column_stack([numbers[:, :NIS], std])).all(axis=1)
     if broken.any():
         raise InputError(
@@ -311,23 +308,30 @@ def _of_poses(
         raise InputError(f"{log.source or log.name}: {error}") from error
 
 
-def predict_to_row(ukf: WrenchUKF, log: FlightLog, k: int) -> None:
-    """Carry the filter from row ``k - 1`` to row ``k`` in equal steps of at most one period."""
-    dt = float(log.t[k] - log.t[k - 1])
-    speeds = 0.5 * (log.rotor_speeds[k - 1] + log.rotor_speeds[k])
-    voltage = None if log.voltage is None else 0.5 * float(log.voltage[k - 1] + log.voltage[k])
-    for step in steps_between(dt, ukf.period):
-        ukf.predict(speeds, step, voltage)
-
-
-def _take_in_imu(ukf: WrenchUKF, log: FlightLog, k: int) -> None:
-    """Correct with what gyro and accelerometer measured in row ``k``, if they did."""
-    gyro, accelerometer = (
-        None if sensor is None or not np.isfinite(sensor[k, 0]) else sensor[k]
-        for sensor in (log.gyro, log.accelerometer)
-    )
-    if gyro is not None or accelerometer is not None:
-        ukf.correct_imu(gyro, accelerometer)
+def _calls(log: FlightLog, rows: Rows, ukf: WrenchUKF, with_imu: bool) -> tuple[np.ndarray, Rows]:
+    """Return the calls that take a filter to each of some rows from the one before, in equal steps
+    of at most one period, and correct it there with what was measured; and the row of each call.
+    """
+    steps = [steps_between(dt, ukf.period) for dt in (log.t[rows] - log.t[rows - 1]).tolist()]
+    imu, read = np.zeros((len(rows), 6)), np.zeros(len(rows), dtype=np.int64)
+    sensors = (log.gyro, log.accelerometer) if with_imu else ()
+    for part, sensor in enumerate(sensors):
+        if sensor is not None:
+            imu[:, 3 * part : 3 * part + 3] = np.nan_to_num(sensor[rows])
+            read += IMU_PARTS[part] * np.isfinite(sensor[rows]).all(axis=1)
+    carried, posed = np.repeat(rows, list(map(len, steps))), rows[log.valid[rows]]
+    to = np.concatenate([carried, rows[read > 0], posed])
+    calls = np.zeros(len(to), dtype=CALL)
+    speeds = 0.5 * (log.rotor_speeds[to - 1] + log.rotor_speeds[to])
+    convert(calls["z"], speeds, log.position[to], log.quaternion[to])
+    felt = slice(len(carried), len(to) - len(posed))
+    calls["z"][felt, :6], calls["parts"][felt] = imu[read > 0], read[read > 0]
+    calls["parts"][felt.stop :], calls["dt"][: felt.start] = 3, np.concatenate(steps)
+    calls["voltage"] = ukf.vehicle.voltage_ref
+    if log.voltage is not None:
+        calls["voltage"] = 0.5 * (log.voltage[to - 1] + log.voltage[to])
+    order = np.argsort(to, kind="stable")
+    return calls[order], to[order]
 
 
 def write_wrench(series: WrenchSeries, path: Path) -> None:

@@ -91,8 +91,7 @@ def thrust_is_assumed(logs: Sequence[FlightLog], vehicle: Vehicle) -> bool:
     """Return whether rotor speeds are worked out from commands, and the vehicle states no curve
     (``motor_curve``) that says how much thrust a command makes.
     """
-    commanded = any(log.commanded for log in logs)
-    return commanded and getattr(vehicle, "motor_curve", None) is None
+    return vehicle.motor_curve is None and any(log.commanded for log in logs)
 
 
 def assumed_thrust_doubts(effects: Sequence[str]) -> tuple[str, ...]:

@@ -82,9 +82,10 @@ def diagnose(
     )
     report("predicting the flights")
     named = {e: x for e, x in setting.items() if e}
-    amended = flights.amended(named)
+    amended = flights.amended(named) if named else vehicle
     notes += [*said.notes, *range_notes(flights)]
     segments = _segments(flights)
+    predicted = {model: _predicted(flights, model, segments) for model in {vehicle, amended}}
     hidden = flights.needs_pose | said.hidden
     unseen = (flights.not_identifiable | said.unseen) - flights.needs_pose
     return Diagnosis(
@@ -92,8 +93,8 @@ def diagnose(
         remainder=said.remainder,
         effects=effects,
         held_out_segments=tuple((flights.logs[i].name, a, b) for i, a, b in segments),
-        before=_errors(flights, vehicle, segments, found.error_before),
-        after=_errors(flights, amended, segments, found.error_after),
+        before=Errors(*found.error_before, *predicted[vehicle]),
+        after=Errors(*found.error_after, *predicted[amended]),
         floor_force_rms=found.floor[0],
         floor_torque_rms=found.floor[1],
         advice=tuple(
@@ -110,7 +111,7 @@ def diagnose(
         pushes=said.pushes,
         cutoff_hz=CUTOFFS.residual_hz,
         declared=vehicle,
-        amended=amended if found.better or not named else vehicle,
+        amended=amended if found.better else vehicle,
         logs=tuple(log.name for log in logs),
         test_logs=tuple(log.name for log in test),
         seconds=float(sum(log.t[-1] - log.t[0] for log in every)),
@@ -130,12 +131,10 @@ def _segments(flights: Flights) -> list[tuple[int, float, float]]:
     return [(int(flights.log[a]), float(flights.t[a]), float(flights.t[b])) for a, b in ends]
 
 
-def _errors(
-    flights: Flights,
-    vehicle: Vehicle,
-    segments: Sequence[tuple[int, float, float]],
-    rms: tuple[float, float],
-) -> Errors:
+def _predicted(
+    flights: Flights, vehicle: Vehicle, segments: Sequence[tuple[int, float, float]]
+) -> tuple[float, float]:
+    """Return how far a model's predictions of the held-out stretches are off: NIS, and m RMS."""
     nis, distance, weight = [], [], []
     for i, log in enumerate(flights.logs):
         own = [(a, b) for k, a, b in segments if k == i]
@@ -143,9 +142,8 @@ def _errors(
             nis.append(nis_without_wrench_state(log, vehicle, own))
             distance.append(rollout_error(log, vehicle, own))
             weight.append(sum(b - a for a, b in own))
-    return Errors(
-        *rms, _mean(np.array(nis), weight), float(np.sqrt(_mean(np.square(distance), weight)))
-    )
+    squares = np.square(distance)
+    return _mean(np.array(nis), weight), float(np.sqrt(_mean(squares, weight)))
 
 
 def _mean(values: Array, weight: Sequence[float]) -> float:

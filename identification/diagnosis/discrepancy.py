@@ -101,6 +101,10 @@ def discrepancy_columns(tracks: Sequence[State], flights: Flights) -> dict[Colum
     shapes += [("place", name, x, every) for name, x in places]
     along = np.pi * (t - t[0]) / max(float(t[-1] - t[0]), 1e-9)
     shapes += [("time", f"time {i}", np.cos(i * along), every) for i in (1, 2, 3)]
+    period = float(np.median(np.diff(t)))
+    for hertz, i in itertools.product(DISCREPANCY.mount_hz, range(3)):
+        z = _resonance(rotors[:, 1 + i], hertz, period, ends)
+        shapes.append(("resonance", f"a part that swings at {hertz:g} Hz", z, (3 + i,)))
     vehicle = flights.vehicle
     arm = DISCREPANCY.torque_arm * vehicle.arm_l
     size = vehicle.weight * np.repeat([1.0, arm], 3) / flights.inertias
@@ -122,18 +126,11 @@ def discrepancy_columns(tracks: Sequence[State], flights: Flights) -> dict[Colum
         column = np.zeros((len(t), 6))
         column[:, channel] = size[channel]
         add("constant", f"a constant in {channel}", column)
-    period = float(np.median(np.diff(t)))
-    acceleration, turning = joined["acceleration"], rotors[:, 1:]
     for hertz in DISCREPANCY.load_hz:
         column = np.zeros((len(t), 6))
-        column[:, :2] = _resonance(acceleration[:, :2], hertz, period, ends)
+        column[:, :2] = _resonance(joined["acceleration"][:, :2], hertz, period, ends)
         column *= size[0] / max(float(column[:, :2].std()), 1e-9)
         add("resonance", f"a load that swings at {hertz:g} Hz in 0", column)
-    for hertz, i in itertools.product(DISCREPANCY.mount_hz, range(3)):
-        column = np.zeros((len(t), 6))
-        z = _scaled(_resonance(turning[:, i], hertz, period, ends))
-        column[:, 3 + i] = size[3 + i] * z
-        add("resonance", f"a part that swings at {hertz:g} Hz in {3 + i}", column)
     return out
 
 

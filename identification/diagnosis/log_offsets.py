@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
-from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import Vehicle
 from ..motion.signals import Signals
+from ..motion.smoothing import lagged, resampled
 
 # time offsets (s) of a log: by which the rotor speeds act later than they are logged, by which the
 # attitude is ahead of the position, and by which the velocity that acts is behind the position's (a
@@ -74,8 +74,8 @@ def with_uneven_lag(signals: Signals, vehicle: Vehicle, asymmetry: float) -> Sig
     ]
     if asymmetry == 0.0 or not any(lags):
         return signals
-    u, kept = signals.rotor_speeds, np.exp(-signals.period / max(lags))
-    followed, _ = lfilter([1.0 - kept], [1.0, -kept], u, axis=0, zi=kept * u[:1])
+    u = signals.rotor_speeds
+    followed = lagged(u, max(lags), signals.period)
     rate = np.abs(np.diff(followed, axis=0, prepend=followed[:1])) / signals.period
     return replace(signals, rotor_speeds=u + asymmetry * rate)
 
@@ -92,9 +92,8 @@ def with_time_offsets(signals: Signals, offsets: Mapping[str, float]) -> Signals
         )
     )
     if rotors != 0.0:
-        n = np.arange(len(signals.t))
-        at = n - rotors / signals.period
-        speeds = np.column_stack([np.interp(at, n, x) for x in signals.rotor_speeds.T])
+        n = np.arange(len(signals.t), dtype=np.float64)
+        speeds = resampled(n - rotors / signals.period, n, signals.rotor_speeds)
         signals = replace(signals, rotor_speeds=speeds)
     if spread != 0.0:
         over = np.sqrt(spread) / signals.period

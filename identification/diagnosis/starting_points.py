@@ -90,15 +90,14 @@ def _likeness(
     every = np.concatenate([np.isin(p.rows, x) for p, x in zip(pieces, at, strict=True)])
     seen = flights.fit_rows[every]
     target = residual[every][seen]
+    sampled = [
+        (p.signals.at(x), slice(None)) if steady else (p.signals, x)
+        for p, x in zip(pieces, at, strict=True)
+    ]
     scale = 1.0 / np.maximum(np.sqrt(np.mean(np.square(target), axis=0)), 1e-12)
 
     def acting(setting: Setting) -> Array:
-        parts = [
-            flights.acting(p.signals.at(x), setting)
-            if steady
-            else flights.acting(p.signals, setting)[x]
-            for p, x in zip(pieces, at, strict=True)
-        ]
+        parts = [flights.acting(signals, setting)[x] for signals, x in sampled]
         return np.asarray(np.concatenate(parts)[seen] * scale)
 
     base, out = acting({}), []

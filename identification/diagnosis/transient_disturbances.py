@@ -53,15 +53,8 @@ def transient_disturbances(flights: Flights, setting: Setting) -> list[Transient
             row = inner[np.argmax(size[:, i])]
             peak = float(slow[row, i])
             above = abs(peak) / max(float(std[i]), 1e-30)
-            if (
-                above
-                > max(TRANSIENT.least_significance, found[channel][0] if channel in found else 0.0)
-                and abs(peak) > least[i]
-            ):
-                found[channel] = (
-                    above,
-                    TransientDisturbance(
-                        channel, flights.logs[flights.log[row]].name, float(flights.t[row]), peak
-                    ),
-                )
+            before, _ = found.get(channel, (TRANSIENT.least_significance, None))
+            if above > before and abs(peak) > least[i]:
+                log, t = flights.logs[flights.log[row]].name, float(flights.t[row])
+                found[channel] = above, TransientDisturbance(channel, log, t, peak)
     return [transient for _, transient in sorted(found.values(), key=lambda x: -x[0])]

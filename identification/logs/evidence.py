@@ -15,6 +15,7 @@ flight counts for few independent samples ``n``. A hover tells nothing: all shar
 likeliest reading is taken, less what it must make up for being less usual.
 """
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -36,7 +37,7 @@ from .flight_log import FlightLog
 from .flight_phases import carrying
 from .log_map import UNITS
 from .readings import DECLARED, Reading, as_written, log_readings
-from .table import Array, Mask, Rows
+from .table import Array, Rows
 
 
 @dataclass(frozen=True)
@@ -81,8 +82,8 @@ _SIDES = np.array([[1.0, 1.0, -1.0, -1.0], [-1.0, 1.0, 1.0, -1.0]])
 
 def likelihood(shares: Sequence[float]) -> float:
     """Return the log-likelihood, up to a constant, of shares of one component each."""
-    left = np.clip(shares, EVIDENCE.least_share, EVIDENCE.most_share)
-    return -0.5 * EVIDENCE.samples * float(np.log(left).sum())
+    bounded = (min(max(x, EVIDENCE.least_share), EVIDENCE.most_share) for x in shares)
+    return -0.5 * EVIDENCE.samples * sum(map(math.log, bounded))
 
 
 def share(total: float, power: float, cross: float, gain: tuple[float, float]) -> float:
@@ -134,9 +135,9 @@ class _Piece:
         """Return columns (m, k), low-passed as a trajectory's motion is."""
         return low_pass(x, CUTOFFS.convention_hz, self.period)
 
-    def band(self, x: Array) -> Array:
-        """Return columns (m, k) in the bands of roll and pitch and of yaw, (m, 2, k)."""
-        low, high, yaw = (low_pass(x, hz, self.period) for hz in EVIDENCE.turn_hz)
+    def band(self, x: Array, rows: Rows | slice = slice(None)) -> Array:
+        """Return rows of columns (m, k) in the bands of roll and pitch and of yaw, (m, 2, k)."""
+        low, high, yaw = (low_pass(x, hz, self.period)[rows] for hz in EVIDENCE.turn_hz)
         return np.stack([high - low, yaw - low], axis=1)
 
 
@@ -177,7 +178,7 @@ class Evidence:
         moving = [x for x in (position, attitude, gyro) if x is not None]
         there = np.isfinite(t) & np.all([np.isfinite(x).all(axis=1) for x in moving], axis=0)
         self._pieces = self._cut(np.flatnonzero(there))
-        self._motion, self._delayed = lru_cache(self._moving), lru_cache(16)(self._pushes)
+        self._motion, self._delayed = lru_cache(self._moving), lru_cache(2)(self._pushes)
         self._moved = lru_cache(2)(self._balances)
 
     @classmethod
@@ -273,21 +274,20 @@ class Evidence:
     def _each(self, values: list[Array]) -> Iterator[tuple[Array, _Piece]]:
         return zip(values, self._pieces, strict=True)
 
-    def _pushes(self, delay: float) -> tuple[Mask, Array]:
-        """Return which samples compared (n,) less a delay lie within their piece, and the first
-        thrusts (n, 9) of ``_driving`` there less their means; zero elsewhere.
+    def _pushes(self, *delays: float) -> tuple[Array, Array]:
+        """Return which samples compared less each delay (d, n) lie within their piece (1, or 0),
+        and the first thrusts (d, 9, n) of ``_driving`` there less their means; zero elsewhere.
         """
-        out = []
+        there, out = [], []
         for x, p in self._each(self._driving):
-            at = p.compared - delay / p.period
+            at = p.compared - np.array(delays)[:, None] / p.period
             row = np.clip(np.floor(at).astype(int), 0, len(x) - 2)
-            part = (at - row)[:, None]
-            between = x[row, :9] * (1.0 - part) + x[row + 1, :9] * part
-            out.append(np.where(((at >= 0.0) & (at <= len(x) - 1))[:, None], between, np.nan))
-        thrusts = np.concatenate(out)
-        there: Mask = np.isfinite(thrusts[:, 0])
-        thrusts -= thrusts[there].mean(axis=0) if there.any() else 0.0
-        return there, np.where(there[:, None], thrusts, 0.0)
+            part = (at - row)[..., None]
+            out.append(x[row, :9] * (1.0 - part) + x[row + 1, :9] * part)
+            there.append((at >= 0.0) & (at <= len(x) - 1))
+        within, thrusts = np.concatenate(there, axis=1).astype(float), np.concatenate(out, axis=1)
+        means = within[:, None] @ thrusts / np.maximum(within.sum(axis=1), 1.0)[:, None, None]
+        return within, np.swapaxes(within[..., None] * (thrusts - means), 1, 2)
 
     def _moving(self, *attitude: Any) -> tuple[Array, Array]:
         """Return what moves the body by one way to turn columns into rotations: specific thrust
@@ -311,35 +311,36 @@ class Evidence:
             axes.append(p.slow(thrusts[:, 9:] * matrices.reshape(-1, 9))[p.compared])
             products = np.einsum("ni,nj->nij", w, w).reshape(-1, 9)
             columns = np.column_stack([w, derivative(w, p.period), products])
-            turns.append(p.band(columns)[p.compared])
+            turns.append(p.band(columns, p.compared))
         return np.concatenate(axes).reshape(-1, 3, 3), np.concatenate(turns)
 
-    def _torques(self, reading: Reading) -> Array:
-        """Return the torques (n, 3) in Nm that the motion needs, in the band of turning; without a
-        vehicle, the angular acceleration.
+    def _needed(self, along: Array, reading: Reading) -> Array:
+        """Return the force ``along`` the thrust axis (n,) above the torques in Nm that the motion
+        needs, in the band of turning (4, n), less their means; without a vehicle, the angular
+        acceleration in place of torques.
         """
-        columns = self._motion(*reading.attitude)[1]
         # a pseudovector: a mirrored body frame turns its sign as well
         body = reading.frames.body
-        turn, inertia = reading.gyro.turn @ body.T * np.linalg.det(body), self._inertia
-        products = inertia @ turn @ columns[..., 6:].reshape(-1, 2, 3, 3) @ turn.T
-        torque: Array = columns[..., 3:6] @ (inertia @ turn).T
-        for i, (j, k) in enumerate(((2, 1), (0, 2), (1, 0))):
-            torque[..., i] += products[..., j, k] - products[..., k, j]
-        return np.column_stack([torque[:, 0, :2], torque[:, 1, 2]])
+        turn = reading.gyro.turn @ body.T * np.linalg.det(body)
+        driven = self._inertia @ turn
+        products = np.cross(turn[:, None, :], driven[:, :, None], axis=0).reshape(3, 9)
+        each, columns = np.hstack([driven, products]), self._motion(*reading.attitude)[1][..., 3:]
+        needed: Array = np.vstack([along, each[:2] @ columns[:, 0].T, each[2] @ columns[:, 1].T])
+        needed -= needed.mean(axis=1, keepdims=True)
+        return needed
 
     def _balances(self, *moves: Any) -> tuple[float, float, Array]:
         """Return what a reading's motion says whatever the rotors: the share of the horizontal
         force that is left, the log-likelihood ratio that a flight must make up for its place, and
-        the force along the thrust axis in m/s2 beside the torques in Nm (n, 4).
+        the force along the thrust axis in m/s2 above the torques (``_needed``).
         """
         reading = Reading(*moves)
         if self._attitude is None:
             force = np.zeros(len(self._t)) if self._along is None else self._along
             felt = self._compared(lambda p: p.slow(p.even(self._t, force[:, None])))
-            return 0.0, 0.0, np.column_stack([felt, self._torques(reading)])
+            return 0.0, 0.0, self._needed(felt[:, 0], reading)
         frames, axes = reading.frames, self._motion(*reading.attitude)[0]
-        push = np.einsum("ij,njk,k->ni", frames.world, axes, frames.body[:, 2])
+        push = axes @ frames.body[:, 2] @ frames.world.T
         force = self._acceleration @ frames.position.T * UNITS["position"][reading.length]
         force += np.array([0.0, 0.0, _G])
         needed, given = (np.ravel(x[:, :2] - x[:, :2].mean(axis=0)) for x in (force, push))
@@ -348,8 +349,8 @@ class Evidence:
         along = np.sum(force * push, axis=1) / np.maximum(size, 1e-9)
         cost = EVIDENCE.fallen * (mean[2] <= EVIDENCE.good * np.linalg.norm(mean))
         cost += EVIDENCE.below * ((frames.position @ self._middle)[2] < 0.0)
-        motion = np.column_stack([along, self._torques(reading)])
-        return share(*variances, EVIDENCE.force_gain), float(cost), motion
+        left = share(*variances, EVIDENCE.force_gain)
+        return left, float(cost), self._needed(along, reading)
 
     def fit(self, reading: Reading, torques: bool = True) -> Fit:
         """Return how well a reading explains the flight; without torques, by forces alone."""
@@ -361,23 +362,24 @@ class Evidence:
             rows[3:] *= -1.0
         gains = [self._gains[0], *[self._gains[1]] * len(mixing)]
         horizontal, cost, motion = self._moved(*reading.moves)
-        needed = motion[:, : len(rows)] - motion[:, : len(rows)].mean(axis=0)
-        squares = np.square(needed)
-
-        def left(delay: float) -> list[float]:
-            there, thrusts = self._delayed(delay)
-            if np.count_nonzero(there) < EVIDENCE.fewest:
-                return [EVIDENCE.most_share] * len(rows)
-            given = thrusts @ rows.T
-            products = (
-                there @ squares,
-                np.sum(given * given, axis=0),
-                np.sum(given * needed, axis=0),
-            )
-            return [share(*each) for each in zip(*products, gains, strict=True)]
-
+        needed = motion[: len(rows)]
         delays = (-reading.late,) if reading.late or not torques else EVIDENCE.delays
-        vertical, *others = max((left(delay) for delay in delays), key=likelihood)
+        there, thrusts = self._delayed(*delays)
+        given = rows @ thrusts
+        products = zip(
+            there @ np.square(needed).T,
+            np.sum(given * given, axis=2),
+            np.sum(given * needed, axis=2),
+            there.sum(axis=1) >= EVIDENCE.fewest,
+            strict=True,
+        )
+        left = [
+            [share(*each) for each in zip(*sums, gains, strict=True)]
+            if enough
+            else [EVIDENCE.most_share] * len(rows)
+            for *sums, enough in products
+        ]
+        vertical, *others = max(left, key=likelihood)
         score = likelihood([horizontal, horizontal, vertical, *others]) - cost - reading.unlikely
         return Fit(reading, horizontal, tuple(others), score)
 

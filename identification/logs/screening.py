@@ -202,10 +202,9 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
     times = log.t if by_imu or log.valid.sum() < 2 else log.t[log.valid]
     if doubt := time_doubt(float(np.median(np.diff(times)))):
         yield Refused(doubt)
+    carried = carrying(np.square(speeds).max(axis=1))
     for i, column in enumerate(speeds.T):
-        if stopped := _stretches(
-            (column == 0.0) & carrying(np.square(speeds).max(axis=1)), log.t, _STOPPED
-        ):
+        if stopped := _stretches((column == 0.0) & carried, log.t, _STOPPED):
             yield Fault(f"omega{i + 1} {zero}, for {stopped}; {all_four}")
     most = _most_rad_s(log, vehicle)
     if (above := np.argwhere(speeds > most)).size:
@@ -398,7 +397,8 @@ def _still(name: str, t: Array, rows: Mask, channel: Array, sisters: Array, name
     still = np.append(False, np.all(np.diff(channel, axis=0) == 0.0, axis=1)) & rows
     changes = np.cumsum(np.diff(sisters, axis=0, prepend=sisters[:1]) != 0.0, axis=0)
     for first, end in runs_of(still):
-        if np.min(changes[end - 1] - changes[first]) < _SISTERS_CHANGE:
+        lasts = t[end - 1] - t[first] >= _STILL
+        if lasts and np.min(changes[end - 1] - changes[first]) < _SISTERS_CHANGE:
             still[first:end] = False
     if found := _stretches(still, t, _STILL):
         wrong = "what depends on it there is wrong if its sensor hung"

@@ -9,6 +9,7 @@ bound of it.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +73,7 @@ POSE_CHANNELS = ("position", "attitude")
 ROTORS = "rotor speeds"
 
 
+@lru_cache(maxsize=1)  # a diagnosis asks three times
 def noise_spectra(log: FlightLog) -> list[ChannelNoise]:
     """Return how the noise of each of a log's channels falls; channels too short to tell, or that
     never change, are left out.

@@ -14,6 +14,8 @@ from tests.support.flown import without_pose
 from tests.support.imu_flights import imu_flight, pose_removed
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
+from windwrench.estimator import WrenchUKF
+from windwrench.estimator.row_steps import steps_between
 from windwrench.identification.inertial_wrench import _two_sided
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.flight_phases import (
@@ -24,6 +26,7 @@ from windwrench.identification.logs.flight_phases import (
     flight_phases,
 )
 from windwrench.identification.wrench_series import (
+    GATE,
     counts,
     estimate_log,
     truth_rmse,
@@ -90,6 +93,37 @@ def test_uneven_times_and_lost_poses_give_a_finite_wrench(seed, jitter, share):
     np.testing.assert_array_equal(
         np.isfinite(series.nis), ~lost & (np.arange(300) > np.argmin(lost))
     )
+
+
+@pytest.mark.parametrize("with_imu", [False, True])
+def test_a_log_is_the_calls_of_a_filter(with_imu):
+    """To the last bit: with late rows, lost and wild poses, and sensors read in some rows."""
+    rng = np.random.default_rng(2)
+    t = np.cumsum(rng.choice([0.005, 0.012], 400))
+    log = held_flight(t, lost=slice(150, 220))
+    log.position[300:320] += 0.2
+    if with_imu:
+        gyro, force = 0.02 * rng.standard_normal((2, 400, 3)) + np.array([[0.0], [9.81]])[:, None]
+        gyro[::3], force[::2] = np.nan, np.nan
+        log = replace(log, gyro=gyro, accelerometer=force * [0.0, 0.0, 1.0])
+    found = estimate_log(log, VEHICLE)
+    ukf = WrenchUKF(VEHICLE, None, log.period, GATE)
+    ukf.reset(log.position[0], log.quaternion[0])
+    for k in range(1, 400):
+        for step in steps_between(t[k] - t[k - 1], ukf.period):
+            ukf.predict(0.5 * (log.rotor_speeds[k - 1] + log.rotor_speeds[k]), step)
+        sensors = [x[k] for x in (log.gyro, log.accelerometer) if x is not None]
+        read = [x if np.isfinite(x).all() else None for x in sensors]
+        if any(x is not None for x in read):
+            ukf.correct_imu(*read)
+        if log.valid[k]:
+            ukf.correct(log.position[k], log.quaternion[k])
+        now = ukf.estimate
+        np.testing.assert_array_equal(found.state[k, :19], now.state[:19])
+        np.testing.assert_array_equal(found.std[k], now.std)
+        np.testing.assert_array_equal(found.loads[k], ukf.record["load"][0])
+        assert found.status[k] == now.status
+    assert found.restarts[-1] == now.restarts
 
 
 def test_a_gap_widens_the_band_and_is_bridged():

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfilt
+from scipy.signal import butter, sosfilt, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from tests.support.flown import VEHICLE, recorded
@@ -21,6 +21,7 @@ from windwrench.identification.motion.noise_spectrum import (
 )
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals
+from windwrench.identification.motion.smoothing import low_pass
 from windwrench.studies.trials.logged_poses import FILTERS
 from windwrench.studies.trials.practice_flights import fly_practice
 
@@ -55,6 +56,14 @@ def test_the_residual_is_newton_and_euler(flown):
     np.testing.assert_allclose(
         residual_wrench(flown, AMENDED), np.column_stack([force, torque]), atol=1e-10
     )
+
+
+@pytest.mark.parametrize("shape", [(10, 1), (500,), (500, 2), (500, 3, 3)])
+def test_the_low_pass_is_that_of_scipy_to_the_last_digit(shape):
+    x = np.cumsum(np.random.default_rng(0).standard_normal(shape), axis=0)
+    for cutoff in (1.0, 5.0, 40.0):
+        there = sosfiltfilt(butter(2, cutoff / 100.0, output="sos"), x, axis=0)
+        np.testing.assert_array_equal(low_pass(x, cutoff, 0.005), there)
 
 
 def test_a_gap_ends_a_piece_and_a_lost_sample_does_not():
