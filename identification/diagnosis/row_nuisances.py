@@ -133,15 +133,23 @@ class Follower:
 
 
 def followers(rows: Rows) -> list[Follower]:
-    """Return the signals of measured rotors and of the motion that follow disturbances."""
+    """Return the signals of measured rotors and of the motion that follow disturbances.
+
+    A flight loop answers the velocity that a disturbance makes, and its acceleration by a change of
+    thrust. The change is in the size of thrust's own variation.
+    """
     flights = rows.flights
-    wrench = rows.at_rows(flights.rotor_wrench({}) / flights.inertias[2:])
+    delivered = flights.rotor_wrench({}) / flights.inertias[2:]
+    change = np.concatenate([np.gradient(delivered[run, 0]) for run in flights.runs])
+    change *= delivered[:, 0].std() / max(float(change.std()), 1e-12)
+    wrench = rows.at_rows(np.column_stack([delivered, change]))
     turned = [p.smooth(p.signals.angular_velocity) for p in flights.pieces({})]
     rates = rows.at_rows(np.concatenate(turned) / NUISANCES.stopped)
     torque = rows.channels - 3
     force = tuple(range(2, torque, 3))
     return [
         Follower("thrust", wrench[:, 0], force),
+        Follower("change of thrust", wrench[:, 4], force),
         *(Follower(f"torque {x}", wrench[:, 1 + i], (torque + i,)) for i, x in enumerate("xyz")),
         *(Follower(f"rate {x}", rates[:, i], (torque + i,)) for i, x in enumerate("xyz")),
     ]

@@ -99,6 +99,19 @@ def test_a_share_of_what_follows_disturbances_counts_as_one(weak):
         np.testing.assert_allclose(calm, 0.01 * rough, rtol=0.1)
 
 
+def test_a_disturbance_that_thrust_answers_by_its_change_counts_as_one(weak):
+    """A flight loop with a rate gain answers a vertical disturbance sooner than thrust shows it."""
+    rows = Rows(weak, {})
+    disturbance = np.zeros((len(rows.t), rows.channels))
+    disturbance[:, 2] = rows.at_rows(np.gradient(weak.rotor_wrench({})[:, 0]))
+    disturbance[:, 2] *= rows.residual({})[rows.fit, 2].std() / disturbance[:, 2].std()
+    columns = answered(rows, followers(rows), disturbance)
+    X = np.stack([x[rows.fit, 2] for x in columns.values()], axis=1)
+    y = disturbance[rows.fit, 2]
+    left = y - X @ np.linalg.lstsq(X, y, rcond=None)[0]
+    assert left.std() < 0.1 * y.std()
+
+
 def size_like(x):
     """Return alternating rows of the shape of ``x`` with a standard deviation of one."""
     return np.where(np.arange(len(x))[:, None] % 2 == 0, 1.0, -1.0) * np.ones_like(x)

@@ -3,6 +3,7 @@ search starts, and delays of rotors.
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from windwrench.identification.diagnosis.carrying_channels import ORDER, carryin
 from windwrench.identification.diagnosis.commanded_rotors import COMMANDED, in_flight_by_thrust
 from windwrench.identification.diagnosis.composite import composites
 from windwrench.identification.diagnosis.log_offsets import LAG_ASYMMETRY
+from windwrench.identification.diagnosis.priors import prior_size
 from windwrench.identification.diagnosis.ranking import rank, starts_of
 from windwrench.identification.diagnosis.regression import Flights
 from windwrench.identification.diagnosis.starting_points import starting_points
@@ -159,3 +161,9 @@ def test_a_lag_that_is_uneven_leaves_no_mass():
     assert 0.5 * APART < apart < 1.5 * APART
     off = [x.coefficients.get("mass", {"dm": 0.0})["dm"] for x in (found.ranking.sets[0], known)]
     assert abs(off[0] - off[1]) < 0.001 * VEHICLE.mass
+
+
+def test_a_hanging_load_of_half_the_vehicles_mass_is_expected():
+    """A prior of a tenth of that mass told measured loads of a half too small by a third."""
+    flights = SimpleNamespace(vehicle=load_vehicle("crazyflie"), thrust_std=0.0)
+    assert 0.5 * flights.vehicle.mass < 2.0 * prior_size(("slung_payload", "m"), flights)
