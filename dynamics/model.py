@@ -8,7 +8,7 @@ import numpy as np
 
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
-from .effects import compile_effects
+from .effects import Bundle, compile_effects
 from .effects.base import (
     HIDDEN,
     PARAMETERS,
@@ -88,14 +88,13 @@ def load_model(record: np.void, vehicle: Vehicle) -> Vehicle:
     ):
         record[f"{kind}_count"] = len(coefficients)
         record[f"{kind}_coefficients"][: len(coefficients)] = coefficients
-    lay_addresses(record, vehicle)
+    lay_addresses(record, bundle)
     record["hooked"] = int(np.any(bundle.wrench_hooks != 0))
     return bundle.vehicle
 
 
-def lay_addresses(record: np.void, vehicle: Vehicle) -> None:
+def lay_addresses(record: np.void, bundle: Bundle) -> None:
     """Write where this process has the compiled effects of a vehicle into the model's fields."""
-    bundle = compile_effects(vehicle)
     for name in _ADDRESSES:
         addresses = getattr(bundle, name)
         record[name][: len(addresses)] = addresses

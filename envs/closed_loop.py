@@ -411,8 +411,8 @@ class ClosedLoop:
         """
         loop = self.record[0]
         loop["step"] = self.ukf.step_address
-        lay_addresses(loop["plant"], self.true)
-        lay_addresses(loop["filter"], self.ukf.vehicle)
+        lay_addresses(loop["plant"], compile_effects(self.true))
+        lay_addresses(loop["filter"], compile_effects(self.ukf.vehicle))
         self.state: Array = loop["filter"]["x"]
         self.covariance: Array = loop["filter"]["P"]
         self.setpoint: Array = loop["flight"]["setpoint"]

@@ -26,6 +26,7 @@ import numpy as np
 from numba import carray
 from numpy.typing import ArrayLike, NDArray
 
+from ..dynamics.effects import compile_effects
 from ..dynamics.model import lay_addresses, reset_model, without_addresses
 from ..dynamics.rotation import attitude_error, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
@@ -448,7 +449,7 @@ class WrenchUKF:
 
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
-        lay_addresses(self.record[0], self.vehicle)
+        lay_addresses(self.record[0], compile_effects(self.vehicle))
         self._bind()
 
     def __copy__(self) -> Self:

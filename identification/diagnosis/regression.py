@@ -6,10 +6,11 @@ one coefficient. Residual and columns come from the same effect models that plan
 through the same filter.
 """
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TypeVar
 
 import numpy as np
@@ -150,8 +151,8 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
             if o.unit == c.unit and o.typical[0]
         ]
         return max(others, default=1.0)
-    share = np.clip(np.log(vehicle.mass / 0.03) / np.log(0.45 / 0.03), 0.0, 1.3)
-    return float(small * (large / small) ** share)
+    share = min(max(math.log(vehicle.mass / 0.03) / math.log(0.45 / 0.03), 0.0), 1.3)
+    return small * (large / small) ** share
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,6 +217,7 @@ class Flights:
         self._drift: np.random.Generator | None = None  # of a copy whose fusion errs otherwise
         self._fused: dict[FlightLog, list[InertialSignals]] = {}
         self._smooth_imu: dict[int, tuple[Array, Array]] = {}
+        self._felt: dict[Piece, Array] = {}
         self._forget()
         self._first: list[Piece] = []
         self.log: Index  # (rows,) which log
@@ -554,15 +556,16 @@ class Flights:
         """
         if self.inertial or not all(map(_reads_throughout, self.logs)):
             return None
-        out = []
-        for piece in self.pieces(setting):
-            s, log = piece.signals, self.logs[piece.log]
-            if piece.log not in self._smooth_imu:
-                self._smooth_imu[piece.log] = _smooth_accelerometer(log)
-            read = resampled(s.t, *self._smooth_imu[piece.log])
-            force = self.vehicle.mass * np.einsum("nij,nj->ni", s.rotation, read)
-            out.append(piece.smooth(force) - piece.needed[:, :3])
-        return np.concatenate(out)
+        pieces = self.pieces(setting)
+        return np.concatenate([_kept(self._felt, p, partial(self._felt_at, p), 40) for p in pieces])
+
+    def _felt_at(self, piece: Piece) -> Array:
+        s, log = piece.signals, self.logs[piece.log]
+        if piece.log not in self._smooth_imu:
+            self._smooth_imu[piece.log] = _smooth_accelerometer(log)
+        read = resampled(s.t, *self._smooth_imu[piece.log])
+        force = self.vehicle.mass * np.einsum("nij,nj->ni", s.rotation, read)
+        return piece.smooth(force) - piece.needed[:, :3]
 
     def _kept_columns(self, setting: Setting) -> dict[Column, Array]:
         """Return the columns of effects that were computed before and hardly change with this
