@@ -530,17 +530,21 @@ class Flights:
         Force is in the world frame, without the weight; both are by the declared mass and inertia,
         as the residual is.
         """
-        out = []
+        out, vehicle = [], self.amended(setting)
         for piece in self.pieces(setting):
-            acting = self.acting(piece.signals, setting, piece.log)
+            acting = self.acting(piece.signals, setting, piece.log, vehicle)
             if self.commanded:
                 acting[:, 3:] = 0.0
             out.append(acting)
         return out
 
-    def acting(self, signals: Signals, setting: Setting, log: int = 0) -> Array:
-        """Return the force and the torque (n, 6) along signals of a log; as of ``model``."""
-        vehicle, offsets = self.amended(setting), setting.get(ROTOR_TIME_OFFSET[0], {})
+    def acting(
+        self, signals: Signals, setting: Setting, log: int = 0, vehicle: Vehicle | None = None
+    ) -> Array:
+        """Return the force and the torque (n, 6) along signals of a log; as of ``model``. The
+        ``vehicle`` is the amended one, if it is at hand.
+        """
+        vehicle, offsets = vehicle or self.amended(setting), setting.get(ROTOR_TIME_OFFSET[0], {})
         s = with_time_offsets(signals, offsets)
         s = with_uneven_lag(s, vehicle, offsets.get(LAG_ASYMMETRY[1], 0.0))
         wrench, _ = acting_wrench(s, vehicle, self.vehicle)
