@@ -515,34 +515,27 @@ class Flights:
         key = tuple((name, *sorted(values.items())) for name, values in setting.items())
 
         def made() -> Array:
-            pieces = zip(self.pieces(setting), self.model(setting), strict=True)
-            found = np.concatenate([piece.needed - piece.smooth(model) for piece, model in pieces])
+            out, vehicle = [], self.amended(setting)
+            for piece in self.pieces(setting):
+                acting = self.acting(piece.signals, setting, piece.log, vehicle)
+                if self.commanded:
+                    acting[:, 3:] = 0.0
+                out.append(piece.needed - piece.smooth(acting))
+            found = np.concatenate(out)
             found.setflags(write=False)
             return found
 
         # a fit asks several times for the residual at its setting
         return _kept(self._residuals, key, made, 16)
 
-    def model(self, setting: Setting) -> list[Array]:
-        """Return the force and the torque (n, 6) of each sample of each piece that these effects
-        say act on the vehicle.
-
-        Force is in the world frame, without the weight; both are by the declared mass and inertia,
-        as the residual is.
-        """
-        out, vehicle = [], self.amended(setting)
-        for piece in self.pieces(setting):
-            acting = self.acting(piece.signals, setting, piece.log, vehicle)
-            if self.commanded:
-                acting[:, 3:] = 0.0
-            out.append(acting)
-        return out
-
     def acting(
         self, signals: Signals, setting: Setting, log: int = 0, vehicle: Vehicle | None = None
     ) -> Array:
-        """Return the force and the torque (n, 6) along signals of a log; as of ``model``. The
-        ``vehicle`` is the amended one, if it is at hand.
+        """Return the force and the torque (n, 6) along signals of a log that these effects say act
+        on the vehicle; ``vehicle`` is the amended one, if it is at hand.
+
+        Force is in the world frame, without the weight; both are by the declared mass and inertia,
+        as the residual is.
         """
         vehicle, offsets = vehicle or self.amended(setting), setting.get(ROTOR_TIME_OFFSET[0], {})
         s = with_time_offsets(signals, offsets)

@@ -84,8 +84,7 @@ def rank_by_rows(
             add(min(near, key=likelihood.objective))
 
     def posterior() -> Posterior:
-        every = list(bases.values())
-        return Posterior(flights, library, every, likelihood.power, given, idle, tried)
+        return Posterior(flights, library, [*bases.values()], likelihood.power, given, idle, tried)
 
     def likeliest() -> Setting:
         """Return the likeliest set's fit, once no set is likelier that was not fitted."""
