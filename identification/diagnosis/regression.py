@@ -249,7 +249,6 @@ class Flights:
     def _forget(self) -> None:
         """Keep nothing of what was computed."""
         self._pieces: dict[tuple[object, ...], list[Piece]] = {}
-        self._columns: dict[tuple[object, ...], dict[Column, Array]] = {}
         self._residuals: dict[tuple[object, ...], Array] = {}
 
     def _noisier(self, hidden: bool = False) -> "Flights":
@@ -564,22 +563,6 @@ class Flights:
         force = self.vehicle.mass * np.einsum("nij,nj->ni", s.rotation, read)
         return piece.smooth(force) - piece.needed[:, :3]
 
-    def _kept_columns(self, setting: Setting) -> dict[Column, Array]:
-        """Return the columns of effects that were computed before and hardly change with this
-        setting.
-
-        An effect model depends on the motion and on what the rotors deliver, not on other effects
-        (except the wind). Time offsets of a few milliseconds, and small changes of what the rotors
-        deliver, make no difference to a column that is only tried.
-        """
-        key = tuple(
-            (name, c, round(value / (0.05 * typical_size((name, c), self.vehicle))))
-            for name, values in sorted(setting.items())
-            if name and (get(name).sets_wind or get(name).kind != "wrench")
-            for c, value in sorted(values.items())
-        )
-        return _kept(self._columns, key, dict, 12)
-
     def step(self, setting: Setting, column: Column, size: float = STEP) -> tuple[float, float]:
         """Return a coefficient's value at a setting, and a step from there within its limits, of so
         many typical sizes, over which a derivative is taken.
@@ -621,15 +604,7 @@ class Flights:
         typical sizes.
         """
         base = self.residual(setting)
-        out: dict[Column, Array] = {}
-        kept = self._kept_columns(setting)
-        for column in wanted:
-            effect = column[0]
-            known = kept if effect and effect not in setting else {}
-            if column not in known:
-                known[column] = self._slope(setting, column, base, step)
-            out[column] = known[column]
-        return out
+        return {column: self._slope(setting, column, base, step) for column in wanted}
 
 
 def _kept(memory: dict[K, V], key: K, make: Callable[[], V], most: int) -> V:
