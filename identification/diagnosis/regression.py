@@ -258,6 +258,17 @@ class Flights:
         out.logs = tuple(noisy_logs(self.logs, self.vehicle, hidden))
         return out
 
+    def of_the_fit(self) -> "Flights":
+        """Return the flights without the logs that the fit never sees."""
+        out = copy(self)
+        out._forget()
+        out.logs = self.logs[: self._fit_logs]
+        out._first = [piece for piece in self._first if piece.log < self._fit_logs]
+        kept = self.log < self._fit_logs
+        for name in ("log", "block", "fit_rows", "start", "t", "visible_noise", "sensor_noise"):
+            setattr(out, name, getattr(self, name)[kept])
+        return out
+
     def _lay_rows(self) -> None:
         """Cut the flights into pieces, and say of which of their samples rows are."""
         self._first = pieces = self.pieces({})
