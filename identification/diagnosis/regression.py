@@ -152,7 +152,7 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
         ]
         return max(others, default=1.0)
     share = min(max(math.log(vehicle.mass / 0.03) / math.log(0.45 / 0.03), 0.0), 1.3)
-    return small * (large / small) ** share
+    return float(small * (large / small) ** share)
 
 
 @dataclass(frozen=True, eq=False)
