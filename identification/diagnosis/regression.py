@@ -6,10 +6,11 @@ one coefficient. Residual and columns come from the same effect models that plan
 through the same filter.
 """
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TypeVar
 
 import numpy as np
@@ -150,7 +151,7 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
             if o.unit == c.unit and o.typical[0]
         ]
         return max(others, default=1.0)
-    share = np.clip(np.log(vehicle.mass / 0.03) / np.log(0.45 / 0.03), 0.0, 1.3)
+    share = min(max(math.log(vehicle.mass / 0.03) / math.log(0.45 / 0.03), 0.0), 1.3)
     return float(small * (large / small) ** share)
 
 
@@ -216,6 +217,7 @@ class Flights:
         self._drift: np.random.Generator | None = None  # of a copy whose fusion errs otherwise
         self._fused: dict[FlightLog, list[InertialSignals]] = {}
         self._smooth_imu: dict[int, tuple[Array, Array]] = {}
+        self._felt: dict[Piece, Array] = {}
         self._forget()
         self._first: list[Piece] = []
         self.log: Index  # (rows,) which log
@@ -247,7 +249,6 @@ class Flights:
     def _forget(self) -> None:
         """Keep nothing of what was computed."""
         self._pieces: dict[tuple[object, ...], list[Piece]] = {}
-        self._columns: dict[tuple[object, ...], dict[Column, Array]] = {}
         self._residuals: dict[tuple[object, ...], Array] = {}
 
     def _noisier(self, hidden: bool = False) -> "Flights":
@@ -255,6 +256,17 @@ class Flights:
         out = copy(self)
         out._forget()
         out.logs = tuple(noisy_logs(self.logs, self.vehicle, hidden))
+        return out
+
+    def of_the_fit(self) -> "Flights":
+        """Return the flights without the logs that the fit never sees."""
+        out = copy(self)
+        out._forget()
+        out.logs = self.logs[: self._fit_logs]
+        out._first = [piece for piece in self._first if piece.log < self._fit_logs]
+        kept = self.log < self._fit_logs
+        for name in ("log", "block", "fit_rows", "start", "t", "visible_noise", "sensor_noise"):
+            setattr(out, name, getattr(self, name)[kept])
         return out
 
     def _lay_rows(self) -> None:
@@ -513,32 +525,29 @@ class Flights:
         key = tuple((name, *sorted(values.items())) for name, values in setting.items())
 
         def made() -> Array:
-            pieces = zip(self.pieces(setting), self.model(setting), strict=True)
-            found = np.concatenate([piece.needed - piece.smooth(model) for piece, model in pieces])
+            out, vehicle = [], self.amended(setting)
+            for piece in self.pieces(setting):
+                acting = self.acting(piece.signals, setting, piece.log, vehicle)
+                if self.commanded:
+                    acting[:, 3:] = 0.0
+                out.append(piece.needed - piece.smooth(acting))
+            found = np.concatenate(out)
             found.setflags(write=False)
             return found
 
         # a fit asks several times for the residual at its setting
         return _kept(self._residuals, key, made, 16)
 
-    def model(self, setting: Setting) -> list[Array]:
-        """Return the force and the torque (n, 6) of each sample of each piece that these effects
-        say act on the vehicle.
+    def acting(
+        self, signals: Signals, setting: Setting, log: int = 0, vehicle: Vehicle | None = None
+    ) -> Array:
+        """Return the force and the torque (n, 6) along signals of a log that these effects say act
+        on the vehicle; ``vehicle`` is the amended one, if it is at hand.
 
         Force is in the world frame, without the weight; both are by the declared mass and inertia,
         as the residual is.
         """
-        out = []
-        for piece in self.pieces(setting):
-            acting = self.acting(piece.signals, setting, piece.log)
-            if self.commanded:
-                acting[:, 3:] = 0.0
-            out.append(acting)
-        return out
-
-    def acting(self, signals: Signals, setting: Setting, log: int = 0) -> Array:
-        """Return the force and the torque (n, 6) along signals of a log; as of ``model``."""
-        vehicle, offsets = self.amended(setting), setting.get(ROTOR_TIME_OFFSET[0], {})
+        vehicle, offsets = vehicle or self.amended(setting), setting.get(ROTOR_TIME_OFFSET[0], {})
         s = with_time_offsets(signals, offsets)
         s = with_uneven_lag(s, vehicle, offsets.get(LAG_ASYMMETRY[1], 0.0))
         wrench, _ = acting_wrench(s, vehicle, self.vehicle)
@@ -554,31 +563,16 @@ class Flights:
         """
         if self.inertial or not all(map(_reads_throughout, self.logs)):
             return None
-        out = []
-        for piece in self.pieces(setting):
-            s, log = piece.signals, self.logs[piece.log]
-            if piece.log not in self._smooth_imu:
-                self._smooth_imu[piece.log] = _smooth_accelerometer(log)
-            read = resampled(s.t, *self._smooth_imu[piece.log])
-            force = self.vehicle.mass * np.einsum("nij,nj->ni", s.rotation, read)
-            out.append(piece.smooth(force) - piece.needed[:, :3])
-        return np.concatenate(out)
+        pieces = self.pieces(setting)
+        return np.concatenate([_kept(self._felt, p, partial(self._felt_at, p), 40) for p in pieces])
 
-    def _kept_columns(self, setting: Setting) -> dict[Column, Array]:
-        """Return the columns of effects that were computed before and hardly change with this
-        setting.
-
-        An effect model depends on the motion and on what the rotors deliver, not on other effects
-        (except the wind). Time offsets of a few milliseconds, and small changes of what the rotors
-        deliver, make no difference to a column that is only tried.
-        """
-        key = tuple(
-            (name, c, round(value / (0.05 * typical_size((name, c), self.vehicle))))
-            for name, values in sorted(setting.items())
-            if name and (get(name).sets_wind or get(name).kind != "wrench")
-            for c, value in sorted(values.items())
-        )
-        return _kept(self._columns, key, dict, 12)
+    def _felt_at(self, piece: Piece) -> Array:
+        s, log = piece.signals, self.logs[piece.log]
+        if piece.log not in self._smooth_imu:
+            self._smooth_imu[piece.log] = _smooth_accelerometer(log)
+        read = resampled(s.t, *self._smooth_imu[piece.log])
+        force = self.vehicle.mass * np.einsum("nij,nj->ni", s.rotation, read)
+        return piece.smooth(force) - piece.needed[:, :3]
 
     def step(self, setting: Setting, column: Column, size: float = STEP) -> tuple[float, float]:
         """Return a coefficient's value at a setting, and a step from there within its limits, of so
@@ -621,15 +615,7 @@ class Flights:
         typical sizes.
         """
         base = self.residual(setting)
-        out: dict[Column, Array] = {}
-        kept = self._kept_columns(setting)
-        for column in wanted:
-            effect = column[0]
-            known = kept if effect and effect not in setting else {}
-            if column not in known:
-                known[column] = self._slope(setting, column, base, step)
-            out[column] = known[column]
-        return out
+        return {column: self._slope(setting, column, base, step) for column in wanted}
 
 
 def _kept(memory: dict[K, V], key: K, make: Callable[[], V], most: int) -> V:

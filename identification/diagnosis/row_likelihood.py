@@ -227,13 +227,13 @@ class RowLikelihood:
             out[name] = value, offset.size * float(std[i])
         return out
 
-    def idle(self, setting: Setting) -> set[str]:
-        """Return the effects of a setting that do nothing there."""
+    def idle(self, setting: Setting, among: Iterable[str]) -> set[str]:
+        """Return which effects of a setting, among some, do nothing there."""
         here = self.rows.residual(setting)
         least = 1e-6 * float(np.abs(here).max())
         return {
             effect
-            for effect in setting
+            for effect in among
             if np.abs(self.rows.residual(without(setting, effect)) - here).max() <= least
         }
 

@@ -16,7 +16,7 @@ from .priors import Base, Setting
 from .ranking import Found, starts_of
 from .regression import Flights, without
 from .row_likelihood import RowLikelihood
-from .sets import Posterior, is_possible
+from .sets import Posterior, Tried, is_possible
 from .settings import DIAGNOSIS
 
 MOST_STARTS = 2  # of an effect with nonlinear coefficients, the likeliest, that are fitted
@@ -48,6 +48,7 @@ def rank_by_rows(
     fitted: dict[frozenset[str], Setting] = {given: first}
     bases: dict[frozenset[str], Base] = {given: likelihood.base(first, starts)}
     idle: set[frozenset[str]] = set()
+    tried: Tried = {}
 
     def base(setting: Setting, unknown: bool = False) -> Base:
         lags = {
@@ -59,9 +60,13 @@ def rank_by_rows(
 
     def add(setting: Setting) -> None:
         key = frozenset(setting)
+        if any(map(flights.is_nonlinear, setting)):  # what was linearised elsewhere says little
+            near = fitted[max(fitted, key=lambda other: len(other & key))]
+            begun = {e: near.get(e, x) for e, x in setting.items()}
+            setting = min(setting, begun, key=likelihood.objective)
         fitted[key] = likelihood.fitted(setting)
         found = set(fitted[key]) - given
-        if found & likelihood.idle(fitted[key]) or not all(
+        if likelihood.idle(fitted[key], found) or not all(
             is_possible(flights, fitted[key], {}, e, plausible=True) for e in found
         ):
             idle.add(key)
@@ -79,7 +84,7 @@ def rank_by_rows(
             add(min(near, key=likelihood.objective))
 
     def posterior() -> Posterior:
-        return Posterior(flights, library, list(bases.values()), likelihood.power, given, idle)
+        return Posterior(flights, library, [*bases.values()], likelihood.power, given, idle, tried)
 
     def likeliest() -> Setting:
         """Return the likeliest set's fit, once no set is likelier that was not fitted."""

@@ -151,10 +151,14 @@ class Rows:
         torque = np.stack([found[c][:, 3:] / self._inertia for c in wanted], axis=2)
         rows = self.from_world(pose, torque=torque)
         out = {c: rows[:, :, i] for i, c in enumerate(wanted)}
-        for effect, name in wanted if self.has_accelerometer else ():
-            if effect and get(effect).kind == "sensing":  # what is felt is not what the pose shows
-                own = self.flights.coefficients(setting, effect)
-                value, delta = self.flights.step(setting, (effect, name))
-                moved = self.residual({**setting, effect: {**own, name: value + delta}})
-                out[effect, name] = (self.residual(setting) - moved) / delta
+        # what is felt is not what the pose shows
+        sensing = [c for c in wanted if c[0] and get(c[0]).kind == "sensing"]
+        if not (sensing and self.has_accelerometer):
+            return out
+        here = self.residual(setting)
+        for effect, name in sensing:
+            own = self.flights.coefficients(setting, effect)
+            value, delta = self.flights.step(setting, (effect, name))
+            moved = self.residual({**setting, effect: {**own, name: value + delta}})
+            out[effect, name] = (here - moved) / delta
         return out

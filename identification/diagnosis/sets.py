@@ -66,6 +66,10 @@ class _Candidate:
         return [c for _, columns in self.variants for c in columns]
 
 
+# by base and power of the likelihood: the evidence of sets there, None of one that cannot be
+Tried = dict[tuple[Base, float], dict[tuple[Variant, ...], SetEvidence | None]]
+
+
 def is_possible(
     flights: Flights, setting: Setting, std: Mapping[Column, float], effect: str, plausible: bool
 ) -> bool:
@@ -105,6 +109,7 @@ class Posterior:
             base that has most of its effects; a single one has them all. Without them each has a
             noise of its own, and of a set the likeliest counts.
         idle: sets that are none: where they fit best an effect of them does nothing.
+        tried: where the evidence of sets beside bases is kept, for posteriors of the same bases.
     """
 
     def __init__(
@@ -115,9 +120,10 @@ class Posterior:
         power: float = 1.0,
         given: frozenset[str] | None = None,
         idle: Collection[frozenset[str]] = (),
+        tried: Tried | None = None,
     ) -> None:
         self.flights, self.library, self.bases, self.power = flights, library, bases, power
-        self.idle = idle
+        self.idle, self._tried = idle, {} if tried is None else tried
         self.given = given
         self.asked_about = len(library) - len(given or ())
         self.inclusion = min(PRIORS.expected / max(self.asked_about, 1), 0.5)
@@ -195,17 +201,20 @@ class Posterior:
         low, high = base.low[asked], base.high[asked]
         variants = self._variants(base)
         ways = {e: sum(v[0] == e for v in variants) for e, _ in variants}
+        tried = self._tried.setdefault((base, self.power), {})
 
         def score(some: tuple[Variant, ...]) -> float:
             key = frozenset(e for e, _ in some)
             if not self._counts(number, key):
                 return -math.inf
-            index = [at[c] for v in some for c in v[1]]
-            try:
-                evidence = set_evidence(m, index, low, high)
-            except np.linalg.LinAlgError:
-                return -math.inf
-            if not self._possible(base, some, evidence):
+            if some not in tried:
+                index = [at[c] for v in some for c in v[1]]
+                try:
+                    found = set_evidence(m, index, low, high)
+                except np.linalg.LinAlgError:
+                    found = None
+                tried[some] = found if found and self._possible(base, some, found) else None
+            if (evidence := tried[some]) is None:
                 return -math.inf
             total = evidence.log_evidence - sum(math.log(ways[e]) for e, _ in some)
             total += self._log_prior(len(some))
@@ -423,7 +432,7 @@ class Posterior:
                 name = c[1].removeprefix(WHOLE_PREFIX)
                 limits = coefficient((effect, name))
                 value += declared(c, self.flights)
-                own[name] = float(np.clip(value, limits.minimum, limits.maximum))
+                own[name] = min(max(value, limits.minimum), limits.maximum)
                 off[name] = deviation
                 if c[1].startswith(WHOLE_PREFIX):
                     own[CENTRAL] = 1.0

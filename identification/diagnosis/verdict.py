@@ -101,7 +101,7 @@ class Judged:
         found = self._found = (
             rank(flights, library, report)
             if flights.has_raw_poses
-            else rank_by_rows(flights, given.library, given.first, given.fixed, report)
+            else rank_by_rows(flights.of_the_fit(), given.library, given.first, given.fixed, report)
         )
         self.ranking, best = found.ranking, found.ranking.sets[0]
         sensors = {name: value for name, (value, _) in found.sensors.items()}

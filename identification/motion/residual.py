@@ -3,13 +3,15 @@
 The model, with the effects that the vehicle declares, is the one that plant and estimator run.
 """
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model
 from ...dynamics.motion import acceleration_of, angular_acceleration_of, body_numbers
 from ...dynamics.vehicle import Vehicle
-from ...runtime.compiled import Record, compiled
+from ...runtime.compiled import Record, compiled_for_vectors
 from .signals import Signals
 
 Array = NDArray[np.float64]
@@ -17,7 +19,7 @@ Array = NDArray[np.float64]
 _MODEL = np.dtype(MODEL_FIELDS)
 
 
-@compiled
+@compiled_for_vectors
 def _act(
     models: Record,
     period: float,
@@ -62,13 +64,18 @@ def acting_wrench(
     Both are as if the vehicle had the mass and inertia of ``body``: the accelerations that the
     model says are right. By default it is the vehicle's own, with its body effects applied.
     """
-    models = np.zeros(1, dtype=_MODEL)
-    own = load_model(models[0], vehicle)
+    models, own = _loaded(vehicle)
     body = body or own
     out = np.empty((len(signals.t), 6))
     turning = np.ascontiguousarray(signals.angular_acceleration)
-    _act(models, signals.period, *signals.columns(), turning, body.mass, body.inertia, out)
+    _act(models.copy(), signals.period, *signals.columns(), turning, body.mass, body.inertia, out)
     return out, body
+
+
+@lru_cache(maxsize=1)  # one vehicle acts on several pieces
+def _loaded(vehicle: Vehicle) -> tuple[np.ndarray, Vehicle]:
+    models = np.zeros(1, dtype=_MODEL)
+    return models, load_model(models[0], vehicle)
 
 
 def needed_wrench(signals: Signals, body: Vehicle) -> Array:
