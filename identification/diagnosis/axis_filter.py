@@ -167,9 +167,7 @@ class AxisFlight:
         count = 0
         for y, a, v, jumps in zip(self.measured, self.drive, self.rate, self.jumps, strict=True):
             rows = np.zeros((len(y), len(total)))
-            _respond(
-                y, a, v, jumps, self.jump_state, gains, found[3], self.period, found[:3], rows
-            )
+            _respond(y, a, v, jumps, self.jump_state, gains, found[3], self.period, found[:3], rows)
             total += rows[skip:].T @ rows[skip:]
             count += max(len(rows) - skip, 0)
         c = len(gains)
@@ -193,7 +191,8 @@ class _Fit:
     square: float  # of the innovations
     count: int
     gains: Array  # (c,) of the jumps, the likeliest ones
-    products: Array  # (4, 4) of what a unit of each part of the noise changes, and of the innovations
+    # (4, 4) of what a unit of each part of the noise changes, and of the innovations
+    products: Array
 
 
 def likeliest_noise(flight: AxisFlight, near: AxisNoise, begun: bool) -> tuple[AxisNoise, Array]:
@@ -238,8 +237,9 @@ def _filter_of(noise: AxisNoise, period: float) -> Array:
 
 
 def _free(noise: AxisNoise) -> Array:
-    """Return a noise as what is searched (3,): logarithms of the disturbance's variance over the
-    pose's and of the correlation time, and the white acceleration's variance over the disturbance's.
+    """Return a noise as what is searched (3,): the logarithms of the disturbance's variance over
+    the pose's and of its correlation time, and the white acceleration's variance over the
+    disturbance's.
     """
     ratios = noise.disturbance / noise.pose, noise.white / noise.disturbance
     return np.array([2.0 * math.log(ratios[0]), math.log(noise.time), ratios[1] ** 2])
