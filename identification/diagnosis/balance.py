@@ -57,9 +57,9 @@ def balance(flights: Flights, setting: Setting) -> Balance:
     held_out = ~flights.fit_rows
     floor = _rms(flights.visible_noise)
     error = _rms(after[held_out])
-    # an IMU's own noise is far below the disturbances that count for none
-    quiet = calm(flights.vehicle)[[0, 3]]
-    least = np.hypot(floor, quiet) if flights.inertial else np.array(floor)
+    # an IMU's own noise, and what a filter left of a pose's, is below what counts for none
+    quiet = calm(flights.vehicle)[[0, 3]] * (flights.inertial or flights.filtered)
+    least = np.hypot(floor, quiet)
     noisy = bool(np.any(np.array(error) > NOISE.most_floor_ratio * least))
     old, new = np.square(before[held_out]), np.square(after[held_out])
     change = np.mean((new - old) / (old.mean(axis=0) + 1e-30), axis=1)
@@ -71,7 +71,7 @@ def balance(flights: Flights, setting: Setting) -> Balance:
         floor,
         _rms(before[held_out]),
         error,
-        flights.filtered or noisy,
+        noisy,
         (float(blocks.mean()), float(blocks.std() / math.sqrt(max(len(blocks) - 1, 1)))),
     )
 

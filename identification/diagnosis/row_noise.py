@@ -24,6 +24,8 @@ class RowNoiseSettings:
     rows_per_number: int = 12  # and channel, that a lag must have
     # share of the variance added as white noise, so that what the low-pass took is not blown up
     loading: float = 0.01
+    # m/s2 and rad/s2, to which a motion is known at best: one of a simulator may have no noise
+    least: float = 1e-4
 
 
 ROW_NOISE = RowNoiseSettings()
@@ -63,8 +65,12 @@ class RowNoise:
 
 def white_noise(x: Array, begins: Mask, fit: Mask) -> RowNoise:
     """Return noise without memory of the size of rows ``x`` (n, c), of the rows ``fit``."""
-    size = np.maximum(np.mean(np.square(x[fit]), axis=0), 1e-12)
-    return RowNoise(np.zeros((0, x.shape[1], x.shape[1])), np.diag(size), begins)
+    size = _size(x[fit])
+    return RowNoise(np.zeros((0, x.shape[1], x.shape[1])), np.diag(size**2), begins)
+
+
+def _size(x: Array) -> Array:
+    return np.sqrt(np.mean(np.square(x), axis=0) + ROW_NOISE.least**2)
 
 
 def fitted_noise(x: Array, begins: Mask, fit: Mask) -> RowNoise:
@@ -74,7 +80,7 @@ def fitted_noise(x: Array, begins: Mask, fit: Mask) -> RowNoise:
     channels = x.shape[1]
     rows = int(fit.sum())
     lags = int(np.clip(rows // (ROW_NOISE.rows_per_number * channels), 1, ROW_NOISE.most_lags))
-    size = np.sqrt(np.mean(np.square(x[fit]), axis=0)) + 1e-12
+    size = _size(x[fit])
     z = x / size
     use = fit & RowNoise(np.zeros((lags, channels, channels)), np.eye(channels), begins).known
     for k in range(1, lags + 1):

@@ -8,6 +8,7 @@ import pytest
 from tests.support.imu_flights import imu_flight, pose_removed
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
+from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.priors import NUISANCE
 from windwrench.identification.diagnosis.regression import Flights
 from windwrench.identification.diagnosis.row_nuisances import answered, followers
@@ -35,6 +36,18 @@ def offset():
 @pytest.fixture(scope="module")
 def weak():
     return Flights([pose_removed(imu_flight(VEHICLE, (WEAK,), seconds=20.0))], VEHICLE)
+
+
+@pytest.mark.parametrize("trajectory", ["hover", "excite"])
+@pytest.mark.parametrize("missing", [(), (EffectSetting("mass", {"dm": 0.03}),)])
+def test_a_simulator_may_have_no_noise(trajectory, missing):
+    """An exact pose looks like a filtered one; what is left of it counts for none."""
+    log = fly_practice(VEHICLE, missing, trajectory, 20.0, 1, turbulence=0.0, sensor=0.0)
+    found = diagnose([log], VEHICLE)
+    assert (found.verdict == "nothing to explain") == (not missing)
+    # of thrust and mass a flight shows the ratio
+    assert {e.name for e in found.effects} <= {"mass", "thrust_scale"}
+    assert len(found.effects) == len(missing)
 
 
 def test_rows_hold_forces_and_torques(offset):
