@@ -186,7 +186,9 @@ def bounded_mode(normal: Array, right: Array, low: Array, high: Array) -> Array:
                 inner[a, b] = normal[i, free[b]]
         if len(free):
             mode[free] = np.linalg.solve(inner, rest)
-    return np.minimum(np.maximum(mode, low), high)
+    for i in range(n):
+        mode[i] = min(max(mode[i], low[i]), high[i])
+    return mode
 
 
 def tempering(blocks: Array, chosen: Index) -> float:

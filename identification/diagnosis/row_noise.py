@@ -70,7 +70,7 @@ def white_noise(x: Array, begins: Mask, fit: Mask) -> RowNoise:
 
 
 def _size(x: Array) -> Array:
-    return np.sqrt(np.mean(np.square(x), axis=0) + ROW_NOISE.least**2)
+    return np.asarray(np.sqrt(np.mean(np.square(x), axis=0) + ROW_NOISE.least**2))
 
 
 def fitted_noise(x: Array, begins: Mask, fit: Mask) -> RowNoise:
