@@ -40,7 +40,6 @@ from .priors import (
     GAIN,
     MODEL_ERROR,
     PRIORS,
-    ROUNDED,
     UNKNOWN,
     WHOLE_PREFIX,
     Base,
@@ -170,23 +169,6 @@ class Likelihood:
         """Standard deviation of the rounding of a rotor speed, rad/s."""
         known = self.vehicle.omega_source == "measured"
         return self.vehicle.omega_lsb / math.sqrt(12.0) if known else 0.0
-
-    def _rounded_torques(self) -> list[list[Array]]:
-        """Return for each axis what another rounding of the rotor speeds would add to the angular
-        acceleration (n, 6) of each piece.
-        """
-        generator = np.random.default_rng(0)
-        out: list[list[Array]] = [[], [], []]
-        for s in self.signals:
-            off = self._rounding_std * math.sqrt(3.0) * generator.uniform(-1.0, 1.0, (len(s.t), 4))
-            off = 0.5 * (off + np.vstack([off[1:], off[-1:]]))  # as the speeds between samples
-            wrench = self.vehicle.rotor_wrench
-            torque = (wrench(s.rotor_speeds + off) - wrench(s.rotor_speeds))[:, 1:]
-            for i in range(3):
-                column = np.zeros((len(s.t), 6))
-                column[:, 3 + i] = torque[:, i] / self.inertias[3 + i]
-                out[i].append(column)
-        return out
 
     def _rounding(self) -> Array:
         """Return the standard deviation of the accelerations (6,) that the rotor speeds' rounding
@@ -372,9 +354,6 @@ class Likelihood:
         bent = map(_bent_rotors, self.signals)
         self._acting["", BETWEEN] = self._change(self.setting, signals=bent)
         self._add_model_errors()
-        if self._rounding_std > 0.0:
-            for axis, column in zip("xyz", self._rounded_torques(), strict=True):
-                self._acting["", ROUNDED + axis] = column
         moved = self._posed[ATTITUDE_TIME_OFFSET] = []
         for track in self.tracks:
             # the rate before the sample is read: after it, it knows that sample's noise
@@ -430,16 +409,26 @@ class Likelihood:
         self._posed[column] = [-x for x in place]
 
     def _add_model_errors(self) -> None:
-        for track, answer in zip(self.tracks, self.answers, strict=True):
+        """Add the columns of forces and torques that are a small share larger, and of what of a
+        torque the flight loop's answer to the state predicts.
+
+        The latter may be too small by the share of it that is rounding (errors in variables): a
+        hover holds little torque, and rounding hides it.
+        """
+        rounded = 2.0 * np.square(self._rounding()[3:])
+        known = [
+            track.rotors[:, 1:] - x[:, 1:]
+            for track, x in zip(self.tracks, self.answers, strict=True)
+        ]
+        share = rounded / np.maximum(np.concatenate(known).var(axis=0), rounded)
+        scale = np.hypot(1.0, share / PRIORS.model_error)
+        for track, expected in zip(self.tracks, known, strict=True):
             for i, axis in enumerate("xyz"):
-                force, torque = np.zeros((2, len(track.t), 6))
+                force, torque, hidden = np.zeros((3, len(track.t), 6))
                 force[:, :3] = track.rotors[:, :1] * track.rotation[:, :, i]
                 torque[:, 3 + i] = track.rotors[:, 1 + i]
-                # of rounded rotor speeds the flight loop's answer to the state shows too little,
-                # and what answers the state stands for it
-                expected = torque.copy()
-                expected[:, 3 + i] -= answer[:, 1 + i]
-                errors = {"force": force, "torque": torque, "expected torque": expected}
+                hidden[:, 3 + i] = scale[i] * expected[:, i]
+                errors = {"force": force, "torque": torque, "expected torque": hidden}
                 for name, x in errors.items():
                     self._acting.setdefault(("", f"{MODEL_ERROR} of {name} {axis}"), []).append(x)
 

@@ -34,7 +34,6 @@ WHOLE_PREFIX = "whole "  # a coefficient of an effect that acts at the centre, w
 # columns without an effect: what any flight may have, and what an effect that is in no library does
 BETWEEN = "rotors between samples"
 MODEL_ERROR, GAIN, UNKNOWN, NUISANCE = "model error", "rotor gain of", "unknown ", "nuisance "
-ROUNDED = "rounding of torque "
 
 
 @dataclass(frozen=True)
@@ -167,34 +166,6 @@ def _bounds(column: Column, flights: Flights) -> tuple[float, float]:
     return min(low - own, 0.0), max(high - own, 0.0)
 
 
-def _errors_of_torques(total: Array, columns: Mapping[Column, int], size: Array) -> Array:
-    """Return by what factor (c,) the model's error of each torque is larger than that of a model of
-    exact rotor speeds.
-
-    A torque's gain is biased low by the share of its column that is the rounding of rotor speeds
-    (errors in variables). What counts is the share of what nuisances leave of the column: a hover
-    holds little torque, and the rotors' innovations stand for most of it. Another rounding shows
-    it: by how much it would add to what the column says.
-    """
-    factor = np.ones(len(size))
-    torque, expected = f"{MODEL_ERROR} of torque ", f"{MODEL_ERROR} of expected torque "
-    torques = (torque, expected, ROUNDED, UNKNOWN)
-    others = [i for (e, n), i in columns.items() if not e and not n.startswith(torques)]
-    inner = total[np.ix_(others, others)] + np.eye(len(others))
-
-    def left(i: int) -> float:
-        cross = total[others, i]
-        return float(total[i, i] - cross @ np.linalg.solve(inner, cross))
-
-    for axis in "xyz":
-        if (rounded := columns.get(("", ROUNDED + axis))) is not None:
-            own = columns["", torque + axis]
-            share = left(rounded) / max(left(own) / size[own] ** 2, 1e-30)
-            for i in (own, columns["", expected + axis]):
-                factor[i] = math.hypot(1.0, share / size[i])
-    return factor
-
-
 def declared(column: Column, flights: Flights) -> float:
     """Return what the vehicle's file states of a column's coefficient, from which a coefficient of
     the likelihood counts; 0 where it states nothing.
@@ -233,9 +204,7 @@ def in_prior_units(
         setting: of effects.
         starts: columns of whole effects.
     """
-    columns = {c: i for i, c in enumerate(names)}
     size = np.array([prior_size(c, flights) for c in names])
-    size *= _errors_of_torques(blocks.sum(axis=0)[:-1, :-1] * size[:, None] * size, columns, size)
     # about zero, not about the setting: the residual with all its effects taken away
     back = np.append([_value(c, flights, setting) for c in names], 1.0)
     whole = blocks @ back
@@ -243,10 +212,7 @@ def in_prior_units(
     blocks[:, :, -1] = blocks[:, -1, :] = whole
     blocks[:, -1, -1] = whole @ back
     scale = np.append(size, 1.0)
-    kept = [i for i, (_, name) in enumerate(names) if not name.startswith(ROUNDED)]
-    at = [*kept, -1]
-    blocks = (blocks * scale[:, None] * scale)[:, at][:, :, at]
-    names, size = [names[i] for i in kept], size[kept]
+    blocks = blocks * scale[:, None] * scale
     low, high = np.array([_bounds(c, flights) for c in names]).T / size
     plain = [i for i, c in enumerate(names) if not c[0] and not c[1].startswith(UNKNOWN)]
     dictionary = [i for i, c in enumerate(names) if not c[0] and c[1].startswith(UNKNOWN)]
