@@ -4,6 +4,7 @@
 """
 
 import json
+import math
 from dataclasses import asdict
 
 import numpy as np
@@ -13,7 +14,6 @@ from tests.support.alike import assert_alike
 from tests.support.flown import DRAG, VEHICLE, settings
 from tests.support.paths import ROOT
 from windwrench.identification.diagnosis.likelihood import Likelihood
-from windwrench.identification.diagnosis.priors import PRIORS
 from windwrench.identification.diagnosis.ranking import rank
 from windwrench.identification.diagnosis.regression import Flights
 from windwrench.studies.trials.practice_flights import fly_practice
@@ -85,8 +85,11 @@ def test_the_gain_of_a_torque_is_known_where_rotors_leave_their_rounding():
         log = fly_practice(VEHICLE, settings({}), trajectory, 12.0, seed=5)
         flights = Flights([log], VEHICLE)
         base = Likelihood(flights, {}).base((), {})
-        sizes[trajectory] = base.size[base.columns["", "model error of torque x"]]
-    assert PRIORS.model_error <= sizes["excite"] < 0.02
+        names = ("expected torque x", "torque x")
+        at = base.at([("", f"model error of {name}") for name in names])
+        predicted, all_of_it = base.total[at, at]
+        sizes[trajectory] = math.sqrt(predicted / all_of_it)
+    assert sizes["excite"] < 7.0
     assert sizes["hover"] > 5.0 * sizes["excite"]
 
 
