@@ -67,7 +67,8 @@ STATES = (0, 1, 2)  # of an axis: pose, rate, disturbance
 SIDEWAYS = 0.01
 
 
-NOISE_ROUNDS = 3  # of the noise and of the flight as it is seen with it
+# of the noise and of the flight as it is seen with it, where no noise is known and where one is
+NOISE_ROUNDS = 3, 2
 FIRST_DISTURBANCE = 0.3  # m/s2 and rad/s2, at which the search for the noise begins
 
 
@@ -118,7 +119,7 @@ class Likelihood:
         self.aside: Array = near.aside if near else np.zeros((3, 3))
         self.tracks = self._run()
         self.answers: list[Array] = same.answers if same else self._rotor_innovations()
-        for i in range(0 if same else 2 if near else NOISE_ROUNDS):
+        for i in range(0 if same else NOISE_ROUNDS[near is not None]):
             self.noise, self.aside, self.known = self._likeliest(begun=near is not None or i > 0)
             self.tracks = self._run()
             self.answers = self._rotor_innovations()
@@ -186,10 +187,10 @@ class Likelihood:
     def _likeliest(
         self, explained: Sequence[Array] | None = None, begun: bool = True
     ) -> tuple[tuple[AxisNoise, ...], Array, list[Array]]:
-        """Return the likeliest noise of each axis, what attitudes' innovations do aside
-        (``causal_filter.run``), and what the rotors' innovations add to the states of each piece
-        (n, 6, 3); ``explained`` (n, 2, 6) is what is known to move the pose,
-        and to accelerate, beside the model. ``begun``: whether this noise is roughly known.
+        """Return the likeliest noise of each axis, the gains of an attitude's innovations on the
+        motion aside (``causal_filter.run``), and what the rotors' innovations add to the states of
+        each piece (n, 6, 3); ``explained`` (n, 2, 6) is what is known to move the pose, and to
+        accelerate, beside the model. ``begun``: whether this noise is roughly known.
         """
         angles = [np.vstack([np.zeros(3), turned(piece.quaternion)]) for piece in self.pieces]
         out = []
@@ -433,11 +434,12 @@ class Likelihood:
                     self._acting.setdefault(("", f"{MODEL_ERROR} of {name} {axis}"), []).append(x)
 
     def _jumps(self) -> tuple[list[Column], list[Array], NDArray[np.intp]]:
-        """Return the columns of the gains on the rotors' innovations, their jumps (n, 6, e) of each
-        piece, and which state jumps.
+        """Return the columns of the gains on innovations of rotors and attitude, their jumps
+        (n, 6, e) of each piece, and which state jumps.
 
         Thrust and torques say something of the axes that they drive. And a loop that rolls or
-        pitches the vehicle has seen where it is, and what pushes it aside.
+        pitches the vehicle has seen where it is, and what pushes it aside. Last, a tilt that the
+        pose corrects has pulled the vehicle aside before.
         """
         kinds = (*(f"axis {axis}" for axis in DRIVEN), "roll aside", "pitch aside", "tilt")
         names: list[Column] = [("", f"{GAIN} {kind} {state}") for kind in kinds for state in STATES]
