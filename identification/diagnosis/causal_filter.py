@@ -179,7 +179,7 @@ def _run(
             d[3 + i] *= keep[3 + i]
         # what the attitude says of the motion aside, which a wrong tilt has pulled
         lift = u[0] * b[21]
-        for i in range(3):
+        for i in range(2):
             e = lift * (r[i, 0] * innovations[k, 4] - r[i, 1] * innovations[k, 3])
             p[i] += aside[i, 0] * e
             v[i] += aside[i, 1] * e
@@ -196,8 +196,8 @@ def run(
         poses: the piece.
         vehicle: with the model.
         noise: of each axis.
-        aside: (3, 3) gain of position, velocity and disturbance of each axis, per unit of what an
-            attitude's innovation turns of the rotors' acceleration.
+        aside: (2, 3) gain of position, velocity and disturbance of both horizontal axes, per unit
+            of what an attitude's innovation turns of the rotors' acceleration.
         known: (n, 6, 3) what is added to pose, rate and disturbance of each axis before the pose of
             sample k is read.
     """
@@ -247,7 +247,7 @@ def sensitivities(
         period: s.
         gain: (6, 3) of the axes.
         keep: (6,) what is left of a disturbance after a period.
-        aside: (3, 3) of ``run``.
+        aside: (2, 3) of ``run``.
         pull: (n, 3, 2) by how much the acceleration (world) grows with an error of the attitude
             about body x and y.
         rate: (n, 3) angular velocity.
@@ -304,7 +304,7 @@ def sensitivities(
                 )
                 state[3 + i, 1, j] += period * g
                 state[3 + i, 2, j] *= keep[3 + i]
-        for i in range(3):
+        for i in range(2):
             px, py = pull[k, i, 0], pull[k, i, 1]
             for j in range(c):
                 x = px * out[k, 3, j] + py * out[k, 4, j]

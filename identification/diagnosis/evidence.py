@@ -150,7 +150,8 @@ def _log_tail(z: float) -> float:
 def bounded_mode(normal: Array, right: Array, low: Array, high: Array) -> Array:
     """Return the maximum (n,) of ``right @ x - x @ normal @ x / 2`` within bounds."""
     n = len(right)
-    mode = np.linalg.solve(normal, right)
+    mode = np.empty(n)
+    mode[:] = np.linalg.solve(normal, right)
     held = np.zeros(n, dtype=np.bool_)
     for _ in range(3 * n):
         worst, most = 0, 0.0

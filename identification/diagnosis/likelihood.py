@@ -116,7 +116,7 @@ class Likelihood:
         # (n, 6, 3) of each piece, what rotors' innovations say of it
         self.known: list[Array] = near.known if near else [np.zeros((n, 6, 3)) for n in lengths]
         # what an attitude's innovation says of the position's filter
-        self.aside: Array = near.aside if near else np.zeros((3, 3))
+        self.aside: Array = near.aside if near else np.zeros((2, 3))
         self.tracks = self._run()
         self.answers: list[Array] = same.answers if same else self._rotor_innovations()
         for i in range(0 if same else NOISE_ROUNDS[near is not None]):
@@ -198,7 +198,7 @@ class Likelihood:
         # rotors that answer a gust before the pose shows it leave less of it unknown
         _, jumps, jump_state = self._jumps()
         known = [np.zeros((len(x), 6, 3)) for x in jumps]
-        aside = np.zeros((3, 3))
+        aside = np.zeros((2, 3))
         for axis in range(6):
             say = [j for j in range(len(jump_state)) if any(x[:, axis, j].any() for x in jumps)]
             measured = [
@@ -223,7 +223,7 @@ class Likelihood:
             out.append(found)
             every = np.zeros(len(jump_state))
             every[say] = gains
-            if axis < 3:
+            if axis < 2:
                 aside[axis] = every[-3:] * self._units
             every[-3:] = 0.0
             for x, jump in zip(known, jumps, strict=True):
@@ -439,7 +439,8 @@ class Likelihood:
 
         Thrust and torques say something of the axes that they drive. And a loop that rolls or
         pitches the vehicle has seen where it is, and what pushes it aside. Last, a tilt that the
-        pose corrects has pulled the vehicle aside before.
+        pose corrects has pulled the vehicle aside before; what it does to the height is too little
+        to fit a gain to.
         """
         kinds = (*(f"axis {axis}" for axis in DRIVEN), "roll aside", "pitch aside", "tilt")
         names: list[Column] = [("", f"{GAIN} {kind} {state}") for kind in kinds for state in STATES]
@@ -458,7 +459,8 @@ class Likelihood:
             for i, axis in ((1, 1), (2, 0)):
                 directions[:, :3, 3 + i] = tilt * found[:, i, None] * rotation[:, :, axis]
             pull = track.rotors[:, :1, None] * rotation[:, :, 1::-1] * [-1.0, 1.0]
-            directions[1:, :3, -1] = np.einsum("nij,nj->ni", pull, track.innovations[:, 3:5])[:-1]
+            off = np.einsum("nij,nj->ni", pull, track.innovations[:, 3:5])
+            directions[1:, :2, -1] = off[:-1, :2]
             jumps = directions[..., None] * self._units
             out.append(jumps.reshape(len(found), 6, len(names)))
         return names, out, np.tile(STATES, len(kinds))
