@@ -77,7 +77,9 @@ def test_the_example_of_a_comparison_has_the_known_answer(call):
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
-    return recorded(tmp_path_factory.mktemp("look") / "flight.csv", "--trajectory", "excite")
+    path = tmp_path_factory.mktemp("look") / "flight.csv"
+    # of less, 12 s do not tell whether it is a force, a tilt or a slow gust
+    return recorded(path, "--trajectory", "excite", effect="constant_force:fx=0.6")
 
 
 def test_a_log_in_place_of_a_command_ends_with_a_sentence_and_a_page(call, log):
