@@ -2,11 +2,13 @@
 coefficient changes in its innovations.
 
 The state is position, velocity, attitude, angular velocity and the disturbance's force and torque
-as accelerations: 18 numbers. Each axis has its own steady gain, so the filter is an observer of
-fixed gains: what an innovation changes with a coefficient follows from linear recursions, exactly
-but for second order. Rotor speeds move linearly between samples.
+as accelerations: 18 numbers. Innovations and the disturbance's force are along the heading and to
+its left, where each axis has a steady gain. So the filter is an observer of fixed gains: what an
+innovation changes with a coefficient follows from linear recursions, exactly but for second order.
+Rotor speeds move linearly between samples.
 """
 
+import math
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -17,7 +19,7 @@ from ...dynamics.motion import acceleration_of, angular_acceleration_of, body_nu
 from ...dynamics.rotation import normalise, quaternion_to_matrix, turn_body
 from ...dynamics.vehicle import Vehicle
 from ...runtime.compiled import Record, compiled, compiled_for_vectors
-from .axis_filter import AxisNoise
+from .steady_filter import PARTNER, SteadyFilter
 
 Array = NDArray[np.float64]
 _MODEL = np.dtype(MODEL_FIELDS)
@@ -59,7 +61,9 @@ class Track(State):
 
     model: Array  # (n, 6) acceleration of the model alone
     predicted: Array  # (n, 7) position and quaternion at sample k, from samples before it
-    innovations: Array  # (n, 6) m, and rad in the body frame
+    heading: Array  # (n, 2) cosine and sine, at sample k
+    innovations: Array  # (n, 6) m, along the heading, to its left and up; rad in the body frame
+    disturbance: Array  # (n, 6) m/s2, in the same directions; rad/s2
 
 
 @compiled
@@ -80,7 +84,6 @@ def _run(
     begun: Array,
     gain: Array,
     keep: Array,
-    aside: Array,
     known: Array,
     at_position: Array,
     at_rotation: Array,
@@ -90,7 +93,9 @@ def _run(
     rotors: Array,
     model: Array,
     predicted: Array,
+    heading: Array,
     innovations: Array,
+    disturbance: Array,
 ) -> None:
     f = models[0]
     b, nothing = body_numbers(f.body), (0.0, 0.0, 0.0)
@@ -98,16 +103,27 @@ def _run(
     q, q2, r = quaternion[0].copy(), np.empty(4), np.empty((3, 3))
     step, mid, both = np.empty(3), np.empty(3), np.empty(4)
     v2, w2, before = np.empty(3), np.empty(3), np.zeros(6)
-    half = 0.5 * period
+    half, say = 0.5 * period, np.empty((6, 3))
+    quaternion_to_matrix(q, r)
+    ahead, left = 1.0, 0.0
     for k in range(len(speeds)):
+        size = math.hypot(r[0, 0], r[1, 0])
+        if size > 0.0:
+            ahead, left = r[0, 0] / size, r[1, 0] / size
+        heading[k, 0], heading[k, 1] = ahead, left
         # what the last sample's rotors said
-        for i in range(3):
-            p[i] += known[k, i, 0]
-            v[i] += known[k, i, 1]
+        for i in range(6):
             d[i] += known[k, i, 2]
+        for i in range(3):
             step[i] = known[k, 3 + i, 0]
             w[i] += known[k, 3 + i, 1]
-            d[3 + i] += known[k, 3 + i, 2]
+        x, y = known[k, 0], known[k, 1]
+        p[0] += ahead * x[0] - left * y[0]
+        p[1] += left * x[0] + ahead * y[0]
+        p[2] += known[k, 2, 0]
+        v[0] += ahead * x[1] - left * y[1]
+        v[1] += left * x[1] + ahead * y[1]
+        v[2] += known[k, 2, 1]
         _turn(q, step, q2)
         for i in range(4):
             q[i] = q2[i]
@@ -121,17 +137,23 @@ def _run(
         e0 = sign * (o[0] * m[1] - o[1] * m[0] - o[2] * m[3] + o[3] * m[2])
         e1 = sign * (o[0] * m[2] + o[1] * m[3] - o[2] * m[0] - o[3] * m[1])
         e2 = sign * (o[0] * m[3] - o[1] * m[2] + o[2] * m[1] - o[3] * m[0])
-        innovations[k, 3], innovations[k, 4], innovations[k, 5] = 2 * e0, 2 * e1, 2 * e2
+        e = innovations[k]
+        e[3], e[4], e[5] = 2 * e0, 2 * e1, 2 * e2
+        x0, x1 = position[k, 0] - p[0], position[k, 1] - p[1]
+        e[0], e[1], e[2] = ahead * x0 + left * x1, ahead * x1 - left * x0, position[k, 2] - p[2]
+        for i in range(6):
+            for s in range(3):
+                say[i, s] = gain[i, s, 0] * e[i] + gain[i, s, 1] * e[PARTNER[i]]
+            d[i] += say[i, 2]
         for i in range(3):
-            e = position[k, i] - p[i]
-            innovations[k, i] = e
-            p[i] += gain[i, 0] * e
-            v[i] += gain[i, 1] * e
-            d[i] += gain[i, 2] * e
-            e = innovations[k, 3 + i]
-            step[i] = gain[3 + i, 0] * e
-            w[i] += gain[3 + i, 1] * e
-            d[3 + i] += gain[3 + i, 2] * e
+            step[i] = say[3 + i, 0]
+            w[i] += say[3 + i, 1]
+        p[0] += ahead * say[0, 0] - left * say[1, 0]
+        p[1] += left * say[0, 0] + ahead * say[1, 0]
+        p[2] += say[2, 0]
+        v[0] += ahead * say[0, 1] - left * say[1, 1]
+        v[1] += left * say[0, 1] + ahead * say[1, 1]
+        v[2] += say[2, 1]
         _turn(q, step, q2)
         # half a step on, where the model is asked; the acceleration is that of the step before
         for i in range(3):
@@ -162,7 +184,10 @@ def _run(
         x, y, z = acceleration_of(b, turn, omega, turning, thrust, nothing, effects)
         model[k, 0], model[k, 1], model[k, 2] = x, y, z
         for i in range(6):
+            disturbance[k, i] = d[i]
             a[i] = before[i] = model[k, i] + d[i]
+        a[0] = before[0] = model[k, 0] + ahead * d[0] - left * d[1]
+        a[1] = before[1] = model[k, 1] + left * d[0] + ahead * d[1]
         for i in range(3):
             at_position[k, i], at_velocity[k, i], at_rate[k, i] = mid[i], v2[i], omega[i]
             for j in range(3):
@@ -177,34 +202,23 @@ def _run(
             w[i] += period * acting[k, 3 + i]
             d[i] *= keep[i]
             d[3 + i] *= keep[3 + i]
-        # what the attitude says of the motion aside, which a wrong tilt has pulled
-        lift = u[0] * b[21]
-        for i in range(2):
-            e = lift * (r[i, 0] * innovations[k, 4] - r[i, 1] * innovations[k, 3])
-            p[i] += aside[i, 0] * e
-            v[i] += aside[i, 1] * e
-            d[i] += aside[i, 2] * e
         _turn(q2, step, q)
 
 
-def run(
-    poses: Poses, vehicle: Vehicle, noise: tuple[AxisNoise, ...], aside: Array, known: Array
-) -> Track:
-    """Return a piece as the filter with a vehicle's model and six axes' noise sees it.
+def run(poses: Poses, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> Track:
+    """Return a piece as the filter with a vehicle's model sees it.
 
     Args:
         poses: the piece.
         vehicle: with the model.
-        noise: of each axis.
-        aside: (2, 3) gain of position, velocity and disturbance of both horizontal axes, per unit
-            of what an attitude's innovation turns of the rotors' acceleration.
+        steady: the filter's gains.
         known: (n, 6, 3) what is added to pose, rate and disturbance of each axis before the pose of
-            sample k is read.
+            sample k is read; in the directions of ``Track.innovations``.
     """
     models = np.zeros(1, dtype=_MODEL)
     load_model(models[0], vehicle)
     n = len(poses.t)
-    shapes = ((3,), (3, 3), (3,), (3,), (6,), (4,), (6,), (7,), (6,))
+    shapes = ((3,), (3, 3), (3,), (3,), (6,), (4,), (6,), (7,), (2,), (6,), (6,))
     out = Track(poses.t, *(np.empty((n, *shape)) for shape in shapes))
     measured = (poses.rotor_speeds, poses.voltage, poses.position, poses.quaternion)
     speeds, voltage, position, quaternion = map(np.ascontiguousarray, measured)
@@ -216,9 +230,8 @@ def run(
         position,
         quaternion,
         np.concatenate([poses.velocity, poses.angular_velocity]),
-        np.array([x.gain for x in noise]),
-        np.exp(-poses.period / np.array([x.time for x in noise], dtype=np.float64)),
-        aside,
+        steady.gain,
+        steady.keep,
         known,
         *(getattr(out, field.name) for field in fields(out)[1:]),
     )
@@ -231,7 +244,7 @@ def sensitivities(
     period: float,
     gain: Array,
     keep: Array,
-    aside: Array,
+    heading: Array,
     pull: Array,
     rate: Array,
     acting: Array,
@@ -241,13 +254,14 @@ def sensitivities(
     state: Array,
     out: Array,
 ) -> None:
-    """Write by how much the innovations' predictions (n, 6, c) change with a unit of each column.
+    """Write by how much the innovations' predictions (n, 6, c) change with a unit of each column;
+    in the directions of ``Track.innovations``, and so are the jumps.
 
     Args:
         period: s.
-        gain: (6, 3) of the axes.
+        gain: (6, 3, 2) of the axes, of ``SteadyFilter``.
         keep: (6,) what is left of a disturbance after a period.
-        aside: (2, 3) of ``run``.
+        heading: (n, 2) of the track.
         pull: (n, 3, 2) by how much the acceleration (world) grows with an error of the attitude
             about body x and y.
         rate: (n, 3) angular velocity.
@@ -262,33 +276,52 @@ def sensitivities(
     n, a, b, e = len(acting), acting.shape[2], moved.shape[2], jumps.shape[2]
     c = a + e
     half = 0.5 * period * period
-    before = np.empty((3, c))
+    mid, say = np.empty((3, c)), np.empty((6, 3, c))
     for k in range(n):
-        for m in range(e):
-            for i in range(6):
-                state[i, jump_state[m], a + m] += jumps[k, i, m]
+        ahead, left = heading[k, 0], heading[k, 1]
+        for j in range(e):
+            s = jump_state[j]
+            for i in range(2, 6):
+                state[i, s, a + j] += jumps[k, i, j]
+            x, y = jumps[k, 0, j], jumps[k, 1, j]
+            # the disturbance turns with the vehicle
+            state[0, s, a + j] += ahead * x - left * y if s < 2 else x
+            state[1, s, a + j] += left * x + ahead * y if s < 2 else y
         for i in range(6):
             for j in range(c):
                 out[k, i, j] = state[i, 0, j]
             for j in range(b):
                 out[k, i, a - b + j] -= moved[k, i, j]
+        for j in range(c):
+            x, y = out[k, 0, j], out[k, 1, j]
+            out[k, 0, j], out[k, 1, j] = ahead * x + left * y, ahead * y - left * x
+        for i in range(6):
+            o = PARTNER[i]
+            for s in range(3):
+                own, other = gain[i, s, 0], gain[i, s, 1]
+                for j in range(c):
+                    say[i, s, j] = -own * out[k, i, j] - other * out[k, o, j]
+        for s in range(3):
+            for i in range(2, 6):
+                for j in range(c):
+                    state[i, s, j] += say[i, s, j]
             for j in range(c):
-                x = out[k, i, j]
-                state[i, 0, j] -= gain[i, 0] * x
-                state[i, 1, j] -= gain[i, 1] * x
-                state[i, 2, j] -= gain[i, 2] * x
+                x, y = say[0, s, j], say[1, s, j]
+                state[0, s, j] += ahead * x - left * y if s < 2 else x
+                state[1, s, j] += left * x + ahead * y if s < 2 else y
         for i in range(3):
             for j in range(c):
-                before[i, j] = state[3 + i, 0, j]
+                mid[i, j] = state[3 + i, 0, j] + 0.5 * period * state[3 + i, 1, j]
         for i in range(3):
             px, py = pull[k, i, 0], pull[k, i, 1]
+            x, y = (ahead, -left) if i == 0 else (left, ahead)
             for j in range(c):
-                g = state[i, 2, j] + px * before[0, j] + py * before[1, j]
+                g = px * mid[0, j] + py * mid[1, j]
+                g += state[2, 2, j] if i == 2 else x * state[0, 2, j] + y * state[1, 2, j]
                 if j < a:
                     g += acting[k, i, j]
                 state[i, 0, j] += period * state[i, 1, j] + half * g
                 state[i, 1, j] += period * g
-                state[i, 2, j] *= keep[i]
         for i in range(3):
             x, y = (i + 1) % 3, (i + 2) % 3
             wx, wy = rate[k, x], rate[k, y]
@@ -300,14 +333,9 @@ def sensitivities(
                 state[3 + i, 0, j] += (
                     period * state[3 + i, 1, j]
                     + half * g
-                    - period * (wx * before[y, j] - wy * before[x, j])
+                    - period * (wx * mid[y, j] - wy * mid[x, j])
                 )
                 state[3 + i, 1, j] += period * g
-                state[3 + i, 2, j] *= keep[3 + i]
-        for i in range(2):
-            px, py = pull[k, i, 0], pull[k, i, 1]
+        for i in range(6):
             for j in range(c):
-                x = px * out[k, 3, j] + py * out[k, 4, j]
-                state[i, 0, j] -= aside[i, 0] * x
-                state[i, 1, j] -= aside[i, 1] * x
-                state[i, 2, j] -= aside[i, 2] * x
+                state[i, 2, j] *= keep[i]

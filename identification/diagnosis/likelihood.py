@@ -25,8 +25,7 @@ from ..logs.flight_log import FlightLog
 from ..motion.sensing_effects import undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, log_signals
-from ..motion.smoothing import continuous, turn_between, turned
-from .axis_filter import AXIS, AxisFlight, AxisNoise, likeliest_noise, steady_noise
+from ..motion.smoothing import continuous, turn_between
 from .causal_filter import Poses, Track, run, sensitivities
 from .discrepancy import changing_columns, discrepancy_columns, variables
 from .log_offsets import (
@@ -35,6 +34,7 @@ from .log_offsets import (
     ROTOR_TIME_OFFSET,
     with_time_offsets,
 )
+from .noise_search import NOISE, NoiseSearch, Seen
 from .priors import (
     BETWEEN,
     GAIN,
@@ -59,6 +59,7 @@ from .regression import (
     without,
 )
 from .rotor_innovations import DRIVEN, rotor_innovations
+from .steady_filter import PAIRS, PoseNoise, SteadyFilter, steady_filter
 
 Array = NDArray[np.float64]
 
@@ -67,9 +68,12 @@ STATES = (0, 1, 2)  # of an axis: pose, rate, disturbance
 SIDEWAYS = 0.01
 
 
-# of the noise and of the flight as it is seen with it, where no noise is known and where one is
-NOISE_ROUNDS = 3, 2
 FIRST_DISTURBANCE = 0.3  # m/s2 and rad/s2, at which the search for the noise begins
+
+
+# of the gains of a pair on the rotors' innovations, of thrust, of torque and of a turn aside: the
+# state that jumps
+JUMP_STATE = np.tile(STATES, 3)
 
 
 class Likelihood:
@@ -112,17 +116,20 @@ class Likelihood:
         if near is not None and [len(piece.t) for piece in near.pieces] != lengths:
             near = None
         same = near if same_noise else None
-        self.noise: tuple[AxisNoise, ...] = near.noise if near else self._first_noise()
-        # (n, 6, 3) of each piece, what rotors' innovations say of it
-        self.known: list[Array] = near.known if near else [np.zeros((n, 6, 3)) for n in lengths]
-        # what an attitude's innovation says of the position's filter
-        self.aside: Array = near.aside if near else np.zeros((2, 3))
-        self.tracks = self._run()
-        self.answers: list[Array] = same.answers if same else self._rotor_innovations()
-        for i in range(0 if same else NOISE_ROUNDS[near is not None]):
-            self.noise, self.aside, self.known = self._likeliest(begun=near is not None or i > 0)
-            self.tracks = self._run()
-            self.answers = self._rotor_innovations()
+        self.noise: PoseNoise = near.noise if near else self._first_noise()
+        # on what the rotors' innovations say of the states, and what they say (n, 6, 3) of a piece
+        self.gains: Array = near.gains if near else np.zeros((len(PAIRS), len(JUMP_STATE)))
+        # what the rotors do that the past does not predict, by a filter that follows the pose closely
+        self.answers: list[Array] = near.answers if near else []
+        if near:
+            self.known, self.tracks = near.known, near.tracks
+        else:
+            self._run(self.steady, [np.zeros((n, 6, 3)) for n in lengths])
+            self.answers = rotor_innovations(list(zip(self.pieces, self.tracks, strict=True)))
+        if same:
+            self._run(self.steady, self._said(self._jumps(), self.gains))
+        else:
+            self._search_noise(begun=near is not None)
         self.signals = [
             _signals(piece, track) for piece, track in zip(self.pieces, self.tracks, strict=True)
         ]
@@ -139,14 +146,24 @@ class Likelihood:
         if not self._acting:
             self._add_what_any_flight_may_have()
 
-    def _run(self) -> list[Track]:
-        return [
-            run(piece, self.vehicle, self.noise, self.aside, known)
-            for piece, known in zip(self.pieces, self.known, strict=True)
+    @property
+    def steady(self) -> SteadyFilter:
+        """The filter."""
+        return steady_filter(self.noise, self.period, self.vehicle.gravity)
+
+    def _run(self, steady: SteadyFilter, known: list[Array]) -> None:
+        self.known = known
+        self.tracks = [
+            run(piece, self.vehicle, steady, x) for piece, x in zip(self.pieces, known, strict=True)
         ]
 
-    def _rotor_innovations(self) -> list[Array]:
-        return rotor_innovations(list(zip(self.pieces, self.tracks, strict=True)))
+    @staticmethod
+    def _said(jumps: Iterable[Array], gains: Array) -> list[Array]:
+        """Return what the rotors' innovations add to the states of each piece (n, 6, 3)."""
+        own = np.empty((6, gains.shape[1]))
+        own[PAIRS] = gains[:, None]
+        said = [np.split(x * own, len(JUMP_STATE) // len(STATES), axis=2) for x in jumps]
+        return [np.add.reduce(parts) for parts in said]
 
     # Noise
 
@@ -155,15 +172,14 @@ class Likelihood:
         """What a unit of acceleration makes of an axis' states in a period."""
         return np.array([self.period**2, self.period, 1.0])
 
-    def _first_noise(self) -> tuple[AxisNoise, ...]:
+    def _first_noise(self) -> PoseNoise:
         floor = sensor_noise(self.flights.logs[0], self.vehicle)
-        out = []
-        for axis in range(6):
-            pose = max(floor.position if axis < 3 else floor.attitude, 1e-6)
-            size = FIRST_DISTURBANCE * (1.0 if axis < 3 else 10.0)
-            white = float(self._rounding()[axis])
-            out.append(steady_noise(pose, size, AXIS.first_time, white, self.period))
-        return tuple(out)
+        return PoseNoise(
+            np.repeat([max(floor.position, 1e-6), max(floor.attitude, 1e-6)], 3),
+            np.repeat([FIRST_DISTURBANCE, 10.0 * FIRST_DISTURBANCE], 3),
+            np.full(6, NOISE.first_time),
+            self._rounding(),
+        )
 
     @property
     def _rounding_std(self) -> float:
@@ -184,64 +200,49 @@ class Likelihood:
         out = np.array([0.0, 0.0, *wrench]) / self.inertias
         return np.asarray(np.maximum(out, 1e-9))
 
-    def _likeliest(
-        self, explained: Sequence[Array] | None = None, begun: bool = True
-    ) -> tuple[tuple[AxisNoise, ...], Array, list[Array]]:
-        """Return the likeliest noise of each axis, the gains of an attitude's innovations on the
-        motion aside (``causal_filter.run``), and what the rotors' innovations add to the states of
-        each piece (n, 6, 3); ``explained`` (n, 2, 6) is what is known to move the pose, and to
-        accelerate, beside the model. ``begun``: whether this noise is roughly known.
+    def _search_noise(self, begun: bool, explained: Sequence[Array] | None = None) -> None:
+        """Take the likeliest noise, and the likeliest gains on the rotors' innovations.
+
+        Args:
+            begun: whether this noise is roughly known.
+            explained: (n, 2, 6) of each piece, what is known to move the pose, and to accelerate,
+                beside the model.
         """
-        angles = [np.vstack([np.zeros(3), turned(piece.quaternion)]) for piece in self.pieces]
-        out = []
-        white = self._rounding()
-        # rotors that answer a gust before the pose shows it leave less of it unknown
-        _, jumps, jump_state = self._jumps()
-        known = [np.zeros((len(x), 6, 3)) for x in jumps]
-        aside = np.zeros((2, 3))
-        for axis in range(6):
-            say = [j for j in range(len(jump_state)) if any(x[:, axis, j].any() for x in jumps)]
-            measured = [
-                np.ascontiguousarray(p.position[:, axis] if axis < 3 else angle[:, axis - 3])
-                for p, angle in zip(self.pieces, angles, strict=True)
-            ]
-            drives = [np.ascontiguousarray(track.model[:, axis]) for track in self.tracks]
-            if explained is not None:
-                measured = [y + x[:, 0, axis] for y, x in zip(measured, explained, strict=True)]
-                drives = [y + x[:, 1, axis] for y, x in zip(drives, explained, strict=True)]
-            rates = [
-                float(p.velocity[axis] if axis < 3 else p.angular_velocity[axis - 3])
-                for p in self.pieces
-            ]
-            now = self.noise[axis]
-            own = [np.ascontiguousarray(x[:, axis, say]) for x in jumps]
-            held = now.innovation / np.array(PRIORS.gains)[jump_state[say]]
-            flight = AxisFlight(measured, drives, rates, self.period, own, jump_state[say], held)
-            found, gains = likeliest_noise(
-                flight, replace(now, white=max(float(white[axis]), now.white)), begun
-            )
-            out.append(found)
-            every = np.zeros(len(jump_state))
-            every[say] = gains
-            if axis < 2:
-                aside[axis] = every[-3:] * self._units
-            every[-3:] = 0.0
-            for x, jump in zip(known, jumps, strict=True):
-                for state in STATES:
-                    at = jump_state == state
-                    x[:, axis, state] = jump[:, axis, at] @ every[at]
-        return tuple(out), aside, known
+        jumps = self._jumps()
+
+        def see(steady: SteadyFilter, gains: Array) -> list[Seen]:
+            self._run(steady, self._said(jumps, gains))
+            out = []
+            for i, track in enumerate(self.tracks):
+                seen = track.innovations
+                if explained is not None:
+                    pose, force = explained[i][:, 0, :, None], explained[i][:, 1, :, None]
+                    seen = seen - self._changes(track, steady, force, pose)[:, :, 0]
+                out.append(Seen(seen, track.disturbance, self._counts(i)))
+            return out
+
+        held = np.array(PRIORS.gains)[JUMP_STATE]
+        search = NoiseSearch(see, jumps, JUMP_STATE, held, self.period, self.vehicle.gravity)
+        self.noise, self.gains = search.likeliest(self.noise, self.gains, begun)
+        self._run(self.steady, self._said(jumps, self.gains))
+
+    def _counts(self, piece: int) -> NDArray[np.bool_]:
+        """Return which samples of a piece the fit may see."""
+        out = self._fit[piece].copy()
+        out[: round(NOISE.settling_time / self.period)] = False
+        return out
 
     def gusts(self) -> tuple[Disturbance, ...]:
         """Return the disturbance of each channel, of which the rotors show a part: a flight loop
         that reads a gyro answers most of a gust's torque before the pose shows it.
         """
         out = []
-        for axis, (own, size) in enumerate(zip(self.noise, self.inertias.tolist(), strict=True)):
-            keep = math.exp(-self.period / own.time)
+        sizes, times = self.inertias * self.noise.disturbance, self.noise.time.tolist()
+        for axis, (size, time) in enumerate(zip(sizes.tolist(), times, strict=True)):
+            keep = math.exp(-self.period / time)
             shown = [lfilter([1.0], [1.0, -keep], known[:, axis, 2]) for known in self.known]
-            rms = size * math.hypot(own.disturbance, float(np.concatenate(shown).std()))
-            out.append(Disturbance(CHANNELS[axis], rms, own.time, size * own.disturbance))
+            said = float(self.inertias[axis] * np.concatenate(shown).std())
+            out.append(Disturbance(CHANNELS[axis], math.hypot(size, said), time, size))
         return tuple(out)
 
     # Columns
@@ -370,13 +371,16 @@ class Likelihood:
         whole library the noise is that of a flight of which everything is known.
         """
         out = copy(self)
-        out.noise, out.aside, out.known = self._likeliest(self._explained(coefficients))
-        heard = out._run()
+        out._search_noise(True, self._explained(coefficients))
         out.tracks = [
-            replace(track, innovations=x.innovations)
-            for track, x in zip(self.tracks, heard, strict=True)
+            replace(
+                track,
+                heading=x.heading,
+                innovations=x.innovations,
+                disturbance=x.disturbance,
+            )
+            for track, x in zip(self.tracks, out.tracks, strict=True)
         ]
-        out.answers = out._rotor_innovations()
         return out._products(starts)
 
     def _explained(self, coefficients: Mapping[Column, float]) -> list[Array]:
@@ -433,54 +437,40 @@ class Likelihood:
                 for name, x in errors.items():
                     self._acting.setdefault(("", f"{MODEL_ERROR} of {name} {axis}"), []).append(x)
 
-    def _jumps(self) -> tuple[list[Column], list[Array], NDArray[np.intp]]:
-        """Return the columns of the gains on innovations of rotors and attitude, their jumps
-        (n, 6, e) of each piece, and which state jumps.
+    def _jumps(self) -> list[Array]:
+        """Return what a unit of each gain of a pair of axes adds to the states (n, 6, e) of each
+        piece.
 
         Thrust and torques say something of the axes that they drive. And a loop that rolls or
-        pitches the vehicle has seen where it is, and what pushes it aside. Last, a tilt that the
-        pose corrects has pulled the vehicle aside before; what it does to the height is too little
-        to fit a gain to.
+        pitches the vehicle has seen where it is, and what pushes it aside.
         """
-        kinds = (*(f"axis {axis}" for axis in DRIVEN), "roll aside", "pitch aside", "tilt")
-        names: list[Column] = [("", f"{GAIN} {kind} {state}") for kind in kinds for state in STATES]
         out = []
         tilt = SIDEWAYS * self.flights.vehicle.gravity
         for found, track in zip(self.answers, self.tracks, strict=True):
-            rotation = track.rotation
             # an innovation of sample k changes the state after it: the jump is before sample k + 1
             found = np.vstack([np.zeros(4), found[:-1]])
-            directions = np.zeros((len(found), 6, len(kinds)))
-            for i, axis in enumerate(DRIVEN):
-                if axis == 2:
-                    directions[:, :3, i] = found[:, i, None] * rotation[:, :, 2]
-                else:
-                    directions[:, axis, i] = found[:, i]
-            for i, axis in ((1, 1), (2, 0)):
-                directions[:, :3, 3 + i] = tilt * found[:, i, None] * rotation[:, :, axis]
-            pull = track.rotors[:, :1, None] * rotation[:, :, 1::-1] * [-1.0, 1.0]
-            off = np.einsum("nij,nj->ni", pull, track.innovations[:, 3:5])
-            directions[1:, :2, -1] = off[:-1, :2]
-            jumps = directions[..., None] * self._units
-            out.append(jumps.reshape(len(found), 6, len(names)))
-        return names, out, np.tile(STATES, len(kinds))
+            (ahead, left), z = track.heading.T, track.rotation[:, :, 2]
+            x = np.zeros((len(found), 6, len(JUMP_STATE) // len(STATES)))
+            x[:, 0, 0] = found[:, 0] * (ahead * z[:, 0] + left * z[:, 1])
+            x[:, 1, 0] = found[:, 0] * (ahead * z[:, 1] - left * z[:, 0])
+            x[:, 2, 0] = found[:, 0] * z[:, 2]
+            x[:, 3:, 1] = found[:, 1:]
+            x[:, 0, 2], x[:, 1, 2] = tilt * found[:, 2], tilt * found[:, 1]
+            out.append((x[..., None] * self._units).reshape(len(x), 6, -1))
+        return out
 
     def _products(self, starts: Starts) -> Base:
-        acting, moved = self._acting, self._posed
-        gains, jumps, jump_state = self._jumps()
-        own = len(STATES) * len(DRIVEN)  # what the rotors say of other axes stays as it was fitted
-        gains, jump_state, jumps = gains[:own], jump_state[:own], [x[:, :, :own] for x in jumps]
+        acting, moved, steady = self._acting, self._posed, self.steady
         asked = (*(c for c in acting if c not in moved), *moved)
-        names = (*asked, *gains)
-        gain = np.array([x.gain for x in self.noise])
-        keep = np.exp(-self.period / np.array([x.time for x in self.noise]))
-        std = np.array([x.innovation for x in self.noise])
+        # what the rotors say of other axes than those that they drive stays as it was fitted
+        drives = [("", f"{GAIN} axis {axis} {state}") for axis in DRIVEN for state in STATES]
+        names = (*asked, *drives)
+        root = np.linalg.cholesky(steady.covariance)
+        inverse = np.linalg.inv(root)
         length = round(REGRESSION.block / self.period)
-        skip = round(AXIS.settling_time / self.period)
         blocks, samples = [], 0
-        for i, track in enumerate(self.tracks):
-            state = np.zeros((6, 3, len(names)))
-            pull = track.rotors[:, :1, None] * track.rotation[:, :, 1::-1] * [-1.0, 1.0]
+        for i, (track, jumps) in enumerate(zip(self.tracks, self._jumps(), strict=True)):
+            state, counts = np.zeros((6, 3, len(names))), self._counts(i)
             for begin in range(0, len(track.position), length):
                 at = slice(begin, min(begin + length, len(track.position)))
                 rows = at.stop - at.start
@@ -490,31 +480,62 @@ class Likelihood:
                         x[:, :, j] = acting[c][i][at]
                 for j, column in enumerate(moved.values()):
                     y[:, :, j] = column[i][at]
+                driven = np.zeros((rows, 6, len(DRIVEN), len(STATES)))
+                driven[:, :3, 0] = jumps[at, :3, : len(STATES)]
+                for j in range(1, len(DRIVEN)):
+                    driven[:, 2 + j, j] = jumps[at, 2 + j, len(STATES) : 2 * len(STATES)]
                 out = np.empty((rows, 6, len(names) + 1))
-                sensitivities(
-                    self.period,
-                    gain,
-                    keep,
-                    self.aside,
-                    pull[at],
-                    track.angular_velocity[at],
-                    x,
-                    y,
-                    np.ascontiguousarray(jumps[i][at]),
-                    jump_state,
-                    state,
-                    out,
-                )
-                out[:, :, -1] = track.innovations[at]
-                out /= std[None, :, None]
-                fit = self._fit[i][at].copy()
-                fit[: max(skip - begin, 0)] = False
-                samples += int(fit.sum())
-                kept = out[fit].reshape(-1, len(names) + 1)
+                changes = self._changes(track, steady, x, y, at, driven.reshape(rows, 6, -1), state)
+                out[:, :, :-1], out[:, :, -1] = changes, track.innovations[at]
+                kept = (inverse @ out[counts[at]]).reshape(-1, out.shape[2])
+                samples += int(counts[at].sum())
                 if len(kept):
                     blocks.append(kept.T @ kept)
-        penalty = 2.0 * samples * float(np.log(std).sum())
+        penalty = 2.0 * samples * float(np.log(np.diagonal(root)).sum())
         return in_prior_units(self.flights, names, np.array(blocks), penalty, self.setting, starts)
+
+    def _changes(
+        self,
+        track: Track,
+        steady: SteadyFilter,
+        acting: Array,
+        moved: Array,
+        at: slice = slice(None),
+        jumps: Array | None = None,
+        state: Array | None = None,
+    ) -> Array:
+        """Return what a unit of columns changes in the predictions (n, 6, c) of a part of a piece.
+
+        Args:
+            track: the piece.
+            steady: the filter.
+            acting: (n, 6, a) of ``sensitivities``.
+            moved: (n, 6, b) of ``sensitivities``.
+            at: the part.
+            jumps: (n, 6, e), of the states in turn; default: none.
+            state: carried from one part to the next; default: none.
+        """
+        if jumps is None:
+            jumps = np.zeros((len(acting), 6, 0))
+        e = jumps.shape[2]
+        if state is None:
+            state = np.zeros((6, 3, acting.shape[2] + e))
+        out = np.empty((len(acting), 6, state.shape[2]))
+        sensitivities(
+            self.period,
+            steady.gain,
+            steady.keep,
+            track.heading[at],
+            track.rotors[at, :1, None] * track.rotation[at, :, 1::-1] * [-1.0, 1.0],
+            track.angular_velocity[at],
+            np.ascontiguousarray(acting),
+            np.ascontiguousarray(moved),
+            jumps,
+            np.resize(STATES, e),
+            state,
+            out,
+        )
+        return out
 
 
 def _bent_rotors(s: Signals) -> Signals:

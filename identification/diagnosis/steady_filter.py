@@ -1,0 +1,96 @@
+"""The steady Kalman filter of a pose near level flight, from the noise of its six axes.
+
+The axes are the position along the heading, to its left and up, and the turns about the body's
+axes. The states of an axis are its pose, the pose's rate, and a disturbance: an Ornstein-Uhlenbeck
+acceleration. A white acceleration beside it stands for the rotors' rounding, and for whatever else
+changes from sample to sample. A pitch pulls the vehicle along its heading and a roll to its right:
+forward and pitch are one filter, and left and roll another. Up and yaw are a pair that nothing
+joins.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+PAIRS = np.array([[0, 4], [1, 3], [2, 5]])  # a position, and the turn that pulls it
+PARTNER = np.array([4, 3, 5, 1, 0, 2])
+PULL = np.array([1.0, -1.0, 0.0])  # of a turn on its position's acceleration, over gravity
+
+
+@dataclass(frozen=True, eq=False)
+class PoseNoise:
+    """The noise of the axes (..., 6). Units: m or rad, and s."""
+
+    pose: Array  # standard deviation of one sample
+    disturbance: Array  # standard deviation, an acceleration
+    time: Array  # s, correlation time
+    white: Array  # standard deviation of an acceleration that lasts one period
+
+
+@dataclass(frozen=True, eq=False)
+class SteadyFilter:
+    """A filter of a pose, or several of them.
+
+    Attributes:
+        gain: (..., 6, 3, 2) of pose, rate and disturbance of each axis, per unit of its own
+            innovation and of its partner's.
+        keep: (..., 6) what is left of a disturbance after a period.
+        covariance: (..., 6, 6) of the innovations.
+    """
+
+    gain: Array
+    keep: Array
+    covariance: Array
+
+
+def steady_filter(noise: PoseNoise, period: float, gravity: float) -> SteadyFilter:
+    """Return the steady filter of poses, every ``period`` s, with this noise."""
+    keep = np.exp(-period / noise.time)
+    # in units of the pose's noise and of a period
+    pose, decay = noise.pose[..., PAIRS], keep[..., PAIRS]
+    unit = period * period / pose
+    half = np.array([0.5, 1.0, 0.0])
+    shape = (*pose.shape[:-1], 6, 6)
+    F, Q, H = np.zeros(shape), np.zeros(shape), np.zeros((2, 6))
+    for i in range(2):
+        at = slice(3 * i, 3 * i + 3)
+        F[..., at, at] = [[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 0.0]]
+        F[..., 3 * i + 2, 3 * i + 2] = decay[..., i]
+        white = np.square(noise.white[..., PAIRS][..., i] * unit[..., i])
+        Q[..., at, at] = white[..., None, None] * np.outer(half, half)
+        size = noise.disturbance[..., PAIRS][..., i] * unit[..., i]
+        Q[..., 3 * i + 2, 3 * i + 2] = np.square(size) * (1.0 - decay[..., i] ** 2)
+        H[i, 3 * i] = 1.0
+    pull = gravity * PULL * unit[..., 0] * pose[..., 1]
+    F[..., :3, 3:6] = pull[..., None, None] * np.outer(half, [1.0, 0.5, 0.0])
+    P = _riccati(F, Q, H)
+    S = P[..., ::3, ::3] + np.eye(2)
+    K = P[..., :, ::3] @ np.linalg.inv(S)
+    gain = np.empty((*keep.shape, 3, 2))
+    covariance = np.zeros((*keep.shape, 6))
+    units = np.array([1.0, 1.0 / period, 1.0 / period**2])
+    for i in range(2):
+        for j in range(2):
+            ratio = pose[..., i] / pose[..., j]
+            at = K[..., 3 * i : 3 * i + 3, j] * ratio[..., None] * units
+            gain[..., PAIRS[:, i], :, int(i != j)] = np.moveaxis(at, -2, 0)
+            covariance[..., PAIRS[:, i], PAIRS[:, j]] = S[..., i, j] * pose[..., i] * pose[..., j]
+    return SteadyFilter(gain, keep, covariance)
+
+
+def _riccati(F: Array, Q: Array, H: Array) -> Array:
+    """Return the steady covariance of the prediction, where the measurement's noise is one, by
+    doubling (B. D. O. Anderson, International Journal of Control 28 (1978), 295-306).
+    """
+    A, X = np.swapaxes(F, -1, -2), Q
+    G = np.broadcast_to(H.T @ H, F.shape)
+    for _ in range(40):
+        W = np.linalg.inv(np.eye(F.shape[-1]) + G @ X)
+        further = np.swapaxes(A, -1, -2) @ X @ W @ A
+        G, A, X = G + A @ W @ G @ np.swapaxes(A, -1, -2), A @ W @ A, X + further
+        if np.abs(further).max(initial=0.0) <= 1e-10 * np.abs(X).max(initial=0.0):
+            break
+    return X
