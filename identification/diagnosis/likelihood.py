@@ -58,7 +58,7 @@ from .regression import (
     typical_size,
     without,
 )
-from .rotor_innovations import DRIVEN, rotor_innovations
+from .rotor_innovations import DRIVEN, rotor_innovations, unrounded
 from .steady_filter import PAIRS, PoseNoise, SteadyFilter, steady_filter
 
 Array = NDArray[np.float64]
@@ -124,7 +124,16 @@ class Likelihood:
         if near:
             self.known, self.tracks = near.known, near.tracks
         else:
-            self._run(self.steady, [np.zeros((n, 6, 3)) for n in lengths])
+            nothing = [np.zeros((n, 6, 3)) for n in lengths]
+            self._run(self.steady, nothing)
+            if self._rounding_std:
+                import os
+                seen = list(zip(self.pieces, self.tracks, strict=True))
+                fine = unrounded(seen, self.vehicle.omega_lsb, int(os.environ.get("UNR", "5")))
+                self.pieces = [
+                    replace(p, rotor_speeds=x) for p, x in zip(self.pieces, fine, strict=True)
+                ]
+                self._run(self.steady, nothing)
             self.answers = rotor_innovations(list(zip(self.pieces, self.tracks, strict=True)))
         if same:
             self._run(self.steady, self._said(self._jumps(), self.gains))

@@ -11,6 +11,7 @@ System Identification, 2nd edition, 1999, section 13.5.)
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from .causal_filter import Poses, Track
 
@@ -41,6 +42,33 @@ def rotor_innovations(pieces: list[tuple[Poses, Track]]) -> list[Array]:
         found[LAGS:] = y - predicted
         out.append(found)
     return out
+
+
+def unrounded(pieces: list[tuple[Poses, Track]], step: float, rounds: int = 5) -> list[Array]:
+    """Return the rotor speeds (n, 4) of each piece as they are expected, rad/s, from what the past
+    predicts of them and from the log, which rounds them to multiples of ``step``.
+    """
+    speeds = [poses.rotor_speeds.copy() for poses, _ in pieces]
+    spread = [np.zeros_like(x) for x in speeds]
+    for _ in range(rounds):
+        sides = [
+            (_known_before(track, now), now[LAGS:])
+            for (_, track), now in zip(pieces, speeds, strict=True)
+        ]
+        predicted = _predicted(sides)
+        left = [
+            np.square(y - z) + v[LAGS:]
+            for (_, y), z, v in zip(sides, predicted, spread, strict=True)
+        ]
+        std = np.sqrt(np.concatenate(left).mean(axis=0))
+        for (poses, _), z, now, v in zip(pieces, predicted, speeds, spread, strict=True):
+            low, high = ((poses.rotor_speeds[LAGS:] + x * step - z) / std for x in (-0.5, 0.5))
+            mass = np.maximum(ndtr(high) - ndtr(low), 1e-12)
+            a, b = (np.exp(-0.5 * x * x) / np.sqrt(2.0 * np.pi) for x in (low, high))
+            mean = np.clip((a - b) / mass, low, high)
+            now[LAGS:] = z + std * mean
+            v[LAGS:] = np.square(std) * np.clip(1.0 + (low * a - high * b) / mass - mean**2, 0.0, 1.0)
+    return speeds
 
 
 def _predicted(sides: list[tuple[Array, Array]]) -> list[Array]:
