@@ -2,10 +2,10 @@
 coefficient changes in its innovations.
 
 The state is position, velocity, attitude, angular velocity and the disturbance's force and torque
-as accelerations: 18 numbers. Innovations and the disturbance's force are along the heading and to
-its left, where each axis has a steady gain. So the filter is an observer of fixed gains: what an
-innovation changes with a coefficient follows from linear recursions, exactly but for second order.
-Rotor speeds move linearly between samples.
+as accelerations: 18 numbers. Innovations are along the heading and to its left, where each axis has
+a steady gain. So the filter is an observer of fixed gains: what an innovation changes with a
+coefficient follows from linear recursions, exactly but for second order. Rotor speeds move linearly
+between samples.
 """
 
 import math
@@ -63,7 +63,14 @@ class Track(State):
     predicted: Array  # (n, 7) position and quaternion at sample k, from samples before it
     heading: Array  # (n, 2) cosine and sine, at sample k
     innovations: Array  # (n, 6) m, along the heading, to its left and up; rad in the body frame
-    disturbance: Array  # (n, 6) m/s2, in the same directions; rad/s2
+    disturbance: Array  # (n, 6) m/s2, world; rad/s2
+
+
+def ahead(track: Track, x: Array) -> Array:
+    """Return world vectors (n, 3) along the heading, to its left and up; further columns stay."""
+    (c, s), out = track.heading.T, x.copy()
+    out[:, 0], out[:, 1] = c * x[:, 0] + s * x[:, 1], c * x[:, 1] - s * x[:, 0]
+    return out
 
 
 @compiled
@@ -71,6 +78,24 @@ def _turn(q: Array, w: Array, out: Array) -> None:
     """Write the quaternion after a rotation vector in the body frame."""
     turn_body(q, w[0], w[1], w[2], 1.0, out)
     normalise(out)
+
+
+@compiled
+def _add(
+    said: Array, ahead: float, left: float, moving: Array, turning: Array, turn: Array
+) -> None:
+    """Add what is said (6, 3) of pose, rate and disturbance of each axis, in the directions of
+    ``Track.innovations``, to those of position (3, 3) and to rate and disturbance of the attitude
+    (2, 3); write what it turns the attitude by (3,).
+    """
+    for s in range(3):
+        moving[s, 0] += ahead * said[0, s] - left * said[1, s]
+        moving[s, 1] += left * said[0, s] + ahead * said[1, s]
+        moving[s, 2] += said[2, s]
+    for i in range(3):
+        turn[i] = said[3 + i, 0]
+        turning[0, i] += said[3 + i, 1]
+        turning[1, i] += said[3 + i, 2]
 
 
 @compiled
@@ -99,7 +124,9 @@ def _run(
 ) -> None:
     f = models[0]
     b, nothing = body_numbers(f.body), (0.0, 0.0, 0.0)
-    p, v, w, d = position[0].copy(), begun[:3].copy(), begun[3:].copy(), np.zeros(6)
+    moving, turning = np.zeros((3, 3)), np.zeros((2, 3))
+    moving[0], moving[1], turning[0] = position[0], begun[:3], begun[3:]
+    p, v, d, w, torque = moving[0], moving[1], moving[2], turning[0], turning[1]
     q, q2, r = quaternion[0].copy(), np.empty(4), np.empty((3, 3))
     step, mid, both = np.empty(3), np.empty(3), np.empty(4)
     v2, w2, before = np.empty(3), np.empty(3), np.zeros(6)
@@ -112,18 +139,7 @@ def _run(
             ahead, left = r[0, 0] / size, r[1, 0] / size
         heading[k, 0], heading[k, 1] = ahead, left
         # what the last sample's rotors said
-        for i in range(6):
-            d[i] += known[k, i, 2]
-        for i in range(3):
-            step[i] = known[k, 3 + i, 0]
-            w[i] += known[k, 3 + i, 1]
-        x, y = known[k, 0], known[k, 1]
-        p[0] += ahead * x[0] - left * y[0]
-        p[1] += left * x[0] + ahead * y[0]
-        p[2] += known[k, 2, 0]
-        v[0] += ahead * x[1] - left * y[1]
-        v[1] += left * x[1] + ahead * y[1]
-        v[2] += known[k, 2, 1]
+        _add(known[k], ahead, left, moving, turning, step)
         _turn(q, step, q2)
         for i in range(4):
             q[i] = q2[i]
@@ -144,16 +160,7 @@ def _run(
         for i in range(6):
             for s in range(3):
                 say[i, s] = gain[i, s, 0] * e[i] + gain[i, s, 1] * e[PARTNER[i]]
-            d[i] += say[i, 2]
-        for i in range(3):
-            step[i] = say[3 + i, 0]
-            w[i] += say[3 + i, 1]
-        p[0] += ahead * say[0, 0] - left * say[1, 0]
-        p[1] += left * say[0, 0] + ahead * say[1, 0]
-        p[2] += say[2, 0]
-        v[0] += ahead * say[0, 1] - left * say[1, 1]
-        v[1] += left * say[0, 1] + ahead * say[1, 1]
-        v[2] += say[2, 1]
+        _add(say, ahead, left, moving, turning, step)
         _turn(q, step, q2)
         # half a step on, where the model is asked; the acceleration is that of the step before
         for i in range(3):
@@ -174,20 +181,19 @@ def _run(
         x, y, z = angular_acceleration_of(b, turn, (w[0], w[1], w[2]), thrust, nothing, effects)
         # of gyroscopic torque the rate half a step on counts, of this step's own acceleration
         omega = (
-            w[0] + half * (x + d[3]),
-            w[1] + half * (y + d[4]),
-            w[2] + half * (z + d[5]),
+            w[0] + half * (x + torque[0]),
+            w[1] + half * (y + torque[1]),
+            w[2] + half * (z + torque[2]),
         )
         x, y, z = angular_acceleration_of(b, turn, omega, thrust, nothing, effects)
         model[k, 3], model[k, 4], model[k, 5] = x, y, z
-        turning = (x + d[3], y + d[4], z + d[5])
-        x, y, z = acceleration_of(b, turn, omega, turning, thrust, nothing, effects)
+        spin = (x + torque[0], y + torque[1], z + torque[2])
+        x, y, z = acceleration_of(b, turn, omega, spin, thrust, nothing, effects)
         model[k, 0], model[k, 1], model[k, 2] = x, y, z
-        for i in range(6):
-            disturbance[k, i] = d[i]
+        disturbance[k, :3], disturbance[k, 3:] = d, torque
+        for i in range(3):
             a[i] = before[i] = model[k, i] + d[i]
-        a[0] = before[0] = model[k, 0] + ahead * d[0] - left * d[1]
-        a[1] = before[1] = model[k, 1] + left * d[0] + ahead * d[1]
+            a[3 + i] = before[3 + i] = model[k, 3 + i] + torque[i]
         for i in range(3):
             at_position[k, i], at_velocity[k, i], at_rate[k, i] = mid[i], v2[i], omega[i]
             for j in range(3):
@@ -200,8 +206,9 @@ def _run(
             v[i] += period * acting[k, i]
             step[i] = period * (w[i] + half * acting[k, 3 + i])
             w[i] += period * acting[k, 3 + i]
-            d[i] *= keep[i]
-            d[3 + i] *= keep[3 + i]
+            torque[i] *= keep[3 + i]
+        x, y = keep[0] * (ahead * d[0] + left * d[1]), keep[1] * (ahead * d[1] - left * d[0])
+        d[0], d[1], d[2] = ahead * x - left * y, left * x + ahead * y, keep[2] * d[2]
         _turn(q2, step, q)
 
 
@@ -284,9 +291,8 @@ def sensitivities(
             for i in range(2, 6):
                 state[i, s, a + j] += jumps[k, i, j]
             x, y = jumps[k, 0, j], jumps[k, 1, j]
-            # the disturbance turns with the vehicle
-            state[0, s, a + j] += ahead * x - left * y if s < 2 else x
-            state[1, s, a + j] += left * x + ahead * y if s < 2 else y
+            state[0, s, a + j] += ahead * x - left * y
+            state[1, s, a + j] += left * x + ahead * y
         for i in range(6):
             for j in range(c):
                 out[k, i, j] = state[i, 0, j]
@@ -307,17 +313,15 @@ def sensitivities(
                     state[i, s, j] += say[i, s, j]
             for j in range(c):
                 x, y = say[0, s, j], say[1, s, j]
-                state[0, s, j] += ahead * x - left * y if s < 2 else x
-                state[1, s, j] += left * x + ahead * y if s < 2 else y
+                state[0, s, j] += ahead * x - left * y
+                state[1, s, j] += left * x + ahead * y
         for i in range(3):
             for j in range(c):
                 mid[i, j] = state[3 + i, 0, j] + 0.5 * period * state[3 + i, 1, j]
         for i in range(3):
             px, py = pull[k, i, 0], pull[k, i, 1]
-            x, y = (ahead, -left) if i == 0 else (left, ahead)
             for j in range(c):
-                g = px * mid[0, j] + py * mid[1, j]
-                g += state[2, 2, j] if i == 2 else x * state[0, 2, j] + y * state[1, 2, j]
+                g = state[i, 2, j] + px * mid[0, j] + py * mid[1, j]
                 if j < a:
                     g += acting[k, i, j]
                 state[i, 0, j] += period * state[i, 1, j] + half * g
@@ -336,6 +340,10 @@ def sensitivities(
                     - period * (wx * mid[y, j] - wy * mid[x, j])
                 )
                 state[3 + i, 1, j] += period * g
-        for i in range(6):
+        for j in range(c):
+            x, y = state[0, 2, j], state[1, 2, j]
+            x, y = keep[0] * (ahead * x + left * y), keep[1] * (ahead * y - left * x)
+            state[0, 2, j], state[1, 2, j] = ahead * x - left * y, left * x + ahead * y
+        for i in range(2, 6):
             for j in range(c):
                 state[i, 2, j] *= keep[i]

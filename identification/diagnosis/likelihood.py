@@ -26,7 +26,7 @@ from ..motion.sensing_effects import undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, log_signals
 from ..motion.smoothing import continuous, turn_between
-from .causal_filter import Poses, Track, run, sensitivities
+from .causal_filter import Poses, Track, ahead, run, sensitivities
 from .discrepancy import changing_columns, discrepancy_columns, variables
 from .log_offsets import (
     ATTITUDE_TIME_OFFSET,
@@ -128,6 +128,7 @@ class Likelihood:
             self._run(self.steady, nothing)
             if self._rounding_std:
                 import os
+
                 seen = list(zip(self.pieces, self.tracks, strict=True))
                 fine = unrounded(seen, self.vehicle.omega_lsb, int(os.environ.get("UNR", "5")))
                 self.pieces = [
@@ -227,7 +228,8 @@ class Likelihood:
                 if explained is not None:
                     pose, force = explained[i][:, 0, :, None], explained[i][:, 1, :, None]
                     seen = seen - self._changes(track, steady, force, pose)[:, :, 0]
-                out.append(Seen(seen, track.disturbance, self._counts(i)))
+                disturbance = ahead(track, track.disturbance)
+                out.append(Seen(seen, disturbance, self._counts(i)))
             return out
 
         held = np.array(PRIORS.gains)[JUMP_STATE]
@@ -458,11 +460,8 @@ class Likelihood:
         for found, track in zip(self.answers, self.tracks, strict=True):
             # an innovation of sample k changes the state after it: the jump is before sample k + 1
             found = np.vstack([np.zeros(4), found[:-1]])
-            (ahead, left), z = track.heading.T, track.rotation[:, :, 2]
             x = np.zeros((len(found), 6, len(JUMP_STATE) // len(STATES)))
-            x[:, 0, 0] = found[:, 0] * (ahead * z[:, 0] + left * z[:, 1])
-            x[:, 1, 0] = found[:, 0] * (ahead * z[:, 1] - left * z[:, 0])
-            x[:, 2, 0] = found[:, 0] * z[:, 2]
+            x[:, :3, 0] = found[:, :1] * ahead(track, track.rotation[:, :, 2])
             x[:, 3:, 1] = found[:, 1:]
             x[:, 0, 2], x[:, 1, 2] = tilt * found[:, 2], tilt * found[:, 1]
             out.append((x[..., None] * self._units).reshape(len(x), 6, -1))

@@ -67,7 +67,9 @@ def unrounded(pieces: list[tuple[Poses, Track]], step: float, rounds: int = 5) -
             a, b = (np.exp(-0.5 * x * x) / np.sqrt(2.0 * np.pi) for x in (low, high))
             mean = np.clip((a - b) / mass, low, high)
             now[LAGS:] = z + std * mean
-            v[LAGS:] = np.square(std) * np.clip(1.0 + (low * a - high * b) / mass - mean**2, 0.0, 1.0)
+            v[LAGS:] = np.square(std) * np.clip(
+                1.0 + (low * a - high * b) / mass - mean**2, 0.0, 1.0
+            )
     return speeds
 
 
