@@ -16,7 +16,7 @@ from tests.support.paths import ROOT
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.envs import Stage
 from windwrench.envs.wind import Uniform
-from windwrench.estimator import WrenchUKF
+from windwrench.estimator import WrenchUKF, WrenchUKFBatch
 
 GOLDEN = ROOT / "tests" / "golden" / "python_errors.json"
 CASES = json.loads(GOLDEN.read_text(encoding="utf-8"))
@@ -27,13 +27,21 @@ GIVEN |= dict(EffectSetting=EffectSetting, Stage=Stage, Uniform=Uniform)
 
 
 def refusal(case):
-    """Return what is said of a bad argument; ``begun`` is a filter that was started."""
+    """Return what is said of a bad argument; ``begun`` is a filter that was started, and ``both`` a
+    batch of two, which the argument must leave as they were.
+    """
     where, _, call = case.partition(": ")
-    module, begun = import_module(f"windwrench.{where}"), WrenchUKF(VEHICLE)
-    begun.reset(*POSE)
-    names = {name: getattr(module, name) for name in dir(module)} | GIVEN | {"begun": begun}
+    module = import_module(f"windwrench.{where}")
+    started = {"begun": WrenchUKF(VEHICLE), "both": WrenchUKFBatch(VEHICLE, 2)}
+    for one in started.values():
+        one.reset(*POSE)
+    before = [(one.estimate.state, one.covariance) for one in started.values()]
+    names = {name: getattr(module, name) for name in dir(module)} | GIVEN | started
     with pytest.raises(InputError) as refused:
         eval(call, names)
+    for one, (state, covariance) in zip(started.values(), before, strict=True):
+        np.testing.assert_array_equal(one.estimate.state, state)
+        np.testing.assert_array_equal(one.covariance, covariance)
     return str(refused.value)
 
 

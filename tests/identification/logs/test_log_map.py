@@ -74,33 +74,6 @@ def test_each_map_that_ships_is_a_map(name):
     assert found.name == name
 
 
-@pytest.mark.parametrize(
-    ("change", "expected"),
-    [
-        ({"attitude": {"columns": ["a", "b", "c"]}}, "attitude must have a list of 4 columns"),
-        ({"rotors": {**GOOD["rotors"], "order": [1, 2, 3, 3]}}, "rotors: order: .*numbers of the"),
-        ({"rotors": {**GOOD["rotors"], "unit": "eRPM"}}, "eRPM without pole_pairs"),
-        ({"rotors": {**GOOD["rotors"], "signs": [1, -1]}}, "signs of 4 times 1 or -1, got .1, -1"),
-        ({"extra": {"sent": {"columns": []}}}, "extra.sent must have some columns of the table"),
-        ({"rows": "some"}, "rows must be mixed, whole or messages, got 'some'"),
-        (
-            {"gyro": {"columns": ["a", "b", "c"], "unit": "raw"}},
-            "gyro has unit raw without a sc",
-        ),
-        (
-            {"commands": {"columns": list("abcd"), "range": [1, 1]}},
-            "commands.range must be two",
-        ),
-        ({"battery": {"columns": ["u", "v"]}}, "battery must have one column of the table"),
-        ({"position": [GOOD["position"], {"columns": ["x"]}]}, "position must have a list of 3"),
-    ],
-)
-def test_a_map_that_is_none_says_what_was_expected(change, expected):
-    """What the golden lines of the command do not hold."""
-    with pytest.raises(InputError, match=expected):
-        parse_map({**GOOD, **change}, "map")
-
-
 def test_a_world_has_several_names():
     for name, meant in {"nwu": "enu", "flu": "enu", "FRD": "ned", "y_up": "y_up"}.items():
         assert parse_map({**GOOD, "world": name}, "map").world == meant
