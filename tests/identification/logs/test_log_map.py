@@ -15,7 +15,6 @@ from windwrench.identification.logs.flight_log import with_rows, write_log
 from windwrench.identification.logs.log_map import load_map, map_names, parse_map
 from windwrench.identification.logs.mapped_log import map_table
 from windwrench.identification.logs.reading import read_log
-from windwrench.identification.logs.rotor_orders import ORDERS, order_words, rotor_order
 from windwrench.identification.logs.tables import open_table
 from windwrench.runtime.errors import InputError
 
@@ -96,21 +95,6 @@ def test_a_map_file_is_taken_by_read_log(tmp_path):
     path = table(tmp_path / "a.csv", {"m1": 3000.0})
     log = read_log(path, map=tmp_path / "map.yaml")
     np.testing.assert_allclose(log.rotor_speeds[0] * 30 / np.pi, [3600, 3600, 3000, 3600])
-    with pytest.raises(InputError, match="both a reader and a map"):
-        read_log(path, "nanobench", map=tmp_path / "map.yaml")
-
-
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("betaflight", "motors 1 rear-right, 2 front-right, 3 rear-left, 4 front-left"),
-        ("px4-x", "motors 1 front-right, 2 rear-left, 3 front-left, 4 rear-right"),
-        ("crazyflie", "motors 1 front-right, 2 rear-right, 3 rear-left, 4 front-left"),
-    ],
-)
-def test_orders_are_what_their_names_say(name, words):
-    assert order_words(ORDERS[name]) == words
-    assert rotor_order(list(ORDERS[name])) == ORDERS[name]
 
 
 def apart(first, empty=""):
