@@ -77,29 +77,6 @@ def recurrent(cell, seen=1, state=4, size=1):
     return {k: 0.3 * rng.standard_normal(s).astype(np.float32) for k, s in shapes.items()}
 
 
-@pytest.mark.parametrize(
-    ("card", "weights", "words"),
-    [
-        ({"repeat": 0}, {}, "repeat"),
-        (
-            {"features": {"frame": ["torque_z"], "history": 2, "scale": [1.0]}},
-            {},
-            r"weight0 must have the shape \(1, 2\), got \(1, 1\)",
-        ),
-        (
-            {},
-            {"weight1": np.zeros((1, 5), np.float32), "bias1": np.zeros(1, np.float32)},
-            "weight1 must have the shape",
-        ),
-        ({}, {"bias0": np.zeros(2, np.float32)}, "bias0 must have the shape"),
-        ({}, recurrent("gru") | {"gru_hidden_bias": np.zeros(5)}, "gru_hidden_bias must have the"),
-    ],
-)
-def test_cards_and_weights_that_do_not_fit_are_named(card, weights, words):
-    with pytest.raises(InputError, match=words):
-        TrainedPolicy({**CARD, **card}, {**follower(), **weights})
-
-
 TASK_CARD = {
     "task": "WindHover",
     "scale": [2.0] * 27,
@@ -125,11 +102,8 @@ def test_a_recurrent_policy_forgets_at_the_start_of_an_episode(kind, card, weigh
     assert [policy(observation)[0] for _ in range(3)] == first
 
 
-def test_a_policy_of_another_task_or_size_is_refused(tmp_path):
-    weights = recurrent("gru", 27, 5, 3)
-    with pytest.raises(InputError, match=r"gru_input must have the shape \(15, 26\)"):
-        TaskPolicy(TASK_CARD | {"scale": [1.0] * 26}, weights)
-    path = save_policy(TASK_CARD, weights, tmp_path / "mine.npz")
+def test_a_policy_of_another_task_is_refused(tmp_path):
+    path = save_policy(TASK_CARD, recurrent("gru", 27, 5, 3), tmp_path / "mine.npz")
     with pytest.raises(InputError, match="a policy of WindHover, not of WindTrajectory"):
         make_pilot(str(path), "WindTrajectory")
 

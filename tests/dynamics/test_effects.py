@@ -115,16 +115,10 @@ def test_a_slung_payload_explains_a_load_that_hangs_in_mujoco():
     )
 
 
-def test_a_bare_name_takes_the_sizes_of_the_vehicle():
-    small = parse_setting("rotor_drag", load_vehicle("crazyflie"))
-    assert small.coefficients["kdx"] == get("rotor_drag").coefficients[0].typical[1]
-    assert (
-        parse_setting("rotor_drag").coefficients["kdx"]
-        == get("rotor_drag").coefficients[0].typical[0]
-    )
-
-
-def test_coefficients_on_a_command_line():
+def test_a_bare_name_takes_the_sizes_of_the_vehicle_unless_they_are_said():
+    sizes = get("rotor_drag").coefficients[0].typical
+    for size, vehicle in zip(sizes, (None, load_vehicle("crazyflie")), strict=True):
+        assert parse_setting("rotor_drag", vehicle).coefficients["kdx"] == size
     setting = parse_setting("rotor_drag:kdx=1e-4, kdy=2e-4")
     assert setting == EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 2e-4})
 

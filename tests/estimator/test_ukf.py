@@ -18,13 +18,9 @@ from tests.support.reference_filters import (
     initial_covariance,
     rotor_effects,
 )
-from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import compile_effects
-from windwrench.estimator import (
-    UKFTuning,
-    WrenchUKF,
-    WrenchUKFBatch,
-)
+from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.estimator.ekf import WrenchEKF, model_jacobian
 from windwrench.estimator.filter_record import drive, propagate
 from windwrench.estimator.reference import difference, displaced
@@ -85,38 +81,6 @@ def test_asynchronous_measurements_agree_with_regular_ones():
     np.testing.assert_allclose(a.torque, b.torque, atol=0.002)
     # half-steps integrate the rate a little better
     np.testing.assert_allclose(np.diag(a.covariance), np.diag(b.covariance), rtol=0.08)
-
-
-def begun(make, *arguments):
-    """Return an estimator that has been started in a hover."""
-    estimator = make(VEHICLE, *arguments)
-    estimator.reset([0, 0, 1], [1, 0, 0, 0])
-    return estimator
-
-
-SPEEDS, POSITION = np.full((2, 4), 400.0), np.zeros((2, 3))
-QUATERNION = np.tile([1.0, 0, 0, 0], (2, 1))
-
-
-@pytest.mark.parametrize(
-    ("method", "arguments", "words"),
-    [
-        ("step", (SPEEDS[:1], POSITION, QUATERNION), r"rotor_speeds \(2, 4\) of rad/s"),
-        ("step", (SPEEDS, POSITION[:, :2], QUATERNION), r"position \(2, 3\)"),
-        ("step", (SPEEDS, POSITION, QUATERNION * [[1.0], [2.0]]), r"length 1, got 2 \(filter 1\)"),
-        ("step", (SPEEDS, POSITION, QUATERNION, [1.0, 2.0, 3.0]), "voltage"),
-        ("step", (SPEEDS[0], POSITION[0], 2.0 * QUATERNION[0]), "length 1, got 2"),
-        ("correct_imu", ([1, 2],), "gyro"),
-        ("correct_imu", (None, [0, 0, np.nan]), "accelerometer"),
-    ],
-)
-def test_bad_measurements_are_named_and_change_nothing(method, arguments, words):
-    estimator = begun(WrenchUKFBatch, 2) if np.ndim(arguments[0]) == 2 else begun(WrenchUKF)
-    before, P = estimator.estimate.state, estimator.covariance
-    with pytest.raises(InputError, match=words):
-        getattr(estimator, method)(*arguments)
-    np.testing.assert_array_equal(estimator.estimate.state, before)
-    np.testing.assert_array_equal(estimator.covariance, P)
 
 
 @compiled

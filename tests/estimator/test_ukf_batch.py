@@ -81,7 +81,8 @@ def test_each_is_the_single_filter_bit_for_bit(samples, vehicles, gate):
     assert together.restarts[4] == 1
     last = singles[-1].estimate
     vectors = ("position", "quaternion", "velocity", "angular_velocity", "torque", "force")
-    for name in (*vectors, "nis"):
+    assert (last.model_std > 0.0).all()
+    for name in (*vectors, "nis", "model_std"):
         np.testing.assert_array_equal(getattr(together, name)[-1], getattr(last, name))
 
 

@@ -54,17 +54,13 @@ def topics(name, kind, rotors=None, **given):
     return TopicReader(name, kind, log_map, VEHICLE)
 
 
-def test_rotors_of_a_multi_array_need_a_unit():
-    with pytest.raises(InputError, match=r"ros2: rotors: topic /m is .* states no unit"):
-        topics("/m", ARRAY, "/m")
+def test_rotors_of_a_multi_array():
     topic = topics("/m", ARRAY, {"topic": "/m", "unit": "rpm", "order": [4, 3, 2, 1]})
     sample = topic.sample(array([10, 20, 30, 40]), 0)
     np.testing.assert_allclose(sample.rotor_speeds, np.array([40, 30, 20, 10]) * np.pi / 30)
     assert sample.stamp is None
     with pytest.raises(Malformed):
         topic.sample(array([1.0, 2.0]), 0)
-    with pytest.raises(InputError, match="ros2: position: topic /m is of type"):
-        topics("/m", ARRAY, position="/m")
 
 
 def test_the_wrench_and_its_twin_as_ros_writes_them():

@@ -5,18 +5,23 @@ with the line of the error. A new case is a new key; ``python -m tests.runtime.t
 writes all lines anew.
 """
 
+import gzip
 import json
+import tempfile
 from dataclasses import replace
 from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.support.bad_inputs import table
+from tests.support.map_tables import hover_table
 from tests.support.paths import ROOT
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.envs import Stage
 from windwrench.envs.wind import Uniform
-from windwrench.estimator import WrenchUKF
+from windwrench.estimator import WrenchUKF, WrenchUKFBatch
 
 GOLDEN = ROOT / "tests" / "golden" / "python_errors.json"
 CASES = json.loads(GOLDEN.read_text(encoding="utf-8"))
@@ -24,25 +29,41 @@ VEHICLE, POSE = load_vehicle("ardrone2"), ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0]
 SPEEDS = np.full(4, VEHICLE.hover_rate)
 GIVEN = dict(np=np, replace=replace, VEHICLE=VEHICLE, POSE=POSE, SPEEDS=SPEEDS)
 GIVEN |= dict(EffectSetting=EffectSetting, Stage=Stage, Uniform=Uniform)
+GIVEN |= dict(gzip=gzip, table=table, hover_table=hover_table)
 
 
-def refusal(case):
-    """Return what is said of a bad argument; ``begun`` is a filter that was started."""
+def refusal(case, folder):
+    """Return what is said of a bad argument; ``begun`` is a filter that was started, and ``both`` a
+    batch of two, which the argument must leave as they were; ``file`` writes one into the folder.
+    """
+
+    def file(name, content):
+        data = content.encode() if isinstance(content, str) else content
+        (folder / name).write_bytes(data)
+        return folder / name
+
     where, _, call = case.partition(": ")
-    module, begun = import_module(f"windwrench.{where}"), WrenchUKF(VEHICLE)
-    begun.reset(*POSE)
-    names = {name: getattr(module, name) for name in dir(module)} | GIVEN | {"begun": begun}
+    module = import_module(f"windwrench.{where}")
+    started = {"begun": WrenchUKF(VEHICLE), "both": WrenchUKFBatch(VEHICLE, 2)}
+    for one in started.values():
+        one.reset(*POSE)
+    before = [(one.estimate.state, one.covariance) for one in started.values()]
+    names = {name: getattr(module, name) for name in dir(module)} | GIVEN | started | {"file": file}
     with pytest.raises(InputError) as refused:
         eval(call, names)
-    return str(refused.value)
+    for one, (state, covariance) in zip(started.values(), before, strict=True):
+        np.testing.assert_array_equal(one.estimate.state, state)
+        np.testing.assert_array_equal(one.covariance, covariance)
+    return str(refused.value).replace(f"{folder}/", "")
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_a_bad_argument_ends_in_its_golden_line(case):
-    assert refusal(case) == CASES[case]
+def test_a_bad_argument_ends_in_its_golden_line(case, tmp_path):
+    assert refusal(case, tmp_path) == CASES[case]
     assert "\n" not in CASES[case]
 
 
 if __name__ == "__main__":
-    lines = {case: refusal(case) for case in CASES}
+    with tempfile.TemporaryDirectory() as made:
+        lines = {case: refusal(case, Path(made)) for case in CASES}
     GOLDEN.write_text(json.dumps(lines, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -14,10 +14,10 @@ KEPT = json.loads((ROOT / "tests" / "data" / "bad_inputs.json").read_text(encodi
 COLUMNS = ("t", "px", "py", "pz", "qw", "qx", "qy", "qz", "omega1", "omega2", "omega3", "omega4")
 
 
-def table(changes=(), rows=60, left_out=""):
-    """Return a hover at 100 Hz as CSV, with some cells changed and one column left out."""
-    names = [name for name in COLUMNS if name != left_out]
-    hover = dict.fromkeys(COLUMNS, "0") | {"pz": "1", "qw": "1"}
+def table(changes=(), rows=60, left_out="", **more):
+    """Return a hover at 100 Hz as CSV: some cells changed, one column left out, ``more`` added."""
+    names = [name for name in (*COLUMNS, *more) if name != left_out]
+    hover = dict.fromkeys(COLUMNS, "0") | {"pz": "1", "qw": "1"} | more
     hover |= {f"omega{i}": "390.5" for i in range(1, 5)}
     lines = [",".join(names)]
     for row in range(rows):

@@ -5,33 +5,23 @@ from scipy.spatial.transform import Rotation
 
 from tests.support import bag_writer
 from tests.support.autopilot_flight import FLIP
-from tests.support.ulog_writer import ulog_bytes
+from tests.support.ulog_writer import esc, odometry, ulog_bytes
 
 
 def write_ulog(log, path):
     """Motion capture and rotor speeds as PX4 logs them: north, east, down, and its own order of
     motors.
     """
-    stamps = np.round(1e6 * (log.t + 10.0)).astype(np.uint64)
     turned = FLIP @ Rotation.from_quat(log.quaternion, scalar_first=True).as_matrix() @ FLIP
     rpm = np.round(log.rotor_speeds[:, [3, 1, 0, 2]] * 30.0 / np.pi).astype(int)
-    path.write_bytes(
-        ulog_bytes(
-            {
-                "vehicle_mocap_odometry": {
-                    "uint64_t timestamp": stamps,
-                    "uint64_t timestamp_sample": stamps,
-                    "uint8_t pose_frame": np.full(len(log.t), 2),
-                    "float position": log.position @ FLIP,
-                    "float q": Rotation.from_matrix(turned).as_quat(scalar_first=True),
-                },
-                "esc_status": {
-                    "uint64_t timestamp": stamps,
-                    **{f"int32_t esc[{i}].esc_rpm": rpm[:, i] for i in range(4)},
-                },
-            }
-        )
-    )
+    pose = {"float position": log.position @ FLIP}
+    pose["float q"] = Rotation.from_matrix(turned).as_quat(scalar_first=True)
+    speeds = {f"int32_t esc[{i}].esc_rpm": rpm[:, i] for i in range(4)}
+    topics = {
+        "vehicle_mocap_odometry": odometry(log.t) | pose,
+        "esc_status": esc(log.t) | speeds,
+    }
+    path.write_bytes(ulog_bytes(topics))
 
 
 def write_bag(log, path, kind="db3", pose_topic="/vicon/drone"):

@@ -83,6 +83,7 @@ def fleet_row(who, flight, *masses):
     """A row of a fleet: a diagnosis that names an excess of mass for each value and deviation (kg),
     with whether it is tentative and what it cannot be told from.
     """
+    error = {"force_rms_N": 0.5, "torque_rms_Nm": 0.01}
     effects = [
         {
             "name": "mass",
@@ -96,4 +97,12 @@ def fleet_row(who, flight, *masses):
     ]
     verdict = "explained" if effects else "nothing to explain"
     named = {"id": who, "flight": flight, "status": "diagnosed", "verdict": verdict}
-    return named | {"effects": effects}
+    return named | {
+        "effects": effects,
+        "remainder": "none",
+        "headline": "The model explains these logs.",
+        "error": {"before": error, "after": {**error, "torque_rms_Nm": None}, "floor": error},
+        "notes": [],
+        "seconds": 15.0,
+        "vehicle": "ardrone2",
+    }

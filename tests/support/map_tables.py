@@ -50,3 +50,9 @@ def table_text(columns):
     whole = np.broadcast_arrays(*map(np.asarray, columns.values()))
     lines = [",".join(f"{x:.17g}" for x in row) for row in np.stack(whole, axis=1).tolist()]
     return "\n".join([",".join(columns), *lines, ""]).encode()
+
+
+def hover_table(name, **given):
+    """Return a map's table of 40 rows as CSV; a keyword replaces a column, None leaves it out."""
+    columns = hover_columns(name, 40, 0.004) | given
+    return table_text({column: x for column, x in columns.items() if x is not None})

@@ -20,20 +20,11 @@ from windwrench.identification.fleet.page import change_in_words, changes, headl
 from windwrench.identification.fleet.running import rows
 
 HOSTILE = "<script>alert('x')</script>&\"=1+1"
-ERROR = {"force_rms_N": 0.5, "torque_rms_Nm": 0.01}
 
 
 def diagnosed(who, flight, *masses):
-    return fleet_row(who, flight, *masses) | {
-        "log": f"{who}/flight{flight}.csv",
-        "time": None,
-        "remainder": "none",
-        "headline": "The model explains these logs.",
-        "error": {"before": ERROR, "after": {**ERROR, "torque_rms_Nm": None}, "floor": ERROR},
-        "notes": [],
-        "seconds": 15.0,
-        "vehicle": "ardrone2",
-    }
+    row = fleet_row(who, flight, *masses)
+    return row | {"log": f"{who}/flight{flight}.csv", "time": None}
 
 
 FLIGHTS = [

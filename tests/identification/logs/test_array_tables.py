@@ -66,13 +66,6 @@ def test_arrays_of_other_lengths_are_left_out_with_a_note(tmp_path):
     assert table.notes == ("arrays of other lengths than 50 were left out: gains",)
 
 
-def test_lists_of_several_lengths_are_refused(tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_text('t,p\n0,"[1, 2]"\n1,"[1, 2, 3]"\n2,"[1, 2]"\n')
-    with pytest.raises(InputError, match=r"row 2 \(line 3\) has 4 field\(s\); expected 3"):
-        open_table(path).read(["p[0]"])
-
-
 @pytest.mark.parametrize(
     ("data", "expected"),
     [

@@ -7,36 +7,24 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
+from tests.support.bad_inputs import table
 from windwrench.dynamics import InputError, load_vehicle
-from windwrench.identification.logs.flight_log import POSE, ROTORS, FlightLog, write_log
+from windwrench.identification.logs.flight_log import POSE, FlightLog, write_log
 from windwrench.identification.logs.reading import read_log
 
 SUFFIXES = (".csv", ".csv.gz", ".parquet")
 
 
-def hover_rows(count=20):
-    """The fields of a hovering AR.Drone's log, as text: a list of dicts."""
-    pose = dict(zip(POSE, ("0.1", "-0.2", "1.0", "1", "0", "0", "0"), strict=True))
-    return [
-        {"t": f"{0.005 * k:.3f}", **pose, **dict.fromkeys(ROTORS, "376.0")} for k in range(count)
-    ]
-
-
-def write_text(path, rows):
-    path.write_text(
-        "\n".join([",".join(rows[0]), *(",".join(row.values()) for row in rows)]) + "\n"
-    )
-    return path
-
-
 @pytest.fixture
-def rows():
-    return hover_rows()
+def read(tmp_path):
+    """Read a hover of an AR.Drone at 100 Hz, some cells changed."""
 
+    def read_table(changes=(), rows=20, **how):
+        path = tmp_path / "flight.csv"
+        path.write_text(table(changes, rows))
+        return read_log(path, vehicle=load_vehicle("ardrone2"), **how)
 
-@pytest.fixture
-def path(tmp_path):
-    return tmp_path / "flight.csv"
+    return read_table
 
 
 def assert_same(one, other):
@@ -49,119 +37,65 @@ def assert_same(one, other):
     np.testing.assert_allclose(one.quaternion, other.quaternion, atol=1e-15)
 
 
-def test_a_good_log_reads(path, rows):
-    log = read_log(write_text(path, rows), vehicle=load_vehicle("ardrone2"))
+def test_a_good_log_reads(read):
+    log = read({(3, "px"): "0.1", (3, "py"): "-0.2"})
     assert log.name == "flight"
     assert log.notes == ()
     assert log.valid.all()
-    assert log.period == pytest.approx(0.005)
+    assert log.period == pytest.approx(0.01)
     np.testing.assert_array_equal(log.position[3], [0.1, -0.2, 1.0])
-    np.testing.assert_array_equal(log.rotor_speeds[0], 376.0)
+    np.testing.assert_array_equal(log.rotor_speeds[0], 390.5)
     assert log.voltage is None
     assert log.force is None
     with pytest.raises(InputError, match="piece 2: it has 1"):
-        read_log(path, piece=2)
+        read(piece=2)
 
 
-def test_a_short_gap_of_a_rotor_is_interpolated_and_counted(path, rows):
+def test_a_short_gap_of_a_rotor_is_interpolated_and_counted(read):
     """One value that is not there is no reason to refuse a flight."""
-    change(rows, 3, omega2="nan")
-    change(rows, 2, omega2="370")
-    change(rows, 4, omega2="380")
-    log = read_log(write_text(path, rows))
+    log = read({(2, "omega2"): "370", (3, "omega2"): "nan", (4, "omega2"): "380"})
     assert log.rotor_speeds[3, 1] == pytest.approx(375.0)
-    assert log.notes == ("missing values interpolated: omega2 1 (over up to 0.01 s)",)
-
-
-def test_a_long_gap_of_a_rotor_is_refused_with_its_line(path):
-    """Nobody knows what a rotor did in a tenth of a second."""
-    rows = hover_rows(60)
-    for k in range(3, 23):
-        change(rows, k, omega2="")
-    words = "column omega2, row 4 .line 5. is empty or NaN; expected a finite number: .* 0.105 s"
-    with pytest.raises(InputError, match=words):
-        read_log(write_text(path, rows))
-
-
-def change(rows, k, **fields):
-    rows[k].update(fields)
-    return rows
-
-
-@pytest.mark.parametrize(
-    ("names", "section"),
-    [("fx, fy, fz", "force"), ("ax, ay, az", "accelerometer"), ("gx, gy, gz", "gyro")],
-)
-def test_three_columns_come_together(path, rows, names, section):
-    first, second, third = names.split(", ")
-    for row in rows:
-        row |= {first: "0", third: "9.8"}
-    with pytest.raises(InputError, match=rf"'{second}' of {section} \(all or none\)"):
-        read_log(write_text(path, rows))
-    for row in rows:
-        row[second] = "0"
-    change(rows, 2, **{second: ""})
-    words = f"column {second}, row 3 .* only {names} together may be"
-    words = "force and torque come together; expected both" if section == "force" else words
-    with pytest.raises(InputError, match=words):
-        read_log(write_text(path, rows))
+    assert log.notes == ("missing values interpolated: omega2 1 (over up to 0.02 s)",)
 
 
 @pytest.mark.parametrize("missing", ["", "nan"])
-def test_lost_poses_are_not_valid(path, rows, missing):
-    for k in (0, 5, 6):
-        change(rows, k, **dict.fromkeys(POSE, missing))
-    log = read_log(write_text(path, rows))
+def test_lost_poses_are_not_valid(read, missing):
+    log = read({(k, name): missing for k in (0, 5, 6) for name in POSE})
     np.testing.assert_array_equal(np.flatnonzero(~log.valid), [0, 5, 6])
     assert np.isnan(log.position[5]).all()
     assert "3 of 20 rows without a pose" in log.notes[0]
 
 
 @pytest.mark.parametrize("every", [{"p": 5, "q": 2}, {"p": 4, "q": 1}, {"p": 1, "q": 3}])
-def test_positions_and_attitudes_of_rates_of_their_own(path, every):
-    rows = hover_rows(200)
-    for k, row in enumerate(rows):
-        half = 0.005 * k  # a turn about z at 2 rad/s
-        row |= {"px": f"{0.01 * k:.6f}", "qw": f"{np.cos(half):.9f}", "qz": f"{np.sin(half):.9f}"}
-        for name in (name for name in POSE if k % every[name[0]]):
-            row[name] = ""
-    log = read_log(write_text(path, rows))
+def test_positions_and_attitudes_of_rates_of_their_own(read, every):
+    changes = {}
+    for k in range(200):
+        half = 0.005 * k  # a turn about z at 1 rad/s
+        row = {"px": f"{0.01 * k:.6f}", "qw": f"{np.cos(half):.9f}", "qz": f"{np.sin(half):.9f}"}
+        row |= {name: "" for name in POSE if k % every[name[0]]}
+        changes |= {(k, name): text for name, text in row.items()}
+    log = read(changes, 200)
     t = log.t[log.valid]
-    assert len(t) >= len(rows) // every["p"] - every["q"]
-    np.testing.assert_allclose(np.diff(t), 0.005 * every["p"], atol=1e-9)
-    np.testing.assert_allclose(log.position[log.valid, 0], 2.0 * t, atol=1e-6)
+    assert len(t) >= 200 // every["p"] - every["q"]
+    np.testing.assert_allclose(np.diff(t), 0.01 * every["p"], atol=1e-9)
+    np.testing.assert_allclose(log.position[log.valid, 0], t, atol=1e-6)
     turned = Rotation.from_quat(log.quaternion[log.valid], scalar_first=True).as_rotvec()[:, 2]
-    np.testing.assert_allclose(turned, 2.0 * t, atol=1e-6)
+    np.testing.assert_allclose(turned, t, atol=1e-6)
     assert any("columns: by the map windwrench" in note for note in log.notes)
 
 
-def test_a_gap_in_time_is_a_note(path, rows):
+def test_a_gap_in_time_is_a_note(read):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        log = read_log(write_text(path, change(rows, 19, t="1.09")))
+        log = read({(19, "t"): "1.18"})
     assert log.notes == (
-        "1 gap(s) in time; the longest is 1 s, at t = 0.09 s (median step 0.005 s)",
+        "1 gap(s) in time; the longest is 1 s, at t = 0.18 s (median step 0.01 s)",
     )
 
 
-@pytest.mark.parametrize(
-    ("step", "message"),
-    [
-        (1e-310, "column t: the median time step is 1e-310 s"),
-        (1e-25, "column t: the median time step is 1e-25 s"),
-        (1e300, r"column t, row \d+: 1e\+300 s after the row before"),
-    ],
-)
-def test_times_of_no_flight_are_refused(path, rows, step, message):
-    for k in range(len(rows)):
-        change(rows, k, t=repr(step * k))
-    with pytest.raises(InputError, match=rf"flight\.csv: {message}"):
-        read_log(write_text(path, rows))
-
-
 @pytest.mark.parametrize("step", [1e-310, 1e-25, 1e-9])
-def test_one_short_step_is_a_flight_s(path, rows, step):
-    assert read_log(write_text(path, change(rows, 1, t=repr(step)))).t[1] == step
+def test_one_short_step_is_a_flight_s(read, step):
+    assert read({(1, "t"): repr(step)}).t[1] == step
 
 
 @pytest.mark.parametrize(
@@ -172,21 +106,23 @@ def test_one_short_step_is_a_flight_s(path, rows, step):
         ("t", 1000.0, "milliseconds"),
     ],
 )
-def test_other_units_are_doubted(path, rows, field, factor, expected):
-    for row in rows:
-        for name in row:
-            if name.startswith(field):
-                row[name] = str(float(row[name]) * factor)
+def test_other_units_are_doubted(read, field, factor, expected):
+    names, *rows = (line.split(",") for line in table(rows=20).splitlines())
+    changes = {
+        (k, name): str(factor * float(text))
+        for k, row in enumerate(rows)
+        for name, text in zip(names, row, strict=True)
+        if name.startswith(field)
+    }
     with pytest.warns(UserWarning, match=expected):
-        log = read_log(write_text(path, rows), vehicle=load_vehicle("ardrone2"))
+        log = read(changes)
     assert expected in log.notes[-1]
     assert log.notes[-1].startswith("warning: ")
 
 
-def test_millimetres_are_doubted(path, rows):
-    change(rows, 7, px="2500")
+def test_millimetres_are_doubted(read):
     with pytest.warns(UserWarning, match="millimetres"):
-        read_log(write_text(path, rows))
+        read({(7, "px"): "2500"})
 
 
 finite = st.floats(-1e3, 1e3, allow_subnormal=False)

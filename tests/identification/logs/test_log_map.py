@@ -15,7 +15,6 @@ from windwrench.identification.logs.flight_log import with_rows, write_log
 from windwrench.identification.logs.log_map import load_map, map_names, parse_map
 from windwrench.identification.logs.mapped_log import map_table
 from windwrench.identification.logs.reading import read_log
-from windwrench.identification.logs.rotor_orders import ORDERS, order_words, rotor_order
 from windwrench.identification.logs.tables import open_table
 from windwrench.runtime.errors import InputError
 
@@ -74,33 +73,6 @@ def test_each_map_that_ships_is_a_map(name):
     assert found.name == name
 
 
-@pytest.mark.parametrize(
-    ("change", "expected"),
-    [
-        ({"attitude": {"columns": ["a", "b", "c"]}}, "attitude must have a list of 4 columns"),
-        ({"rotors": {**GOOD["rotors"], "order": [1, 2, 3, 3]}}, "rotors: order: .*numbers of the"),
-        ({"rotors": {**GOOD["rotors"], "unit": "eRPM"}}, "eRPM without pole_pairs"),
-        ({"rotors": {**GOOD["rotors"], "signs": [1, -1]}}, "signs of 4 times 1 or -1, got .1, -1"),
-        ({"extra": {"sent": {"columns": []}}}, "extra.sent must have some columns of the table"),
-        ({"rows": "some"}, "rows must be mixed, whole or messages, got 'some'"),
-        (
-            {"gyro": {"columns": ["a", "b", "c"], "unit": "raw"}},
-            "gyro has unit raw without a sc",
-        ),
-        (
-            {"commands": {"columns": list("abcd"), "range": [1, 1]}},
-            "commands.range must be two",
-        ),
-        ({"battery": {"columns": ["u", "v"]}}, "battery must have one column of the table"),
-        ({"position": [GOOD["position"], {"columns": ["x"]}]}, "position must have a list of 3"),
-    ],
-)
-def test_a_map_that_is_none_says_what_was_expected(change, expected):
-    """What the golden lines of the command do not hold."""
-    with pytest.raises(InputError, match=expected):
-        parse_map({**GOOD, **change}, "map")
-
-
 def test_a_world_has_several_names():
     for name, meant in {"nwu": "enu", "flu": "enu", "FRD": "ned", "y_up": "y_up"}.items():
         assert parse_map({**GOOD, "world": name}, "map").world == meant
@@ -123,21 +95,6 @@ def test_a_map_file_is_taken_by_read_log(tmp_path):
     path = table(tmp_path / "a.csv", {"m1": 3000.0})
     log = read_log(path, map=tmp_path / "map.yaml")
     np.testing.assert_allclose(log.rotor_speeds[0] * 30 / np.pi, [3600, 3600, 3000, 3600])
-    with pytest.raises(InputError, match="both a reader and a map"):
-        read_log(path, "nanobench", map=tmp_path / "map.yaml")
-
-
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("betaflight", "motors 1 rear-right, 2 front-right, 3 rear-left, 4 front-left"),
-        ("px4-x", "motors 1 front-right, 2 rear-left, 3 front-left, 4 rear-right"),
-        ("crazyflie", "motors 1 front-right, 2 rear-right, 3 rear-left, 4 front-left"),
-    ],
-)
-def test_orders_are_what_their_names_say(name, words):
-    assert order_words(ORDERS[name]) == words
-    assert rotor_order(list(ORDERS[name])) == ORDERS[name]
 
 
 def apart(first, empty=""):

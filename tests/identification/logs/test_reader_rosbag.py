@@ -255,8 +255,6 @@ def test_a_map_may_lie_elsewhere(write, tmp_path):
     (tmp_path / "other.yaml").write_text("position: /b\n")
     assert_flight(read_log(path, f"rosbag:{tmp_path / 'other.yaml'}", VEHICLE))
     assert_flight(read_log(path, vehicle=VEHICLE, map=tmp_path / "other.yaml"))
-    with pytest.raises(InputError, match=r"reader 'nanobench' takes no option, got 'x'"):
-        read_log(path, "nanobench:x", VEHICLE)
 
 
 def test_columns_pick_four_of_more(write):
@@ -290,52 +288,11 @@ def test_times_that_are_no_use_are_replaced_or_left_out(write, topics, delay, sa
     assert any(said in note for note in log.notes)
 
 
-@pytest.mark.parametrize(
-    ("topic_map", "expected"),
-    [
-        ("position: /nowhere", r"unknown topic '/nowhere'; expected one of /a, /motors, /n"),
-        (
-            "position: /motors",
-            r"position: topic /motors is of type mav_msgs\S+; expected geometry_msgs.*as columns",
-        ),
-        (
-            "position: {topic: /motors, columns: [x, y, z]}",
-            "no section attitude; expected position and attitude",
-        ),
-        ("pos: /a", "unknown key 'pos'; expected one of .*position"),
-        ("position: {topic: [1]}", r"unknown topic '\[1\]'; expected one of /a"),
-        ("rotors: {topic: /n, unit: [rpm]}", "rotors.unit must be a text"),
-        ("rotors: /n", "rotors: topic /n is .* states no unit; expected unit: rad/s, rpm, Hz"),
-        ("- pose", "expected a mapping of position, rotors and so on to topics, got list"),
-    ],
-)
-def test_a_wrong_map_is_named(write, topic_map, expected):
-    """What the golden lines of maps do not hold."""
-    path = write(FLIGHT | {"/n": numbers(OURS)}, "bag", topic_map)
-    with pytest.raises(InputError, match=rf"flight.(bag|topics.yaml): (.*: )?{expected}"):
-        read_log(path, "rosbag", VEHICLE)
-
-
 @pytest.mark.parametrize("kind", ["bag", "mcap"])
 @pytest.mark.parametrize(
     ("topics", "expected"),
     [
-        (
-            {"/motors": motors()},
-            "position: no topic of a type that fits; expected one of geometry_ms",
-        ),
         ({"/a": pose()}, r"rotors: no topic .* in \S*flight.topics.yaml. The topics: /a"),
-        (FLIGHT | {"/b": pose()}, r"position: 2 topics could be it \(/a, /b\); expected one"),
-        (FLIGHT | {"/b": pose(), "/imu": imu()}, r"position: 2 topics could be it \(/a, /b\)"),
-        (
-            {"/goal_pose": pose(), "/motors": motors()},
-            r"no topic but set-points by their names \(/goal_pose\)",
-        ),
-        (
-            {"/a": pose(), "/motors": numbers(OURS)},
-            r"rotors: /motors could be it, but a multi-array states no unit; expected in \S+"
-            r"flight.topics.yaml the line rotors: {topic: /motors, unit: rad/s}",
-        ),
         (FLIGHT | {"/a": pose(times=[])}, "topic /a has no messages"),
         (FLIGHT | {"/a": pose(times=[0.0])}, r"/a: 1 message\(s\); expected at least two"),
         (FLIGHT | {"/motors": motors(times=WIDE + 9)}, "do not overlap"),
@@ -344,6 +301,7 @@ def test_a_wrong_map_is_named(write, topic_map, expected):
     ],
 )
 def test_what_is_missing_is_named(write, kind, topics, expected):
+    """What is wrong with topics and maps alone is in the golden lines of Python's errors."""
     with pytest.raises(InputError, match=f"flight.*: .*{expected}"):
         read_log(write(topics, kind), "rosbag", VEHICLE)
 
@@ -377,7 +335,6 @@ def test_what_is_not_there_is_refused(tmp_path):
     (tmp_path / "flight.csv").write_text("t")
     for path, reader_name, expected in (
         (tmp_path / "absent.bag", "rosbag", r"absent.bag: cannot be read as a ROS bag"),
-        (tmp_path / "flight.csv", "rosbag", r"unknown kind of bag; expected .bag, .db3, .mcap"),
         (tmp_path, "rosbag", r"cannot be read as a ROS 2 bag: .*metadata"),
         (tmp_path, None, r"is a folder; expected a file, or .* ROS 2 bag, .*; found flight.csv"),
     ):

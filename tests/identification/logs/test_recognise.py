@@ -1,6 +1,5 @@
 """Which reader a log needs is told from what is in it, whatever its name."""
 
-import gzip
 import sys
 from pathlib import Path
 
@@ -8,11 +7,9 @@ import numpy as np
 import pytest
 
 from tests.support.data_paths import DATA
-from tests.support.map_tables import hover_columns, table_text
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.logs.readers import (
     READERS,
-    TABLES,
     find_reader,
     reader_by_columns,
     reader_by_content,
@@ -64,37 +61,10 @@ def test_the_folder_of_a_bag_is_known_by_what_is_in_it(tmp_path, entry):
     assert reader_by_content(tmp_path) is READERS["rosbag"]
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "expected"),
-    [
-        ("a.xyz", b"", r"begins with nothing \(it is empty\)"),
-        (
-            "a.xyz",
-            gzip.compress(b"ULog\x01\x12\x35"),
-            "packed .gzip.; expected a table, .csv.gz by",
-        ),
-        ("a.tlog", bytes(8) + b"\xfd" + bytes(40), "is telemetry .MAVLink., which has the motors"),
-    ],
-)
-def test_what_no_reader_knows_says_what_was_found(tmp_path, name, content, expected):
-    path = tmp_path / name
-    path.write_bytes(content)
-    with pytest.raises(InputError, match=rf"{name}: .*{expected}") as refused:
-        read_log(path)
-    assert "\n" not in str(refused.value)
-
-
 def test_a_table_that_fits_two_readers_is_refused():
     header = [*find_reader("racer").signature, *find_reader("nanobench").signature]
     with pytest.raises(InputError, match="--reader nanobench or --reader racer"):
         reader_by_columns(Path("a.csv"), header)
-
-
-@pytest.mark.parametrize("reader", TABLES)
-def test_tables_are_known_by_their_columns(tmp_path, reader):
-    path = tmp_path / "flight.csv"
-    path.write_bytes(table_text(hover_columns(TABLES[reader])))
-    assert f"reader {reader}" in read_log(path).source
 
 
 def test_a_table_whose_guess_leaves_no_doubt_is_read_at_once(tmp_path):

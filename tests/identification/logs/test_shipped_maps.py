@@ -1,4 +1,4 @@
-"""Tables of the maps that ship: what their columns become, and what is refused."""
+"""Tables of the maps that ship: what their columns become."""
 
 from dataclasses import replace
 
@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.support.map_tables import hover_columns, table_text
-from windwrench.dynamics import InputError, load_vehicle
+from tests.support.map_tables import hover_table
+from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.logs.reading import read_log
 
@@ -19,15 +19,12 @@ AXES = ("roll_rad", "pitch_rad", "yaw_rad")
 
 @pytest.fixture
 def read(tmp_path):
-    """Read a hover by a map; a keyword replaces a column, None leaves the column out."""
+    """Read a hover by a map; golden lines say what is refused of one."""
 
-    def read_table(name, vehicle=None, reader=None, **given):
-        columns = {
-            k: v for k, v in (hover_columns(name, COUNT, 0.004) | given).items() if v is not None
-        }
+    def read_table(name, vehicle=None, **given):
         path = tmp_path / "log.csv"
-        path.write_bytes(table_text(columns))
-        return read_log(path, reader, vehicle)
+        path.write_bytes(hover_table(name, **given))
+        return read_log(path, None, vehicle)
 
     return read_table
 
@@ -88,31 +85,3 @@ def test_stray_samples_are_dropped(read, stray, left):
     assert all(len(column) == left for column in log.extra.values())
     said = "dropped 5 stray sample(s) before a gap of 0.7" if stray == 5 else "1 gap(s) in time"
     assert any(said in note for note in log.notes)
-
-
-@pytest.mark.parametrize(
-    ("name", "given", "expected"),
-    [
-        (
-            "crazypad",
-            {"motor_m2_0to65535": 7e4},
-            r"motor_m2_0to65535, row 1 .*70000; expected a mo",
-        ),
-        ("crazypad", {"motor_m3_0to65535": None}, "motor_m3_0to65535; expected those of a Crazy"),
-        ("crazypad", {"vbat_V": np.nan}, "vbat_V, row 1 .* is empty or NaN"),
-        ("crazyswarm2", {"pitch_rad": None}, "does not fit: no column 'pitch_rad' of attitude"),
-        ("crazyswarm2", {"thrust_cmd_N": np.nan}, "thrust_cmd_N, row 1 .line 2. is empty or NaN"),
-        ("crazyswarm2", {"t_s": 0.0}, "column t_s, row 2 .line 3.: 0 s repeats"),
-        (
-            "nanobench",
-            {"pwr_pm_vbat": -1.0},
-            "pwr_pm_vbat, row 1 .* is -1; expected a v",
-        ),
-        ("nanobench", {"motor_motor_m2": np.nan}, "motor_motor_m2, row 1 .* is empty or NaN"),
-        ("racer", {"quat_w": None}, "quat_w; expected those of a table of the racer"),
-        ("racer", {"rpm_rear_left": None}, "rpm_rear_left; expected those of a table of the racer"),
-    ],
-)
-def test_a_bad_table_is_named(read, name, given, expected):
-    with pytest.raises(InputError, match=f"log.csv: .*{expected}"):
-        read(name, reader=name, **given)

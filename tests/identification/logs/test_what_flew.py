@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support.dataflash_writer import dataflash, imu, parm
+from tests.support.map_tables import table_text
 from tests.support.sd_card_writer import sd_card
 from tests.support.ulog_writer import sensor_combined, stamps, ulog_bytes
 from windwrench.dynamics import InputError, load_vehicle
@@ -180,33 +181,27 @@ def test_rotors_are_found_by_their_directions():
 
 
 def test_a_decoded_blackbox_of_six_motors_and_of_ten_times_the_volts(tmp_path):
-    names = ["time (us)", "vbatLatest (V)", *(f"gyroADC[{i}]" for i in range(3))]
-    names += [*(f"accSmooth[{i}]" for i in range(3)), *(f"motor[{i}]" for i in range(6))]
-    still = np.zeros((len(T), 3)), np.tile([0.0, 0.0, 2048.0], (len(T), 1))
-    rows = np.column_stack([1e6 * T, np.full(len(T), 227.0), *still, 48 + 2000 * SHARES[:, :6]])
+    columns = {"time (us)": 1e6 * T, "vbatLatest (V)": 227.0}
+    columns |= {f"{name}[{i}]": 0.0 for name in ("gyroADC", "accSmooth") for i in range(3)}
+    columns |= {"accSmooth[2]": 2048.0}
+    columns |= {f"motor[{i}]": 48 + 2000 * SHARES[:, i] for i in range(6)}
     path = tmp_path / "log.csv"
-
-    def write(count):
-        kept = len(names) - 6 + count
-        text = "\n".join(",".join(f"{x:.6g}" for x in row[:kept]) for row in rows)
-        path.write_text(",".join(names[:kept]) + "\n" + text + "\n")
-
-    write(6)
+    path.write_bytes(table_text(columns))
     with pytest.raises(InputError, match=r"6 rotors turn \(motor\[0\], .*motor\[5\]\); expected"):
         read_log(path)
-    write(4)
+    del columns["motor[4]"], columns["motor[5]"]
+    path.write_bytes(table_text(columns))
     log = read_log(path)
     assert log.voltage[0] == pytest.approx(22.7)
     assert any("taken as a tenth" in note for note in log.notes)
 
 
 def test_voltages_of_no_battery_are_left_out(tmp_path):
-    columns = {"t": T, "omega1": 400 + T, "omega2": 400 + T, "omega3": 400 + T, "omega4": 400 + T}
-    columns |= {"px": T, "py": T, "pz": T, "qw": 1 + 0 * T, "qx": 0 * T, "qy": 0 * T, "qz": 0 * T}
+    columns = {"t": T, "px": T, "py": T, "pz": T, "qw": 1.0, "qx": 0.0, "qy": 0.0, "qz": 0.0}
+    columns |= {f"omega{i}": 400 + T for i in range(1, 5)}
     columns["vbat"] = np.where(np.arange(len(T)) == 50, 227.0, 11.1)
     path = tmp_path / "log.csv"
-    table = np.column_stack([*columns.values()])
-    np.savetxt(path, table, "%.9g", ",", header=",".join(columns), comments="")
+    path.write_bytes(table_text(columns))
     log = read_log(path)
     np.testing.assert_allclose(log.voltage, 11.1)
     assert any("1 of 300 voltages, 227 to 227 V, are none of a" in note for note in log.notes)
