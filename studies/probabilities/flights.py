@@ -19,7 +19,7 @@ from windwrench.dynamics.effects import names
 from windwrench.dynamics.vehicle import Vehicle
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.regression import lost_behind_a_filter
-from windwrench.identification.diagnosis.verdict import beyond_calm
+from windwrench.identification.diagnosis.residuals import beyond_calm
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import InputError
 from windwrench.studies.scoring import EQUIVALENTS, STAND_INS

@@ -11,7 +11,7 @@ from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.commanded_rotors import COMMANDED
 from windwrench.identification.diagnosis.regression import Flights, lost_behind_a_filter
-from windwrench.identification.diagnosis.transient_disturbances import transient_disturbances
+from windwrench.identification.diagnosis.residuals import transient_disturbances
 from windwrench.identification.report.headline import headline
 from windwrench.identification.report.words import remainder_sentence
 from windwrench.studies.trials.logged_poses import FILTERS
