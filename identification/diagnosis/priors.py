@@ -69,7 +69,7 @@ Variant = tuple[str, tuple[Column, ...]]
 class Base:
     """The likelihood near one setting, in prior standard deviations."""
 
-    columns: dict[Column, int]
+    names: Sequence[Column]  # (c,)
     size: Array  # (c,) prior standard deviations
     low: Array
     high: Array
@@ -80,6 +80,11 @@ class Base:
     typical: Array  # (c,) typical sizes in prior standard deviations
     dictionary: Index  # columns of the discrepancy
     starts: Starts
+
+    @cached_property
+    def columns(self) -> dict[Column, int]:
+        """Where each column is."""
+        return {c: i for i, c in enumerate(self.names)}
 
     def at(self, columns: Iterable[Column]) -> Index:
         """Return where some columns are."""
@@ -106,13 +111,16 @@ class Base:
         size = np.ones(len(others)) if size is None else size
         return marginal(total[:-1, :-1], total[:-1, -1], deviance, asked, others, size)
 
-    def mode(self, chosen: Index, power: float = 1.0) -> tuple[Array, Array]:
-        """Return the mode of some columns (n,) where no other acts, and what is known of them: the
-        inverse of their covariance (n, n).
+    def mode(self, chosen: Index, power: float = 1.0) -> dict[Column, tuple[float, float]]:
+        """Return the coefficients of some columns at the mode where no other acts, and their
+        standard deviations.
         """
         total = power * self.total
         normal = total[np.ix_(chosen, chosen)] + np.eye(len(chosen))
-        return np.linalg.solve(normal, total[chosen, -1]), normal
+        mode = np.linalg.solve(normal, total[chosen, -1]) * self.size[chosen]
+        std = np.sqrt(np.diag(np.linalg.inv(normal))) * self.size[chosen]
+        found = zip(chosen, mode.tolist(), std.tolist(), strict=True)
+        return {self.names[i]: (x, s) for i, x, s in found}
 
 
 def variants_of(
@@ -219,7 +227,7 @@ def in_prior_units(
     bare = [(e, n.removeprefix(WHOLE_PREFIX)) for e, n in names]
     typical = np.array([typical_size(c, flights.vehicle) for c in bare])
     return Base(
-        {c: i for i, c in enumerate(names)},
+        names,
         size,
         low,
         high,

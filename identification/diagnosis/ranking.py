@@ -73,7 +73,8 @@ def rank(
     near = Likelihood(flights, {})
     best, starts = nothing = near, starts_of(flights, library, {})
     loud = best.base(library, starts)
-    quiet = best.quieter(_whole_library(loud), starts)
+    everything = loud.mode(np.append(loud.plain, loud.at(loud.asked)))
+    quiet = best.quieter({c: x for c, (x, _) in everything.items()}, starts)
     found = Posterior(flights, library, (loud, quiet))
     # the best effect first, alone: another set's columns are those of the model that has it
     setting = found.best_setting(1)
@@ -107,14 +108,6 @@ def rank(
     ranking = found.ranking(best.quieter({column: size}, starts) if gained > by_chance else None)
     late = {c[1]: x for c, x in found.nuisances().items() if c in flights.offsets}
     return Found(found, ranking, found.best_setting(), best.gusts(), late)
-
-
-def _whole_library(base: Base) -> dict[Column, float]:
-    """Return the coefficients of all columns of effects together, at the mode."""
-    chosen = np.append(base.plain, base.at(base.asked))
-    names = list(base.columns)
-    coefficients = base.mode(chosen)[0] * base.size[chosen]
-    return {names[i]: float(x) for i, x in zip(chosen, coefficients, strict=True)}
 
 
 def rank_by_rows(

@@ -147,15 +147,14 @@ class Posterior:
         """Return the power of the likelihood that the scatter beside the likeliest set allows."""
         base, best = self._likeliest()
         own = base.at(best.columns)
-        return tempering(base.blocks, np.array(sorted([*base.plain, *own]), dtype=np.intp))
+        return tempering(base.blocks, np.sort(np.append(base.plain, own)))
 
     def _negligible(self, base: Base, asked: Index) -> Array:
         """Return how much (len(asked),) of each column any flight may have."""
         little = PRIORS.negligible * base.typical[asked]
         # bases have the starts of other effects: of none a little acts
         if self.given is not None:
-            names = list(base.columns)
-            little[[names[i][1].startswith(START_PREFIX) for i in asked]] = 0.0
+            little[[base.names[i][1].startswith(START_PREFIX) for i in asked]] = 0.0
         return little
 
     def _log_prior(self, effects: int) -> float:
@@ -277,10 +276,9 @@ class Posterior:
         none, more = [], []
         for base in (self.bases[-1], *((quieter,) if quieter else ())):
             m = self._dictionary_beside_best(base)
-            names = list(base.columns)
             groups: dict[str, list[int]] = {}
             for i, at in enumerate(base.dictionary.tolist()):
-                groups.setdefault(names[at][1].split(": ")[0], []).append(i)
+                groups.setdefault(base.names[at][1].split(": ")[0], []).append(i)
             found = [evidence_of_one_more(m, i, DISCREPANCY.sizes) for i in groups.values()]
             none.append(m.constant)
             more.append(m.constant + float(logsumexp(found)) - math.log(len(found)))
@@ -295,8 +293,7 @@ class Posterior:
         coefficients = m.right / m.own
         gains = m.right * coefficients
         best = int(np.argmax(gains))
-        name = list(base.columns)[base.dictionary[best]]
-        return name, float(coefficients[best]), float(gains[best])
+        return base.names[base.dictionary[best]], float(coefficients[best]), float(gains[best])
 
     def log_bayes_factor(self, effect: str) -> float:
         """Return by how much the likeliest set with an effect is likelier than the likeliest
@@ -312,9 +309,7 @@ class Posterior:
         """Return the deviance that the likeliest set leaves, with the nuisances integrated out."""
         base, best = self._likeliest()
         m = base.marginal(base.at(best.columns), base.plain, power=self.power)
-        # of the nuisances' integral the logarithm is no deviance
-        log_volume = 0.5 * float(np.linalg.slogdet(base.mode(base.plain, self.power)[1])[1])
-        whole = -2.0 * (m.constant + log_volume) - self.power * base.penalty
+        whole = m.deviance - self.power * base.penalty
         return whole - m.explained(range(len(m.right)), best.evidence.mode)
 
     def alone(self) -> dict[str, float]:
@@ -342,15 +337,8 @@ class Posterior:
         values and standard deviations.
         """
         base, best = self._likeliest()
-        count = len(base.plain)
-        mode, normal = base.mode(np.append(base.plain, base.at(best.columns)), self.power)
-        value, std = mode[:count], np.sqrt(np.diag(np.linalg.inv(normal)))[:count]
-        names = list(base.columns)
-        size = base.size[base.plain]
-        return {
-            names[i]: (float(x), float(s))
-            for i, x, s in zip(base.plain, value * size, std * size, strict=True)
-        }
+        found = base.mode(np.append(base.plain, base.at(best.columns)), self.power)
+        return {c: x for c, x in found.items() if not c[0]}
 
     def shown(self, known: Sequence[Column] = ()) -> dict[str, float]:
         """Return for each effect outside the likeliest set by how much a typical size of it changes
@@ -445,10 +433,9 @@ class Posterior:
         p = {k: math.exp(v - total) for k, v in self.scores.items()}
         probability = {e: sum(x for k, x in p.items() if e in k) for e in self.library}
         best = sorted(p, key=p.__getitem__, reverse=True)
-        sets = []
-        for key in best:
-            if p[key] < SETS.least_probability:
-                break
-            setting, std = self._setting(key)
-            sets.append(RankedSet(tuple(sorted(key)), p[key], setting, std))
-        return Ranking(probability, tuple(sets), self.structure(quieter), self.power)
+        sets = tuple(
+            RankedSet(tuple(sorted(key)), p[key], *self._setting(key))
+            for key in best
+            if p[key] >= SETS.least_probability
+        )
+        return Ranking(probability, sets, self.structure(quieter), self.power)
