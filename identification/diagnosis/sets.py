@@ -1,7 +1,9 @@
 """The posterior over sets of effects, from sums of products beside some settings of them."""
 
 import math
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,10 +73,10 @@ Tried = dict[tuple[Base, float], dict[tuple[Variant, ...], SetEvidence | None]]
 
 
 def is_possible(
-    flights: Flights, setting: Setting, std: Mapping[Column, float], effect: str, plausible: bool
+    flights: Flights, setting: Setting, std: Mapping[str, float], effect: str, plausible: bool
 ) -> bool:
-    """Return whether a vehicle can have an effect's coefficients at a setting; ``plausible``: and
-    whether they are physics of this effect.
+    """Return whether a vehicle can have an effect's coefficients, with their standard deviations,
+    at a setting; ``plausible``: and whether they are physics of this effect.
 
     An effect that stands for another one is often fitted at a bound: a dry friction, named a drag,
     needs a quadratic part below zero. A true coefficient of zero is at a bound too, but its best
@@ -89,7 +91,7 @@ def is_possible(
     return not words.implausible(
         Found(
             own,
-            {name: std.get((effect, name), 0.0) for name in own},
+            {name: std.get(name, 0.0) for name in own},
             {c.name: typical_size((effect, c.name), vehicle) for c in words.coefficients},
             flights.speed,
             frozenset(get(name).family for name in named),
@@ -199,7 +201,7 @@ class Posterior:
         m = base.marginal(asked, np.concatenate([base.plain, asked]), little, self.power)
         low, high = base.low[asked], base.high[asked]
         variants = self._variants(base)
-        ways = {e: sum(v[0] == e for v in variants) for e, _ in variants}
+        ways = Counter(e for e, _ in variants)
         tried = self._tried.setdefault((base, self.power), {})
 
         def score(some: tuple[Variant, ...]) -> float:
@@ -208,11 +210,10 @@ class Posterior:
                 return -math.inf
             if some not in tried:
                 index = [at[c] for v in some for c in v[1]]
-                try:
+                tried[some] = None
+                with suppress(np.linalg.LinAlgError):
                     found = set_evidence(m, index, low, high)
-                except np.linalg.LinAlgError:
-                    found = None
-                tried[some] = found if found and self._possible(base, some, found) else None
+                    tried[some] = found if self._possible(base, some, found) else None
             if (evidence := tried[some]) is None:
                 return -math.inf
             total = evidence.log_evidence - sum(math.log(ways[e]) for e, _ in some)
@@ -225,44 +226,31 @@ class Posterior:
         always = base.effects if len(self.bases) > 1 else self.given or frozenset()
         first = tuple(v for v in variants if self.given is not None and v[0] in always)
         score(first)
-        if asked_sets is not None:
-            for some in asked_sets:
-                if all(c in at for v in some for c in v[1]):
-                    score(some)
-        single = [(*first, v) for v in variants if v not in first]
-        level = [(score(some), some) for some in single]
-        most = 0 if asked_sets is not None else SETS.most_effects + len(self.given or ())
-        for size in range(len(first) + 2, most + 1):
-            level.sort(key=lambda x: x[0], reverse=True)
-            seen: set[frozenset[Variant]] = set()
-            more = []
-            kept = level[: SETS.kept_sets * (2 if size == len(first) + 2 else 1)]
-            for _, some in kept:
+        for some in asked_sets or ():
+            if all(c in at for v in some for c in v[1]):
+                score(some)
+        level = [(*first, v) for v in variants if v not in first]
+        begun, most = len(first) + 1, SETS.most_effects + len(self.given or ())
+        for size in range(begun, begun + 1 if asked_sets is not None else max(most, begun) + 1):
+            level.sort(key=score, reverse=True)
+            grown: dict[frozenset[Variant], tuple[Variant, ...]] = {}
+            for some in level[: SETS.kept_sets * (2 if size == begun else 1)]:
                 for v in variants:
-                    key = frozenset((*some, v))
-                    if v[0] in {e for e, _ in some} or key in seen:
-                        continue
-                    seen.add(key)
-                    more.append((score((*some, v)), (*some, v)))
-            level = more
+                    if v[0] not in {e for e, _ in some}:
+                        grown.setdefault(frozenset((*some, v)), (*some, v))
+            level = list(grown.values())
 
     def _possible(self, base: Base, some: Sequence[Variant], evidence: SetEvidence) -> bool:
         """Return whether a vehicle can have the coefficients of a set at its mode."""
         plausible = self.given is not None
         asked = [
-            (e, columns)
+            e
             for e, columns in some
             if get(e).possible or (plausible and get(e).implausible)
             if not columns[0][1].startswith(START_PREFIX)
         ]
-        if not asked:
-            return True
-        setting, std = self._at_mode(base, some, evidence)
-        for effect, _ in asked:
-            own = {(effect, name): x for name, x in std[effect].items()}
-            if not is_possible(self.flights, setting, own, effect, plausible):
-                return False
-        return True
+        setting, std = self._at_mode(base, some, evidence) if asked else ({}, {})
+        return all(is_possible(self.flights, setting, std[e], e, plausible) for e in asked)
 
     def structure(self, quieter: Base | None = None) -> float:
         """Return the logarithm of the Bayes factor of one more column beside the likeliest set.
@@ -403,25 +391,21 @@ class Posterior:
         """Return the coefficients of a set at the mode, and their standard deviations."""
         setting: Setting = {}
         std: Setting = {}
-        row = 0
+        found = zip(evidence.mode.tolist(), evidence.std.tolist(), strict=True)
         for effect, columns in some:
             own: dict[str, float] = dict(self.flights.coefficients({}, effect))
             off: dict[str, float] = {}
-            for c in columns:
-                value = float(evidence.mode[row] * base.size[base.columns[c]])
-                deviation = float(evidence.std[row] * base.size[base.columns[c]])
-                row += 1
+            for c, (mode, deviation) in zip(columns, found, strict=False):
                 if c[1].startswith(START_PREFIX):
                     own |= base.starts[c]
                     if moves_time(effect):
-                        first = get(effect).coefficients[0].name
-                        own[first] *= float(evidence.mode[row - 1])
+                        own[get(effect).coefficients[0].name] *= mode
                     continue
-                name = c[1].removeprefix(WHOLE_PREFIX)
+                name, size = c[1].removeprefix(WHOLE_PREFIX), float(base.size[base.columns[c]])
                 limits = coefficient((effect, name))
-                value += declared(c, self.flights)
+                value = mode * size + declared(c, self.flights)
                 own[name] = min(max(value, limits.minimum), limits.maximum)
-                off[name] = deviation
+                off[name] = deviation * size
                 if c[1].startswith(WHOLE_PREFIX):
                     own[CENTRAL] = 1.0
             setting[effect], std[effect] = own, off
