@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...dynamics.vehicle import Vehicle
 from ..findings import CHANNELS, Disturbance, TransientDisturbance
 from ..motion.smoothing import CUTOFFS, low_pass
+from .discrepancy import weight_and_torque
 from .regression import Flights, Setting
 
 Array = NDArray[np.float64]
@@ -23,10 +24,8 @@ class ResidualSettings:
 
     # times the noise floor; a residual up to that is the sensors' noise
     most_floor_ratio: float = 1.2
-    # shares of the weight, and of the weight times the arm: a weaker disturbance, below the cut-off
-    # ``CUTOFFS.calm_hz``, is none
-    calm_force: float = 0.006
-    calm_torque: float = 0.0015
+    # of ``weight_and_torque``: a weaker disturbance, below the cut-off ``CUTOFFS.calm_hz``, is none
+    calm: float = 0.006
     # standard deviations; 378 flights that a model explains had up to 6.6, in strong turbulence up
     # to 4.6
     least_significance: float = 10.0
@@ -89,9 +88,7 @@ def balance(flights: Flights, setting: Setting) -> Balance:
 
 def calm(vehicle: Vehicle) -> Array:
     """Return the disturbances (6,) that count for none, N and Nm."""
-    return vehicle.weight * np.repeat(
-        [RESIDUAL.calm_force, RESIDUAL.calm_torque * vehicle.arm_l], 3
-    )
+    return RESIDUAL.calm * weight_and_torque(vehicle)
 
 
 def beyond_calm(disturbances: Sequence[Disturbance], vehicle: Vehicle) -> float:
