@@ -179,17 +179,7 @@ def declared(column: Column, flights: Flights) -> float:
     the likelihood counts; 0 where it states nothing.
     """
     effect, name = column
-    if not effect or name.startswith(START_PREFIX):
-        return 0.0
     return flights.coefficients({}, effect).get(name.removeprefix(WHOLE_PREFIX), 0.0)
-
-
-def _value(column: Column, flights: Flights, setting: Setting) -> float:
-    """Return what a column's coefficient has at a setting, as the likelihood counts it."""
-    effect, name = column
-    if not effect or name.startswith((START_PREFIX, WHOLE_PREFIX)):
-        return 0.0
-    return flights.coefficients(setting, effect).get(name, 0.0) - declared(column, flights)
 
 
 def in_prior_units(
@@ -214,7 +204,9 @@ def in_prior_units(
     """
     size = np.array([prior_size(c, flights) for c in names])
     # about zero, not about the setting: the residual with all its effects taken away
-    back = np.append([_value(c, flights, setting) for c in names], 1.0)
+    bare = [(e, n.removeprefix(WHOLE_PREFIX)) for e, n in names]
+    here = [flights.coefficients(setting, e).get(n, 0.0) for e, n in bare]
+    back = np.append(np.subtract(here, [declared(c, flights) for c in bare]), 1.0)
     whole = blocks @ back
     blocks = blocks.copy()
     blocks[:, :, -1] = blocks[:, -1, :] = whole
@@ -224,7 +216,6 @@ def in_prior_units(
     low, high = np.array([_bounds(c, flights) for c in names]).T / size
     plain = [i for i, c in enumerate(names) if not c[0] and not c[1].startswith(UNKNOWN)]
     dictionary = [i for i, c in enumerate(names) if not c[0] and c[1].startswith(UNKNOWN)]
-    bare = [(e, n.removeprefix(WHOLE_PREFIX)) for e, n in names]
     typical = np.array([typical_size(c, flights.vehicle) for c in bare])
     return Base(
         names,

@@ -48,8 +48,7 @@ def starting_points(
         beside: other effects that act.
     """
     declared = get(effect).starting_points
-    if declared is None:
-        return []
+    assert declared is not None, f"{effect} declares no starting points"
     position, seen = flights.at_rows("position"), flights.fit_rows
     found = [
         dict(start)
@@ -86,7 +85,8 @@ def _likeness(
     """
     pieces = flights.pieces({})
     steady = _is_steady(flights, {effect: starts[0]})
-    at = [_every(p.rows) for p in pieces]
+    steps = [max(1, STARTING.sample_step // int(p.rows[1] - p.rows[0])) for p in pieces]
+    at = [p.rows[::step] for p, step in zip(pieces, steps, strict=True)]
     every = np.concatenate([np.isin(p.rows, x) for p, x in zip(pieces, at, strict=True)])
     seen = flights.fit_rows[every]
     target = residual[every][seen]
@@ -119,8 +119,3 @@ def _is_steady(flights: Flights, setting: Setting) -> bool:
     same = replace(signals.at(np.zeros(200, dtype=np.int64)), period=0.317)
     found = flights.acting(same, setting)
     return bool(np.all(found == found[0]))
-
-
-def _every(rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return every so many-th row of a piece."""
-    return rows[:: max(1, STARTING.sample_step // max(1, int(rows[1] - rows[0])))]
