@@ -131,15 +131,12 @@ class Posterior:
         self.inclusion = min(PRIORS.expected / max(self.asked_about, 1), 0.5)
         self.known: dict[frozenset[str], _Candidate] = {}
         self.scores: dict[frozenset[str], float] = {}
-        if given is not None:
-            for i in range(len(bases)):
-                self._search(i)
-            return
         # beside the noise of nothing explained no effect shows: what others found is asked there
-        for i in range(1, len(bases)):
+        for i in range(1 if given is None else 0, len(bases)):
             self._search(i)
-        found = sorted(self.scores, key=self.scores.__getitem__, reverse=True)
-        self._search(0, [self.known[k].variants for k in found[: SETS.kept_asked]])
+        if given is None:
+            found = sorted(self.scores, key=self.scores.__getitem__, reverse=True)
+            self._search(0, [self.known[k].variants for k in found[: SETS.kept_asked]])
 
     def _likeliest(self) -> tuple[Base, _Candidate]:
         best = self.known[max(self.scores, key=self.scores.__getitem__)]
@@ -166,15 +163,10 @@ class Posterior:
 
     def _counts(self, number: int, key: frozenset[str]) -> bool:
         """Return whether a set is judged beside a base."""
-        if key in self.idle:
-            return False
-        own = self.bases[number].effects
-        if len(self.bases) == 1:
-            return (self.given or frozenset()) <= key
         if self.given is None:  # of a set in another base the columns are that base's
             return number > 0 or not any(x.effects and key >= x.effects for x in self.bases[1:])
         most = max(len(x.effects) for x in self.bases if x.effects <= key)
-        return own <= key and len(own) == most
+        return key not in self.idle and len(self.bases[number].effects) == most
 
     def _variants(self, base: Base) -> list[Variant]:
         out, known = [], self.given is not None
@@ -223,8 +215,7 @@ class Posterior:
                 self.known[key] = _Candidate(number, some, evidence)
             return total
 
-        always = base.effects if len(self.bases) > 1 else self.given or frozenset()
-        first = tuple(v for v in variants if self.given is not None and v[0] in always)
+        first = tuple(v for v in variants if self.given is not None and v[0] in base.effects)
         score(first)
         for some in asked_sets or ():
             if all(c in at for v in some for c in v[1]):
