@@ -311,10 +311,9 @@ class Judged:
                 "something that no effect of the library is acts with a probability of "
                 f"{strange:.0%}: all names are tentative",
             )
-        seconds = sum(float(p.signals.t[-1] - p.signals.t[0]) for p in flights.pieces({}))
-        if seconds < rule.least_seconds:
+        if flights.seconds < rule.least_seconds:
             doubts["short"] = (
-                f"{seconds:.1f} s of flight are too few for a sure name: fly at least "
+                f"{flights.seconds:.1f} s of flight are too few for a sure name: fly at least "
                 f"{rule.least_seconds:g} s",
             )
         if named and not self.balance.better:

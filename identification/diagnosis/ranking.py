@@ -175,30 +175,25 @@ def rank_by_rows(
         return Posterior(flights, library, [*bases.values()], likelihood.power, given, idle, tried)
 
     def likeliest() -> Setting:
-        """Return the likeliest set's fit, once no set is likelier that was not fitted."""
-        while True:
-            setting = posterior().best_setting(len(library))
-            if (key := frozenset(setting)) in bases:
-                return fitted[key]
-            report(f"trying {', '.join(e for e in setting if e not in given) or 'no effect'}")
-            add(setting)
-
-    def confirmed() -> Setting:
-        """Return the likeliest set's fit, once no set that lacks one of its effects is likelier
-        where it is fitted as well.
+        """Return the likeliest set's fit, once no set is likelier that was not fitted, nor, where
+        rotors are measured, one that lacks one of its effects.
         """
         while True:
-            best = likeliest()
-            less = [without(best, out) for out in best if out not in given]
-            new = [x for x in less if frozenset(x) not in fitted]
-            if flights.commanded or not new:
+            setting = posterior().best_setting(len(library))
+            new = [setting]
+            if (key := frozenset(setting)) in bases:
+                best = fitted[key]
+                less = [without(best, out) for out in best if out not in given]
+                new = [x for x in less if not flights.commanded and frozenset(x) not in fitted]
+            if not new:
                 return best
-            for setting in new:
-                add(setting)
+            for some in new:
+                report(f"trying {', '.join(e for e in some if e not in given) or 'no effect'}")
+                add(some)
 
-    confirmed()
+    likeliest()
     likelihood.power = posterior().tempering()
-    best = confirmed()
+    best = likeliest()
     bases.pop(frozenset(best))  # the last is the one that has the dictionary
     bases[frozenset(best)] = base(best, unknown=True)
     found = posterior()

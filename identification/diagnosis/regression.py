@@ -206,7 +206,7 @@ class Flights:
             [log.period for log in self.logs], self.logs[0].period, rtol=0.01
         )
         self.logs = tuple(excerpt(self.logs))
-        self._fit_logs, self._has_test = len(logs), bool(test)
+        self._fit_logs = len(logs)
         self._drift: np.random.Generator | None = None  # of a copy whose fusion errs otherwise
         self._fused: dict[FlightLog, list[InertialSignals]] = {}
         self._felt: dict[Piece, Array] = {}
@@ -218,6 +218,7 @@ class Flights:
         self.start: Mask  # (rows,) first row of a piece
         self.t: Array  # (rows,) s
         self.period: float  # s, from row to row
+        self.seconds: float  # of unbroken flight
         self._lay_rows()
         # by what the accelerometers from which the motion is read may be off, and all signals
         self.biases = self._biases()
@@ -265,18 +266,15 @@ class Flights:
         """Cut the flights into pieces, and say of which of their samples rows are."""
         self._first = pieces = self.pieces({})
         parts, count = [], 0
-        seconds = sum(float(piece.signals.t[-1] - piece.signals.t[0]) for piece in pieces)
-        length = (
-            REGRESSION.short_block
-            if self.commanded and seconds < 8 * REGRESSION.block
-            else REGRESSION.block
-        )
+        self.seconds = sum(float(x.signals.t[-1] - x.signals.t[0]) for x in pieces)
+        short = self.commanded and self.seconds < 8 * REGRESSION.block
+        length = REGRESSION.short_block if short else REGRESSION.block
         for piece in pieces:
             time = piece.signals.t[piece.rows]
             number = ((time - time[0]) // length).astype(np.int64)
             seen = (
                 np.full(len(time), piece.log < self._fit_logs)
-                if self._has_test
+                if len(self.logs) > self._fit_logs
                 else number % REGRESSION.blocks_per_held_out != held_out(number)
             )
             log = np.full(len(time), piece.log)
@@ -583,7 +581,7 @@ class Flights:
             delta = delta if c.minimum <= value + delta <= c.maximum else -delta
         return value, delta
 
-    def _slope(self, setting: Setting, column: Column, base: Array, step: float) -> Array:
+    def _slope(self, setting: Setting, column: Column, step: float) -> Array:
         """Return what a unit of a coefficient adds (rows, 6), by a difference from the residual at
         a setting.
         """
@@ -600,7 +598,7 @@ class Flights:
             c, far = coefficient(column), abs(delta)
             if c.minimum <= value - far and value + far <= c.maximum:
                 return (at(value - delta) - at(value + delta)) / (2.0 * delta)
-        return (base - at(value + delta)) / delta
+        return (self.residual(setting) - at(value + delta)) / delta
 
     def columns(
         self, setting: Setting, wanted: Iterable[Column], step: float = STEP
@@ -611,8 +609,7 @@ class Flights:
         So ``residual(setting + d) = residual(setting) - column * d``, by a difference of ``step``
         typical sizes.
         """
-        base = self.residual(setting)
-        return {column: self._slope(setting, column, base, step) for column in wanted}
+        return {column: self._slope(setting, column, step) for column in wanted}
 
 
 def _kept(memory: dict[K, V], key: K, make: Callable[[], V], most: int) -> V:
