@@ -6,14 +6,14 @@ flights, resembles the residual most.
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.effects import get
-from ...dynamics.effects.declaration import Unexplained
+from ...dynamics.effects.declaration import Coefficients, Unexplained
 from .regression import Flights, Setting, typical_size
 
 Array = NDArray[np.float64]
@@ -35,9 +35,9 @@ def starting_points(
     effect: str,
     flights: Flights,
     residual: Array,
-    stated: Mapping[str, float],
+    stated: Coefficients,
     beside: Iterable[str] = (),
-) -> list[dict[str, float]]:
+) -> Sequence[Coefficients]:
     """Return the coefficients from which a fit of an effect starts.
 
     Args:
@@ -49,26 +49,20 @@ def starting_points(
     """
     declared = get(effect).starting_points
     assert declared is not None, f"{effect} declares no starting points"
-    position, seen = flights.at_rows("position"), flights.fit_rows
-    found = [
-        dict(start)
-        for start in declared(
-            Unexplained(
-                flights.vehicle,
-                {
-                    c.name: typical_size((effect, c.name), flights.vehicle)
-                    for c in get(effect).coefficients
-                },
-                stated,
-                frozenset(get(e).family for e in beside if e),
-                position.mean(axis=0),
-                position[seen],
-                flights.at_rows("velocity")[seen],
-                residual[seen, :3],
-                residual[seen, 3:],
-            )
+    position, seen, vehicle = flights.at_rows("position"), flights.fit_rows, flights.vehicle
+    found = declared(
+        Unexplained(
+            vehicle,
+            {c.name: typical_size((effect, c.name), vehicle) for c in get(effect).coefficients},
+            stated,
+            frozenset(get(e).family for e in beside),
+            position.mean(axis=0),
+            position[seen],
+            flights.at_rows("velocity")[seen],
+            residual[seen, :3],
+            residual[seen, 3:],
         )
-    ]
+    )
     if len(found) <= STARTING.most_tried:
         return found
     likeness = _likeness(effect, found, flights, residual)
@@ -78,7 +72,7 @@ def starting_points(
 
 
 def _likeness(
-    effect: str, starts: list[dict[str, float]], flights: Flights, residual: Array
+    effect: str, starts: Sequence[Coefficients], flights: Flights, residual: Array
 ) -> list[float]:
     """Return how much of the residual goes like each start's wrench; minus infinity where it has
     none.

@@ -117,21 +117,19 @@ def _read(flights: Flights, setting: Setting, effect: str) -> Iterator[str]:
     placed = any(np.isfinite(log.position).any() for log in flights.logs)
     place = "position" if placed else "accelerometer"
     turn = "gyro" if flights.inertial else "attitude"
+    rotors = "motor commands" if flights.commanded else "rotor speeds"
+    turned = s.rotation @ Rotation.from_rotvec([0.1, -0.1, 0.1]).as_matrix()
     # inputs, changed by some per cent, or by as much as they vary in a calm flight (SI units)
-    changed: dict[str, tuple[str, Array]] = {
-        "rotor_speeds": (
-            "motor commands" if flights.commanded else "rotor speeds",
-            1.05 * s.rotor_speeds,
-        ),
-        "position": (place, s.position + 0.1),
-        "velocity": (place, s.velocity + 0.5),
-        "rotation": (turn, s.rotation @ Rotation.from_rotvec([0.1, -0.1, 0.1]).as_matrix()),
-        "angular_velocity": (turn, s.angular_velocity + 0.3),
-    }
+    changed: list[tuple[str, dict[str, Any]]] = [
+        (rotors, {"rotor_speeds": 1.05 * s.rotor_speeds}),
+        (place, {"position": s.position + 0.1}),
+        (place, {"velocity": s.velocity + 0.5}),
+        (turn, {"rotation": turned}),
+        (turn, {"angular_velocity": s.angular_velocity + 0.3}),
+    ]
     if s.voltage is not None:
-        changed["voltage"] = "battery voltage", 0.97 * s.voltage
-    for name, (channel, values) in changed.items():
-        moved: dict[str, Any] = {name: values}
+        changed.append(("battery voltage", {"voltage": 0.97 * s.voltage}))
+    for channel, moved in changed:
         off = _wrench(flights, setting, effect, replace(s, **moved)) - own
         if _size(off) > LEAST_CHANGE * max(_size(own), 1e-12):
             yield channel
