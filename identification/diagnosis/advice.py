@@ -59,7 +59,8 @@ def _relative(
     """Return the relative changes of what an effect changes, and their standard deviations."""
     names = [c.name for c in get(effect).coefficients if c.name in values and c.name != CENTRAL]
     unit = np.array([unit_of_change((effect, name), vehicle) for name in names])
-    return np.array([[values[name], std.get(name, 0.0)] for name in names]).T / unit
+    both = np.array([[values[name], std.get(name, 0.0)] for name in names])
+    return np.asarray(both.T / unit)
 
 
 def outside_the_fit(flights: Flights) -> Iterator[str]:

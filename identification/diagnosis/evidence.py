@@ -147,7 +147,7 @@ def bounded_mode(normal: Array, right: Array, low: Array, high: Array) -> Array:
     is held there, the farthest first, and what is pulled back is free again.
     """
     n = len(right)
-    mode = np.linalg.solve(normal, right)
+    mode: Array = np.linalg.solve(normal, right)
     size, held = np.sqrt(np.diag(normal)), np.zeros(n, dtype=np.bool_)
     for _ in range(3 * n):
         beyond = np.maximum(low - mode, mode - high)
@@ -165,7 +165,8 @@ def bounded_mode(normal: Array, right: Array, low: Array, high: Array) -> Array:
         free = np.flatnonzero(~held)
         left = right - normal @ np.where(held, mode, 0.0)
         mode[free] = np.linalg.solve(normal[free][:, free], left[free])
-    return np.minimum(np.maximum(mode, low), high)
+    mode[:] = np.minimum(np.maximum(mode, low), high)
+    return mode
 
 
 def tempering(blocks: Array, chosen: Index) -> float:
