@@ -63,10 +63,10 @@ class RegressionSettings:
 
     rows_per_cutoff: float = 5.0  # rows in a period of the residual's cut-off
     margin: float = 0.6  # s at either end of a piece, where the filters lack half of what they need
-    # share of sensor noise in an effect's column, from which the effect is not identifiable; of one
-    # that scales a measurement, it could cancel the measurement's own noise
+    # share of sensor noise in the power of an effect's column, from which the effect is not
+    # identifiable. One that scales a measurement could cancel the measurement's own noise: of its
+    # column it is the share in the amplitude
     most_noise_share: float = 0.1
-    most_noise_share_of_scale: float = 0.01
     # rounding steps by which rotor speeds must vary; with less, the rounding is no noise but looks
     # like an effect
     least_steps_of_rotor_speed: float = 1.4
@@ -330,11 +330,7 @@ class Flights:
                 turned = loud if noisy._drift is None else self._in_own_axes(loud, noisy)
                 noise += float(weight @ np.mean(np.square(turned - quiet), axis=0))
                 whole += float(weight @ np.mean(np.square(quiet), axis=0))
-            most = (
-                REGRESSION.most_noise_share_of_scale
-                if get(effect).scales_noise
-                else REGRESSION.most_noise_share
-            )
+            most = REGRESSION.most_noise_share ** (2 if get(effect).scales_noise else 1)
             if self.inertial and whole == 0.0:
                 traceless.add(effect)
             if effect in traceless or noise > most * whole:

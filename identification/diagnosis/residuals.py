@@ -68,8 +68,8 @@ def balance(flights: Flights, setting: Setting) -> Balance:
     floor = _rms(flights.visible_noise)
     error = _rms(after[held_out])
     # an IMU's own noise, and what a filter left of a pose's, is below what counts for none
-    quiet = calm(flights.vehicle)[[0, 3]] * (flights.inertial or flights.filtered)
-    least = np.hypot(floor, quiet)
+    quiet = RESIDUAL.calm * weight_and_torque(flights.vehicle)[[0, 3]]
+    least = np.hypot(floor, quiet) if flights.inertial or flights.filtered else np.array(floor)
     noisy = bool(np.any(np.array(error) > RESIDUAL.most_floor_ratio * least))
     old, new = np.square(before[held_out]), np.square(after[held_out])
     change = np.mean((new - old) / (old.mean(axis=0) + 1e-30), axis=1)
@@ -86,17 +86,13 @@ def balance(flights: Flights, setting: Setting) -> Balance:
     )
 
 
-def calm(vehicle: Vehicle) -> Array:
-    """Return the disturbances (6,) that count for none, N and Nm."""
-    return RESIDUAL.calm * weight_and_torque(vehicle)
-
-
 def beyond_calm(disturbances: Sequence[Disturbance], vehicle: Vehicle) -> float:
     """Return the logarithm of the largest unanswered disturbance of the six channels over what
     counts for none; ``-inf`` where none was fitted.
     """
     slow = [x.unanswered_below(CUTOFFS.calm_hz) for x in disturbances]
-    return float(np.log(np.max(slow / calm(vehicle)))) if slow else -np.inf
+    calm = RESIDUAL.calm * weight_and_torque(vehicle)
+    return float(np.log(np.max(slow / calm))) if slow else -np.inf
 
 
 def transient_disturbances(flights: Flights, setting: Setting) -> list[TransientDisturbance]:
