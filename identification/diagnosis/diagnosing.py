@@ -136,15 +136,7 @@ def diagnose(
         candidates=said.candidates,
         traces=tuple(said.traces()),
         signatures=tuple(
-            signature(
-                flights,
-                setting,
-                e.name,
-                said.parts[e.name],
-                found.after,
-                settings.most_signature_points,
-            )
-            for e in effects
+            signature(flights, setting, e.name, said.parts[e.name], found.after) for e in effects
         ),
         structure=said.structure,
         gusts=said.gusts,

@@ -24,7 +24,6 @@ class DiagnosisSettings:
     # deviance by which an effect of typical size is sure: of one of some thirty effects, before
     # which one is expected, 20 to 1 afterwards
     least_shown: float = 13.0
-    most_signature_points: int = 600  # of a plot
 
     def __repr__(self) -> str:
         """Return what differs from the defaults, so that a signature can be read."""

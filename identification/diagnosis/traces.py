@@ -35,7 +35,7 @@ ORDER = (
 
 
 def signature(
-    flights: Flights, setting: Setting, effect: str, share: Array, after: Array, points: int
+    flights: Flights, setting: Setting, effect: str, share: Array, after: Array
 ) -> Signature:
     """Return the channel in which an effect is largest, against what it follows most closely.
 
@@ -45,7 +45,6 @@ def signature(
         effect: its name.
         share: of the effect in the residual (rows, 6).
         after: the residual (rows, 6) with all effects.
-        points: of the plot, at most.
     """
     noise = np.maximum(flights.sensor_noise.std(axis=0), 1e-12)
     size = share.std(axis=0) / noise
@@ -55,9 +54,7 @@ def signature(
         explanatory_variables(flights, setting),
         key=lambda d: abs(float(np.corrcoef(d[1], y)[0, 1])) if y.std() > 1e-9 else 0.0,
     )
-    thin = slice(None, None, max(1, len(y) // points))
-    left = (y + after[:, channel])[thin]
-    return Signature(effect, CHANNELS[channel], name, x[thin], left, y[thin])
+    return Signature(effect, CHANNELS[channel], name, x, y + after[:, channel], y)
 
 
 def explanatory_variables(flights: Flights, setting: Setting) -> list[tuple[str, Array]]:
