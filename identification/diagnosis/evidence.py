@@ -136,7 +136,7 @@ def _log_tail(z: float) -> float:
     ``z``, at least zero.
     """
     if z < 10.0:
-        return 0.5 * z * z + math.log(0.5 * math.erfc(z / math.sqrt(2.0)))
+        return 0.5 * z * z + math.log(_normal(-z))
     w = 1.0 / (z * z)  # M. Abramowitz and I. Stegun, Handbook (1964), 26.2.12
     return -math.log(z * math.sqrt(2.0 * math.pi)) + math.log1p(-w * (1.0 - w * (3.0 - 15.0 * w)))
 

@@ -233,21 +233,18 @@ def starts_of(
     """
     out: dict[Column, Mapping[str, float]] = {}
     residuals: list[Array] = []
-    for effect in library:
-        if effect in setting:
-            continue
+    beside = [*setting, *(e.name for e in flights.vehicle.effects)]
+    for effect in (e for e in library if e not in setting):
+        found: list[Mapping[str, float]] = []
         if moves_time(effect) and get(effect).kind == "rotor input":
             name = get(effect).coefficients[0].name
             typical = typical_size((effect, name), flights.vehicle)
-            for i, share in enumerate(TIME_STARTS):
-                out[effect, f"{START_PREFIX}{i}"] = {name: share * typical}
-            continue
-        if not flights.is_nonlinear(effect):
-            continue
-        residuals = residuals or [flights.residual(x) for x in (setting, *others)]
-        stated = flights.stated(effect)
-        beside = [*setting, *(e.name for e in flights.vehicle.effects)]
-        found = [x for y in residuals for x in starting_points(effect, flights, y, stated, beside)]
-        for i, start in enumerate(found):
-            out[effect, f"{START_PREFIX}{i}"] = {**start, **stated}
+            found = [{name: share * typical} for share in TIME_STARTS]
+        elif flights.is_nonlinear(effect):
+            residuals = residuals or [flights.residual(x) for x in (setting, *others)]
+            stated = flights.stated(effect)
+            for y in residuals:
+                starts = starting_points(effect, flights, y, stated, beside)
+                found += [{**start, **stated} for start in starts]
+        out |= {(effect, f"{START_PREFIX}{i}"): start for i, start in enumerate(found)}
     return out
