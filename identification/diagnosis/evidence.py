@@ -147,7 +147,8 @@ def bounded_mode(normal: Array, right: Array, low: Array, high: Array) -> Array:
     is held there, the farthest first, and what is pulled back is free again.
     """
     n = len(right)
-    mode: Array = np.linalg.solve(normal, right)
+    mode = np.empty(n)
+    mode[:] = np.linalg.solve(normal, right)
     size, held = np.sqrt(np.diag(normal)), np.zeros(n, dtype=np.bool_)
     for _ in range(3 * n):
         beyond = np.maximum(low - mode, mode - high)
