@@ -14,19 +14,12 @@ from .turning_delay import turning_delay
 
 @dataclass(frozen=True)
 class Given:
-    """What needs no evidence.
+    """What needs no evidence."""
 
-    Attributes:
-        library: effects that are asked about.
-        first: effects that any set has, with coefficients about which a fit begins.
-        fixed: effects that are known from elsewhere, with their coefficients.
-        late: the delay of commands, which the vehicle's turns show and no force; None where no
-            delay is known.
-    """
-
-    library: list[str]
-    first: dict[str, dict[str, float]]
-    fixed: dict[str, dict[str, float]]
+    library: list[str]  # effects that are asked about
+    first: dict[str, dict[str, float]]  # any set has them; with coefficients where a fit begins
+    fixed: dict[str, dict[str, float]]  # known from elsewhere, with their coefficients
+    # the delay of commands, which the vehicle's turns show and no force; None where none is known
     late: NamedEffect | None = None
 
 

@@ -1,31 +1,63 @@
 """From flight logs to the effects that their vehicle's model lacks: the whole of a diagnosis.
 
-The evidence of sets of effects says what acts (``verdict``). Effects and coefficients are chosen on
-the fitted blocks of flight; the errors before and after are those of blocks, or logs, that the fit
-never saw.
+Effects and coefficients are chosen on the fitted blocks of flight; the errors before and after are
+those of blocks, or logs, that the fit never saw. A name is sure where it is probable, where what it
+does is at least as large as what is left unexplained beyond the sensors' noise, and where little
+speaks for a cause outside the library. The rule is the same for every kind of log; what differs is
+whose likelihood it is: that of the poses, where they and the rotors were measured as they were, or
+that of the wrench's balance.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...dynamics.effects import get, names
+from ...dynamics.effects import get, names, playing
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError, unknown_name
-from ..findings import CHANNELS, Diagnosis, Errors, NamedEffect, Signature, Trace
+from ..findings import (
+    CHANNELS,
+    Alternative,
+    Candidate,
+    Diagnosis,
+    Errors,
+    NamedEffect,
+    Probabilities,
+    Structure,
+    Trace,
+)
 from ..logs.flight_log import FlightLog
 from ..logs.screening import LEAST_SECONDS, screen_log
 from ..motion.noise_spectrum import filtering_notes, pose_was_filtered
 from ..motion.smoothing import CUTOFFS
 from ..prediction import nis_without_wrench_state, rollout_error
 from ..wrench_series import pose_notes
-from .explanatory_variables import explanatory_variables, range_notes
-from .regression import Flights, lost_behind_a_filter
+from .advice import FILTERED, advice, composites, inertial_notes, outside_the_fit
+from .commanded_rotors import THRUST_FACTORS, assumed_thrust_doubts
+from .commands import what_commands_show
+from .log_offsets import ROTOR_TIME_OFFSET
+from .priors import NUISANCE
+from .ranking import rank, rank_by_rows
+from .regression import (
+    CENTRAL,
+    Column,
+    Flights,
+    coefficient,
+    moves_time,
+    typical_size,
+    unit_of_change,
+    without,
+)
+from .residuals import balance, beyond_calm, transient_disturbances
 from .settings import DIAGNOSIS, DiagnosisSettings
-from .verdict import Judged
+from .traces import carrying_channels, signature
+from .unknown import signs, unknown
+from .worth import worth
 
 Array = NDArray[np.float64]
 
@@ -83,7 +115,7 @@ def diagnose(
     report("predicting the flights")
     named = {e: x for e, x in setting.items() if e}
     amended = flights.amended(named) if named else vehicle
-    notes += [*said.notes, *range_notes(flights)]
+    notes += [*said.notes, *outside_the_fit(flights)]
     segments = _segments(flights)
     predicted = {model: _predicted(flights, model, segments) for model in {vehicle, amended}}
     hidden = flights.needs_pose | said.hidden
@@ -98,13 +130,13 @@ def diagnose(
         floor_force_rms=found.floor[0],
         floor_torque_rms=found.floor[1],
         advice=tuple(
-            _advice(effects, sorted(unseen), said.remainder, flights.filtered, sorted(hidden))
+            advice(effects, sorted(unseen), said.remainder, flights.filtered, sorted(hidden))
         ),
         notes=tuple(dict.fromkeys(notes)),
         candidates=said.candidates,
-        traces=tuple(_traces(flights, said)),
+        traces=tuple(said.traces()),
         signatures=tuple(
-            _signature(flights, said, e.name, settings.most_signature_points) for e in effects
+            signature(flights, setting, e.name, said.parts[e.name], found.after) for e in effects
         ),
         structure=said.structure,
         gusts=said.gusts,
@@ -122,6 +154,266 @@ def diagnose(
         ranking=said.ranking,
         probabilities=said.probabilities,
     )
+
+
+class Judged:
+    """What acts on flights, by the evidence of sets of effects, and what is left.
+
+    Args:
+        flights: of the vehicle.
+        library: effects that may be named.
+        rule: when a name is sure, and what is reported.
+        report: called with a line of progress.
+
+    Public attributes are those of ``Diagnosis``, and beside them:
+
+    Attributes:
+        setting: coefficients of the effects; under no name what the sensors have.
+        balance: the residual with them.
+        parts: by how much the residual (rows, 6) grows where one effect is left out.
+        hidden: effects that would show if the errors of an IMU were known.
+        unseen: effects of which these flights would not show a typical size.
+    """
+
+    def __init__(
+        self,
+        flights: Flights,
+        library: Sequence[str],
+        rule: DiagnosisSettings,
+        report: Callable[[str], None],
+    ) -> None:
+        self._flights, self._rule = flights, rule
+        library = [e for e in library if e not in flights.not_identifiable]
+        given = self._given = what_commands_show(flights, library)
+        report("asking how probable each effect is")
+        found = self._found = (
+            rank(flights, library, report)
+            if flights.has_raw_poses
+            else rank_by_rows(flights.of_the_fit(), given.library, given.first, given.fixed, report)
+        )
+        self.ranking, best = found.ranking, found.ranking.sets[0]
+        sensors = {name: value for name, (value, _) in found.sensors.items()}
+        self.setting = {e: dict(x) for e, x in {**given.fixed, **found.setting}.items()}
+        self.setting |= {"": sensors} if sensors else {}
+        self.balance = balance(flights, self.setting)
+        self.parts = {
+            e: flights.residual(without(self.setting, e)) - self.balance.after
+            for e in self.setting
+            if e
+        }
+        self.gusts = found.gusts
+        self.pushes = tuple(transient_disturbances(flights, self.setting))
+        differs = {e: self._differs(e) for e in given.first if e in best.effects}
+        named = [e for e in found.setting if differs.get(e, 1.0) >= rule.least_sure_probability]
+        disturbed = beyond_calm(self.gusts, flights.vehicle)
+        some = any(e not in differs for e in named)
+        structure = found.ranking.structure
+        strange = unknown(signs(structure, disturbed, bool(self.pushes), some))
+        rivals = {e: self._rivals(e) for e in named}
+        known = {
+            e: differs[e] if e in differs else self._probability({e, *rivals[e]}) for e in named
+        }
+        self.doubts = self._doubts(named, strange)
+        unsure = bool(set(self.doubts) - {"assumed thrust"})
+        sizes = worth(flights, given.fixed, given.first, found.setting)
+        effects = [self._named(e, known[e], sizes[e], unsure, rivals[e]) for e in named]
+        names = {e: (1.0 - strange) * p for e, p in known.items()}
+        if given.late:
+            effects.append(replace(given.late, tentative="short" in self.doubts))
+            names[given.late.name] = 1.0
+        self.effects = tuple(effects)
+        structured = strange > 0.5 and structure > 0.0
+        self.structure = (self._sign(),) if structured else ()
+        some = self.balance.noisy or disturbed > 0.0 or bool(self.pushes)
+        self.remainder = "structured" if structured else "random" if some else "none"
+        unseen = self._too_small_to_show()
+        biases = [("", f"{NUISANCE}{name}") for _, name in flights.biases]
+        self.hidden = unseen - self._too_small_to_show(biases)
+        self.unseen = unseen - self.hidden
+        alone = found.posterior.alone()
+        self.candidates = tuple(
+            Candidate(e, alone[e], e in named)
+            for e in sorted(alone, key=alone.__getitem__, reverse=True)
+        )
+        self.notes = (
+            *inertial_notes(flights, named),
+            *(sentence for sentences in self.doubts.values() for sentence in sentences),
+            *self._late_rotors(),
+        )
+        sets = [
+            Alternative(
+                tuple(e for e in x.effects if e not in given.first),
+                x.probability * (1.0 - strange),
+            )
+            for x in found.ranking.sets
+        ]
+        stated = tuple(x for x in sets if x.probability >= rule.least_stated)
+        self.probabilities = Probabilities(names, stated, strange)
+
+    def _too_small_to_show(self, known: Sequence[Column] = ()) -> frozenset[str]:
+        """Return the effects of which a typical size would not be sure, with some nuisances
+        known.
+        """
+        shown = self._found.posterior.shown(known)
+        return frozenset(e for e, x in shown.items() if x < self._rule.least_shown)
+
+    def _differs(self, effect: str) -> float:
+        """Return the probability that a calibration, which is in every set, differs from what the
+        vehicle states; 0 where it does so by too little for a name.
+        """
+        flights, best = self._flights, self.ranking.sets[0]
+        own, most = flights.coefficients({}, effect), 0.0
+        for name, value in best.coefficients[effect].items():
+            off, std = abs(value - own.get(name, 0.0)), best.std[effect].get(name, 0.0)
+            least = self._rule.least_size * typical_size((effect, name), flights.vehicle)
+            if off > least and std:
+                most = max(most, math.erf(off / std / math.sqrt(2.0)))
+        return most
+
+    def _rivals(self, effect: str) -> tuple[str, ...]:
+        """Return the effects that, in the place of one of the likeliest set, explain the flights
+        nearly as well.
+        """
+        if effect in self._given.first:
+            factors = playing(*THRUST_FACTORS)
+            return tuple(x for x in factors if x != effect) if effect in factors else ()
+        best = self.ranking.sets[0]
+        rest = set(best.effects) - {effect}
+        out: list[str] = []
+        for other in self.ranking.sets:
+            more = set(other.effects) - rest
+            in_its_place = rest < set(other.effects) and len(more) == 1 and effect not in more
+            if in_its_place and other.probability > self._rule.least_rival * best.probability:
+                out += more
+        return tuple(out)
+
+    def _probability(self, effects: set[str]) -> float:
+        """Return the probability that one of some effects acts, which flights do not tell apart, if
+        nothing acts but effects of the library.
+        """
+        return min(sum(x.probability for x in self.ranking.sets if effects & set(x.effects)), 1.0)
+
+    def _doubts(self, named: Sequence[str], strange: float) -> dict[str, tuple[str, ...]]:
+        """Return for each check, by its name, the sentences that say why a name may be wrong."""
+        flights, rule, found = self._flights, self._rule, self._found
+        alike = composites(flights.vehicle, found.setting, self.ranking.sets[0].std)
+        doubts = {"composite": tuple(alike)}
+        if strange > rule.most_unknown:
+            doubts["unknown"] = (
+                "something that no effect of the library is acts with a probability of "
+                f"{strange:.0%}: all names are tentative",
+            )
+        if flights.seconds < rule.least_seconds:
+            doubts["short"] = (
+                f"{flights.seconds:.1f} s of flight are too few for a sure name: fly at least "
+                f"{rule.least_seconds:g} s",
+            )
+        if named and not self.balance.better:
+            growth, std = (100.0 * x for x in self.balance.growth)
+            doubts["held out"] = (
+                "on held-out flight the named effects do not make the squared error smaller "
+                f"({growth:+.2g} +- {std:.2g} %): the model stays as it was declared",
+            )
+        if flights.filtered and named:
+            doubts["filtered pose"] = (FILTERED,)
+        doubts["hidden cause"] = tuple(
+            f"{effect}: {' or '.join(hidden)}, which these logs do not show, would look like it. "
+            "Log the pose to tell them apart"
+            for effect, hidden in found.behind.items()
+        )
+        if flights.thrust_std > 0.0:
+            doubts["assumed thrust"] = assumed_thrust_doubts(named)
+        return {check: sentences for check, sentences in doubts.items() if sentences}
+
+    def _energy_share(self, effect: str) -> float:
+        """Return the share of the residual's energy without an effect that it explains, each
+        channel over its sensors' noise.
+        """
+        flights, after = self._flights, self.balance.after
+        size = np.sqrt(np.mean(np.square(flights.visible_noise), axis=0)) + 1e-12
+        left, whole = (
+            float(np.mean(np.square(x[~flights.fit_rows] / size)))
+            for x in (after, after + self.parts[effect])
+        )
+        return max(1.0 - left / whole, 0.0) if whole > 0.0 else 0.0
+
+    def _named(
+        self, effect: str, probability: float, size: float, unsure: bool, others: tuple[str, ...]
+    ) -> NamedEffect:
+        flights, rule, found = self._flights, self._rule, self._found
+        std = dict(self.ranking.sets[0].std[effect])
+        # that an effect acts at the rotors, as it is written, is nothing to report
+        values = {
+            name: x
+            for name, x in found.setting[effect].items()
+            if name != CENTRAL or x > rule.least_in_std * std.get(name, math.inf)
+        }
+        uncertain = flights.thrust_std > 0.0 and get(effect).role in THRUST_FACTORS
+        if uncertain:
+            unit = {name: unit_of_change((effect, name), flights.vehicle) for name in std}
+            std = {name: math.hypot(x, flights.thrust_std * unit[name]) for name, x in std.items()}
+        sizes = [
+            abs(x) / typical_size((effect, name), flights.vehicle)
+            for name, x in values.items()
+            if name != CENTRAL
+        ]
+        return NamedEffect(
+            name=effect,
+            coefficients=values,
+            std={name: std.get(name, 0.0) for name in values},
+            units={name: coefficient((effect, name)).unit for name in values},
+            tentative=unsure
+            or uncertain
+            or probability < rule.least_sure_probability
+            or size < rule.least_worth,
+            indistinguishable_from=others,
+            evidence={
+                "energy_explained": self._energy_share(effect),
+                "log_bayes_factor": found.posterior.log_bayes_factor(effect),
+                "largest_coefficient_in_typical_sizes": max(sizes, default=0.0),
+                "size_over_what_is_left": size,
+            },
+            channels=carrying_channels(flights, found.setting, effect),
+        )
+
+    def _sign(self) -> Structure:
+        """Return which column of the dictionary explains most beside the likeliest set."""
+        (_, name), _, gained = self._found.posterior.strangest()
+        group, what = name.removeprefix("unknown ").split(": ", 1)
+        column, _, channel = what.rpartition(" in ")
+        where = f"{CHANNELS[int(channel)]} with {column}" if column else f"the part of {what}"
+        return Structure(group, where, gained / self._found.posterior.left())
+
+    def traces(self) -> Iterator[Trace]:
+        """Yield the residual of each piece of flight over time."""
+        flights, found = self._flights, self.balance
+        for rows in flights.runs:
+            yield Trace(
+                flights.logs[flights.log[rows[0]]].name,
+                flights.period,
+                flights.t[rows],
+                found.before[rows],
+                found.after[rows],
+                ~flights.fit_rows[rows],
+                {effect: part[rows] for effect, part in self.parts.items()},
+            )
+
+    def _late_rotors(self) -> Iterator[str]:
+        """Yield, as a sentence, by how much rotor speeds act later than they are logged."""
+        flights, rule, found = self._flights, self._rule, self._found
+        offset, std = found.sensors.get(ROTOR_TIME_OFFSET[1], (0.0, math.inf))
+        least = max(rule.least_rotor_time_offset, rule.least_in_std * std)
+        if flights.inertial or any(map(moves_time, found.setting)) or abs(offset) < least:
+            return
+        yield (
+            f"the rotor speeds act {abs(1000 * offset):.1f} ms "
+            f"{'later' if offset > 0 else 'earlier'} than they are logged"
+            + (
+                ", or the filter of the pose delays it by as much"
+                if flights.filtered and offset > 0
+                else ""
+            )
+        )
 
 
 def _segments(flights: Flights) -> list[tuple[int, float, float]]:
@@ -153,79 +445,3 @@ def _mean(values: Array, weight: Sequence[float]) -> float:
         if good.any()
         else float("nan")
     )
-
-
-def _traces(flights: Flights, said: Judged) -> Iterator[Trace]:
-    for rows in flights.runs:
-        yield Trace(
-            flights.logs[flights.log[rows[0]]].name,
-            flights.period,
-            flights.t[rows],
-            said.balance.before[rows],
-            said.balance.after[rows],
-            ~flights.fit_rows[rows],
-            {effect: part[rows] for effect, part in said.parts.items()},
-        )
-
-
-def _signature(flights: Flights, said: Judged, effect: str, points: int) -> Signature:
-    """Return the channel in which an effect is largest, against what it follows most closely."""
-    share = said.parts[effect]
-    noise = np.maximum(flights.sensor_noise.std(axis=0), 1e-12)
-    channel = (
-        int(np.argmax(share.std(axis=0) / noise))
-        if np.any(share.std(axis=0) > 0.3 * noise)
-        else int(np.argmax(np.abs(share).mean(axis=0) / noise))
-    )
-    y, after = share[:, channel], said.balance.after[:, channel]
-    name, x = max(
-        explanatory_variables(flights, said.setting),
-        key=lambda d: abs(float(np.corrcoef(d[1], y)[0, 1])) if y.std() > 1e-9 else 0.0,
-    )
-    thin = slice(None, None, max(1, len(y) // points))
-    return Signature(effect, CHANNELS[channel], name, x[thin], (y + after)[thin], y[thin])
-
-
-def _advice(
-    effects: Sequence[NamedEffect],
-    not_identifiable: Sequence[str],
-    remainder: str,
-    filtered: bool,
-    needs_pose: Sequence[str],
-) -> list[str]:
-    out = []
-    if filtered:
-        out.append(
-            "Log the pose as it was measured, before any filter or estimator. Behind one, no "
-            f"flight identifies {', '.join(sorted(lost_behind_a_filter()))}, and no name is more "
-            "than tentative."
-        )
-        not_identifiable = [x for x in not_identifiable if x not in lost_behind_a_filter()]
-    for effect in effects:
-        if effect.indistinguishable_from:
-            group = (effect.name, *effect.indistinguishable_from)
-            out.append(
-                f"{' or '.join(group)}: these logs cannot tell them apart. To separate them, fly: "
-                + "; ".join(f"{name}: {get(name).excitation}" for name in group)
-            )
-    if remainder == "structured":
-        out.append(
-            "The residual still has structure that no effect of the library explains, so the "
-            "named effects are tentative. Fly one thing at a time (hover, climbs, level flight at "
-            "several speeds, turns) to see what the residual follows."
-        )
-    if needs_pose:
-        out.append(
-            "An IMU alone does not show "
-            + ", ".join(needs_pose)
-            + ": they need a velocity, a position or an attitude that no gyro and accelerometer "
-            "know. To identify one of them, log the pose as well."
-        )
-    if not_identifiable:
-        out.append(
-            "Not identifiable from these flights: "
-            + ", ".join(not_identifiable)
-            + ". To identify one of them, fly: "
-            + "; ".join(f"{name}: {get(name).excitation}" for name in not_identifiable[:4])
-        )
-    return out

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import bilinear, lfilter
 
+from ...dynamics.vehicle import Vehicle
 from .causal_filter import State
 from .priors import UNKNOWN
 from .regression import Column, Flights
@@ -45,13 +46,18 @@ DISCREPANCY = DiscrepancySettings()
 CHANGING = f"{UNKNOWN}changing coefficient: "
 
 
-def _joined(tracks: Sequence[State]) -> tuple[Array, dict[str, Array]]:
-    """Return where pieces end but the last, and what is known of all of them, one after the
-    other.
+def weight_and_torque(vehicle: Vehicle) -> Array:
+    """Return the units (6,) of unknown forces, N, and torques, Nm: the weight, and the weight at a
+    quarter of the arm.
     """
+    return vehicle.weight * np.repeat([1.0, DISCREPANCY.torque_arm * vehicle.arm_l], 3)
+
+
+def _joined(tracks: Sequence[State]) -> tuple[Array, State]:
+    """Return where pieces end but the last, and all of them, one after the other."""
     ends = np.cumsum([len(track.position) for track in tracks])[:-1]
-    names = (f.name for f in fields(State))
-    return ends, {n: np.concatenate([getattr(track, n) for track in tracks]) for n in names}
+    columns = (np.concatenate([getattr(x, f.name) for x in tracks]) for f in fields(State))
+    return ends, State(*columns)
 
 
 def _scaled(x: Array) -> Array:
@@ -68,10 +74,9 @@ def discrepancy_columns(tracks: Sequence[State], flights: Flights) -> dict[Colum
         tracks: the pieces.
         flights: of the vehicle.
     """
-    ends, joined = _joined(tracks)
-    rotation, velocity, position = joined["rotation"], joined["velocity"], joined["position"]
-    rate, rotors, t = joined["angular_velocity"], joined["rotors"], joined["t"]
-    body = np.einsum("nij,ni->nj", rotation, velocity)
+    ends, whole = _joined(tracks)
+    t, position, rotation, rotors = whole.t, whole.position, whole.rotation, whole.rotors
+    rate, body = whole.angular_velocity, np.einsum("nij,ni->nj", rotation, whole.velocity)
     above = position[:, 2] - position[:, 2].min()
     shapes: list[tuple[str, str, Array, tuple[int, ...]]] = []  # group, name, of which channels
     every = tuple(range(6))
@@ -94,7 +99,7 @@ def discrepancy_columns(tracks: Sequence[State], flights: Flights) -> dict[Colum
             ("rotors", f"angular velocities {axes}", rate[:, a] * rate[:, b], (3, 4, 5)),
         ]
     heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
-    places = [("x", position[:, 0]), ("y", position[:, 1]), ("height", position[:, 2])]
+    places = list(zip(("x", "y", "height"), position.T, strict=True))
     places += [(f"height below {h:g} m", np.exp(-above / h)) for h in DISCREPANCY.heights]
     places += [("heading's sine", np.sin(heading)), ("heading's cosine", np.cos(heading))]
     places += [(f"tilt {axis}", rotation[:, 2, i]) for i, axis in enumerate("xy")]
@@ -105,9 +110,7 @@ def discrepancy_columns(tracks: Sequence[State], flights: Flights) -> dict[Colum
     for hertz, i in itertools.product(DISCREPANCY.mount_hz, range(3)):
         z = _resonance(rotors[:, 1 + i], hertz, period, ends)
         shapes.append(("resonance", f"a part that swings at {hertz:g} Hz", z, (3 + i,)))
-    vehicle = flights.vehicle
-    arm = DISCREPANCY.torque_arm * vehicle.arm_l
-    size = vehicle.weight * np.repeat([1.0, arm], 3) / flights.inertias
+    size = weight_and_torque(flights.vehicle) / flights.inertias
     out: dict[Column, list[Array]] = {}
 
     def add(group: str, name: str, column: Array) -> None:
@@ -128,7 +131,7 @@ def discrepancy_columns(tracks: Sequence[State], flights: Flights) -> dict[Colum
         add("constant", f"a constant in {channel}", column)
     for hertz in DISCREPANCY.load_hz:
         column = np.zeros((len(t), 6))
-        column[:, :2] = _resonance(joined["acceleration"][:, :2], hertz, period, ends)
+        column[:, :2] = _resonance(whole.acceleration[:, :2], hertz, period, ends)
         column *= size[0] / max(float(column[:, :2].std()), 1e-9)
         add("resonance", f"a load that swings at {hertz:g} Hz in 0", column)
     return out
@@ -152,10 +155,10 @@ def variables(tracks: Sequence[State]) -> dict[str, list[Array]]:
     """Return what a coefficient may change with: variables (n,) of each piece by name, of mean zero
     and standard deviation one over all.
     """
-    ends, joined = _joined(tracks)
-    rotation, velocity, position = joined["rotation"], joined["velocity"], joined["position"]
+    ends, whole = _joined(tracks)
+    position, rotation, velocity = whole.position, whole.rotation, whole.velocity
     heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
-    speed, rotors = np.linalg.norm(velocity, axis=1), joined["rotors"]
+    speed = np.linalg.norm(velocity, axis=1)
     found = {
         "speed": speed,
         "speed, squared": speed**2,
@@ -165,9 +168,9 @@ def variables(tracks: Sequence[State]) -> dict[str, list[Array]]:
         "position y": position[:, 1],
         "heading's sine": np.sin(heading),
         "heading's cosine": np.cos(heading),
-        "time": joined["t"],
-        "thrust": rotors[:, 0],
-        "yaw rate": joined["angular_velocity"][:, 2],
+        "time": whole.t,
+        "thrust": whole.rotors[:, 0],
+        "yaw rate": whole.angular_velocity[:, 2],
     }
     scaled = {name: _scaled(x) for name, x in found.items()}
     return {name: np.split(x, ends) for name, x in scaled.items() if x.any()}

@@ -28,7 +28,13 @@ class Marginal:
 
     normal: Array  # (c, c)
     right: Array  # (c,)
-    constant: float
+    deviance: float  # where those asked about are zero, and the others at their mode
+    log_volume: float  # of what was integrated out: minus its logarithm
+
+    @property
+    def constant(self) -> float:
+        """The log-likelihood where those asked about are zero."""
+        return -0.5 * self.deviance - self.log_volume
 
     @property
     def own(self) -> Array:
@@ -62,7 +68,8 @@ def marginal(
     return Marginal(
         normal[np.ix_(asked, asked)] - cross.T @ cross,
         right[asked] - cross.T @ own,
-        -0.5 * deviance + 0.5 * float(own @ own) - float(np.log(np.diagonal(factor)).sum()),
+        deviance - float(own @ own),
+        float(np.log(np.diagonal(factor)).sum()),
     )
 
 
@@ -90,43 +97,31 @@ def set_evidence(m: Marginal, index: Sequence[int], low: Array, high: Array) -> 
     Raises:
         numpy.linalg.LinAlgError: columns of the set that no prior tells apart.
     """
-    at = np.asarray(index, dtype=np.intp)
-    mode, std = np.empty(len(at)), np.empty(len(at))
-    value = _evidence(m.normal, m.right, at, low, high, mode, std)
+    value, mode, std = _evidence(m.normal, m.right, np.array(index, dtype=np.intp), low, high)
     return SetEvidence(m.constant + value, mode, std)
 
 
 @compiled
 def _evidence(
-    every: Array, slopes: Array, at: np.ndarray, low: Array, high: Array, mode: Array, std: Array
-) -> float:
-    """Write mode and standard deviations of the columns ``at`` (n,); return the logarithm of their
-    evidence.
+    every: Array, slopes: Array, at: np.ndarray, low: Array, high: Array
+) -> tuple[float, Array, Array]:
+    """Return the logarithm of the evidence of the columns ``at`` (n,), their mode and standard
+    deviations.
     """
-    n = len(at)
-    if n == 0:
-        return 0.0
-    normal, right, lo, hi = np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n)
-    for i in range(n):
-        for j in range(n):
-            normal[i, j] = every[at[i], at[j]]
-        normal[i, i] += 1.0
-        right[i], lo[i], hi[i] = slopes[at[i]], low[at[i]], high[at[i]]
+    right, lo, hi, value = slopes[at], low[at], high[at], 0.0
+    if len(at) == 0:
+        return value, right, lo
+    normal = every[at][:, at] + np.eye(len(at))
     factor = np.linalg.cholesky(normal)
-    inverse = np.linalg.inv(normal)
-    mode[:] = bounded_mode(normal, right, lo, hi)
-    value = 0.0
-    for i in range(n):
-        slope = right[i]
-        for j in range(n):
-            slope -= normal[i, j] * mode[j]
-        value += 0.5 * mode[i] * (right[i] + slope) - math.log(factor[i, i])
+    mode = bounded_mode(normal, right, lo, hi)
+    slope = right - normal @ mode
+    for i in range(len(at)):
+        value += 0.5 * mode[i] * (right[i] + slope[i]) - math.log(factor[i, i])
         if mode[i] <= lo[i] or mode[i] >= hi[i]:
             # int_0^inf exp(-s t - h t^2 / 2) dt over the whole normal integral of curvature h
-            value += _log_tail(abs(slope) / math.sqrt(normal[i, i]))
+            value += _log_tail(abs(slope[i]) / math.sqrt(normal[i, i]))
         value -= math.log(max(_normal(hi[i]) - _normal(lo[i]), 1e-12))
-        std[i] = math.sqrt(inverse[i, i])
-    return value
+    return value, mode, np.sqrt(np.diag(np.linalg.inv(normal)))
 
 
 @compiled
@@ -141,54 +136,37 @@ def _log_tail(z: float) -> float:
     ``z``, at least zero.
     """
     if z < 10.0:
-        return 0.5 * z * z + math.log(0.5 * math.erfc(z / math.sqrt(2.0)))
+        return 0.5 * z * z + math.log(_normal(-z))
     w = 1.0 / (z * z)  # M. Abramowitz and I. Stegun, Handbook (1964), 26.2.12
     return -math.log(z * math.sqrt(2.0 * math.pi)) + math.log1p(-w * (1.0 - w * (3.0 - 15.0 * w)))
 
 
 @compiled
 def bounded_mode(normal: Array, right: Array, low: Array, high: Array) -> Array:
-    """Return the maximum (n,) of ``right @ x - x @ normal @ x / 2`` within bounds."""
+    """Return the maximum (n,) of ``right @ x - x @ normal @ x / 2`` within bounds: what leaves them
+    is held there, the farthest first, and what is pulled back is free again.
+    """
     n = len(right)
     mode = np.empty(n)
     mode[:] = np.linalg.solve(normal, right)
-    held = np.zeros(n, dtype=np.bool_)
+    size, held = np.sqrt(np.diag(normal)), np.zeros(n, dtype=np.bool_)
     for _ in range(3 * n):
-        worst, most = 0, 0.0
-        for i in range(n):
-            beyond = max(low[i] - mode[i], mode[i] - high[i])
-            if not held[i] and beyond > 1e-12 and beyond * math.sqrt(normal[i, i]) > most:
-                worst, most = i, beyond * math.sqrt(normal[i, i])
-        if most > 0.0:
+        beyond = np.maximum(low - mode, mode - high)
+        pull = right - normal @ mode
+        inwards = np.where(mode >= high, -pull, pull)
+        outside, back = ~held & (beyond > 1e-12), held & (inwards > 1e-9)
+        if outside.any():
+            worst = np.argmax(np.where(outside, beyond * size, 0.0))
             held[worst] = True
-            mode[worst] = low[worst] if mode[worst] < low[worst] else high[worst]
+            mode[worst] = min(max(mode[worst], low[worst]), high[worst])
+        elif back.any():
+            held[np.argmax(np.where(back, inwards, 0.0))] = False
         else:
-            back, most = 0, 1e-9
-            for i in range(n):
-                if held[i]:
-                    pull = right[i]
-                    for j in range(n):
-                        pull -= normal[i, j] * mode[j]
-                    inwards = -pull if mode[i] >= high[i] else pull
-                    if inwards > most:
-                        back, most = i, inwards
-            if most <= 1e-9:
-                break
-            held[back] = False
+            break
         free = np.flatnonzero(~held)
-        inner, rest = np.empty((len(free), len(free))), np.empty(len(free))
-        for a in range(len(free)):
-            i = free[a]
-            rest[a] = right[i]
-            for j in range(n):
-                if held[j]:
-                    rest[a] -= normal[i, j] * mode[j]
-            for b in range(len(free)):
-                inner[a, b] = normal[i, free[b]]
-        if len(free):
-            mode[free] = np.linalg.solve(inner, rest)
-    for i in range(n):
-        mode[i] = min(max(mode[i], low[i]), high[i])
+        left = right - normal @ np.where(held, mode, 0.0)
+        mode[free] = np.linalg.solve(normal[free][:, free], left[free])
+    mode[:] = np.minimum(np.maximum(mode, low), high)
     return mode
 
 

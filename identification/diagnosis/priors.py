@@ -69,7 +69,7 @@ Variant = tuple[str, tuple[Column, ...]]
 class Base:
     """The likelihood near one setting, in prior standard deviations."""
 
-    columns: dict[Column, int]
+    names: Sequence[Column]  # (c,)
     size: Array  # (c,) prior standard deviations
     low: Array
     high: Array
@@ -80,6 +80,11 @@ class Base:
     typical: Array  # (c,) typical sizes in prior standard deviations
     dictionary: Index  # columns of the discrepancy
     starts: Starts
+
+    @cached_property
+    def columns(self) -> dict[Column, int]:
+        """Where each column is."""
+        return {c: i for i, c in enumerate(self.names)}
 
     def at(self, columns: Iterable[Column]) -> Index:
         """Return where some columns are."""
@@ -106,13 +111,16 @@ class Base:
         size = np.ones(len(others)) if size is None else size
         return marginal(total[:-1, :-1], total[:-1, -1], deviance, asked, others, size)
 
-    def mode(self, chosen: Index, power: float = 1.0) -> tuple[Array, Array]:
-        """Return the mode of some columns (n,) where no other acts, and what is known of them: the
-        inverse of their covariance (n, n).
+    def mode(self, chosen: Index, power: float = 1.0) -> dict[Column, tuple[float, float]]:
+        """Return the coefficients of some columns at the mode where no other acts, and their
+        standard deviations.
         """
         total = power * self.total
         normal = total[np.ix_(chosen, chosen)] + np.eye(len(chosen))
-        return np.linalg.solve(normal, total[chosen, -1]), normal
+        mode = np.linalg.solve(normal, total[chosen, -1]) * self.size[chosen]
+        std = np.sqrt(np.diag(np.linalg.inv(normal))) * self.size[chosen]
+        found = zip(chosen, mode.tolist(), std.tolist(), strict=True)
+        return {self.names[i]: (x, s) for i, x, s in found}
 
 
 def variants_of(
@@ -171,17 +179,7 @@ def declared(column: Column, flights: Flights) -> float:
     the likelihood counts; 0 where it states nothing.
     """
     effect, name = column
-    if not effect or name.startswith(START_PREFIX):
-        return 0.0
     return flights.coefficients({}, effect).get(name.removeprefix(WHOLE_PREFIX), 0.0)
-
-
-def _value(column: Column, flights: Flights, setting: Setting) -> float:
-    """Return what a column's coefficient has at a setting, as the likelihood counts it."""
-    effect, name = column
-    if not effect or name.startswith((START_PREFIX, WHOLE_PREFIX)):
-        return 0.0
-    return flights.coefficients(setting, effect).get(name, 0.0) - declared(column, flights)
 
 
 def in_prior_units(
@@ -206,7 +204,9 @@ def in_prior_units(
     """
     size = np.array([prior_size(c, flights) for c in names])
     # about zero, not about the setting: the residual with all its effects taken away
-    back = np.append([_value(c, flights, setting) for c in names], 1.0)
+    bare = [(e, n.removeprefix(WHOLE_PREFIX)) for e, n in names]
+    here = [flights.coefficients(setting, e).get(n, 0.0) for e, n in bare]
+    back = np.append(np.subtract(here, [declared(c, flights) for c in bare]), 1.0)
     whole = blocks @ back
     blocks = blocks.copy()
     blocks[:, :, -1] = blocks[:, -1, :] = whole
@@ -216,10 +216,9 @@ def in_prior_units(
     low, high = np.array([_bounds(c, flights) for c in names]).T / size
     plain = [i for i, c in enumerate(names) if not c[0] and not c[1].startswith(UNKNOWN)]
     dictionary = [i for i, c in enumerate(names) if not c[0] and c[1].startswith(UNKNOWN)]
-    bare = [(e, n.removeprefix(WHOLE_PREFIX)) for e, n in names]
     typical = np.array([typical_size(c, flights.vehicle) for c in bare])
     return Base(
-        {c: i for i, c in enumerate(names)},
+        names,
         size,
         low,
         high,

@@ -1,8 +1,14 @@
-"""Which effects act: the posterior over sets of up to five, and what they leave unexplained.
+"""Which effects act: the posterior over sets, and what they leave unexplained.
 
 Every effect of the library is as likely as every other before the flight, and one is expected to be
-missing. A set's evidence is that of the likelier noise of two: that beside no effect, and that
-beside the best set, because what is not explained counts as a disturbance.
+missing. Where poses and rotors were measured as they were, a set's evidence is that of the likelier
+noise of two: that beside no effect, and that beside the best set, because what is not explained
+counts as a disturbance.
+
+Of other flights (rotors known by commands, a pose that was filtered, a motion read from an IMU)
+rows of forces and, where rotors are measured, of torques are explained, with one noise for all
+sets. The likeliest set is fitted without linearisation, and so is each that comes out likeliest
+after it, until none does that was not fitted.
 """
 
 import math
@@ -15,10 +21,13 @@ from numpy.typing import NDArray
 from ...dynamics.effects import get
 from ..findings import Disturbance, Ranking
 from .climbing import Height, linearised, mode
+from .evidence import set_evidence
 from .likelihood import Likelihood
 from .priors import Base, Setting, Starts
-from .regression import START_PREFIX, Column, Flights, moves_time, typical_size
-from .sets import Posterior
+from .regression import START_PREFIX, Column, Flights, moves_time, typical_size, without
+from .row_likelihood import RowLikelihood
+from .sets import Posterior, Tried, is_possible
+from .settings import DIAGNOSIS
 from .starting_points import starting_points
 
 Array = NDArray[np.float64]
@@ -27,6 +36,7 @@ Array = NDArray[np.float64]
 # typical sizes at which a lag or a delay is tried as a whole: their columns change with them
 TIME_STARTS = (0.3, 0.6, 1.2)
 ROUNDS = 6  # of fitting the noise beside the best set
+MOST_STARTS = 2  # of an effect with nonlinear coefficients, the likeliest, that are fitted by rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +73,8 @@ def rank(
     near = Likelihood(flights, {})
     best, starts = nothing = near, starts_of(flights, library, {})
     loud = best.base(library, starts)
-    quiet = best.quieter(_whole_library(loud), starts)
+    everything = loud.mode(np.append(loud.plain, loud.at(loud.asked)))
+    quiet = best.quieter({c: x for c, (x, _) in everything.items()}, starts)
     found = Posterior(flights, library, (loud, quiet))
     # the best effect first, alone: another set's columns are those of the model that has it
     setting = found.best_setting(1)
@@ -99,12 +110,118 @@ def rank(
     return Found(found, ranking, found.best_setting(), best.gusts(), late)
 
 
-def _whole_library(base: Base) -> dict[Column, float]:
-    """Return the coefficients of all columns of effects together, at the mode."""
-    chosen = np.append(base.plain, base.at(base.asked))
-    names = list(base.columns)
-    coefficients = base.mode(chosen)[0] * base.size[chosen]
-    return {names[i]: float(x) for i, x in zip(chosen, coefficients, strict=True)}
+def rank_by_rows(
+    flights: Flights,
+    library: Sequence[str],
+    first: Setting,
+    fixed: Setting,
+    report: Callable[[str], None] = lambda text: None,
+) -> Found:
+    """Return the posterior over sets of effects of a library.
+
+    Args:
+        flights: of the vehicle.
+        library: effects that may act, those of ``first`` among them.
+        first: effects that any set has, with coefficients about which a fit begins; none where
+            rotors are measured.
+        fixed: effects that are known from elsewhere, with their coefficients.
+        report: called with a line of progress.
+    """
+    likelihood = RowLikelihood(flights, library, first, fixed)
+    library = likelihood.library
+    first = {e: x for e, x in first.items() if e in library}
+    given = frozenset(first)
+    first = likelihood.fitted(first)
+    starts = starts_of(flights, library, first)
+    fitted: dict[frozenset[str], Setting] = {given: first}
+    bases: dict[frozenset[str], Base] = {given: likelihood.base(first, starts)}
+    idle: set[frozenset[str]] = set()
+    tried: Tried = {}
+
+    def base(setting: Setting, unknown: bool = False) -> Base:
+        lags = {
+            c: x
+            for c, x in starts.items()
+            if not flights.is_nonlinear(c[0]) and c[0] not in setting
+        }
+        return likelihood.base(setting, lags, unknown=unknown)
+
+    def add(setting: Setting) -> None:
+        key = frozenset(setting)
+        if any(map(flights.is_nonlinear, setting)):  # what was linearised elsewhere says little
+            near = fitted[max(fitted, key=lambda other: len(other & key))]
+            begun = {e: near.get(e, x) for e, x in setting.items()}
+            setting = min(setting, begun, key=likelihood.objective)
+        fitted[key] = likelihood.fitted(setting)
+        found = set(fitted[key]) - given
+        if likelihood.idle(fitted[key], found) or not all(
+            is_possible(flights, fitted[key], {}, e, plausible=True) for e in found
+        ):
+            idle.add(key)
+            return
+        bases[key] = base(fitted[key])
+
+    for effect in library:
+        if not flights.is_nonlinear(effect) or effect in given:
+            continue
+        report(f"trying {effect}")
+        own = [{**first, effect: dict(x)} for c, x in starts.items() if c[0] == effect]
+        own.sort(key=likelihood.objective)
+        if own:
+            near = map(likelihood.fitted, own[:MOST_STARTS])
+            add(min(near, key=likelihood.objective))
+
+    def posterior() -> Posterior:
+        return Posterior(flights, library, [*bases.values()], likelihood.power, given, idle, tried)
+
+    def likeliest() -> Setting:
+        """Return the likeliest set's fit, once no set is likelier that was not fitted, nor, where
+        rotors are measured, one that lacks one of its effects.
+        """
+        while True:
+            setting = posterior().best_setting(len(library))
+            new = [setting]
+            if (key := frozenset(setting)) in bases:
+                best = fitted[key]
+                less = [without(best, out) for out in best if out not in given]
+                new = [x for x in less if not flights.commanded and frozenset(x) not in fitted]
+            if not new:
+                return best
+            for some in new:
+                report(f"trying {', '.join(e for e in some if e not in given) or 'no effect'}")
+                add(some)
+
+    likeliest()
+    likelihood.power = posterior().tempering()
+    best = likeliest()
+    bases.pop(frozenset(best))  # the last is the one that has the dictionary
+    bases[frozenset(best)] = base(best, unknown=True)
+    found = posterior()
+    hidden = sorted(flights.needs_pose - flights.without_trace - set(best))
+    behind = _behind(likelihood, best, [e for e in hidden if not flights.is_nonlinear(e)])
+    return Found(found, found.ranking(), best, sensors=likelihood.sensors(best), behind=behind)
+
+
+def _behind(
+    likelihood: RowLikelihood, best: Setting, hidden: Sequence[str]
+) -> dict[str, tuple[str, ...]]:
+    """Return of each effect of a set the ``hidden`` ones, which logs do not show and which may act
+    all the same, that explain the flights as well in its place.
+    """
+    if not hidden or not best:
+        return {}
+    base = likelihood.base(best, {}, [*best, *hidden])
+    at = base.at(base.asked)
+    m = base.marginal(at, base.plain, power=likelihood.power)
+
+    def explained(effects: set[str]) -> float:
+        index = [i for i, (effect, _) in enumerate(base.asked) if effect in effects]
+        return m.explained(index, set_evidence(m, index, base.low[at], base.high[at]).mode)
+
+    # up to the deviance of a rival's likelihood
+    whole = explained(set(best)) + 2.0 * math.log(DIAGNOSIS.least_rival)
+    found = {e: tuple(h for h in hidden if explained({*best, h} - {e}) > whole) for e in best}
+    return {e: others for e, others in found.items() if others}
 
 
 def starts_of(
@@ -116,21 +233,18 @@ def starts_of(
     """
     out: dict[Column, Mapping[str, float]] = {}
     residuals: list[Array] = []
-    for effect in library:
-        if effect in setting:
-            continue
+    beside = [*setting, *(e.name for e in flights.vehicle.effects)]
+    for effect in (e for e in library if e not in setting):
+        found: list[Mapping[str, float]] = []
         if moves_time(effect) and get(effect).kind == "rotor input":
             name = get(effect).coefficients[0].name
             typical = typical_size((effect, name), flights.vehicle)
-            for i, share in enumerate(TIME_STARTS):
-                out[effect, f"{START_PREFIX}{i}"] = {name: share * typical}
-            continue
-        if not flights.is_nonlinear(effect):
-            continue
-        residuals = residuals or [flights.residual(x) for x in (setting, *others)]
-        stated = flights.stated(effect)
-        beside = [*setting, *(e.name for e in flights.vehicle.effects)]
-        found = [x for y in residuals for x in starting_points(effect, flights, y, stated, beside)]
-        for i, start in enumerate(found):
-            out[effect, f"{START_PREFIX}{i}"] = {**start, **stated}
+            found = [{name: share * typical} for share in TIME_STARTS]
+        elif flights.is_nonlinear(effect):
+            residuals = residuals or [flights.residual(x) for x in (setting, *others)]
+            stated = flights.stated(effect)
+            for y in residuals:
+                starts = starting_points(effect, flights, y, stated, beside)
+                found += [{**start, **stated} for start in starts]
+        out |= {(effect, f"{START_PREFIX}{i}"): start for i, start in enumerate(found)}
     return out

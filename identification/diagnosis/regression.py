@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import TypeVar
 
 import numpy as np
@@ -63,10 +63,10 @@ class RegressionSettings:
 
     rows_per_cutoff: float = 5.0  # rows in a period of the residual's cut-off
     margin: float = 0.6  # s at either end of a piece, where the filters lack half of what they need
-    # share of sensor noise in an effect's column, from which the effect is not identifiable; of one
-    # that scales a measurement, it could cancel the measurement's own noise
+    # share of sensor noise in the power of an effect's column, from which the effect is not
+    # identifiable. One that scales a measurement could cancel the measurement's own noise: of its
+    # column it is the share in the amplitude
     most_noise_share: float = 0.1
-    most_noise_share_of_scale: float = 0.01
     # rounding steps by which rotor speeds must vary; with less, the rounding is no noise but looks
     # like an effect
     least_steps_of_rotor_speed: float = 1.4
@@ -113,13 +113,6 @@ def moves_time(effect: str) -> bool:
 def is_nonlinear(effect: str) -> bool:
     """Return whether an effect's force is no sum over its coefficients."""
     return get(effect).starting_points is not None
-
-
-def lost_behind_a_filter() -> frozenset[str]:
-    """Return the effects that a low-pass of the pose makes or hides: it delays, and weakens fast
-    turns.
-    """
-    return needing(Need.FAST_MOTION)
 
 
 def coefficient(column: Column) -> Coefficient:
@@ -213,10 +206,9 @@ class Flights:
             [log.period for log in self.logs], self.logs[0].period, rtol=0.01
         )
         self.logs = tuple(excerpt(self.logs))
-        self._fit_logs, self._has_test = len(logs), bool(test)
+        self._fit_logs = len(logs)
         self._drift: np.random.Generator | None = None  # of a copy whose fusion errs otherwise
         self._fused: dict[FlightLog, list[InertialSignals]] = {}
-        self._smooth_imu: dict[int, tuple[Array, Array]] = {}
         self._felt: dict[Piece, Array] = {}
         self._forget()
         self._first: list[Piece] = []
@@ -226,6 +218,7 @@ class Flights:
         self.start: Mask  # (rows,) first row of a piece
         self.t: Array  # (rows,) s
         self.period: float  # s, from row to row
+        self.seconds: float  # of unbroken flight
         self._lay_rows()
         # by what the accelerometers from which the motion is read may be off, and all signals
         self.biases = self._biases()
@@ -273,18 +266,15 @@ class Flights:
         """Cut the flights into pieces, and say of which of their samples rows are."""
         self._first = pieces = self.pieces({})
         parts, count = [], 0
-        seconds = sum(float(piece.signals.t[-1] - piece.signals.t[0]) for piece in pieces)
-        length = (
-            REGRESSION.short_block
-            if self.commanded and seconds < 8 * REGRESSION.block
-            else REGRESSION.block
-        )
+        self.seconds = sum(float(x.signals.t[-1] - x.signals.t[0]) for x in pieces)
+        short = self.commanded and self.seconds < 8 * REGRESSION.block
+        length = REGRESSION.short_block if short else REGRESSION.block
         for piece in pieces:
             time = piece.signals.t[piece.rows]
             number = ((time - time[0]) // length).astype(np.int64)
             seen = (
                 np.full(len(time), piece.log < self._fit_logs)
-                if self._has_test
+                if len(self.logs) > self._fit_logs
                 else number % REGRESSION.blocks_per_held_out != held_out(number)
             )
             log = np.full(len(time), piece.log)
@@ -302,36 +292,37 @@ class Flights:
         removing it from the pose; of a causal filter, it would mend the filter's gains.
         """
         linear = [e for e in names() if not is_nonlinear(e)]
-        shares = self._noise_shares(noisy, linear)
-        lost = {e for e, share in shares.items() if share > _most_noise_share(e)}
+        lost, _ = self._noisy_columns(noisy, linear)
         if self.inertial:
             # a column also depends on what the IMU knows badly
             quietly = lost  # of these, what the sensors' noise alone hides
             noisy._forget()
             noisy._drift = np.random.default_rng(1)
-            shares = self._noise_shares(noisy, [*linear, *filter(is_nonlinear, names())])
-            lost = {e for e, share in shares.items() if share > _most_noise_share(e)}
-            self.without_trace = frozenset(e for e, share in shares.items() if share == np.inf)
-            lacking: set[str] = set()  # what no pose would bring back
+            lost, self.without_trace = self._noisy_columns(
+                noisy, [*linear, *filter(is_nonlinear, names())]
+            )
+            lacking: frozenset[str] = frozenset()  # what no pose would bring back
             if all(log.voltage is None for log in self.logs):
                 lacking |= set(playing(Role.THRUST_OVER_VOLTAGE))
             if self.commanded:
                 lacking |= needing(*NOT_COMMANDED)
-            self.needs_pose = frozenset(lost - (quietly - self.without_trace) - lacking)
+            self.needs_pose = lost - (quietly - self.without_trace) - lacking
         if self.commanded:
             lost |= needing(*NOT_COMMANDED)
         if self.filtered:
-            lost |= lost_behind_a_filter()
+            lost |= needing(Need.FAST_MOTION)
         if not self.rotor_speeds_vary:
             lost |= needing(Need.FINE_ROTOR_SPEEDS)
-        return frozenset(lost)
+        return lost
 
-    def _noise_shares(self, noisy: "Flights", effects: Iterable[str]) -> dict[str, float]:
-        """Return the share of noise in what each effect adds; infinite where an effect leaves no
+    def _noisy_columns(
+        self, noisy: "Flights", effects: Iterable[str]
+    ) -> tuple[frozenset[str], frozenset[str]]:
+        """Return the effects of which too much of what they add is noise, and those that leave no
         trace at all in an IMU.
         """
         weight = 1.0 / (np.mean(np.square(self.sensor_noise), axis=0) + 1e-30)
-        out = {}
+        lost, traceless = set(), set()
         for effect in effects:
             noise = whole = 0.0
             pairs = zip(self._typical_parts(effect), noisy._typical_parts(effect), strict=True)
@@ -339,10 +330,12 @@ class Flights:
                 turned = loud if noisy._drift is None else self._in_own_axes(loud, noisy)
                 noise += float(weight @ np.mean(np.square(turned - quiet), axis=0))
                 whole += float(weight @ np.mean(np.square(quiet), axis=0))
-            out[effect] = (
-                noise / whole if whole > 0.0 else np.inf if self.inertial or noise > 0.0 else 0.0
-            )
-        return out
+            most = REGRESSION.most_noise_share ** (2 if get(effect).scales_noise else 1)
+            if self.inertial and whole == 0.0:
+                traceless.add(effect)
+            if effect in traceless or noise > most * whole:
+                lost.add(effect)
+        return frozenset(lost), frozenset(traceless)
 
     def _typical_parts(self, effect: str) -> list[Array]:
         """Return what typical coefficients of an effect explain (rows, 6), one by one; all together
@@ -567,10 +560,8 @@ class Flights:
         return np.concatenate([_kept(self._felt, p, partial(self._felt_at, p), 40) for p in pieces])
 
     def _felt_at(self, piece: Piece) -> Array:
-        s, log = piece.signals, self.logs[piece.log]
-        if piece.log not in self._smooth_imu:
-            self._smooth_imu[piece.log] = _smooth_accelerometer(log)
-        read = resampled(s.t, *self._smooth_imu[piece.log])
+        s = piece.signals
+        read = resampled(s.t, *_smooth_accelerometer(self.logs[piece.log]))
         force = self.vehicle.mass * np.einsum("nij,nj->ni", s.rotation, read)
         return piece.smooth(force) - piece.needed[:, :3]
 
@@ -586,7 +577,7 @@ class Flights:
             delta = delta if c.minimum <= value + delta <= c.maximum else -delta
         return value, delta
 
-    def _slope(self, setting: Setting, column: Column, base: Array, step: float) -> Array:
+    def _slope(self, setting: Setting, column: Column, step: float) -> Array:
         """Return what a unit of a coefficient adds (rows, 6), by a difference from the residual at
         a setting.
         """
@@ -603,7 +594,7 @@ class Flights:
             c, far = coefficient(column), abs(delta)
             if c.minimum <= value - far and value + far <= c.maximum:
                 return (at(value - delta) - at(value + delta)) / (2.0 * delta)
-        return (base - at(value + delta)) / delta
+        return (self.residual(setting) - at(value + delta)) / delta
 
     def columns(
         self, setting: Setting, wanted: Iterable[Column], step: float = STEP
@@ -614,8 +605,7 @@ class Flights:
         So ``residual(setting + d) = residual(setting) - column * d``, by a difference of ``step``
         typical sizes.
         """
-        base = self.residual(setting)
-        return {column: self._slope(setting, column, base, step) for column in wanted}
+        return {column: self._slope(setting, column, step) for column in wanted}
 
 
 def _kept(memory: dict[K, V], key: K, make: Callable[[], V], most: int) -> V:
@@ -637,6 +627,7 @@ def _reads_throughout(log: FlightLog) -> bool:
     return len(times) > 0 and float(np.diff(ends).max()) < SIGNALS.gap
 
 
+@lru_cache(maxsize=16)  # of several pieces, and again at each setting of sensing effects
 def _smooth_accelerometer(log: FlightLog) -> tuple[Array, Array]:
     """Return times (n,) s, evenly spaced, and what the accelerometer reads (n, 3) m/s2, with the
     same low-pass as the pose.
@@ -651,14 +642,6 @@ def _smooth_accelerometer(log: FlightLog) -> tuple[Array, Array]:
 
 def _smooth(x: Array, signals: Signals) -> Array:
     return low_pass(x, CUTOFFS.residual_hz, signals.period)
-
-
-def _most_noise_share(effect: str) -> float:
-    return (
-        REGRESSION.most_noise_share_of_scale
-        if get(effect).scales_noise
-        else REGRESSION.most_noise_share
-    )
 
 
 def held_out(number: Index) -> Index:

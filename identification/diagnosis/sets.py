@@ -1,7 +1,9 @@
 """The posterior over sets of effects, from sums of products beside some settings of them."""
 
 import math
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,10 +73,10 @@ Tried = dict[tuple[Base, float], dict[tuple[Variant, ...], SetEvidence | None]]
 
 
 def is_possible(
-    flights: Flights, setting: Setting, std: Mapping[Column, float], effect: str, plausible: bool
+    flights: Flights, setting: Setting, std: Mapping[str, float], effect: str, plausible: bool
 ) -> bool:
-    """Return whether a vehicle can have an effect's coefficients at a setting; ``plausible``: and
-    whether they are physics of this effect.
+    """Return whether a vehicle can have an effect's coefficients, with their standard deviations,
+    at a setting; ``plausible``: and whether they are physics of this effect.
 
     An effect that stands for another one is often fitted at a bound: a dry friction, named a drag,
     needs a quadratic part below zero. A true coefficient of zero is at a bound too, but its best
@@ -89,7 +91,7 @@ def is_possible(
     return not words.implausible(
         Found(
             own,
-            {name: std.get((effect, name), 0.0) for name in own},
+            {name: std.get(name, 0.0) for name in own},
             {c.name: typical_size((effect, c.name), vehicle) for c in words.coefficients},
             flights.speed,
             frozenset(get(name).family for name in named),
@@ -129,15 +131,12 @@ class Posterior:
         self.inclusion = min(PRIORS.expected / max(self.asked_about, 1), 0.5)
         self.known: dict[frozenset[str], _Candidate] = {}
         self.scores: dict[frozenset[str], float] = {}
-        if given is not None:
-            for i in range(len(bases)):
-                self._search(i)
-            return
         # beside the noise of nothing explained no effect shows: what others found is asked there
-        for i in range(1, len(bases)):
+        for i in range(1 if given is None else 0, len(bases)):
             self._search(i)
-        found = sorted(self.scores, key=self.scores.__getitem__, reverse=True)
-        self._search(0, [self.known[k].variants for k in found[: SETS.kept_asked]])
+        if given is None:
+            found = sorted(self.scores, key=self.scores.__getitem__, reverse=True)
+            self._search(0, [self.known[k].variants for k in found[: SETS.kept_asked]])
 
     def _likeliest(self) -> tuple[Base, _Candidate]:
         best = self.known[max(self.scores, key=self.scores.__getitem__)]
@@ -147,15 +146,14 @@ class Posterior:
         """Return the power of the likelihood that the scatter beside the likeliest set allows."""
         base, best = self._likeliest()
         own = base.at(best.columns)
-        return tempering(base.blocks, np.array(sorted([*base.plain, *own]), dtype=np.intp))
+        return tempering(base.blocks, np.sort(np.append(base.plain, own)))
 
     def _negligible(self, base: Base, asked: Index) -> Array:
         """Return how much (len(asked),) of each column any flight may have."""
         little = PRIORS.negligible * base.typical[asked]
         # bases have the starts of other effects: of none a little acts
         if self.given is not None:
-            names = list(base.columns)
-            little[[names[i][1].startswith(START_PREFIX) for i in asked]] = 0.0
+            little[[base.names[i][1].startswith(START_PREFIX) for i in asked]] = 0.0
         return little
 
     def _log_prior(self, effects: int) -> float:
@@ -165,15 +163,10 @@ class Posterior:
 
     def _counts(self, number: int, key: frozenset[str]) -> bool:
         """Return whether a set is judged beside a base."""
-        if key in self.idle:
-            return False
-        own = self.bases[number].effects
-        if len(self.bases) == 1:
-            return (self.given or frozenset()) <= key
         if self.given is None:  # of a set in another base the columns are that base's
             return number > 0 or not any(x.effects and key >= x.effects for x in self.bases[1:])
         most = max(len(x.effects) for x in self.bases if x.effects <= key)
-        return own <= key and len(own) == most
+        return key not in self.idle and len(self.bases[number].effects) == most
 
     def _variants(self, base: Base) -> list[Variant]:
         out, known = [], self.given is not None
@@ -200,7 +193,7 @@ class Posterior:
         m = base.marginal(asked, np.concatenate([base.plain, asked]), little, self.power)
         low, high = base.low[asked], base.high[asked]
         variants = self._variants(base)
-        ways = {e: sum(v[0] == e for v in variants) for e, _ in variants}
+        ways = Counter(e for e, _ in variants)
         tried = self._tried.setdefault((base, self.power), {})
 
         def score(some: tuple[Variant, ...]) -> float:
@@ -209,11 +202,10 @@ class Posterior:
                 return -math.inf
             if some not in tried:
                 index = [at[c] for v in some for c in v[1]]
-                try:
+                tried[some] = None
+                with suppress(np.linalg.LinAlgError):
                     found = set_evidence(m, index, low, high)
-                except np.linalg.LinAlgError:
-                    found = None
-                tried[some] = found if found and self._possible(base, some, found) else None
+                    tried[some] = found if self._possible(base, some, found) else None
             if (evidence := tried[some]) is None:
                 return -math.inf
             total = evidence.log_evidence - sum(math.log(ways[e]) for e, _ in some)
@@ -223,47 +215,33 @@ class Posterior:
                 self.known[key] = _Candidate(number, some, evidence)
             return total
 
-        always = base.effects if len(self.bases) > 1 else self.given or frozenset()
-        first = tuple(v for v in variants if self.given is not None and v[0] in always)
+        first = tuple(v for v in variants if self.given is not None and v[0] in base.effects)
         score(first)
-        if asked_sets is not None:
-            for some in asked_sets:
-                if all(c in at for v in some for c in v[1]):
-                    score(some)
-        single = [(*first, v) for v in variants if v not in first]
-        level = [(score(some), some) for some in single]
-        most = 0 if asked_sets is not None else SETS.most_effects + len(self.given or ())
-        for size in range(len(first) + 2, most + 1):
-            level.sort(key=lambda x: x[0], reverse=True)
-            seen: set[frozenset[Variant]] = set()
-            more = []
-            kept = level[: SETS.kept_sets * (2 if size == len(first) + 2 else 1)]
-            for _, some in kept:
+        for some in asked_sets or ():
+            if all(c in at for v in some for c in v[1]):
+                score(some)
+        level = [(*first, v) for v in variants if v not in first]
+        begun, most = len(first) + 1, SETS.most_effects + len(self.given or ())
+        for size in range(begun, begun + 1 if asked_sets is not None else max(most, begun) + 1):
+            level.sort(key=score, reverse=True)
+            grown: dict[frozenset[Variant], tuple[Variant, ...]] = {}
+            for some in level[: SETS.kept_sets * (2 if size == begun else 1)]:
                 for v in variants:
-                    key = frozenset((*some, v))
-                    if v[0] in {e for e, _ in some} or key in seen:
-                        continue
-                    seen.add(key)
-                    more.append((score((*some, v)), (*some, v)))
-            level = more
+                    if v[0] not in {e for e, _ in some}:
+                        grown.setdefault(frozenset((*some, v)), (*some, v))
+            level = list(grown.values())
 
     def _possible(self, base: Base, some: Sequence[Variant], evidence: SetEvidence) -> bool:
         """Return whether a vehicle can have the coefficients of a set at its mode."""
         plausible = self.given is not None
         asked = [
-            (e, columns)
+            e
             for e, columns in some
             if get(e).possible or (plausible and get(e).implausible)
             if not columns[0][1].startswith(START_PREFIX)
         ]
-        if not asked:
-            return True
-        setting, std = self._at_mode(base, some, evidence)
-        for effect, _ in asked:
-            own = {(effect, name): x for name, x in std[effect].items()}
-            if not is_possible(self.flights, setting, own, effect, plausible):
-                return False
-        return True
+        setting, std = self._at_mode(base, some, evidence) if asked else ({}, {})
+        return all(is_possible(self.flights, setting, std[e], e, plausible) for e in asked)
 
     def structure(self, quieter: Base | None = None) -> float:
         """Return the logarithm of the Bayes factor of one more column beside the likeliest set.
@@ -277,10 +255,9 @@ class Posterior:
         none, more = [], []
         for base in (self.bases[-1], *((quieter,) if quieter else ())):
             m = self._dictionary_beside_best(base)
-            names = list(base.columns)
             groups: dict[str, list[int]] = {}
             for i, at in enumerate(base.dictionary.tolist()):
-                groups.setdefault(names[at][1].split(": ")[0], []).append(i)
+                groups.setdefault(base.names[at][1].split(": ")[0], []).append(i)
             found = [evidence_of_one_more(m, i, DISCREPANCY.sizes) for i in groups.values()]
             none.append(m.constant)
             more.append(m.constant + float(logsumexp(found)) - math.log(len(found)))
@@ -295,8 +272,7 @@ class Posterior:
         coefficients = m.right / m.own
         gains = m.right * coefficients
         best = int(np.argmax(gains))
-        name = list(base.columns)[base.dictionary[best]]
-        return name, float(coefficients[best]), float(gains[best])
+        return base.names[base.dictionary[best]], float(coefficients[best]), float(gains[best])
 
     def log_bayes_factor(self, effect: str) -> float:
         """Return by how much the likeliest set with an effect is likelier than the likeliest
@@ -312,9 +288,7 @@ class Posterior:
         """Return the deviance that the likeliest set leaves, with the nuisances integrated out."""
         base, best = self._likeliest()
         m = base.marginal(base.at(best.columns), base.plain, power=self.power)
-        # of the nuisances' integral the logarithm is no deviance
-        log_volume = 0.5 * float(np.linalg.slogdet(base.mode(base.plain, self.power)[1])[1])
-        whole = -2.0 * (m.constant + log_volume) - self.power * base.penalty
+        whole = m.deviance - self.power * base.penalty
         return whole - m.explained(range(len(m.right)), best.evidence.mode)
 
     def alone(self) -> dict[str, float]:
@@ -342,15 +316,8 @@ class Posterior:
         values and standard deviations.
         """
         base, best = self._likeliest()
-        count = len(base.plain)
-        mode, normal = base.mode(np.append(base.plain, base.at(best.columns)), self.power)
-        value, std = mode[:count], np.sqrt(np.diag(np.linalg.inv(normal)))[:count]
-        names = list(base.columns)
-        size = base.size[base.plain]
-        return {
-            names[i]: (float(x), float(s))
-            for i, x, s in zip(base.plain, value * size, std * size, strict=True)
-        }
+        found = base.mode(np.append(base.plain, base.at(best.columns)), self.power)
+        return {c: x for c, x in found.items() if not c[0]}
 
     def shown(self, known: Sequence[Column] = ()) -> dict[str, float]:
         """Return for each effect outside the likeliest set by how much a typical size of it changes
@@ -415,25 +382,21 @@ class Posterior:
         """Return the coefficients of a set at the mode, and their standard deviations."""
         setting: Setting = {}
         std: Setting = {}
-        row = 0
+        found = zip(evidence.mode.tolist(), evidence.std.tolist(), strict=True)
         for effect, columns in some:
             own: dict[str, float] = dict(self.flights.coefficients({}, effect))
             off: dict[str, float] = {}
-            for c in columns:
-                value = float(evidence.mode[row] * base.size[base.columns[c]])
-                deviation = float(evidence.std[row] * base.size[base.columns[c]])
-                row += 1
+            for c, (mode, deviation) in zip(columns, found, strict=False):
                 if c[1].startswith(START_PREFIX):
                     own |= base.starts[c]
                     if moves_time(effect):
-                        first = get(effect).coefficients[0].name
-                        own[first] *= float(evidence.mode[row - 1])
+                        own[get(effect).coefficients[0].name] *= mode
                     continue
-                name = c[1].removeprefix(WHOLE_PREFIX)
+                name, size = c[1].removeprefix(WHOLE_PREFIX), float(base.size[base.columns[c]])
                 limits = coefficient((effect, name))
-                value += declared(c, self.flights)
+                value = mode * size + declared(c, self.flights)
                 own[name] = min(max(value, limits.minimum), limits.maximum)
-                off[name] = deviation
+                off[name] = deviation * size
                 if c[1].startswith(WHOLE_PREFIX):
                     own[CENTRAL] = 1.0
             setting[effect], std[effect] = own, off
@@ -445,10 +408,9 @@ class Posterior:
         p = {k: math.exp(v - total) for k, v in self.scores.items()}
         probability = {e: sum(x for k, x in p.items() if e in k) for e in self.library}
         best = sorted(p, key=p.__getitem__, reverse=True)
-        sets = []
-        for key in best:
-            if p[key] < SETS.least_probability:
-                break
-            setting, std = self._setting(key)
-            sets.append(RankedSet(tuple(sorted(key)), p[key], setting, std))
-        return Ranking(probability, tuple(sets), self.structure(quieter), self.power)
+        sets = tuple(
+            RankedSet(tuple(sorted(key)), p[key], *self._setting(key))
+            for key in best
+            if p[key] >= SETS.least_probability
+        )
+        return Ranking(probability, sets, self.structure(quieter), self.power)

@@ -18,11 +18,12 @@ class DiagnosisSettings:
     least_stated: float = 0.001  # probability of an alternative that is reported
     least_size: float = 0.1  # typical sizes, from which a calibration is worth a name
     least_rotor_time_offset: float = 0.001  # s, worth a note
-    least_in_std: float = 3.0  # standard deviations, from which a nuisance is
+    # standard deviations that chance makes: of a nuisance that is worth a note, and of a prior, by
+    # which others may differ in an effect's place
+    least_in_std: float = 3.0
     # deviance by which an effect of typical size is sure: of one of some thirty effects, before
     # which one is expected, 20 to 1 afterwards
     least_shown: float = 13.0
-    most_signature_points: int = 600  # of a plot
 
     def __repr__(self) -> str:
         """Return what differs from the defaults, so that a signature can be read."""

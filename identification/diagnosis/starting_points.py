@@ -6,14 +6,14 @@ flights, resembles the residual most.
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.effects import get
-from ...dynamics.effects.declaration import Unexplained
+from ...dynamics.effects.declaration import Coefficients, Unexplained
 from .regression import Flights, Setting, typical_size
 
 Array = NDArray[np.float64]
@@ -35,9 +35,9 @@ def starting_points(
     effect: str,
     flights: Flights,
     residual: Array,
-    stated: Mapping[str, float],
+    stated: Coefficients,
     beside: Iterable[str] = (),
-) -> list[dict[str, float]]:
+) -> Sequence[Coefficients]:
     """Return the coefficients from which a fit of an effect starts.
 
     Args:
@@ -48,28 +48,21 @@ def starting_points(
         beside: other effects that act.
     """
     declared = get(effect).starting_points
-    if declared is None:
-        return []
-    position, seen = flights.at_rows("position"), flights.fit_rows
-    found = [
-        dict(start)
-        for start in declared(
-            Unexplained(
-                flights.vehicle,
-                {
-                    c.name: typical_size((effect, c.name), flights.vehicle)
-                    for c in get(effect).coefficients
-                },
-                stated,
-                frozenset(get(e).family for e in beside if e),
-                position.mean(axis=0),
-                position[seen],
-                flights.at_rows("velocity")[seen],
-                residual[seen, :3],
-                residual[seen, 3:],
-            )
+    assert declared is not None, f"{effect} declares no starting points"
+    position, seen, vehicle = flights.at_rows("position"), flights.fit_rows, flights.vehicle
+    found = declared(
+        Unexplained(
+            vehicle,
+            {c.name: typical_size((effect, c.name), vehicle) for c in get(effect).coefficients},
+            stated,
+            frozenset(get(e).family for e in beside),
+            position.mean(axis=0),
+            position[seen],
+            flights.at_rows("velocity")[seen],
+            residual[seen, :3],
+            residual[seen, 3:],
         )
-    ]
+    )
     if len(found) <= STARTING.most_tried:
         return found
     likeness = _likeness(effect, found, flights, residual)
@@ -79,14 +72,15 @@ def starting_points(
 
 
 def _likeness(
-    effect: str, starts: list[dict[str, float]], flights: Flights, residual: Array
+    effect: str, starts: Sequence[Coefficients], flights: Flights, residual: Array
 ) -> list[float]:
     """Return how much of the residual goes like each start's wrench; minus infinity where it has
     none.
     """
     pieces = flights.pieces({})
     steady = _is_steady(flights, {effect: starts[0]})
-    at = [_every(p.rows) for p in pieces]
+    steps = [max(1, STARTING.sample_step // int(p.rows[1] - p.rows[0])) for p in pieces]
+    at = [p.rows[::step] for p, step in zip(pieces, steps, strict=True)]
     every = np.concatenate([np.isin(p.rows, x) for p, x in zip(pieces, at, strict=True)])
     seen = flights.fit_rows[every]
     target = residual[every][seen]
@@ -119,8 +113,3 @@ def _is_steady(flights: Flights, setting: Setting) -> bool:
     same = replace(signals.at(np.zeros(200, dtype=np.int64)), period=0.317)
     found = flights.acting(same, setting)
     return bool(np.all(found == found[0]))
-
-
-def _every(rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return every so many-th row of a piece."""
-    return rows[:: max(1, STARTING.sample_step // max(1, int(rows[1] - rows[0])))]

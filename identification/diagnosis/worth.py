@@ -11,11 +11,11 @@ from .priors import prior_size
 from .regression import Flights, Setting, without
 from .row_nuisances import row_nuisances
 from .rows import Rows
+from .settings import DIAGNOSIS
 
 Array = NDArray[np.float64]
 
 
-MOST_IN_STD = 3.0  # of a prior, that others may differ in an effect's place
 NOISE_KNOWN = 0.2  # share of the sensors' noise, to which it is known
 
 
@@ -55,7 +55,7 @@ def worth(
         ]
         X = np.stack([*nuisances, *own], axis=2)[fit] / size[:, None]
         y = part[fit] / size
-        bounds = -MOST_IN_STD, MOST_IN_STD
-        done = lsq_linear(X.reshape(-1, X.shape[2]), y.ravel(), bounds).x
+        most = DIAGNOSIS.least_in_std
+        done = lsq_linear(X.reshape(-1, X.shape[2]), y.ravel(), (-most, most)).x
         out[effect] = float(np.sqrt(np.mean(np.square(y - X @ done), axis=0)).max())
     return out

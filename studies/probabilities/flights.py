@@ -15,11 +15,10 @@ from typing import Any
 import numpy as np
 
 from windwrench.dynamics import load_vehicle
-from windwrench.dynamics.effects import names
+from windwrench.dynamics.effects import Need, names, needing
 from windwrench.dynamics.vehicle import Vehicle
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.diagnosis.regression import lost_behind_a_filter
-from windwrench.identification.diagnosis.verdict import beyond_calm
+from windwrench.identification.diagnosis.residuals import beyond_calm
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import InputError
 from windwrench.studies.scoring import EQUIVALENTS, STAND_INS
@@ -103,7 +102,7 @@ def diagnosed(
     ended = time.process_time()
     lost = set(found.needs_pose)
     if "filtered pose" in found.doubts or any("were filtered before" in x for x in found.notes):
-        lost |= lost_behind_a_filter()
+        lost |= needing(Need.FAST_MOTION)
     stated, ranking = found.probabilities, found.ranking
     assert ranking is not None
     return {

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from windwrench.dynamics import EffectSetting, load_vehicle
+from windwrench.dynamics.effects import Need, needing
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.commanded_rotors import COMMANDED
-from windwrench.identification.diagnosis.regression import Flights, lost_behind_a_filter
-from windwrench.identification.diagnosis.transient_disturbances import transient_disturbances
+from windwrench.identification.diagnosis.regression import Flights
+from windwrench.identification.diagnosis.residuals import transient_disturbances
 from windwrench.identification.report.headline import headline
 from windwrench.identification.report.words import remainder_sentence
 from windwrench.studies.trials.logged_poses import FILTERS
@@ -58,7 +59,7 @@ def test_names_behind_a_filter_are_the_same_but_tentative(name, filtered, coeffi
     assert found.floor_is_bound
     assert name in {e.name for e in found.effects}
     assert all(e.tentative for e in found.effects)
-    assert not lost_behind_a_filter() & {e.name for e in found.effects}
+    assert not needing(Need.FAST_MOTION) & {e.name for e in found.effects}
     assert found.verdict == "partly explained"
     assert "perhaps" in headline(found)
     assert found.advice[0].startswith("Log the pose as it was measured")
@@ -73,7 +74,7 @@ def test_a_filters_delay_is_no_late_motor():
         [FILTERS["causal 10 Hz"](fly_practice(VEHICLE, (), "excite", 20.0, 4), VEHICLE)], VEHICLE
     )
     assert not [e for e in found.effects if not e.tentative]
-    assert not lost_behind_a_filter() & {e.name for e in found.effects}
+    assert not needing(Need.FAST_MOTION) & {e.name for e in found.effects}
     assert any(
         "later than they are logged, or the filter of the pose delays it" in n for n in found.notes
     )

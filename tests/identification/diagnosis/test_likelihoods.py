@@ -40,7 +40,7 @@ def by_numbers(normal, right, low, high):
 @pytest.mark.parametrize(("right", "low"), [(3.0, -np.inf), (-4.0, 0.0), (-0.5, -np.inf)])
 def test_the_evidence_of_one_coefficient_is_the_integral(right, low):
     found = set_evidence(
-        Marginal(np.array([[2.0]]), np.array([right]), 0.0),
+        Marginal(np.array([[2.0]]), np.array([right]), 0.0, 0.0),
         [0],
         np.array([low]),
         np.array([np.inf]),

@@ -10,9 +10,9 @@ from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.priors import NUISANCE
+from windwrench.identification.diagnosis.ranking import rank_by_rows
 from windwrench.identification.diagnosis.regression import Flights
 from windwrench.identification.diagnosis.row_nuisances import answered, followers
-from windwrench.identification.diagnosis.row_ranking import rank_by_rows
 from windwrench.identification.diagnosis.rows import Rows
 from windwrench.identification.diagnosis.worth import worth
 from windwrench.runtime.errors import InputError

@@ -11,14 +11,14 @@ import pytest
 from tests.support.flown import VEHICLE, recorded
 from tests.support.own_effects import HOSE, joined
 from windwrench.dynamics import EffectSetting, load_vehicle
-from windwrench.identification.diagnosis.carrying_channels import ORDER, carrying_channels
+from windwrench.identification.diagnosis.advice import composites
 from windwrench.identification.diagnosis.commanded_rotors import COMMANDED, in_flight_by_thrust
-from windwrench.identification.diagnosis.composite import composites
 from windwrench.identification.diagnosis.log_offsets import LAG_ASYMMETRY
 from windwrench.identification.diagnosis.priors import prior_size
 from windwrench.identification.diagnosis.ranking import rank, starts_of
 from windwrench.identification.diagnosis.regression import Flights
 from windwrench.identification.diagnosis.starting_points import starting_points
+from windwrench.identification.diagnosis.traces import ORDER, carrying_channels
 from windwrench.identification.diagnosis.turning_delay import turning_delay
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.signals import log_signals
@@ -61,7 +61,7 @@ STIFFER = {"inertia": {"jx": 0.1, "jy": 0.1, "jz": 0.1}}
 )
 def test_two_that_change_alike_may_be_a_third(setting, third):
     std = {effect: dict.fromkeys(values, 0.002) for effect, values in setting.items()}
-    found = composites(VEHICLE, setting, std)
+    found = list(composites(VEHICLE, setting, std))
     assert len(found) == bool(third)
     assert all(third in sentence.split(": ")[1] for sentence in found)
 

@@ -1,7 +1,7 @@
-"""Which channels of the logs carry a finding: those in which it leaves its trace, and those that
-its effect model reads.
+"""Where a finding shows: the quantity that it follows most closely, the channels of the logs in
+which it leaves its trace, and those that its effect model reads.
 
-Both are computed. The trace is the share of the effect's deviance in the balance of forces and in
+All are computed. The trace is the share of the effect's deviance in the balance of forces and in
 that of torques; what the model reads shows where its wrench changes with an input.
 """
 
@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.effects import get
+from ..findings import CHANNELS, Signature
 from ..motion.signals import Signals
 from .regression import Flights, Setting, without
 
 Array = NDArray[np.float64]
-
 
 # shares from which a channel carries an effect: of its deviance, in the forces or in the torques,
 # and of its wrench, as an input changes
@@ -32,6 +32,56 @@ ORDER = (
     "motor commands",
     "battery voltage",
 )
+
+
+def signature(
+    flights: Flights, setting: Setting, effect: str, share: Array, after: Array
+) -> Signature:
+    """Return the channel in which an effect is largest, against what it follows most closely.
+
+    Args:
+        flights: of the vehicle.
+        setting: coefficients of all effects.
+        effect: its name.
+        share: of the effect in the residual (rows, 6).
+        after: the residual (rows, 6) with all effects.
+    """
+    noise = np.maximum(flights.sensor_noise.std(axis=0), 1e-12)
+    size = share.std(axis=0) / noise
+    channel = int(np.argmax(size if np.any(size > 0.3) else np.abs(share).mean(axis=0) / noise))
+    y = share[:, channel]
+    name, x = max(
+        explanatory_variables(flights, setting),
+        key=lambda d: abs(float(np.corrcoef(d[1], y)[0, 1])) if y.std() > 1e-9 else 0.0,
+    )
+    return Signature(effect, CHANNELS[channel], name, x, y + after[:, channel], y)
+
+
+def explanatory_variables(flights: Flights, setting: Setting) -> list[tuple[str, Array]]:
+    """Return the explanatory variables at the rows: what a force may depend on, with its unit."""
+    names = ("t", "position", "rotation", "velocity")
+    t, position, rotation, velocity = (flights.at_rows(name, setting) for name in names)
+    pieces = flights.pieces(setting)
+    rate = np.concatenate([p.smooth(p.signals.angular_velocity) for p in pieces])
+    body = np.einsum("nij,ni->nj", rotation, velocity)
+    speed = np.linalg.norm(body, axis=1)
+    heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
+    found = [
+        *((f"body velocity {a} (m/s)", body[:, i]) for i, a in enumerate("xyz")),
+        ("speed (m/s)", speed),
+        ("squared speed (m2/s2)", speed**2),
+        ("height (m)", position[:, 2]),
+        ("sine of the heading", np.sin(heading)),
+        ("cosine of the heading", np.cos(heading)),
+        ("time (s)", t),
+    ]
+    if flights.rotor_speeds_vary:
+        found.append(("thrust (N)", flights.rotor_wrench(setting)[:, 0]))
+    found += [(f"angular velocity {a} (rad/s)", rate[:, i]) for i, a in enumerate("xyz")]
+    found += [(f"world position {a} (m)", position[:, i]) for i, a in enumerate("xy")]
+    if all(p.signals.voltage is not None for p in pieces):
+        found.append(("battery voltage (V)", flights.at_rows("voltage", setting)))
+    return [(name, x) for name, x in found if x.std() > 1e-9]
 
 
 def carrying_channels(flights: Flights, setting: Setting, effect: str) -> tuple[str, ...]:
@@ -64,21 +114,19 @@ def _read(flights: Flights, setting: Setting, effect: str) -> Iterator[str]:
     placed = any(np.isfinite(log.position).any() for log in flights.logs)
     place = "position" if placed else "accelerometer"
     turn = "gyro" if flights.inertial else "attitude"
+    rotors = "motor commands" if flights.commanded else "rotor speeds"
+    turned = s.rotation @ Rotation.from_rotvec([0.1, -0.1, 0.1]).as_matrix()
     # inputs, changed by some per cent, or by as much as they vary in a calm flight (SI units)
-    changed: dict[str, tuple[str, Array]] = {
-        "rotor_speeds": (
-            "motor commands" if flights.commanded else "rotor speeds",
-            1.05 * s.rotor_speeds,
-        ),
-        "position": (place, s.position + 0.1),
-        "velocity": (place, s.velocity + 0.5),
-        "rotation": (turn, s.rotation @ Rotation.from_rotvec([0.1, -0.1, 0.1]).as_matrix()),
-        "angular_velocity": (turn, s.angular_velocity + 0.3),
-    }
+    changed: list[tuple[str, dict[str, Any]]] = [
+        (rotors, {"rotor_speeds": 1.05 * s.rotor_speeds}),
+        (place, {"position": s.position + 0.1}),
+        (place, {"velocity": s.velocity + 0.5}),
+        (turn, {"rotation": turned}),
+        (turn, {"angular_velocity": s.angular_velocity + 0.3}),
+    ]
     if s.voltage is not None:
-        changed["voltage"] = "battery voltage", 0.97 * s.voltage
-    for name, (channel, values) in changed.items():
-        moved: dict[str, Any] = {name: values}
+        changed.append(("battery voltage", {"voltage": 0.97 * s.voltage}))
+    for channel, moved in changed:
         off = _wrench(flights, setting, effect, replace(s, **moved)) - own
         if _size(off) > LEAST_CHANGE * max(_size(own), 1e-12):
             yield channel

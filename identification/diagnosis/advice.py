@@ -1,0 +1,147 @@
+"""What a diagnosis says beside its findings, in sentences: what else may be the cause, where the
+fit does not reach, and what to fly.
+"""
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...dynamics.effects import Need, Role, get, needing, playing
+from ...dynamics.vehicle import Vehicle
+from ..findings import NamedEffect
+from ..motion.inertial_signals import pose_rate
+from .regression import CENTRAL, Flights, Setting, unit_of_change
+
+Array = NDArray[np.float64]
+
+FILTERED = (
+    "the pose was filtered before the log was written. Whether the named effects act on the "
+    "vehicle, or follow from feedback-induced correlation, shows only in the sensors' own noise, "
+    "so all names are tentative. Log the pose as it was measured"
+)
+# from when on two changes are alike: standard deviations, of any component, that they may be apart,
+# and the share of the changes to which effect models are alike
+MOST_APART, SHARE = 2.5, 0.1
+# quantile of the fitted rows up to which the fit knows a quantity, and the share of other rows
+# beyond it from which these are said to lie outside
+KNOWN, OUTSIDE = 0.995, 0.05
+
+
+def composites(vehicle: Vehicle, setting: Setting, std: Setting) -> Iterator[str]:
+    """Yield which single effect may be the cause of two of a setting.
+
+    Thrust is known by what it moves: only its ratios to mass and to inertia show. So of mass,
+    inertia and a scale of thrust any two that change alike are the third, the other way round.
+
+    Args:
+        vehicle: as it is declared.
+        setting: coefficients of effects.
+        std: their standard deviations.
+    """
+    roles = (Role.MASS, Role.THRUST, Role.INERTIA)
+    for third in roles:
+        pair = [playing(role, among=setting) for role in roles if role != third]
+        for a, b in itertools.product(*pair):
+            (x, dx), (y, dy) = (_relative(vehicle, e, setting[e], std[e]) for e in (a, b))
+            off = np.subtract.outer(x, y)
+            alike = SHARE * np.maximum.outer(np.abs(x), np.abs(y))
+            size = np.sqrt(np.add.outer(dx**2, dy**2) + alike**2)
+            if np.all(np.abs(off) < MOST_APART * size):
+                other = " or ".join(playing(third))
+                yield f"{a} and {b} change alike: {other} may be the one cause"
+
+
+def _relative(
+    vehicle: Vehicle, effect: str, values: Mapping[str, float], std: Mapping[str, float]
+) -> Array:
+    """Return the relative changes of what an effect changes, and their standard deviations."""
+    names = [c.name for c in get(effect).coefficients if c.name in values and c.name != CENTRAL]
+    unit = np.array([unit_of_change((effect, name), vehicle) for name in names])
+    both = np.array([[values[name], std.get(name, 0.0)] for name in names])
+    return np.asarray(both.T / unit)
+
+
+def outside_the_fit(flights: Flights) -> Iterator[str]:
+    """Yield of each quantity in which held-out flight leaves the range of the fit how far it does.
+
+    A coefficient that was fitted at 6 m/s says what happens at 14 m/s only if the effect's form
+    holds that far, which the fit cannot know.
+    """
+    seen, vehicle = flights.fit_rows, flights.vehicle
+    thrust = vehicle.rotor_wrench(flights.at_rows("rotor_speeds"))[:, 0]
+    for name, unit, values in (
+        ("the speed", "m/s", np.linalg.norm(flights.at_rows("velocity"), axis=1)),
+        ("the turn rate", "rad/s", np.linalg.norm(flights.at_rows("angular_velocity"), axis=1)),
+        ("the thrust", "weights", thrust / vehicle.weight),
+    ):
+        most = float(np.quantile(values[seen], KNOWN))
+        beyond = values[~seen] > most
+        if beyond.mean() > OUTSIDE:
+            yield (
+                f"outside the range of the fit: {name} of {beyond.mean():.0%} of the held-out "
+                f"flight is above {most:.3g} {unit}, up to {values[~seen].max():.3g} {unit}. The "
+                "errors there are those of an extrapolation"
+            )
+
+
+def inertial_notes(flights: Flights, named: Sequence[str]) -> Iterator[str]:
+    """Yield what follows from a motion that is read from an IMU."""
+    if not flights.inertial:
+        return
+    rates = [pose_rate(log) for log in flights.logs]
+    yield (
+        "the log has no pose: the motion is read from gyro and accelerometer. Horizontal axes "
+        f"are those in which the vehicle pointed at t = {flights.logs[0].t[0]:.4g} s, where its "
+        "flight begins, and drift with the gyro"
+        if not any(rates)
+        else f"the log has {min(rates):.3g} positions a second: fast motion is read from gyro "
+        "and accelerometer, slow motion from the positions"
+    )
+    for effect in playing(Role.THRUST_AXIS, among=named):
+        yield f"{effect}: an IMU that is mounted tilted by as much leaves the same log"
+
+
+def advice(
+    effects: Sequence[NamedEffect],
+    not_identifiable: Sequence[str],
+    remainder: str,
+    filtered: bool,
+    needs_pose: Sequence[str],
+) -> Iterator[str]:
+    """Yield what to fly, and to log, to separate what these logs cannot."""
+    if filtered:
+        lost = needing(Need.FAST_MOTION)
+        yield (
+            "Log the pose as it was measured, before any filter or estimator. Behind one, no "
+            f"flight identifies {', '.join(sorted(lost))}, and no name is more than tentative."
+        )
+        not_identifiable = [x for x in not_identifiable if x not in lost]
+    for effect in effects:
+        if effect.indistinguishable_from:
+            group = (effect.name, *effect.indistinguishable_from)
+            yield (
+                f"{' or '.join(group)}: these logs cannot tell them apart. To separate them, fly: "
+                + "; ".join(f"{name}: {get(name).excitation}" for name in group)
+            )
+    if remainder == "structured":
+        yield (
+            "The residual still has structure that no effect of the library explains, so the "
+            "named effects are tentative. Fly one thing at a time (hover, climbs, level flight at "
+            "several speeds, turns) to see what the residual follows."
+        )
+    if needs_pose:
+        yield (
+            "An IMU alone does not show "
+            + ", ".join(needs_pose)
+            + ": they need a velocity, a position or an attitude that no gyro and accelerometer "
+            "know. To identify one of them, log the pose as well."
+        )
+    if not_identifiable:
+        yield (
+            "Not identifiable from these flights: "
+            + ", ".join(not_identifiable)
+            + ". To identify one of them, fly: "
+            + "; ".join(f"{name}: {get(name).excitation}" for name in not_identifiable[:4])
+        )
