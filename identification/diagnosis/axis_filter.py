@@ -33,6 +33,7 @@ class AxisSettings:
 AXIS = AxisSettings()
 STEPS = 40  # of the search, at most
 STEP = 1e-3  # of what is searched, for derivatives
+LEAST_INNOVATION = 1e-9  # m and rad: below the last digit of any log
 
 
 @dataclass(frozen=True)
@@ -183,7 +184,9 @@ class AxisFlight:
         # the gains are linear, so they are fitted at once
         beside = np.linalg.solve(total[:c, :c], total[:c, c:])
         left = total[c:, c:] - total[:c, c:].T @ beside
-        return _Fit(float(left[-1, -1]), max(count, 1), gains + beside[:, -1], left)
+        count = max(count, 1)
+        square = float(left[-1, -1]) + count * LEAST_INNOVATION**2
+        return _Fit(square, count, gains + beside[:, -1], left)
 
 
 @dataclass(frozen=True, eq=False)
