@@ -32,6 +32,7 @@ class NoiseSettings:
 NOISE = NoiseSettings()
 STEPS = 40  # of the search, at most
 STEP = 1e-4  # of what is searched, for derivatives
+LEAST_POSE = 1e-9  # m and rad: below the last digit of any log
 SEARCHED = 8  # numbers of the noise of a pair
 
 
@@ -127,6 +128,7 @@ class NoiseSearch:
         x = _free(near)
         low, high = x - 16.0, x + 16.0
         # the last is at most some ten thousand, where a white acceleration alone acts
+        low[:, 0] = math.log(LEAST_POSE)
         low[:, 2:], high[:, 2:] = (math.log(NOISE.times[0]), 0.0), (math.log(NOISE.times[1]), 1e4)
         x = np.clip(x, low, high)
         if not begun:

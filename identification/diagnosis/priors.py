@@ -92,8 +92,9 @@ class Base:
 
     @cached_property
     def total(self) -> Array:
-        """Sums of products (c + 1, c + 1)."""
-        return np.asarray(self.blocks.sum(axis=0))
+        """Sums of products (c + 1, c + 1), which are known to rounding."""
+        total = self.blocks.sum(axis=0)
+        return np.asarray(total + np.diag(1e-12 * np.diagonal(total)))
 
     @property
     def asked(self) -> list[Column]:

@@ -67,39 +67,46 @@ def rank(
         report: called with a line of progress.
     """
 
-    def beside(setting: Setting) -> tuple[Likelihood, Starts]:
+    def beside(setting: Setting, near: Likelihood) -> tuple[Likelihood, Starts]:
         return Likelihood(flights, setting, near), starts_of(flights, library, setting, {})
 
-    near = Likelihood(flights, {})
-    best, starts = nothing = near, starts_of(flights, library, {})
+    def fitted(setting: Setting, near: Likelihood) -> tuple[Likelihood, Starts, Posterior]:
+        report(f"trying {', '.join(setting)}")
+
+        def height(x: Setting) -> Height:
+            base = Likelihood(flights, x, near, same_noise=True).base(x, {})
+            return linearised(flights, base, base.asked, x)
+
+        setting = tried[frozenset(setting)] = mode(setting, height)
+        best, starts = beside(setting, near)
+        return best, starts, Posterior(flights, library, (loud, best.base(library, starts)))
+
+    best = Likelihood(flights, {})
+    starts = starts_of(flights, library, {})
+    nothing = best, starts
     loud = best.base(library, starts)
     everything = loud.mode(np.append(loud.plain, loud.at(loud.asked)))
     quiet = best.quieter({c: x for c, (x, _) in everything.items()}, starts)
     found = Posterior(flights, library, (loud, quiet))
-    # the best effect first, alone: another set's columns are those of the model that has it
-    setting = found.best_setting(1)
     tried: dict[frozenset[str], Setting] = {frozenset(): {}}
+    # the best effect first, alone: another set's columns are those of the model that has it
+    if setting := found.best_setting(1):
+        seen = [fitted(setting, best)]
+        # what is alike counts as a disturbance beside it: each is judged beside its own noise
+        seen += [fitted(x, seen[0][0]) for x in seen[0][2].rivals(setting)]
+        best, starts, found = max(
+            seen, key=lambda x: x[2].scores.get(frozenset(x[0].setting), -math.inf)
+        )
     for _ in range(ROUNDS):
         # the columns of the same set change with its coefficients, where these have moved far
-        if not found.is_elsewhere(setting, tried):
-            setting = found.best_setting()
-            if not found.is_elsewhere(setting, tried):
-                break
-        report(f"trying {', '.join(setting)}")
-
-        def height(x: Setting, near: Likelihood = near) -> Height:
-            base = Likelihood(flights, x, near, same_noise=True).base(x, {})
-            return linearised(flights, base, base.asked, x)
-
-        setting = mode(setting, height)
-        tried[frozenset(setting)] = setting
-        near, starts = beside(setting)
-        best = near
-        found = Posterior(flights, library, (loud, best.base(library, starts)))
         setting = found.best_setting()
+        if not found.is_elsewhere(setting, tried):
+            break
+        best, starts, found = fitted(setting, best)
     # once more, with the dictionary's columns, that are dear, beside the likeliest set
+    setting = found.best_setting()
     if setting.keys() != best.setting.keys():
-        best, starts = beside(setting) if setting else nothing
+        best, starts = beside(setting, best) if setting else nothing
     whole = best.base(library, starts, unknown=True)
     found = Posterior(flights, library, (loud, whole), found.tempering())
     column, size, gained = found.strangest()

@@ -271,18 +271,20 @@ class Flights:
         length = REGRESSION.short_block if short else REGRESSION.block
         for piece in pieces:
             time = piece.signals.t[piece.rows]
-            number = ((time - time[0]) // length).astype(np.int64)
+            number = ((time - time[0]) // length).astype(np.int64) + count
             seen = (
                 np.full(len(time), piece.log < self._fit_logs)
                 if len(self.logs) > self._fit_logs
                 else number % REGRESSION.blocks_per_held_out != held_out(number)
             )
             log = np.full(len(time), piece.log)
-            parts.append((log, number + count, seen, np.arange(len(time)) == 0, time))
-            count += int(number[-1]) + 1
+            parts.append((log, number, seen, np.arange(len(time)) == 0, time))
+            count = int(number[-1]) + 1
         self.log, self.block, self.fit_rows, self.start, self.t = map(
             np.concatenate, zip(*parts, strict=True)
         )
+        if self.fit_rows.all() and self.block[-1] > 0:  # fewer than four blocks
+            self.fit_rows = self.block < self.block[-1]
         self.period = float(np.median(np.diff(self.t)))
 
     def _lost_in_noise(self, noisy: "Flights") -> frozenset[str]:

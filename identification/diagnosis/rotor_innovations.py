@@ -81,7 +81,8 @@ def _predicted(sides: list[tuple[Array, Array]]) -> list[Array]:
     mean, size = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-12)
     z = np.column_stack([(x - mean) / size, np.ones(len(x))])
     normal = z.T @ z
-    normal += 1e-6 * np.diag(np.diagonal(normal))  # against columns that are alike
+    # against columns that are alike, and those that do not vary: all others have a square of one
+    normal += 1e-6 * len(z) * np.eye(len(normal))
     predicted = z @ np.linalg.solve(normal, z.T @ y)
     return np.split(predicted, np.cumsum([len(part) for part, _ in sides])[:-1])
 

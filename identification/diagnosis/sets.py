@@ -51,6 +51,7 @@ class SetSettings:
     most_effects: int = 5
     kept_sets: int = 8  # of each size, to which a further effect is added
     kept_asked: int = 24  # sets, the best, that are asked for beside the noise of no effect too
+    most_rivals: int = 2  # effects, alike to the likeliest one, that are tried in its place
     least_probability: float = 1e-6  # of a set that is kept
 
 
@@ -357,6 +358,15 @@ class Posterior:
         """Return the coefficients of the likeliest set of at most so many effects."""
         key = max((k for k in self.scores if len(k) <= most), key=self.scores.__getitem__)
         return self._setting(key)[0]
+
+    def rivals(self, setting: Setting) -> list[Setting]:
+        """Return the coefficients of the likeliest other effects that, alone, gain at least half of
+        what a setting does.
+        """
+        least = 0.5 * (self.scores.get(frozenset(setting), -math.inf) + self.scores[frozenset()])
+        found = [k for k, x in self.scores.items() if len(k) == 1 and x > least and k - {*setting}]
+        found.sort(key=self.scores.__getitem__, reverse=True)
+        return [self._setting(k)[0] for k in found[: SETS.most_rivals]]
 
     def is_elsewhere(self, new: Setting, tried: Mapping[frozenset[str], Setting]) -> bool:
         """Return whether a set was not tried yet, or with coefficients that are more than a

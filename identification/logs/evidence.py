@@ -22,6 +22,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
+from scipy.fft import next_fast_len
 
 from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import (
@@ -36,7 +37,7 @@ from ..motion.smoothing import (
 from .flight_log import FlightLog
 from .flight_phases import carrying
 from .log_map import UNITS
-from .readings import DECLARED, Reading, as_written, log_readings
+from .readings import DECLARED, OFFSET, Reading, as_written, log_readings
 from .table import Array, Rows
 
 
@@ -60,6 +61,11 @@ class EvidenceSettings:
     torque_gain: tuple[float, float] = (0.4, 2.5)  # and of thrust in commands
     most_thrust: float = 1.5  # of its 99th percentile: more is a wrong reading of a sensor
     delays: tuple[float, ...] = tuple(0.02 * k for k in range(-5, 6))
+    # s by which rotors may come late against the motion on one clock: motors, radio and filters
+    # make them up to 0.22 s early on measured flights; the most that is looked for, and its steps
+    near: tuple[float, float] = (-0.25, 0.1)
+    far: float = 5.0
+    step: float = 0.02
 
     samples: float = 20.0  # independent samples of one component that a flight counts for, at most
     least_share: float = 0.01  # a smaller share says no more: no model is better
@@ -239,14 +245,12 @@ class Evidence:
     @cached_property
     def _acceleration(self) -> Array:
         """Acceleration (n, 3) in the columns' world and unit of length, by s2."""
-        position = self._position
-        assert position is not None
+        return self._compared(lambda p: p.slow(self._second(p)))
 
-        def second(p: _Piece) -> Array:
-            smooth = low_pass(p.even(self._t, position), CUTOFFS.pose_hz, p.period)
-            return p.slow(derivative(smooth, p.period, 2))
-
-        return self._compared(second)
+    def _second(self, p: _Piece) -> Array:
+        assert self._position is not None
+        smooth = low_pass(p.even(self._t, self._position), CUTOFFS.pose_hz, p.period)
+        return derivative(smooth, p.period, 2)
 
     @cached_property
     def _middle(self) -> Array:
@@ -289,25 +293,32 @@ class Evidence:
         means = within[:, None] @ thrusts / np.maximum(within.sum(axis=1), 1.0)[:, None, None]
         return within, np.swapaxes(within[..., None] * (thrusts - means), 1, 2)
 
+    def _turned(self, reading: Reading) -> Iterator[tuple[Array, Array]]:
+        """Yield the rotations (m, 3, 3), zero where no attitude is known, and the angular velocity
+        (m, 3) of each piece by the way in which a reading turns columns into rotations.
+        """
+        quaternion = None
+        if self._attitude is not None:
+            good, rotation = as_written(self._attitude, reading)
+            quaternion = np.full((len(good), 4), np.nan)
+            quaternion[good] = continuous(rotation.as_quat(scalar_first=True))
+        for p in self._pieces:
+            if quaternion is None:
+                assert self._gyro is not None
+                w = p.even(self._t, self._gyro)
+                yield np.zeros((len(w), 3, 3)), w
+            else:
+                q = low_pass(p.even(self._t, quaternion), CUTOFFS.pose_hz, p.period)
+                yield turning(q, p.period)
+
     def _moving(self, *attitude: Any) -> tuple[Array, Array]:
         """Return what moves the body by one way to turn columns into rotations: specific thrust
         times the body's axes (n, 3, 3) in m/s2, in the world; and, in two bands, angular
         velocity, angular acceleration and products of the angular velocity (n, 2, 15).
         """
-        quaternion = None
-        if self._attitude is not None:
-            good, rotation = as_written(self._attitude, Reading(*attitude))
-            quaternion = np.full((len(good), 4), np.nan)
-            quaternion[good] = continuous(rotation.as_quat(scalar_first=True))
         axes, turns = [], []
-        for thrusts, p in self._each(self._driving):
-            if quaternion is None:
-                assert self._gyro is not None
-                w = p.even(self._t, self._gyro)
-                matrices = np.zeros((len(w), 3, 3))
-            else:
-                q = low_pass(p.even(self._t, quaternion), CUTOFFS.pose_hz, p.period)
-                matrices, w = turning(q, p.period)
+        turned = self._turned(Reading(*attitude))
+        for (thrusts, p), (matrices, w) in zip(self._each(self._driving), turned, strict=True):
             axes.append(p.slow(thrusts[:, 9:] * matrices.reshape(-1, 9))[p.compared])
             products = np.einsum("ni,nj->nij", w, w).reshape(-1, 9)
             columns = np.column_stack([w, derivative(w, p.period), products])
@@ -363,7 +374,7 @@ class Evidence:
         gains = [self._gains[0], *[self._gains[1]] * len(mixing)]
         horizontal, cost, motion = self._moved(*reading.moves)
         needed = motion[: len(rows)]
-        delays = (-reading.late,) if reading.late or not torques else EVIDENCE.delays
+        delays = EVIDENCE.delays if torques else (0.0,)
         there, thrusts = self._delayed(*delays)
         given = rows @ thrusts
         products = zip(
@@ -382,6 +393,40 @@ class Evidence:
         vertical, *others = max(left, key=likelihood)
         score = likelihood([horizontal, horizontal, vertical, *others]) - cost - reading.unlikely
         return Fit(reading, horizontal, tuple(others), score)
+
+    def late(self) -> float:
+        """Return by how many s the rotors' columns come late against the motion, as declared; 0
+        where they do not, or where the flight does not tell.
+
+        In the band of turning the force along the thrust axis follows the thrust, and what turns
+        the body the torques. Their signs are correlated over all lags: one landing outweighs a
+        flight otherwise. By chance a correlation has the variance of Bartlett's formula.
+        """
+        mixing = np.vstack([self._k, self._mixing])
+        sums, chance = np.zeros(1), np.full(4, 1e-300)
+        for p, (matrices, w) in zip(self._pieces, self._turned(DECLARED), strict=True):
+            if self._along is None:
+                force = self._second(p) + np.array([0.0, 0.0, _G])
+                along = np.sum(force * matrices[:, :, 2], axis=1)
+            else:
+                along = p.even(self._t, self._along[:, None])[:, 0]
+            turn = derivative(w, p.period) @ self._inertia + np.cross(w, w @ self._inertia)
+            both = p.even(self._t, self._thrusts) @ mixing.T, np.column_stack([along, turn])
+            thin = max(1, round(EVIDENCE.step / p.period))
+            most = round(EVIDENCE.far / (thin * p.period))
+            signs = [np.sign(p.band(x, slice(None, None, thin))[:, 0]) for x in both]
+            length = next_fast_len(len(signs[0]) + most, real=True)
+            given, needed = (np.fft.rfft(x, length, axis=0) for x in signs)
+            products = np.fft.irfft(given * needed.conj(), length, axis=0)
+            sums = sums + products[np.arange(-most, most + 1)]
+            chance += np.sum(np.square(products), axis=0) / len(signs[0])
+            lags = thin * p.period * np.arange(-most, most + 1)
+        squares = 0.5 * np.square(sums) / chance
+        follows = np.sum(squares * (sums > 0.0), axis=1)
+        is_near = (lags >= EVIDENCE.near[0]) & (lags <= EVIDENCE.near[1])
+        best = int(np.argmax(np.where(is_near, 0.0, follows)))
+        lead = follows[best] - np.max(np.sum(squares, axis=1)[is_near])
+        return float(lags[best]) if lead > OFFSET else 0.0
 
     def turns(self, reading: Reading) -> float:
         """Return the root mean square of roll and pitch rates in the band of turning, rad/s."""
@@ -442,6 +487,8 @@ def departures(evidence: Evidence) -> list[Reading]:
     """Return the readings that explain a log where the log as declared does not: none, one, or
     several that fit alike.
     """
+    if evidence.enough and (late := evidence.late()):
+        return [Reading(late=late)]
     ranking = Ranking.of(evidence, log_readings(evidence.has_pose))
     best, left, most = ranking.best, ranking.fit.torque, EVIDENCE.good_torque
     if evidence.has_pose and best.moves != DECLARED.moves:  # forces tell, not torques

@@ -57,6 +57,8 @@ _GAP = 3.0  # median time steps
 class FlightLog:
     """One flight, checked: times increase, numbers are finite, quaternions have length 1.
 
+    A row in which an inertial sensor was read along some of its axes alone counts as not read.
+
     Attributes:
         t: (N,) s.
         position: (N, 3) m, world; NaN where the pose is missing.
@@ -109,6 +111,10 @@ class FlightLog:
             pose = np.column_stack([self.position, self.quaternion])
             there = np.isfinite(pose).all(axis=1)
             object.__setattr__(self, "valid", there)
+        for name in ("accelerometer", "gyro"):
+            x = getattr(self, name)
+            if x is not None and not (read := np.isfinite(x).all(axis=1)).all():
+                object.__setattr__(self, name, np.where(read[:, None], x, np.nan))
 
     def __repr__(self) -> str:
         times = f", {self.t[0]:.3g} to {self.t[-1]:.3g} s" if len(self.t) else ""

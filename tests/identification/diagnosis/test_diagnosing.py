@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from tests.support.data_paths import data_file
+from tests.support.flown import without_pose
 from windwrench.dynamics import EffectSetting, Vehicle, load_vehicle
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.regression import Flights, held_out
@@ -306,6 +307,15 @@ def test_no_flight_keeps_step_with_what_is_held_out():
         assert np.all((share > 0.05) & (share < 0.5)), period
     flights = Flights([fly()], VEHICLE)
     assert np.array_equal(flights.fit_rows, flights.block % 4 != held_out(flights.block))
+
+
+@pytest.mark.parametrize(("seconds", "every"), [(24.0, 5.0), (10.01, 99.0)])
+def test_some_flight_is_held_out_of_short_pieces(seconds, every):
+    """Pieces of less than four blocks, and a flight of three blocks, had no held-out error."""
+    log = fly(seconds=seconds)
+    found = diagnose([without_pose(log, (log.t - log.t[0] + 0.3) % every < 0.3)], VEHICLE)
+    assert found.held_out_segments
+    assert 0.0 < found.after.force_rms < 0.1
 
 
 def test_the_error_is_that_of_test_logs_where_they_are_given():

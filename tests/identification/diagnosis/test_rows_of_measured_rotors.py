@@ -15,6 +15,7 @@ from windwrench.identification.diagnosis.regression import Flights
 from windwrench.identification.diagnosis.row_nuisances import answered, followers
 from windwrench.identification.diagnosis.rows import Rows
 from windwrench.identification.diagnosis.worth import worth
+from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import InputError
 from windwrench.studies.trials.logged_poses import FILTERS
 from windwrench.studies.trials.practice_flights import fly_practice
@@ -48,6 +49,25 @@ def test_a_simulator_may_have_no_noise(trajectory, missing):
     # of thrust and mass a flight shows the ratio
     assert {e.name for e in found.effects} <= {"mass", "thrust_scale"}
     assert len(found.effects) == len(missing)
+
+
+@pytest.mark.parametrize("turns", [0.0, 1e-9])
+def test_a_still_flight_without_noise_is_diagnosed(turns):
+    """Columns that do not vary carry nothing; what is known to the last digit is no more."""
+    rng, count = np.random.default_rng(0), 3001
+    place = [0.0, 0.0, 1.0] + 1e-9 * rng.standard_normal((count, 3))
+    attitude = [1.0, 0.0, 0.0, 0.0] + turns * rng.standard_normal((count, 4))
+    speeds = np.full((count, 4), VEHICLE.hover_rate)
+    found = diagnose([FlightLog(0.005 * np.arange(count), place, attitude, speeds)], VEHICLE)
+    assert not any(not e.tentative for e in found.effects)
+
+
+def test_an_imu_that_was_read_along_some_axes_counts_as_not_read():
+    log = pose_removed(imu_flight(VEHICLE, seconds=15.0, trajectory="gentle"))
+    gyro = log.gyro.copy()
+    gyro[1::2, 1] = np.nan
+    assert np.isnan(replace(log, gyro=gyro).gyro[1::2]).all()
+    assert diagnose([replace(log, gyro=gyro)], VEHICLE).verdict == "nothing to explain"
 
 
 def test_rows_hold_forces_and_torques(offset):

@@ -321,3 +321,14 @@ def test_a_clean_flight_and_a_rotor_at_its_limit_are_not_noted():
     clipped = np.minimum(log.rotor_speeds, limited.omega_max)
     clipped[:, 0] = limited.omega_max
     assert not [*stuck_channels(replace(log, rotor_speeds=clipped), limited)]
+
+
+def test_commands_that_run_seconds_late_are_named_by_the_thrust_alone():
+    """No torque is known of a collective command; the force along the thrust axis is enough."""
+    log = flight("gentle", seconds=25.0)
+    collective = np.sqrt(np.mean(np.square(log.rotor_speeds), axis=1))
+    on_time = replace(log, rotor_speeds=np.tile(collective[:, None], 4), commanded=True)
+    screen_log(on_time, VEHICLE)
+    late = np.interp(log.t - 2.25, log.t, collective)
+    with pytest.raises(InputError, match=r"flight\.csv: .* come 2\.2\d s too late .* commands"):
+        screen_log(replace(on_time, rotor_speeds=np.tile(late[:, None], 4)), VEHICLE)
