@@ -7,7 +7,7 @@ from sums of products alone.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import replace
@@ -102,11 +102,12 @@ class Likelihood:
         if near is not None and _sensing(near.vehicle) == _sensing(self.vehicle):
             self.pieces, self._fit = near.pieces, near._fit
         else:
+            finer = iter(near.finer if near else ())
             found = [
                 (i, piece)
                 for i, log in enumerate(flights.logs)
                 if flights.fit_rows[flights.log == i].any()  # no test log
-                for piece in read_poses(log, self.vehicle)
+                for piece in read_poses(log, self.vehicle, finer)
             ]
             self.pieces = [piece for _, piece in found]
             self._fit = [_in_fit(flights, i, piece.t) for i, piece in found]
@@ -117,25 +118,16 @@ class Likelihood:
             near = None
         same = near if same_noise else None
         self.noise: PoseNoise = near.noise if near else self._first_noise()
-        # on what the rotors' innovations say of the states, and what they say (n, 6, 3) of a piece
+        # of the rotors' innovations, and what they say (n, 6, 3) of each piece
         self.gains: Array = near.gains if near else np.zeros((len(PAIRS), len(JUMP_STATE)))
-        # what the rotors do that the past does not predict, by a filter that follows the pose closely
+        # what is added to the rotor speeds (n, 4) of each piece that the log rounds; and what they
+        # do that the past does not predict, as a filter sees it that follows the pose closely
+        self.finer: list[Array] = near.finer if near else []
         self.answers: list[Array] = near.answers if near else []
         if near:
             self.known, self.tracks = near.known, near.tracks
         else:
-            nothing = [np.zeros((n, 6, 3)) for n in lengths]
-            self._run(self.steady, nothing)
-            if self._rounding_std:
-                import os
-
-                seen = list(zip(self.pieces, self.tracks, strict=True))
-                fine = unrounded(seen, self.vehicle.omega_lsb, int(os.environ.get("UNR", "5")))
-                self.pieces = [
-                    replace(p, rotor_speeds=x) for p, x in zip(self.pieces, fine, strict=True)
-                ]
-                self._run(self.steady, nothing)
-            self.answers = rotor_innovations(list(zip(self.pieces, self.tracks, strict=True)))
+            self._see_rotors()
         if same:
             self._run(self.steady, self._said(self._jumps(), self.gains))
         else:
@@ -155,6 +147,20 @@ class Likelihood:
             )
         if not self._acting:
             self._add_what_any_flight_may_have()
+
+    def _see_rotors(self) -> None:
+        nothing = [np.zeros((len(piece.t), 6, 3)) for piece in self.pieces]
+        self._run(self.steady, nothing)
+        seen = list(zip(self.pieces, self.tracks, strict=True))
+        if self._rounding_std:
+            self.finer = unrounded(seen, self.vehicle.omega_lsb)
+            self.pieces = [
+                replace(piece, rotor_speeds=piece.rotor_speeds + x)
+                for piece, x in zip(self.pieces, self.finer, strict=True)
+            ]
+            self._run(self.steady, nothing)
+            seen = list(zip(self.pieces, self.tracks, strict=True))
+        self.answers = rotor_innovations(seen)
 
     @property
     def steady(self) -> SteadyFilter:
@@ -570,9 +576,9 @@ def _sensing(vehicle: Vehicle) -> tuple[EffectSetting, ...]:
     return tuple(e for e in vehicle.effects if get(e.name).kind == "sensing")
 
 
-def read_poses(log: FlightLog, vehicle: Vehicle) -> list[Poses]:
+def read_poses(log: FlightLog, vehicle: Vehicle, finer: Iterator[Array]) -> list[Poses]:
     """Return the unbroken pieces of a log as they were measured, without what the vehicle's sensing
-    effects did to them.
+    effects did to them; ``finer`` is added to the rotor speeds (n, 4) of each.
 
     Where poses are late or early, rotor speeds are moved instead: poses would lose of their noise.
     """
@@ -584,6 +590,7 @@ def read_poses(log: FlightLog, vehicle: Vehicle) -> list[Poses]:
     out = []
     for raw, smooth in zip(log_signals(undone, np.inf), log_signals(undone), strict=True):
         q = Rotation.from_matrix(raw.rotation).as_quat(scalar_first=True)
+        raw = replace(raw, rotor_speeds=raw.rotor_speeds + next(finer, 0.0))
         raw = with_time_offsets(raw, {ROTOR_TIME_OFFSET[1]: offset})
         out.append(
             Poses(
