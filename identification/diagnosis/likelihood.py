@@ -98,6 +98,8 @@ class Likelihood:
         self.flights, self.setting = flights, setting
         self.vehicle = flights.amended(setting)
         self.pieces: list[Poses]
+        self.tracks: list[Track]
+        self.known: list[Array]
         self._fit: list[NDArray[np.bool_]]
         if near is not None and _sensing(near.vehicle) == _sensing(self.vehicle):
             self.pieces, self._fit = near.pieces, near._fit

@@ -245,12 +245,12 @@ class NoiseSearch:
 
 
 def _pairs(x: Array) -> Array:
-    return x[PAIRS].reshape(len(PAIRS), -1)
+    return np.asarray(x[PAIRS].reshape(len(PAIRS), -1))
 
 
 def _covariance(steady: SteadyFilter) -> Array:
     """Return the covariance of each pair's innovations (..., 3, 2, 2)."""
-    return steady.covariance[..., PAIRS[:, :, None], PAIRS[:, None, :]]
+    return np.asarray(steady.covariance[..., PAIRS[:, :, None], PAIRS[:, None, :]])
 
 
 def _free(noise: PoseNoise) -> Array:
