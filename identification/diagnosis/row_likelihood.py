@@ -64,8 +64,6 @@ class RowLikelihood:
         self.library = [e for e in self.library if e in traced or e not in linear]
         wanted = self.flights.columns_of(e for e in linear if e in traced)
         own = [found[c] * prior_size(c, self.flights) for c in wanted]
-        if self.flights.commanded:
-            return self._noise_beside(y, own, {})[0]
         # first as if all of a signal could be disturbances that it follows
         signals = followers(rows)
         _, explained = self._noise_beside(y, own, _named(answered(rows, signals, y)))
