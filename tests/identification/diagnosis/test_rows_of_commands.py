@@ -71,3 +71,9 @@ def test_a_hover_shows_a_load_by_the_mean_thrust_alone():
     assert abs(scale - (1.0 / 1.3 - 1.0)) < 1.96 * std
     # a command makes another thrust in each flight
     assert std > 0.9 * NUISANCES.thrust * (1.0 + scale)
+
+
+def test_a_hover_without_a_load_shows_neither_more_thrust_nor_a_lift():
+    """A loop that holds the height lets thrust vary against every vertical disturbance."""
+    found = diagnose([hover(0.0, seed=1)], STATED)
+    assert not {"thrust_scale", "constant_force"} & {e.name for e in found.effects}
