@@ -64,13 +64,11 @@ class RowLikelihood:
         self.library = [e for e in self.library if e in traced or e not in linear]
         wanted = self.flights.columns_of(e for e in linear if e in traced)
         own = [found[c] * prior_size(c, self.flights) for c in wanted]
-        if self.flights.commanded:
-            return self._noise_beside(y, own, {})[0]
+        signals, explained = followers(rows), np.zeros_like(y)
         # first as if all of a signal could be disturbances that it follows
-        signals = followers(rows)
-        _, explained = self._noise_beside(y, own, _named(answered(rows, signals, y)))
-        answers = _named(answered(rows, signals, y - explained))
-        noise, _ = self._noise_beside(y, own, answers)
+        for _ in range(ROW_NOISE.rounds):
+            answers = _named(answered(rows, signals, y - explained))
+            noise, explained = self._noise_beside(y, own, answers)
         self.nuisances |= answers
         return noise
 

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 class NuisanceSettings:
     """Standard deviations of what differs from flight to flight."""
 
-    thrust: float = 0.02  # relative, of a flight against the others: cells, propellers, air
+    thrust: float = 0.02  # relative, of a flight against what is usual: cells, propellers, air
     drift: float = 0.003  # relative, of thrust over a flight, beside the fade and the battery's sag
     delay: float = 0.02  # s, of commands
     tilt: float = 0.01  # rad, of the motion capture's vertical, and of the rotors' mean axis
@@ -76,9 +76,7 @@ def _of_commands(of: _Flown) -> dict[str, Array]:
     rows, flights, use, i = of.rows, of.rows.flights, NUISANCES, of.number
     time = flights.t - flights.t[of.here > 0][0]
     w = 2.0 * time / max(float(time[of.here > 0][-1]), 1e-9) - 1.0
-    out = {}
-    if len(flights.logs) > 1:
-        out[f"thrust {i}"] = use.thrust * rows.from_body(of.along(2, of.thrust))
+    out = {f"thrust {i}": use.thrust * rows.from_body(of.along(2, of.thrust))}
     out[f"drift {i}"] = use.drift * rows.from_body(of.along(2, of.thrust * w))
     bend = of.thrust * (1.5 * w * w - 0.5)
     out[f"bend {i}"] = use.drift * rows.from_body(of.along(2, bend))
@@ -133,24 +131,34 @@ class Follower:
 
 
 def followers(rows: Rows) -> list[Follower]:
-    """Return the signals of measured rotors and of the motion that follow disturbances.
+    """Return the signals of rotors and of the motion that follow disturbances.
 
-    A flight loop answers the velocity that a disturbance makes, and its acceleration by a change of
-    thrust. The change is in the size of thrust's own variation.
+    A flight loop answers a sideways disturbance by tilting, and the noise of a measured tilt looks
+    like one that it answers: in hover, tilt is hardly anything else. It answers the velocity that a
+    vertical disturbance makes by thrust, and its acceleration by a change of thrust. The change is
+    in the size of thrust's own variation. Commands are late in any set, which is a change of thrust
+    already.
     """
     flights = rows.flights
     delivered = flights.rotor_wrench({}) / flights.inertias[2:]
+    tilt = flights.vehicle.gravity * rows.rotation[:, 2, :2]
     change = np.concatenate([np.gradient(delivered[run, 0]) for run in flights.runs])
     change *= delivered[:, 0].std() / max(float(change.std()), 1e-12)
-    wrench = rows.at_rows(np.column_stack([delivered, change]))
+    wrench = rows.at_rows(np.column_stack([tilt, delivered, change]))
+    torque = rows.channels - 3 * rows.with_torques
+    along = [tuple(range(axis, torque, 3)) for axis in range(3)]
+    forces = [
+        Follower(name, wrench[:, axis], along[axis])
+        for axis, name in enumerate(("tilt x", "tilt y", "thrust"))
+    ]
+    if not rows.with_torques:
+        return forces
     turned = [p.smooth(p.signals.angular_velocity) for p in flights.pieces({})]
     rates = rows.at_rows(np.concatenate(turned) / NUISANCES.stopped)
-    torque = rows.channels - 3
-    force = tuple(range(2, torque, 3))
     return [
-        Follower("thrust", wrench[:, 0], force),
-        Follower("change of thrust", wrench[:, 4], force),
-        *(Follower(f"torque {x}", wrench[:, 1 + i], (torque + i,)) for i, x in enumerate("xyz")),
+        *forces,
+        Follower("change of thrust", wrench[:, 6], along[2]),
+        *(Follower(f"torque {x}", wrench[:, 3 + i], (torque + i,)) for i, x in enumerate("xyz")),
         *(Follower(f"rate {x}", rates[:, i], (torque + i,)) for i, x in enumerate("xyz")),
     ]
 

@@ -1,0 +1,79 @@
+"""Flights whose rotors are known by commands, in hover: thrust and tilt answer what moves the
+vehicle, and the measured tilt is noise for the most part.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from tests.support.flown import VEHICLE
+from windwrench.dynamics.vehicle import MotorCurve
+from windwrench.identification.diagnosis.diagnosing import diagnose
+from windwrench.identification.diagnosis.row_nuisances import NUISANCES
+from windwrench.identification.logs.flight_log import FlightLog
+
+SECONDS, PERIOD = 20.0, 0.01
+# N of thrust is what a command is taken for
+STATED = replace(VEHICLE, motor_curve=MotorCurve(thrust=(0.0, 0.5, 1.0)))
+
+
+def gusts(rng, size, time):
+    """Return an Ornstein-Uhlenbeck disturbance (samples, axes) with these standard deviations."""
+    keep = math.exp(-PERIOD / time)
+    steps = (
+        rng.standard_normal((round(SECONDS / PERIOD), len(size))) * size * (1.0 - keep**2) ** 0.5
+    )
+    out = np.zeros_like(steps)
+    for k in range(1, len(out)):
+        out[k] = keep * out[k - 1] + steps[k]
+    return out
+
+
+def hover(load, seed):
+    """Return a hover in gusts of a vehicle that carries a load: its loop answers them by thrust and
+    by tilt, of which the motion capture sees 0.3 degrees too much or too little.
+    """
+    rng = np.random.default_rng(seed)
+    push, seen = gusts(rng, np.array([0.04, 0.04, 0.06]), 0.5), gusts(rng, np.full(2, 0.006), 0.1)
+    position, answer = np.zeros_like(push), np.zeros_like(push)
+    position[0, 2] = 1.0
+    velocity = np.zeros(3)
+    for k in range(1, len(push)):
+        wanted = 9.0 * (position[0] - position[k - 1]) - 4.0 * velocity
+        answer[k] = answer[k - 1] + PERIOD / 0.1 * (wanted - answer[k - 1])
+        velocity = velocity + PERIOD * (answer[k] + push[k])
+        position[k] = position[k - 1] + PERIOD * velocity
+    tilt = answer[:, :2] / STATED.gravity + seen
+    attitude = Rotation.from_euler("xy", np.column_stack([-tilt[:, 1], tilt[:, 0]]))
+    thrust = (STATED.mass + load) * (STATED.gravity + answer[:, 2])
+    speed = np.sqrt(thrust / STATED.k.sum())
+    return FlightLog(
+        PERIOD * np.arange(len(push)),
+        position + 2e-4 * rng.standard_normal(position.shape),
+        attitude.as_quat(scalar_first=True),
+        np.repeat(speed[:, None], 4, axis=1),
+        name="hover",
+        commanded=True,
+    )
+
+
+def test_a_hover_shows_a_load_by_the_mean_thrust_alone():
+    """How thrust and the measured tilt go with the motion is the flight loop's answer, and noise:
+    neither tells a lifting force from more thrust.
+    """
+    found = diagnose([hover(0.3 * STATED.mass, seed=0)], STATED)
+    by_name = {e.name: e for e in found.effects}
+    assert "constant_force" not in by_name
+    thrust = by_name["thrust_scale"]
+    scale, std = thrust.coefficients["s"], thrust.std["s"]
+    assert abs(scale - (1.0 / 1.3 - 1.0)) < 1.96 * std
+    # a command makes another thrust in each flight
+    assert std > 0.9 * NUISANCES.thrust * (1.0 + scale)
+
+
+def test_a_hover_without_a_load_shows_neither_more_thrust_nor_a_lift():
+    """A loop that holds the height lets thrust vary against every vertical disturbance."""
+    found = diagnose([hover(0.0, seed=1)], STATED)
+    assert not {"thrust_scale", "constant_force"} & {e.name for e in found.effects}
