@@ -1,5 +1,5 @@
-"""Flights whose rotors are known by commands, in hover: thrust and tilt answer what moves the
-vehicle, and the measured tilt is noise for the most part.
+"""Flights whose rotors are known by commands, in hover: tilt answers what moves the vehicle, and
+the measured tilt is noise for the most part.
 """
 
 import math
@@ -60,8 +60,8 @@ def hover(load, seed):
 
 
 def test_a_hover_shows_a_load_by_the_mean_thrust_alone():
-    """How thrust and the measured tilt go with the motion is the flight loop's answer, and noise:
-    neither tells a lifting force from more thrust.
+    """How the measured tilt goes with the motion is the flight loop's answer, and noise: it does
+    not tell a lifting force from more thrust.
     """
     found = diagnose([hover(0.3 * STATED.mass, seed=0)], STATED)
     by_name = {e.name: e for e in found.effects}
@@ -73,7 +73,6 @@ def test_a_hover_shows_a_load_by_the_mean_thrust_alone():
     assert std > 0.9 * NUISANCES.thrust * (1.0 + scale)
 
 
-def test_a_hover_without_a_load_shows_neither_more_thrust_nor_a_lift():
+def test_in_a_hover_without_a_load_nothing_is_sure():
     """A loop that holds the height lets thrust vary against every vertical disturbance."""
-    found = diagnose([hover(0.0, seed=1)], STATED)
-    assert not {"thrust_scale", "constant_force"} & {e.name for e in found.effects}
+    assert not [e for e in diagnose([hover(0.0, seed=1)], STATED).effects if not e.tentative]
