@@ -30,7 +30,7 @@ class NoiseSettings:
 
 
 NOISE = NoiseSettings()
-STEPS = 40  # of the search, at most
+STEPS = 20  # of the search, at most
 STEP = 1e-4  # of what is searched, for derivatives
 LEAST_POSE = 1e-9  # m and rad: below the last digit of any log
 SEARCHED = 8  # numbers of the noise of a pair

@@ -67,46 +67,56 @@ def rank(
         report: called with a line of progress.
     """
 
-    def beside(setting: Setting, near: Likelihood) -> tuple[Likelihood, Starts]:
-        return Likelihood(flights, setting, near), starts_of(flights, library, setting, {})
-
-    def fitted(setting: Setting, near: Likelihood) -> tuple[Likelihood, Starts, Posterior]:
+    def fitted(setting: Setting, near: Likelihood) -> Likelihood:
         report(f"trying {', '.join(setting)}")
 
         def height(x: Setting) -> Height:
             base = Likelihood(flights, x, near, same_noise=True).base(x, {})
             return linearised(flights, base, base.asked, x)
 
-        setting = tried[frozenset(setting)] = mode(setting, height)
-        best, starts = beside(setting, near)
-        return best, starts, Posterior(flights, library, (loud, best.base(library, starts)))
+        tried[frozenset(setting)] = setting
+        return Likelihood(flights, mode(setting, height), near)
 
-    best = Likelihood(flights, {})
+    def around(best: Likelihood) -> tuple[Starts, Posterior]:
+        starts = starts_of(flights, library, best.setting, {})
+        return starts, Posterior(flights, library, (loud, best.base(library, starts)))
+
+    def alone(best: Likelihood) -> float:
+        base = best.base(best.setting, {})
+        found = Posterior(flights, [*best.setting], (base, base))
+        return found.scores.get(frozenset(best.setting), -math.inf)
+
+    nothing = best = Likelihood(flights, {})
     starts = starts_of(flights, library, {})
-    nothing = best, starts
     loud = best.base(library, starts)
     everything = loud.mode(np.append(loud.plain, loud.at(loud.asked)))
     quiet = best.quieter({c: x for c, (x, _) in everything.items()}, starts)
     found = Posterior(flights, library, (loud, quiet))
+    # as it was asked for: where a fit ends, a little of other effects beside it moves what is asked
     tried: dict[frozenset[str], Setting] = {frozenset(): {}}
     # the best effect first, alone: another set's columns are those of the model that has it
     if setting := found.best_setting(1):
-        seen = [fitted(setting, best)]
+        best = fitted(setting, best)
+        score = alone(best)
+        starts, found = around(best)
         # what is alike counts as a disturbance beside it: each is judged beside its own noise
-        seen += [fitted(x, seen[0][0]) for x in seen[0][2].rivals(setting)]
-        best, starts, found = max(
-            seen, key=lambda x: x[2].scores.get(frozenset(x[0].setting), -math.inf)
-        )
+        rivals = [fitted(x, best) for x in found.rivals(setting)]
+        rival = max(rivals, key=alone, default=best)
+        if rival is not best and alone(rival) > score:
+            best = rival
+            starts, found = around(best)
     for _ in range(ROUNDS):
         # the columns of the same set change with its coefficients, where these have moved far
         setting = found.best_setting()
         if not found.is_elsewhere(setting, tried):
             break
-        best, starts, found = fitted(setting, best)
+        best = fitted(setting, best)
+        starts, found = around(best)
     # once more, with the dictionary's columns, that are dear, beside the likeliest set
     setting = found.best_setting()
     if setting.keys() != best.setting.keys():
-        best, starts = beside(setting, best) if setting else nothing
+        best = Likelihood(flights, setting, best) if setting else nothing
+        starts = starts_of(flights, library, setting, *([{}] if setting else []))
     whole = best.base(library, starts, unknown=True)
     found = Posterior(flights, library, (loud, whole), found.tempering())
     column, size, gained = found.strangest()
