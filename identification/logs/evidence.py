@@ -60,7 +60,7 @@ class EvidenceSettings:
     force_gain: tuple[float, float] = (0.6, 1.6)
     torque_gain: tuple[float, float] = (0.4, 2.5)  # and of thrust in commands
     most_thrust: float = 1.5  # of its 99th percentile: more is a wrong reading of a sensor
-    delays: tuple[float, ...] = tuple(0.02 * k for k in range(-5, 6))
+    delays: tuple[float, ...] = tuple(0.02 * k for k in range(-5, 13))
     # s by which rotors may come late against the motion on one clock: motors, radio and filters
     # make them up to 0.22 s early on measured flights; the most that is looked for, and its steps
     near: tuple[float, float] = (-0.25, 0.1)
