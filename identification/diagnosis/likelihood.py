@@ -133,7 +133,7 @@ class Likelihood:
         if same:
             self._run(self.steady, self._said(self._jumps(), self.gains))
         else:
-            self._search_noise(begun=near is not None)
+            self._search_noise()
         self.signals = [
             _signals(piece, track) for piece, track in zip(self.pieces, self.tracks, strict=True)
         ]
@@ -218,11 +218,10 @@ class Likelihood:
         out = np.array([0.0, 0.0, *wrench]) / self.inertias
         return np.asarray(np.maximum(out, 1e-9))
 
-    def _search_noise(self, begun: bool, explained: Sequence[Array] | None = None) -> None:
+    def _search_noise(self, explained: Sequence[Array] | None = None) -> None:
         """Take the likeliest noise, and the likeliest gains on the rotors' innovations.
 
         Args:
-            begun: whether this noise is roughly known.
             explained: (n, 2, 6) of each piece, what is known to move the pose, and to accelerate,
                 beside the model.
         """
@@ -242,7 +241,7 @@ class Likelihood:
 
         held = np.array(PRIORS.gains)[JUMP_STATE]
         search = NoiseSearch(see, jumps, JUMP_STATE, held, self.period, self.vehicle.gravity)
-        self.noise, self.gains = search.likeliest(self.noise, self.gains, begun)
+        self.noise, self.gains = search.likeliest(self.noise, self.gains)
         self._run(self.steady, self._said(jumps, self.gains))
 
     def _counts(self, piece: int) -> NDArray[np.bool_]:
@@ -390,7 +389,7 @@ class Likelihood:
         whole library the noise is that of a flight of which everything is known.
         """
         out = copy(self)
-        out._search_noise(True, self._explained(coefficients))
+        out._search_noise(self._explained(coefficients))
         out.tracks = [
             replace(
                 track,

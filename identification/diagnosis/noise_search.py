@@ -117,13 +117,12 @@ class NoiseSearch:
     period: float
     gravity: float
 
-    def likeliest(self, near: PoseNoise, gains: Array, begun: bool) -> tuple[PoseNoise, Array]:
+    def likeliest(self, near: PoseNoise, gains: Array) -> tuple[PoseNoise, Array]:
         """Return the noise and the gains (3, e) at maximum likelihood, by damped steps.
 
         Args:
             near: the noise at which the search begins.
             gains: (3, e) at which it begins.
-            begun: whether that noise is roughly known.
         """
         x = _free(near)
         low, high = x - 16.0, x + 16.0
@@ -131,8 +130,6 @@ class NoiseSearch:
         low[:, 0] = math.log(LEAST_POSE)
         low[:, 2:], high[:, 2:] = (math.log(NOISE.times[0]), 0.0), (math.log(NOISE.times[1]), 1e4)
         x = np.clip(x, low, high)
-        if not begun:
-            x = np.clip(self._start(x, gains), low, high)
         none = np.full(gains.shape, np.inf)
         low, high = (np.column_stack([y, _pairs(z)]) for y, z in ((-none, low), (none, high)))
         at = np.column_stack([gains, _pairs(x)])
@@ -153,17 +150,6 @@ class NoiseSearch:
                 at = at + better[:, None] * step
                 height, normal, right = self._slopes(at)
         return self._noise(at), at[:, :-SEARCHED]
-
-    def _start(self, x: Array, gains: Array) -> Array:
-        """Return of nine starts the best one of each axis."""
-        steps = [[0.0, y, z, 0.0] for y in (-2.0, 0.0, 2.0) for z in (-1.6, 0.0, 1.6)]
-        tried = x + np.array(steps)[:, None, :]
-        found = []
-        for start in tried:
-            steady = steady_filter(_noise(start), self.period, self.gravity)
-            e, variance = self._innovations(steady, gains), np.diagonal(steady.covariance)
-            found.append(np.square(e).sum(axis=0) / variance + len(e) * np.log(variance))
-        return np.asarray(tried[np.argmin(found, axis=0), np.arange(6)])
 
     def _innovations(self, steady: SteadyFilter, gains: Array) -> Array:
         return np.concatenate([seen.innovations[seen.fit] for seen in self.see(steady, gains)])
