@@ -120,7 +120,7 @@ class Likelihood:
             near = None
         same = near if same_noise else None
         self.noise: PoseNoise = near.noise if near else self._first_noise()
-        # of the rotors' innovations, and what they say (n, 6, 3) of each piece
+        # by which the states answer the rotors' innovations
         self.gains: Array = near.gains if near else np.zeros((len(PAIRS), len(JUMP_STATE)))
         # what is added to the rotor speeds (n, 4) of each piece that the log rounds; and what they
         # do that the past does not predict, as a filter sees it that follows the pose closely

@@ -222,8 +222,8 @@ class NoiseSearch:
         numbers = range(SEARCHED)
         noise = [self._noise(at + STEP * np.eye(at.shape[1])[i - SEARCHED]) for i in numbers]
         fields = ("pose", "disturbance", "time", "white")
-        all_ = PoseNoise(*(np.stack([getattr(x, f) for x in noise]) for f in fields))
-        there = steady_filter(all_, self.period, self.gravity)
+        moved = PoseNoise(*(np.stack([getattr(x, f) for x in noise]) for f in fields))
+        there = steady_filter(moved, self.period, self.gravity)
         gain = (there.gain - here.gain).reshape(SEARCHED, 6, 6)
         slopes = np.concatenate([gain, (there.keep - here.keep)[..., None]], axis=2) / STEP
         change = (_covariance(there) - _covariance(here)) / STEP

@@ -101,9 +101,9 @@ def rank(
         starts, found = around(best)
         # what is alike counts as a disturbance beside it: each is judged beside its own noise
         rivals = [fitted(x, best) for x in found.rivals(setting)]
-        rival = max(rivals, key=alone, default=best)
-        if rival is not best and alone(rival) > score:
-            best = rival
+        scores = [score, *map(alone, rivals)]
+        if max(scores) > score:
+            best = [best, *rivals][scores.index(max(scores))]
             starts, found = around(best)
     for _ in range(ROUNDS):
         # the columns of the same set change with its coefficients, where these have moved far

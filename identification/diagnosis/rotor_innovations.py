@@ -24,7 +24,8 @@ Array = NDArray[np.float64]
 # 23 flights whose loops saw more than their logs, 7 got a wrong probable set with 4, and 4 with 20
 LAGS = 20
 # of a regression on rounded speeds. Of 34 hovers, half by a simulator that is not ours, the
-# likeliest set is the true one on 16 without, and on 19 with 5
+# likeliest set is the true one on 16 without, and on 19 with 5. More rounds are nearer to the true
+# speeds, but what is left of the error then follows the loop: with 12, fewer sets were right
 ROUNDS = 5
 # the axis of the pose that each of thrust and torques drives
 DRIVEN = (2, 3, 4, 5)
