@@ -1,4 +1,4 @@
-"""What a diagnosis finds, as plain data: ``diagnosis.py`` fills it, ``report.py`` writes it down.
+"""What a diagnosis finds, as plain data: ``diagnosis`` fills it, ``report`` writes it down.
 
 Everything that was compared was low-passed at ``Diagnosis.cutoff_hz`` with zero phase. Force is in
 the world frame, torque about the centre of mass in the body frame.
