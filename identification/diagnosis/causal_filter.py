@@ -2,10 +2,10 @@
 coefficient changes in its innovations.
 
 The state is position, velocity, attitude, angular velocity and the disturbance's force and torque
-as accelerations: 18 numbers. Innovations are along the heading and to its left, where each axis has
-a steady gain. So the filter is an observer of fixed gains: what an innovation changes with a
-coefficient follows from linear recursions, exactly but for second order. Rotor speeds move linearly
-between samples.
+as accelerations: 18 numbers. Rolls and pitches are told about the world's x and y, turned with the
+heading: there each axis has a steady gain, on whatever way the vehicle yaws. So the filter is an
+observer of fixed gains: what an innovation changes with a coefficient follows from linear
+recursions, exactly but for second order. Rotor speeds move linearly between samples.
 """
 
 import math
@@ -23,6 +23,7 @@ from .steady_filter import PARTNER, SteadyFilter
 
 Array = NDArray[np.float64]
 _MODEL = np.dtype(MODEL_FIELDS)
+STRAIGHT = (0, 1, 2, 5)  # axes that the heading does not turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,14 +63,16 @@ class Track(State):
     model: Array  # (n, 6) acceleration of the model alone
     predicted: Array  # (n, 7) position and quaternion at sample k, from samples before it
     heading: Array  # (n, 2) cosine and sine, at sample k
-    innovations: Array  # (n, 6) m, along the heading, to its left and up; rad in the body frame
+    innovations: Array  # (n, 6) m, world; rad, as ``level`` returns them
     disturbance: Array  # (n, 6) m/s2, world; rad/s2
 
 
-def ahead(track: Track, x: Array) -> Array:
-    """Return world vectors (n, 3) along the heading, to its left and up; further columns stay."""
-    (c, s), out = track.heading.T, x.copy()
-    out[:, 0], out[:, 1] = c * x[:, 0] + s * x[:, 1], c * x[:, 1] - s * x[:, 0]
+def level(heading: Array, x: Array) -> Array:
+    """Return vectors (n, 3) in body axes, about the world's x and y as the heading (n, 2) turns
+    them, and body z.
+    """
+    (c, s), out = heading.T, x.copy()
+    out[:, 0], out[:, 1] = c * x[:, 0] - s * x[:, 1], s * x[:, 0] + c * x[:, 1]
     return out
 
 
@@ -89,13 +92,19 @@ def _add(
     (2, 3); write what it turns the attitude by (3,).
     """
     for s in range(3):
-        moving[s, 0] += ahead * said[0, s] - left * said[1, s]
-        moving[s, 1] += left * said[0, s] + ahead * said[1, s]
-        moving[s, 2] += said[2, s]
-    for i in range(3):
-        turn[i] = said[3 + i, 0]
-        turning[0, i] += said[3 + i, 1]
-        turning[1, i] += said[3 + i, 2]
+        for i in range(3):
+            moving[s, i] += said[i, s]
+        x, y, z = (
+            ahead * said[3, s] + left * said[4, s],
+            ahead * said[4, s] - left * said[3, s],
+            said[5, s],
+        )
+        if s == 0:
+            turn[0], turn[1], turn[2] = x, y, z
+        else:
+            turning[s - 1, 0] += x
+            turning[s - 1, 1] += y
+            turning[s - 1, 2] += z
 
 
 @compiled
@@ -154,9 +163,9 @@ def _run(
         e1 = sign * (o[0] * m[2] + o[1] * m[3] - o[2] * m[0] - o[3] * m[1])
         e2 = sign * (o[0] * m[3] - o[1] * m[2] + o[2] * m[1] - o[3] * m[0])
         e = innovations[k]
-        e[3], e[4], e[5] = 2 * e0, 2 * e1, 2 * e2
-        x0, x1 = position[k, 0] - p[0], position[k, 1] - p[1]
-        e[0], e[1], e[2] = ahead * x0 + left * x1, ahead * x1 - left * x0, position[k, 2] - p[2]
+        e[3], e[4], e[5] = 2 * (ahead * e0 - left * e1), 2 * (left * e0 + ahead * e1), 2 * e2
+        for i in range(3):
+            e[i] = position[k, i] - p[i]
         for i in range(6):
             for s in range(3):
                 say[i, s] = gain[i, s, 0] * e[i] + gain[i, s, 1] * e[PARTNER[i]]
@@ -206,9 +215,11 @@ def _run(
             v[i] += period * acting[k, i]
             step[i] = period * (w[i] + half * acting[k, 3 + i])
             w[i] += period * acting[k, 3 + i]
-            torque[i] *= keep[3 + i]
-        x, y = keep[0] * (ahead * d[0] + left * d[1]), keep[1] * (ahead * d[1] - left * d[0])
-        d[0], d[1], d[2] = ahead * x - left * y, left * x + ahead * y, keep[2] * d[2]
+            d[i] *= keep[i]
+        x = keep[3] * (ahead * torque[0] - left * torque[1])
+        y = keep[4] * (left * torque[0] + ahead * torque[1])
+        torque[0], torque[1] = ahead * x + left * y, ahead * y - left * x
+        torque[2] *= keep[5]
         _turn(q2, step, q)
 
 
@@ -288,19 +299,19 @@ def sensitivities(
         ahead, left = heading[k, 0], heading[k, 1]
         for j in range(e):
             s = jump_state[j]
-            for i in range(2, 6):
+            for i in STRAIGHT:
                 state[i, s, a + j] += jumps[k, i, j]
-            x, y = jumps[k, 0, j], jumps[k, 1, j]
-            state[0, s, a + j] += ahead * x - left * y
-            state[1, s, a + j] += left * x + ahead * y
+            x, y = jumps[k, 3, j], jumps[k, 4, j]
+            state[3, s, a + j] += ahead * x + left * y
+            state[4, s, a + j] += ahead * y - left * x
         for i in range(6):
             for j in range(c):
                 out[k, i, j] = state[i, 0, j]
             for j in range(b):
                 out[k, i, a - b + j] -= moved[k, i, j]
         for j in range(c):
-            x, y = out[k, 0, j], out[k, 1, j]
-            out[k, 0, j], out[k, 1, j] = ahead * x + left * y, ahead * y - left * x
+            x, y = out[k, 3, j], out[k, 4, j]
+            out[k, 3, j], out[k, 4, j] = ahead * x - left * y, left * x + ahead * y
         for i in range(6):
             o = PARTNER[i]
             for s in range(3):
@@ -308,13 +319,13 @@ def sensitivities(
                 for j in range(c):
                     say[i, s, j] = -own * out[k, i, j] - other * out[k, o, j]
         for s in range(3):
-            for i in range(2, 6):
+            for i in STRAIGHT:
                 for j in range(c):
                     state[i, s, j] += say[i, s, j]
             for j in range(c):
-                x, y = say[0, s, j], say[1, s, j]
-                state[0, s, j] += ahead * x - left * y
-                state[1, s, j] += left * x + ahead * y
+                x, y = say[3, s, j], say[4, s, j]
+                state[3, s, j] += ahead * x + left * y
+                state[4, s, j] += ahead * y - left * x
         for i in range(3):
             for j in range(c):
                 mid[i, j] = state[3 + i, 0, j] + 0.5 * period * state[3 + i, 1, j]
@@ -341,9 +352,9 @@ def sensitivities(
                 )
                 state[3 + i, 1, j] += period * g
         for j in range(c):
-            x, y = state[0, 2, j], state[1, 2, j]
-            x, y = keep[0] * (ahead * x + left * y), keep[1] * (ahead * y - left * x)
-            state[0, 2, j], state[1, 2, j] = ahead * x - left * y, left * x + ahead * y
-        for i in range(2, 6):
+            x, y = state[3, 2, j], state[4, 2, j]
+            x, y = keep[3] * (ahead * x - left * y), keep[4] * (left * x + ahead * y)
+            state[3, 2, j], state[4, 2, j] = ahead * x + left * y, ahead * y - left * x
+        for i in STRAIGHT:
             for j in range(c):
                 state[i, 2, j] *= keep[i]

@@ -26,7 +26,7 @@ from ..motion.sensing_effects import undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, log_signals
 from ..motion.smoothing import continuous, turn_between
-from .causal_filter import Poses, Track, ahead, run, sensitivities
+from .causal_filter import Poses, Track, level, run, sensitivities
 from .discrepancy import changing_columns, discrepancy_columns, variables
 from .log_offsets import (
     ATTITUDE_TIME_OFFSET,
@@ -235,7 +235,8 @@ class Likelihood:
                 if explained is not None:
                     pose, force = explained[i][:, 0, :, None], explained[i][:, 1, :, None]
                     seen = seen - self._changes(track, steady, force, pose)[:, :, 0]
-                disturbance = ahead(track, track.disturbance)
+                disturbance = track.disturbance.copy()
+                disturbance[:, 3:] = level(track.heading, disturbance[:, 3:])
                 out.append(Seen(seen, disturbance, self._counts(i)))
             return out
 
@@ -468,9 +469,9 @@ class Likelihood:
             # an innovation of sample k changes the state after it: the jump is before sample k + 1
             found = np.vstack([np.zeros(4), found[:-1]])
             x = np.zeros((len(found), 6, len(JUMP_STATE) // len(STATES)))
-            x[:, :3, 0] = found[:, :1] * ahead(track, track.rotation[:, :, 2])
-            x[:, 3:, 1] = found[:, 1:]
-            x[:, 0, 2], x[:, 1, 2] = tilt * found[:, 2], tilt * found[:, 1]
+            x[:, :3, 0] = found[:, :1] * track.rotation[:, :, 2]
+            x[:, 3:, 1] = level(track.heading, found[:, 1:])
+            x[:, 0, 2], x[:, 1, 2] = tilt * x[:, 4, 1], tilt * x[:, 3, 1]
             out.append((x[..., None] * self._units).reshape(len(x), 6, -1))
         return out
 

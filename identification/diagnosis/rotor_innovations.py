@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from .causal_filter import Poses, Track
+from .causal_filter import Poses, Track, level
 
 Array = NDArray[np.float64]
 
@@ -115,14 +115,17 @@ def _known_before(track: Track, rotors: Array) -> Array:
     known = [rotors[i : i + count] for i in reversed(range(LAGS))]
     before = slice(LAGS - 1, LAGS - 1 + count)
     body = np.einsum("nij,ni->nj", track.rotation[before], track.velocity[before])
+    # along the heading and to its left, and about the body's axes
+    back = track.heading * [1.0, -1.0]
+    seen = np.hstack([level(back, x) for x in np.hsplit(track.innovations, 2)])
     known += [
         track.rotation[before][:, 2, :2],
         body,
         track.position[before],
         track.angular_velocity[before],
         track.acceleration[before] - track.model[before],
-        track.innovations[before],
+        seen[before],
         # the loop may have read this sample's pose before the rotors were logged
-        track.innovations[LAGS:],
+        seen[LAGS:],
     ]
     return np.column_stack(known)
