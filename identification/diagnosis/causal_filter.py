@@ -265,15 +265,19 @@ def sensitivities(
     heading: Array,
     pull: Array,
     rate: Array,
+    gyration: Array,
     acting: Array,
     moved: Array,
     jumps: Array,
     jump_state: np.ndarray,
+    slopes: Array,
+    innovations: Array,
+    disturbance: Array,
     state: Array,
     out: Array,
 ) -> None:
     """Write by how much the innovations' predictions (n, 6, c) change with a unit of each column;
-    in the directions of ``Track.innovations``, and so are the jumps.
+    in the directions of ``Track.innovations``, and so are jumps, innovations and disturbances.
 
     Args:
         period: s.
@@ -283,18 +287,24 @@ def sensitivities(
         pull: (n, 3, 2) by how much the acceleration (world) grows with an error of the attitude
             about body x and y.
         rate: (n, 3) angular velocity.
+        gyration: (n, 3, 3) by how much the angular acceleration grows with the angular velocity.
         acting: (n, 6, a) what a unit of the first ``a`` columns adds to the model's acceleration.
         moved: (n, 6, b) by how much a unit of the last ``b`` of those moves the measured pose.
         jumps: (n, 6, e) what a unit of the columns behind them adds to one state of each axis,
             before the pose of sample k is read.
         jump_state: (e,) the state: 0 the pose, 1 its rate, 2 the disturbance.
+        slopes: (6, 7, m) what a unit of the last columns adds to the gains of each axis, in the
+            order of ``gain``, and to ``keep``.
+        innovations: (n, 6) to which the filter answers.
+        disturbance: (n, 6) that it has, when it has read a pose.
         state: (6, 3, c) carried from one call to the next.
         out: (n, 6, c).
     """
     n, a, b, e = len(acting), acting.shape[2], moved.shape[2], jumps.shape[2]
-    c = a + e
+    m = slopes.shape[2]
+    c, f = a + e + m, a + e
     half = 0.5 * period * period
-    mid, say = np.empty((3, c)), np.empty((6, 3, c))
+    mid, turned, say = np.empty((3, c)), np.empty((3, c)), np.empty((6, 3, c))
     for k in range(n):
         ahead, left = heading[k, 0], heading[k, 1]
         for j in range(e):
@@ -318,6 +328,9 @@ def sensitivities(
                 own, other = gain[i, s, 0], gain[i, s, 1]
                 for j in range(c):
                     say[i, s, j] = -own * out[k, i, j] - other * out[k, o, j]
+                x, y = innovations[k, i], innovations[k, o]
+                for j in range(m):
+                    say[i, s, f + j] += slopes[i, 2 * s, j] * x + slopes[i, 2 * s + 1, j] * y
         for s in range(3):
             for i in STRAIGHT:
                 for j in range(c):
@@ -338,10 +351,15 @@ def sensitivities(
                 state[i, 0, j] += period * state[i, 1, j] + half * g
                 state[i, 1, j] += period * g
         for i in range(3):
+            gx, gy, gz = gyration[k, i, 0], gyration[k, i, 1], gyration[k, i, 2]
+            for j in range(c):
+                g = state[3 + i, 2, j]
+                turned[i, j] = g + gx * state[3, 1, j] + gy * state[4, 1, j] + gz * state[5, 1, j]
+        for i in range(3):
             x, y = (i + 1) % 3, (i + 2) % 3
             wx, wy = rate[k, x], rate[k, y]
             for j in range(c):
-                g = state[3 + i, 2, j]
+                g = turned[i, j]
                 if j < a:
                     g += acting[k, 3 + i, j]
                 # an error in body axes turns back as these turn on
@@ -353,8 +371,19 @@ def sensitivities(
                 state[3 + i, 1, j] += period * g
         for j in range(c):
             x, y = state[3, 2, j], state[4, 2, j]
-            x, y = keep[3] * (ahead * x - left * y), keep[4] * (left * x + ahead * y)
+            mid[0, j], mid[1, j] = (
+                keep[3] * (ahead * x - left * y),
+                keep[4] * (left * x + ahead * y),
+            )
+        x, y = disturbance[k, 3], disturbance[k, 4]
+        for j in range(m):
+            mid[0, f + j] += slopes[3, 6, j] * x
+            mid[1, f + j] += slopes[4, 6, j] * y
+        for j in range(c):
+            x, y = mid[0, j], mid[1, j]
             state[3, 2, j], state[4, 2, j] = ahead * x + left * y, ahead * y - left * x
         for i in STRAIGHT:
             for j in range(c):
                 state[i, 2, j] *= keep[i]
+            for j in range(m):
+                state[i, 2, f + j] += slopes[i, 6, j] * disturbance[k, i]

@@ -34,7 +34,7 @@ from .log_offsets import (
     ROTOR_TIME_OFFSET,
     with_time_offsets,
 )
-from .noise_search import NOISE, NoiseSearch, Seen
+from .noise_search import NOISE, NoiseSearch
 from .priors import (
     BETWEEN,
     GAIN,
@@ -68,6 +68,7 @@ STATES = (0, 1, 2)  # of an axis: pose, rate, disturbance
 SIDEWAYS = 0.01
 
 
+OWN = np.equal(np.arange(6)[:, None, None], PAIRS).any(axis=2)  # (6, 3) whether a pair's axis
 FIRST_DISTURBANCE = 0.3  # m/s2 and rad/s2, at which the search for the noise begins
 
 
@@ -178,9 +179,7 @@ class Likelihood:
     @staticmethod
     def _said(jumps: Iterable[Array], gains: Array) -> list[Array]:
         """Return what the rotors' innovations add to the states of each piece (n, 6, 3)."""
-        own = np.empty((6, gains.shape[1]))
-        own[PAIRS] = gains[:, None]
-        said = [np.split(x * own, len(JUMP_STATE) // len(STATES), axis=2) for x in jumps]
+        said = [np.split(x * (OWN @ gains), len(JUMP_STATE) // len(STATES), axis=2) for x in jumps]
         return [np.add.reduce(parts) for parts in said]
 
     # Noise
@@ -227,23 +226,36 @@ class Likelihood:
         """
         jumps = self._jumps()
 
-        def see(steady: SteadyFilter, gains: Array) -> list[Seen]:
+        def see(
+            steady: SteadyFilter, gains: Array, slopes: Array | None
+        ) -> Iterator[tuple[Array, Array]]:
             self._run(steady, self._said(jumps, gains))
-            out = []
             for i, track in enumerate(self.tracks):
-                seen = track.innovations
+                none, counts = np.empty((len(track.t), 6, 0)), self._counts(i)
                 if explained is not None:
                     pose, force = explained[i][:, 0, :, None], explained[i][:, 1, :, None]
-                    seen = seen - self._changes(track, steady, force, pose)[:, :, 0]
-                disturbance = track.disturbance.copy()
-                disturbance[:, 3:] = level(track.heading, disturbance[:, 3:])
-                out.append(Seen(seen, disturbance, self._counts(i)))
-            return out
+                    change = self._changes(track, steady, force, pose)[:, :, 0]
+                    track = replace(track, innovations=track.innovations - change)
+                if slopes is None:
+                    yield track.innovations[counts], none[counts]
+                    continue
+                state = np.zeros((6, 3, gains.size + slopes.shape[2]))
+                for at in self._blocks(track):
+                    own = (jumps[i][at, :, None] * OWN[:, :, None]).reshape(-1, 6, gains.size)
+                    changes = self._changes(
+                        track, steady, none[at], none[at], at, own, state, slopes
+                    )
+                    yield track.innovations[at][counts[at]], changes[counts[at]]
 
         held = np.array(PRIORS.gains)[JUMP_STATE]
-        search = NoiseSearch(see, jumps, JUMP_STATE, held, self.period, self.vehicle.gravity)
+        search = NoiseSearch(see, held, self.period, self.vehicle.gravity)
         self.noise, self.gains = search.likeliest(self.noise, self.gains)
         self._run(self.steady, self._said(jumps, self.gains))
+
+    def _blocks(self, track: Track) -> Iterator[slice]:
+        """Return the parts of a piece of which the columns are in memory at a time."""
+        length, n = round(REGRESSION.block / self.period), len(track.t)
+        return (slice(begin, min(begin + length, n)) for begin in range(0, n, length))
 
     def _counts(self, piece: int) -> NDArray[np.bool_]:
         """Return which samples of a piece the fit may see."""
@@ -483,12 +495,10 @@ class Likelihood:
         names = (*asked, *drives)
         root = np.linalg.cholesky(steady.covariance)
         inverse = np.linalg.inv(root)
-        length = round(REGRESSION.block / self.period)
         blocks, samples = [], 0
         for i, (track, jumps) in enumerate(zip(self.tracks, self._jumps(), strict=True)):
             state, counts = np.zeros((6, 3, len(names))), self._counts(i)
-            for begin in range(0, len(track.position), length):
-                at = slice(begin, min(begin + length, len(track.position)))
+            for at in self._blocks(track):
                 rows = at.stop - at.start
                 x, y = np.zeros((rows, 6, len(asked))), np.zeros((rows, 6, len(moved)))
                 for j, c in enumerate(asked):
@@ -519,6 +529,7 @@ class Likelihood:
         at: slice = slice(None),
         jumps: Array | None = None,
         state: Array | None = None,
+        slopes: Array | None = None,
     ) -> Array:
         """Return what a unit of columns changes in the predictions (n, 6, c) of a part of a piece.
 
@@ -530,12 +541,14 @@ class Likelihood:
             at: the part.
             jumps: (n, 6, e), of the states in turn; default: none.
             state: carried from one part to the next; default: none.
+            slopes: (6, 7, m) of ``sensitivities``; default: none.
         """
-        if jumps is None:
-            jumps = np.zeros((len(acting), 6, 0))
-        e = jumps.shape[2]
+        jumps = np.empty((len(acting), 6, 0)) if jumps is None else jumps
+        slopes = np.empty((6, 7, 0)) if slopes is None else slopes
+        e, disturbance = jumps.shape[2], track.disturbance[at].copy()
+        disturbance[:, 3:] = level(track.heading[at], disturbance[:, 3:])
         if state is None:
-            state = np.zeros((6, 3, acting.shape[2] + e))
+            state = np.zeros((6, 3, acting.shape[2] + e + slopes.shape[2]))
         out = np.empty((len(acting), 6, state.shape[2]))
         sensitivities(
             self.period,
@@ -544,14 +557,25 @@ class Likelihood:
             track.heading[at],
             track.rotors[at, :1, None] * track.rotation[at, :, 1::-1] * [-1.0, 1.0],
             track.angular_velocity[at],
+            gyration(self.vehicle, track.angular_velocity[at]),
             np.ascontiguousarray(acting),
             np.ascontiguousarray(moved),
             jumps,
             np.resize(STATES, e),
+            slopes,
+            track.innovations[at],
+            disturbance,
             state,
             out,
         )
         return out
+
+
+def gyration(vehicle: Vehicle, rate: Array) -> Array:
+    """Return by how much the angular acceleration (n, 3, 3) grows with the angular velocity."""
+    # -u x J v over the inertia J, of all pairs of axes u and v
+    twist = -np.cross(np.eye(3)[:, None], vehicle.inertia) @ np.linalg.inv(vehicle.inertia)
+    return np.einsum("nk,kji->nij", rate, twist + twist.swapaxes(0, 1))
 
 
 def _bent_rotors(s: Signals) -> Signals:
