@@ -2,13 +2,17 @@
 coefficient changes in the innovations of all axes.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
+from scipy.spatial.transform import Rotation
 
 from tests.support.flown import VEHICLE, recorded
-from windwrench.identification.diagnosis.likelihood import Likelihood
-from windwrench.identification.diagnosis.noise_search import NoiseSearch, Seen
+from windwrench.identification.diagnosis.causal_filter import sensitivities
+from windwrench.identification.diagnosis.likelihood import OWN, Likelihood, gyration
+from windwrench.identification.diagnosis.noise_search import NoiseSearch, _free
 from windwrench.identification.diagnosis.regression import Flights
 from windwrench.identification.diagnosis.steady_filter import (
     PAIRS,
@@ -54,9 +58,12 @@ def search():
         state = moved(state, TRUE.white * rng.standard_normal(6))
         state[:, 2] += spread * rng.standard_normal(6)
 
-    def see(steady, gains):
-        own = np.empty(6)
-        own[PAIRS] = gains
+    pull = np.zeros((n, 3, 2))
+    pull[:, 1, 0], pull[:, 0, 1] = PULLS[1], PULLS[0]
+    still, none = (np.tile([1.0, 0.0], (n, 1)), np.zeros((n, 3))), np.empty((n, 6, 0))
+
+    def see(steady, gains, slopes):
+        own = (OWN @ gains)[:, 0]
         x, innovations, disturbance = np.zeros((6, 3)), np.empty((n, 6)), np.empty((n, 6))
         for k in range(n):
             x[:, 2] += own * jumps[k, :, 0]
@@ -65,9 +72,30 @@ def search():
             disturbance[k] = x[:, 2]
             x = moved(x, 0.0)
             x[:, 2] = steady.keep * disturbance[k]
-        return [Seen(innovations, disturbance, np.arange(n) >= 100)]
+        slopes = np.empty((6, 7, 0)) if slopes is None else slopes
+        each = np.ascontiguousarray(jumps * OWN)
+        out = np.empty((n, 6, 3 + slopes.shape[2]))
+        sensitivities(
+            PERIOD,
+            steady.gain,
+            steady.keep,
+            still[0],
+            pull,
+            still[1],
+            np.zeros((n, 3, 3)),
+            none,
+            none,
+            each,
+            np.array([2, 2, 2]),
+            slopes,
+            innovations,
+            disturbance,
+            np.zeros((6, 3, out.shape[2])),
+            out,
+        )
+        return [(innovations[100:], out[100:])]
 
-    return NoiseSearch(see, [jumps], np.array([2]), np.array([1e2]), PERIOD, GRAVITY)
+    return NoiseSearch(see, np.array([1e2]), PERIOD, GRAVITY)
 
 
 def test_the_gains_are_those_of_the_riccati_equation():
@@ -104,13 +132,37 @@ def test_the_likeliest_noise_is_the_true_one(search):
 def test_the_search_follows_the_likelihood(search):
     """Its gradient is that of the height."""
     x = np.column_stack([np.log([TRUE.pose, TRUE.disturbance, TRUE.time]).T, np.full(6, 0.1)])
-    at = np.column_stack([[0.0, 0.0, 0.3], x[PAIRS].reshape(3, 8)])
+    at = np.append([0.0, 0.0, 0.3], x)
     height, _, right = search._slopes(at)
     np.testing.assert_allclose(height, search._height(at))
-    for i in range(at.shape[1]):
-        step = 1e-4 * np.eye(at.shape[1])[i]
+    for i, step in enumerate(1e-4 * np.eye(len(at))):
         rise = (search._height(at + step) - search._height(at - step)) / 2e-4
-        np.testing.assert_allclose(rise, -right[:, i], rtol=0.01, atol=0.5)
+        assert rise == pytest.approx(-right[i], rel=0.01, abs=0.5)
+
+
+def test_the_search_follows_the_likelihood_where_a_vehicle_spins(monkeypatch):
+    log = recorded("hover", seconds=12.0)
+    spin = Rotation.from_rotvec(np.outer(log.t, [0.0, 0.0, 6.0]))
+    q = spin * Rotation.from_quat(log.quaternion, scalar_first=True)
+    searches = []
+    monkeypatch.setattr(NoiseSearch, "likeliest", lambda *x: searches.append(x) or x[1:])
+    Likelihood(Flights([replace(log, quaternion=q.as_quat(scalar_first=True))], VEHICLE), {})
+    search, near, gains = searches[0]
+    at = np.append(gains, _free(near) + [0.0, 0.0, 0.0, 0.1])
+    right = search._slopes(at)[2]
+    for i in range(-24, 0):
+        step = 1e-4 * np.eye(len(at))[i]
+        rise = (search._height(at + step) - search._height(at - step)) / 2e-4
+        assert rise == pytest.approx(-right[i], rel=0.01, abs=0.5)
+
+
+def test_gyroscopic_torques_grow_with_the_rate():
+    J = np.array([[2.0, 0.1, 0.0], [0.1, 3.0, 0.2], [0.0, 0.2, 5.0]])
+    rate = np.array([0.3, -0.7, 1.9])
+    found = gyration(replace(VEHICLE, inertia=J), rate[None])[0]
+    for i, step in enumerate(1e-4 * np.eye(3)):
+        there, here = (np.linalg.solve(J, np.cross(w, J @ w)) for w in (rate + step, rate - step))
+        np.testing.assert_allclose(found[:, i], (here - there) / 2e-4, atol=1e-9)
 
 
 def test_columns_say_what_a_coefficient_changes_in_the_innovations():
