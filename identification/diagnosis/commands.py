@@ -43,7 +43,7 @@ def what_commands_show(flights: Flights, library: Sequence[str]) -> Given:
         # commands are late
         same = [x for x in playing(Role.LAG, Role.DELAY, among=library) if x != delay]
         library = [e for e in library if e not in same]
-        if shown := turning_delay(seen, flights.vehicle):
+        if shown := turning_delay(seen, flights.vehicle, flights.logs[0].period):
             library.remove(delay)
             c = get(delay).coefficients[0]
             late = NamedEffect(

@@ -54,6 +54,7 @@ from .regression import (
     without,
 )
 from .residuals import balance, beyond_calm, transient_disturbances
+from .row_nuisances import NUISANCES
 from .settings import DIAGNOSIS, DiagnosisSettings
 from .traces import carrying_channels, signature
 from .unknown import signs, unknown
@@ -257,14 +258,27 @@ class Judged:
         shown = self._found.posterior.shown(known)
         return frozenset(e for e, x in shown.items() if x < self._rule.least_shown)
 
+    def _std(self, effect: str) -> dict[str, float]:
+        """Return the standard deviations of an effect in the likeliest set; of what stands for the
+        thrust of commands, with what a flight's thrust differs by from what is usual.
+        """
+        flights, std = self._flights, self.ranking.sets[0].std[effect]
+        if not flights.commanded or get(effect).role not in THRUST_FACTORS:
+            return dict(std)
+        off = NUISANCES.thrust / math.sqrt(len(flights.logs))
+        return {
+            name: math.hypot(x, off * unit_of_change((effect, name), flights.vehicle))
+            for name, x in std.items()
+        }
+
     def _differs(self, effect: str) -> float:
         """Return the probability that a calibration, which is in every set, differs from what the
         vehicle states; 0 where it does so by too little for a name.
         """
         flights, best = self._flights, self.ranking.sets[0]
-        own, most = flights.coefficients({}, effect), 0.0
+        own, stds, most = flights.coefficients({}, effect), self._std(effect), 0.0
         for name, value in best.coefficients[effect].items():
-            off, std = abs(value - own.get(name, 0.0)), best.std[effect].get(name, 0.0)
+            off, std = abs(value - own.get(name, 0.0)), stds.get(name, 0.0)
             least = self._rule.least_size * typical_size((effect, name), flights.vehicle)
             if off > least and std:
                 most = max(most, math.erf(off / std / math.sqrt(2.0)))
@@ -341,7 +355,7 @@ class Judged:
         self, effect: str, probability: float, size: float, unsure: bool, others: tuple[str, ...]
     ) -> NamedEffect:
         flights, rule, found = self._flights, self._rule, self._found
-        std = dict(self.ranking.sets[0].std[effect])
+        std = self._std(effect)
         # that an effect acts at the rotors, as it is written, is nothing to report
         values = {
             name: x

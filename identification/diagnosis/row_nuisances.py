@@ -32,15 +32,23 @@ NUISANCES = NuisanceSettings()
 
 
 def row_nuisances(rows: Rows) -> dict[str, Array]:
-    """Return columns (n, channels) by name, each in standard deviations of its prior."""
+    """Return columns (n, channels) by name, each in standard deviations of its prior.
+
+    Of thrust at a command they are the differences between flights: what all flights share is the
+    thrust's own coefficient, and a column nearly like its own would with it be a lag or a drag.
+    """
     out: dict[str, Array] = {}
-    for i in range(len(rows.flights.logs)):
+    count = len(rows.flights.logs)
+    for i in range(count):
         here = np.zeros(len(rows.flights.t))
         here[rows.flights.log == i] = 1.0
         if here.any():
             of = _Flown(rows, i, here)
             out |= _of_sensors(of)
             out |= _of_commands(of) if rows.flights.commanded else _of_rotors(of)
+    differ = [name for name in (f"thrust {i}" for i in range(count)) if name in out]
+    shared = sum(out[name] for name in differ) / max(len(differ), 1)
+    out |= {name: out[name] - shared for name in differ}
     offsets = rows.flights.offsets
     found = rows.columns({}, offsets)
     return out | {c[1]: offsets[c].size * x for c, x in found.items()}
@@ -70,6 +78,7 @@ class _Flown:
 def _of_commands(of: _Flown) -> dict[str, Array]:
     """Return what differs between flights whose rotors are known by commands.
 
+    From one sample to the next rotors may be held or not, and lag: half a period is not known.
     Where the delay of commands is known from how the vehicle turns, that of its thrust may still
     differ: the flight loop answers vertical motion.
     """
@@ -80,9 +89,9 @@ def _of_commands(of: _Flown) -> dict[str, Array]:
     out[f"drift {i}"] = use.drift * rows.from_body(of.along(2, of.thrust * w))
     bend = of.thrust * (1.5 * w * w - 0.5)
     out[f"bend {i}"] = use.drift * rows.from_body(of.along(2, bend))
-    if rows.fixed:
-        late = rows.columns({}, [ROTOR_TIME_OFFSET])[ROTOR_TIME_OFFSET]
-        out[f"delay {i}"] = use.delay * rows.at_rows(of.here)[:, None] * late
+    late = rows.columns({}, [ROTOR_TIME_OFFSET])[ROTOR_TIME_OFFSET]
+    delay = 0.5 * flights.pieces({})[0].signals.period + (use.delay if rows.fixed else 0.0)
+    out[f"delay {i}"] = delay * rows.at_rows(of.here)[:, None] * late
     level = flights.vehicle.gravity * of.here[:, None]
     for axis, name in enumerate("xy"):
         if not flights.inertial:

@@ -8,9 +8,11 @@ flight; it may not be negative. What else moves the vehicle, and the pose's nois
 spectrum: the likelihood is Whittle's with an unknown noise at each frequency.
 
 It is a pure delay that is fitted. A lag also takes gain away at high frequencies, but so does a
-loop that is closed over a noisy pose: a lag of that delay is always as good.
+loop that is closed over a noisy pose: a lag of that delay is always as good. What the vehicle
+declares of either is no part of the delay.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -19,8 +21,10 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.signal import csd, welch
 
+from ...dynamics.effects import get
 from ...dynamics.vehicle import Vehicle
 from ..motion.signals import Signals
+from .regression import moves_time
 
 Array = NDArray[np.float64]
 
@@ -76,27 +80,30 @@ class _Spectra:
         return 2.0 * self.count * float(np.sum(np.log(noise / self.turning)))
 
 
-def turning_delay(pieces: Sequence[Signals], vehicle: Vehicle) -> Delay | None:
+def turning_delay(pieces: Sequence[Signals], vehicle: Vehicle, held: float = 0.0) -> Delay | None:
     """Return the delay of the rotors' moments behind the commands; None where turning does not show
     one.
 
     Args:
         pieces: unbroken flight, with rotor speeds worked out from commands.
         vehicle: as it is declared.
+        held: s, from one logged command to the next. Between them rotor speeds move linearly here;
+            rotors that are held at each are late by half as long, and those of a log that has left
+            commands out by less.
     """
+    rotors = [e for e in vehicle.effects if moves_time(e.name)]
+    declared = sum(sum(e.coefficients.values()) for e in rotors if get(e.name).kind != "sensing")
     spectra = [s for piece in pieces for s in _spectra(piece, vehicle)]
     if not spectra:
         return None
 
     def deviance(seconds: float) -> float:
-        return sum(s.deviance(np.exp(-1j * s.omega * seconds)) for s in spectra)
+        return sum(s.deviance(np.exp(-1j * s.omega * (declared + seconds))) for s in spectra)
 
     seconds, std, least = _least(deviance)
-    return (
-        Delay(seconds, std, -least)
-        if -least > DELAY.least_log_likelihood_ratio and seconds > 2.0 * std
-        else None
-    )
+    std = math.hypot(std, 0.5 * held / math.sqrt(12.0))
+    late = -least > DELAY.least_log_likelihood_ratio and seconds - 0.25 * held > 2.0 * std
+    return Delay(seconds, std, -least) if late else None
 
 
 def _spectra(piece: Signals, vehicle: Vehicle) -> list[_Spectra]:
