@@ -32,8 +32,6 @@ NOISE = NoiseSettings()
 STEPS = 20  # of the search, at most
 STEP = 1e-4  # of what is searched, for derivatives
 LEAST_POSE = 1e-9  # m and rad: below the last digit of any log
-# m/s2 and rad/s2, to which a motion is known at best: a simulator's log may have no noise
-LEAST_DISTURBANCE = 1e-4
 SEARCHED = 24  # numbers of the noise: four of each axis
 
 
@@ -66,7 +64,7 @@ class NoiseSearch:
         """
         x = _free(near)
         low, high = x - 16.0, x + 16.0
-        low[:, 0], low[:, 1] = math.log(LEAST_POSE), math.log(LEAST_DISTURBANCE)
+        low[:, 0] = math.log(LEAST_POSE)
         low[:, 2:], high[:, 2:] = (math.log(NOISE.times[0]), 0.0), (math.log(NOISE.times[1]), 1e4)
         none = np.full(gains.size, np.inf)
         low, high = np.append(-none, low), np.append(none, high)

@@ -361,13 +361,17 @@ class Flights:
         return np.column_stack([np.einsum("nij,nkj,nk->ni", own, other, x[:, :3]), x[:, 3:]])
 
     def rotor_wrench(self, setting: Setting) -> Array:
-        """Return what the rotors deliver at the rows (rows, 4): thrust (N) and torque (Nm, body),
-        low-passed.
+        """Return what the rotors deliver at the rows (rows, 4), behind a lag and the like that the
+        vehicle has: thrust (N) and torque (Nm, body), low-passed.
         """
-        vehicle, pieces = self.amended(setting), self.pieces(setting)
-        return np.concatenate(
-            [p.smooth(vehicle.rotor_wrench(p.signals.rotor_speeds)) for p in pieces]
-        )
+        vehicle, out = self.amended(setting), []
+        own = tuple(e for e in vehicle.effects if get(e.name).kind == "rotor input")
+        for p in self.pieces(setting):
+            still = replace(p.signals, angular_velocity=np.zeros_like(p.signals.angular_velocity))
+            wrench, _ = acting_wrench(still, replace(vehicle, effects=own))
+            thrust = np.einsum("ni,ni->n", wrench[:, :3], still.rotation[:, :, 2])
+            out.append(p.smooth(np.column_stack([thrust, wrench[:, 3:]])))
+        return np.concatenate(out)
 
     def at_rows(self, name: str, setting: Setting | None = None) -> Array:
         """Return a signal (rows, ...) of ``Signals``, by its name, at the rows."""

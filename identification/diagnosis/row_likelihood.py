@@ -87,13 +87,14 @@ class RowLikelihood:
         rows = self.rows
         X = np.stack([*own, *self.nuisances.values(), *answers.values()], axis=2)
         known = X.shape[2] - len(answers)
-        noise = white_noise(y, rows.begins, rows.fit)
+        noise = white_noise(y, rows.begins, rows.fit, rows.least)
         for _ in range(ROW_NOISE.rounds):
             use = rows.fit & noise.known
             x = noise.white(X)[use].reshape(-1, X.shape[2])
             z = noise.white(y)[use].ravel()
             mode = np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ z)
-            noise = fitted_noise(y - X[:, :, :known] @ mode[:known], rows.begins, rows.fit)
+            left = y - X[:, :, :known] @ mode[:known]
+            noise = fitted_noise(left, rows.begins, rows.fit, rows.least)
         return noise, X[:, :, : len(own)] @ mode[: len(own)]
 
     def _white(self, x: Array) -> Array:

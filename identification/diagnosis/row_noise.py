@@ -24,8 +24,9 @@ class RowNoiseSettings:
     rows_per_number: int = 12  # and channel, that a lag must have
     # share of the variance added as white noise, so that what the low-pass took is not blown up
     loading: float = 0.01
-    # m/s2 and rad/s2, to which a motion is known at best: one of a simulator may have no noise
-    least: float = 1e-4
+    # of the weight, and of it at a quarter of the arm: how well a log shows motion at best, for a
+    # simulator's may have no noise
+    least: float = 1e-5
 
 
 ROW_NOISE = RowNoiseSettings()
@@ -63,24 +64,26 @@ class RowNoise:
         return np.asarray(np.einsum("ij,nj...->ni...", root, out))
 
 
-def white_noise(x: Array, begins: Mask, fit: Mask) -> RowNoise:
-    """Return noise without memory of the size of rows ``x`` (n, c), of the rows ``fit``."""
-    size = _size(x[fit])
+def white_noise(x: Array, begins: Mask, fit: Mask, least: Array) -> RowNoise:
+    """Return noise without memory of the size of rows ``x`` (n, c), of the rows ``fit``, and of
+    ``least`` (c,).
+    """
+    size = _size(x[fit], least)
     return RowNoise(np.zeros((0, x.shape[1], x.shape[1])), np.diag(size**2), begins)
 
 
-def _size(x: Array) -> Array:
-    return np.asarray(np.sqrt(np.mean(np.square(x), axis=0) + ROW_NOISE.least**2))
+def _size(x: Array, least: Array) -> Array:
+    return np.asarray(np.sqrt(np.mean(np.square(x), axis=0) + np.square(least)))
 
 
-def fitted_noise(x: Array, begins: Mask, fit: Mask) -> RowNoise:
+def fitted_noise(x: Array, begins: Mask, fit: Mask, least: Array) -> RowNoise:
     """Return the noise of which rows ``x`` (n, c) are a sample, of the rows ``fit`` (n,): least
-    squares, with a little white noise added.
+    squares, with a little white noise added, and white noise of ``least`` (c,).
     """
     channels = x.shape[1]
     rows = int(fit.sum())
     lags = int(np.clip(rows // (ROW_NOISE.rows_per_number * channels), 1, ROW_NOISE.most_lags))
-    size = _size(x[fit])
+    size = _size(x[fit], least)
     z = x / size
     use = fit & RowNoise(np.zeros((lags, channels, channels)), np.eye(channels), begins).known
     for k in range(1, lags + 1):
@@ -88,10 +91,10 @@ def fitted_noise(x: Array, begins: Mask, fit: Mask) -> RowNoise:
     at = np.flatnonzero(use)
     past = np.column_stack([z[at - k] for k in range(1, lags + 1)])
     now = z[at]
-    loading = ROW_NOISE.loading * len(at)
-    normal = past.T @ past + loading * np.eye(past.shape[1])
+    loading = len(at) * (ROW_NOISE.loading + np.square(least / size))
+    normal = past.T @ past + np.diag(np.tile(loading, lags))
     found = np.linalg.solve(normal, past.T @ now)
-    left = now.T @ now + loading * np.eye(channels) - found.T @ (past.T @ now)
+    left = now.T @ now + np.diag(loading) - found.T @ (past.T @ now)
     covariance = left / max(len(at) - lags * channels, 1)
     parts = [found[k * channels : (k + 1) * channels].T for k in range(lags)]
     return RowNoise(

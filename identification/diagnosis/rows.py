@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 from ...dynamics.effects import get
 from ..motion.smoothing import CUTOFFS, low_pass
+from .discrepancy import weight_and_torque
 from .regression import Column, Flights, Setting
+from .row_noise import ROW_NOISE
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -56,6 +58,7 @@ class Rows:
         log: (n,) which log.
         t: (n,) s.
         channels: 3, 6 or 9.
+        least: (channels,) to which a motion is known at best.
         with_torques: whether torques are among them.
         rotation: (samples, 3, 3) body to world, at the samples of ``flights``.
     """
@@ -79,6 +82,11 @@ class Rows:
         self.block = np.cumsum(new) - 1
         self.has_accelerometer = flights.felt({}) is not None
         self.channels = 3 * (1 + self.has_accelerometer + self.with_torques)
+        force, torque = np.split(
+            ROW_NOISE.least * weight_and_torque(flights.vehicle) / flights.inertias, 2
+        )
+        forces, torques = [force] * (1 + self.has_accelerometer), [torque] * self.with_torques
+        self.least = np.concatenate([*forces, *torques])
         self._inertia = flights.inertias[3:]
         self.rotation = flights.at_rows("rotation")
 
