@@ -26,7 +26,7 @@ class RowNoiseSettings:
     loading: float = 0.01
     # of the weight, and of it at a quarter of the arm: how well a log shows motion at best, for a
     # simulator's may have no noise
-    least: float = 1e-5
+    least: float = 1e-4
 
 
 ROW_NOISE = RowNoiseSettings()
