@@ -49,8 +49,8 @@ from .priors import (
     variants_of,
 )
 from .regression import (
+    BLOCK,
     CENTRAL,
-    REGRESSION,
     STEP,
     Column,
     Flights,
@@ -482,7 +482,7 @@ class Likelihood:
         names = (*asked, *drives)
         root = np.linalg.cholesky(steady.covariance)
         inverse = np.linalg.inv(root)
-        length = round(REGRESSION.block / self.period)
+        length = round(BLOCK / self.period)
         blocks, samples = [], 0
         for i, (track, jumps) in enumerate(zip(self.tracks, self._jumps(), strict=True)):
             state, counts = np.zeros((6, 3, len(names))), self._counts(i)

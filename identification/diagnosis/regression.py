@@ -30,7 +30,7 @@ from ..motion.sensor_noise import noisy_logs
 from ..motion.signals import SIGNALS, Signals, log_signals
 from ..motion.smoothing import CUTOFFS, low_pass, resampled
 from .commanded_rotors import (
-    COMMANDED,
+    UNSTATED_THRUST_STD,
     downsampled,
     in_flight,
     in_flight_by_thrust,
@@ -57,26 +57,19 @@ K = TypeVar("K")
 V = TypeVar("V")
 
 
-@dataclass(frozen=True)
-class RegressionSettings:
-    """Rows and blocks of the regression, what flights must excite, and how much memory is used."""
-
-    rows_per_cutoff: float = 5.0  # rows in a period of the residual's cut-off
-    margin: float = 0.6  # s at either end of a piece, where the filters lack half of what they need
-    # share of sensor noise in the power of an effect's column, from which the effect is not
-    # identifiable. One that scales a measurement could cancel the measurement's own noise: of its
-    # column it is the share in the amplitude
-    most_noise_share: float = 0.1
-    # rounding steps by which rotor speeds must vary; with less, the rounding is no noise but looks
-    # like an effect
-    least_steps_of_rotor_speed: float = 1.4
-    block: float = 3.0  # s of flight held out, or left out in cross-validation, in one piece
-    short_block: float = 1.0  # s, the same of commanded flights of fewer than eight blocks
-    blocks_per_held_out: int = 4  # one of so many blocks is held out
-    memory: int = 2**28  # bytes, of pieces that are kept
-
-
-REGRESSION = RegressionSettings()
+ROWS_PER_CUTOFF = 5.0  # rows in a period of the residual's cut-off
+MARGIN = 0.6  # s at either end of a piece, where the filters lack half of what they need
+# share of sensor noise in the power of an effect's column, from which the effect is not
+# identifiable. One that scales a measurement could cancel the measurement's own noise: of its
+# column it is the share in the amplitude
+MOST_NOISE_SHARE = 0.1
+# rounding steps by which rotor speeds must vary; with less, the rounding is no noise but looks
+# like an effect
+LEAST_STEPS_OF_ROTOR_SPEED = 1.4
+BLOCK = 3.0  # s of flight held out, or left out in cross-validation, in one piece
+SHORT_BLOCK = 1.0  # s, the same of commanded flights of fewer than eight blocks
+BLOCKS_PER_HELD_OUT = 4  # one of so many blocks is held out
+MEMORY = 2**28  # bytes, of pieces that are kept
 # what logs lack whose rotor speeds are worked out from commands: torque is left out, the thrust
 # curve is a guess, and commands do not tell small differences between rotors
 NOT_COMMANDED = (Need.MOMENTS, Need.SINGLE_ROTORS)
@@ -193,9 +186,7 @@ class Flights:
         elif self.commanded:
             self.logs = tuple(in_flight(log, vehicle) for log in self.logs)
         # relative standard deviation of the thrust that is assumed
-        self.thrust_std = (
-            COMMANDED.unstated_thrust_std if thrust_is_assumed(self.logs, vehicle) else 0.0
-        )
+        self.thrust_std = UNSTATED_THRUST_STD if thrust_is_assumed(self.logs, vehicle) else 0.0
         # the noise of a filtered pose cannot be read from its log, nor can what the filter's delay
         # and bandwidth took away
         self.filtered = not (self.commanded or self.inertial) and any(
@@ -267,15 +258,15 @@ class Flights:
         self._first = pieces = self.pieces({})
         parts, count = [], 0
         self.seconds = sum(float(x.signals.t[-1] - x.signals.t[0]) for x in pieces)
-        short = self.commanded and self.seconds < 8 * REGRESSION.block
-        length = REGRESSION.short_block if short else REGRESSION.block
+        short = self.commanded and self.seconds < 8 * BLOCK
+        length = SHORT_BLOCK if short else BLOCK
         for piece in pieces:
             time = piece.signals.t[piece.rows]
             number = ((time - time[0]) // length).astype(np.int64) + count
             seen = (
                 np.full(len(time), piece.log < self._fit_logs)
                 if len(self.logs) > self._fit_logs
-                else number % REGRESSION.blocks_per_held_out != held_out(number)
+                else number % BLOCKS_PER_HELD_OUT != held_out(number)
             )
             log = np.full(len(time), piece.log)
             parts.append((log, number, seen, np.arange(len(time)) == 0, time))
@@ -332,7 +323,7 @@ class Flights:
                 turned = loud if noisy._drift is None else self._in_own_axes(loud, noisy)
                 noise += float(weight @ np.mean(np.square(turned - quiet), axis=0))
                 whole += float(weight @ np.mean(np.square(quiet), axis=0))
-            most = REGRESSION.most_noise_share ** (2 if get(effect).scales_noise else 1)
+            most = MOST_NOISE_SHARE ** (2 if get(effect).scales_noise else 1)
             if self.inertial and whole == 0.0:
                 traceless.add(effect)
             if effect in traceless or noise > most * whole:
@@ -395,7 +386,7 @@ class Flights:
         """Whether the rotor speeds vary by enough of their rounding steps."""
         return (
             float(np.median(self.at_rows("rotor_speeds").std(axis=0)))
-            > REGRESSION.least_steps_of_rotor_speed * self.vehicle.omega_lsb
+            > LEAST_STEPS_OF_ROTOR_SPEED * self.vehicle.omega_lsb
         )
 
     def pieces(self, setting: Setting) -> list[Piece]:
@@ -407,7 +398,7 @@ class Flights:
             if get(e.name).kind == "sensing"
         )
         size = 400 * max(sum(len(p.signals.t) for p in self._first), 1)  # bytes
-        most = min(max(REGRESSION.memory // size, 1), 40)
+        most = min(max(MEMORY // size, 1), 40)
         return _kept(self._pieces, sensing, lambda: self._cut(vehicle), most)
 
     def _cut(self, vehicle: Vehicle) -> list[Piece]:
@@ -579,16 +570,30 @@ class Flights:
             delta = delta if c.minimum <= value + delta <= c.maximum else -delta
         return value, delta
 
-    def _slope(self, setting: Setting, column: Column, step: float) -> Array:
-        """Return what a unit of a coefficient adds (rows, 6), by a difference from the residual at
-        a setting.
+    def columns(
+        self,
+        setting: Setting,
+        wanted: Iterable[Column],
+        step: float = STEP,
+        residual: Callable[[Setting], Array] | None = None,
+    ) -> dict[Column, Array]:
+        """Return what each unit of a coefficient adds to a residual, (rows, 6) of these flights.
+
+        So ``residual(setting + d) = residual(setting) - column * d``, by a difference of ``step``
+        typical sizes.
         """
+        left = residual or self.residual
+        return {column: self._slope(setting, column, step, left) for column in wanted}
+
+    def _slope(
+        self, setting: Setting, column: Column, step: float, residual: Callable[[Setting], Array]
+    ) -> Array:
         effect, name = column
         own = self.coefficients(setting, effect)
         value, delta = self.step(setting, column, step)
 
         def at(moved: float) -> Array:
-            return self.residual({**setting, effect: {**own, name: moved}})
+            return residual({**setting, effect: {**own, name: moved}})
 
         # moving signals in time moves their noise as well, and a step to one side would seem to
         # reduce it: the difference is taken to both sides
@@ -596,18 +601,7 @@ class Flights:
             c, far = coefficient(column), abs(delta)
             if c.minimum <= value - far and value + far <= c.maximum:
                 return (at(value - delta) - at(value + delta)) / (2.0 * delta)
-        return (self.residual(setting) - at(value + delta)) / delta
-
-    def columns(
-        self, setting: Setting, wanted: Iterable[Column], step: float = STEP
-    ) -> dict[Column, Array]:
-        """Return what each unit of a coefficient adds to the residual that the model leaves, (rows,
-        6) each.
-
-        So ``residual(setting + d) = residual(setting) - column * d``, by a difference of ``step``
-        typical sizes.
-        """
-        return {column: self._slope(setting, column, step) for column in wanted}
+        return (residual(setting) - at(value + delta)) / delta
 
 
 def _kept(memory: dict[K, V], key: K, make: Callable[[], V], most: int) -> V:
@@ -651,11 +645,11 @@ def held_out(number: Index) -> Index:
     evenly as can be: by the golden ratio, with which no flight keeps step.
     """
     golden = 0.5 * (5.0**0.5 - 1.0)
-    turn = (0.75 + golden * (number // REGRESSION.blocks_per_held_out)) % 1.0
-    return np.asarray(REGRESSION.blocks_per_held_out * turn, dtype=np.int64)
+    turn = (0.75 + golden * (number // BLOCKS_PER_HELD_OUT)) % 1.0
+    return np.asarray(BLOCKS_PER_HELD_OUT * turn, dtype=np.int64)
 
 
 def _rows(signals: Signals) -> Index:
-    step = max(1, round(1.0 / (REGRESSION.rows_per_cutoff * CUTOFFS.residual_hz * signals.period)))
-    edge = round(REGRESSION.margin / signals.period)
+    step = max(1, round(1.0 / (ROWS_PER_CUTOFF * CUTOFFS.residual_hz * signals.period)))
+    edge = round(MARGIN / signals.period)
     return np.arange(edge, len(signals.t) - edge, step)

@@ -23,7 +23,7 @@ from .priors import (
     prior_size,
 )
 from .regression import Column, Flights, without
-from .row_noise import ROW_NOISE, RowNoise, fitted_noise, white_noise
+from .row_noise import ROUNDS, RowNoise, fitted_noise, white_noise
 from .row_nuisances import answered, followers, row_nuisances
 from .rows import Rows
 
@@ -66,7 +66,7 @@ class RowLikelihood:
         own = [found[c] * prior_size(c, self.flights) for c in wanted]
         signals, explained = followers(rows), np.zeros_like(y)
         # first as if all of a signal could be disturbances that it follows
-        for _ in range(ROW_NOISE.rounds):
+        for _ in range(ROUNDS):
             answers = _named(answered(rows, signals, y - explained))
             noise, explained = self._noise_beside(y, own, answers)
         self.nuisances |= answers
@@ -88,7 +88,7 @@ class RowLikelihood:
         X = np.stack([*own, *self.nuisances.values(), *answers.values()], axis=2)
         known = X.shape[2] - len(answers)
         noise = white_noise(y, rows.begins, rows.fit)
-        for _ in range(ROW_NOISE.rounds):
+        for _ in range(ROUNDS):
             use = rows.fit & noise.known
             x = noise.white(X)[use].reshape(-1, X.shape[2])
             z = noise.white(y)[use].ravel()

@@ -15,20 +15,13 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class RowNoiseSettings:
-    """The autoregression."""
-
-    rounds: int = 3  # of the noise and of what is explained beside it
-    most_lags: int = 3
-    rows_per_number: int = 12  # and channel, that a lag must have
-    # share of the variance added as white noise, so that what the low-pass took is not blown up
-    loading: float = 0.01
-    # m/s2 and rad/s2, to which a motion is known at best: one of a simulator may have no noise
-    least: float = 1e-4
-
-
-ROW_NOISE = RowNoiseSettings()
+ROUNDS = 3  # of the noise and of what is explained beside it
+MOST_LAGS = 3
+ROWS_PER_NUMBER = 12  # and channel, that a lag must have
+# share of the variance added as white noise, so that what the low-pass took is not blown up
+LOADING = 0.01
+# m/s2 and rad/s2, to which a motion is known at best: one of a simulator may have no noise
+LEAST_SIZE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +63,7 @@ def white_noise(x: Array, begins: Mask, fit: Mask) -> RowNoise:
 
 
 def _size(x: Array) -> Array:
-    return np.asarray(np.sqrt(np.mean(np.square(x), axis=0) + ROW_NOISE.least**2))
+    return np.asarray(np.sqrt(np.mean(np.square(x), axis=0) + LEAST_SIZE**2))
 
 
 def fitted_noise(x: Array, begins: Mask, fit: Mask) -> RowNoise:
@@ -79,7 +72,7 @@ def fitted_noise(x: Array, begins: Mask, fit: Mask) -> RowNoise:
     """
     channels = x.shape[1]
     rows = int(fit.sum())
-    lags = int(np.clip(rows // (ROW_NOISE.rows_per_number * channels), 1, ROW_NOISE.most_lags))
+    lags = int(np.clip(rows // (ROWS_PER_NUMBER * channels), 1, MOST_LAGS))
     size = _size(x[fit])
     z = x / size
     use = fit & RowNoise(np.zeros((lags, channels, channels)), np.eye(channels), begins).known
@@ -88,7 +81,7 @@ def fitted_noise(x: Array, begins: Mask, fit: Mask) -> RowNoise:
     at = np.flatnonzero(use)
     past = np.column_stack([z[at - k] for k in range(1, lags + 1)])
     now = z[at]
-    loading = ROW_NOISE.loading * len(at)
+    loading = LOADING * len(at)
     normal = past.T @ past + loading * np.eye(past.shape[1])
     found = np.linalg.solve(normal, past.T @ now)
     left = now.T @ now + loading * np.eye(channels) - found.T @ (past.T @ now)

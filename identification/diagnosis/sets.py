@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Found
 from ..findings import RankedSet, Ranking
-from .discrepancy import CHANGING, DISCREPANCY
+from .discrepancy import CHANGING, SHARE_OF_EFFECT
 from .evidence import (
     Index,
     Marginal,
@@ -44,18 +44,18 @@ from .regression import (
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class SetSettings:
-    """How much of the sets is looked at."""
-
-    most_effects: int = 5
-    kept_sets: int = 8  # of each size, to which a further effect is added
-    kept_asked: int = 24  # sets, the best, that are asked for beside the noise of no effect too
-    most_rivals: int = 2  # effects, alike to the likeliest one, that are tried in its place
-    least_probability: float = 1e-6  # of a set that is kept
-
-
-SETS = SetSettings()
+MOST_EFFECTS = 5
+KEPT_SETS = 8  # of each size, to which a further effect is added
+KEPT_ASKED = 24  # sets, the best, that are asked for beside the noise of no effect too
+MOST_RIVALS = 2  # effects, alike to the likeliest one, that are tried in its place
+LEAST_PROBABILITY = 1e-6  # of a set that is kept
+# shares of the weight, and of the weight at a quarter of the arm: standard deviations of what a
+# column of the dictionary adds
+UNKNOWN_SIZES = (0.001, 0.003, 0.01, 0.03)
+EFFECT_ERROR = 0.01  # share of its own wrench by which the model of an effect is wrong
+# power of the likelihood where rotor speeds hardly leave their rounding steps: their rounding is
+# then no noise, and follows the flight
+ROUNDED = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +137,7 @@ class Posterior:
             self._search(i)
         if given is None:
             found = sorted(self.scores, key=self.scores.__getitem__, reverse=True)
-            self._search(0, [self.known[k].variants for k in found[: SETS.kept_asked]])
+            self._search(0, [self.known[k].variants for k in found[:KEPT_ASKED]])
 
     def _likeliest(self) -> tuple[Base, _Candidate]:
         best = self.known[max(self.scores, key=self.scores.__getitem__)]
@@ -222,11 +222,11 @@ class Posterior:
             if all(c in at for v in some for c in v[1]):
                 score(some)
         level = [(*first, v) for v in variants if v not in first]
-        begun, most = len(first) + 1, SETS.most_effects + len(self.given or ())
+        begun, most = len(first) + 1, MOST_EFFECTS + len(self.given or ())
         for size in range(begun, begun + 1 if asked_sets is not None else max(most, begun) + 1):
             level.sort(key=score, reverse=True)
             grown: dict[frozenset[Variant], tuple[Variant, ...]] = {}
-            for some in level[: SETS.kept_sets * (2 if size == begun else 1)]:
+            for some in level[: KEPT_SETS * (2 if size == begun else 1)]:
                 for v in variants:
                     if v[0] not in {e for e, _ in some}:
                         grown.setdefault(frozenset((*some, v)), (*some, v))
@@ -259,7 +259,7 @@ class Posterior:
             groups: dict[str, list[int]] = {}
             for i, at in enumerate(base.dictionary.tolist()):
                 groups.setdefault(base.names[at][1].split(": ")[0], []).append(i)
-            found = [evidence_of_one_more(m, i, DISCREPANCY.sizes) for i in groups.values()]
+            found = [evidence_of_one_more(m, i, UNKNOWN_SIZES) for i in groups.values()]
             none.append(m.constant)
             more.append(m.constant + float(logsumexp(found)) - math.log(len(found)))
         return max(more) - max(none)
@@ -347,14 +347,14 @@ class Posterior:
         asked = base.at(base.asked)
         # an effect of the set is true to some per cent, whatever it changes with
         changing = base.at(c for c in base.columns if c[1].startswith(CHANGING))
-        wrong = np.full(len(changing), DISCREPANCY.model_error / DISCREPANCY.share_of_effect)
+        wrong = np.full(len(changing), EFFECT_ERROR / SHARE_OF_EFFECT)
         little, ones = self._negligible(base, asked), np.ones(len(base.plain) + len(own))
         chosen = np.concatenate([base.plain, own, asked, changing])
         varied = self.flights.commanded or self.flights.rotor_speeds_vary
-        power = self.power * (1.0 if varied else DISCREPANCY.rounded)
+        power = self.power * (1.0 if varied else ROUNDED)
         return base.marginal(base.dictionary, chosen, np.concatenate([ones, little, wrong]), power)
 
-    def best_setting(self, most: int = SETS.most_effects) -> Setting:
+    def best_setting(self, most: int = MOST_EFFECTS) -> Setting:
         """Return the coefficients of the likeliest set of at most so many effects."""
         key = max((k for k in self.scores if len(k) <= most), key=self.scores.__getitem__)
         return self._setting(key)[0]
@@ -366,7 +366,7 @@ class Posterior:
         least = 0.5 * (self.scores.get(frozenset(setting), -math.inf) + self.scores[frozenset()])
         found = [k for k, x in self.scores.items() if len(k) == 1 and x > least and k - {*setting}]
         found.sort(key=self.scores.__getitem__, reverse=True)
-        return [self._setting(k)[0] for k in found[: SETS.most_rivals]]
+        return [self._setting(k)[0] for k in found[:MOST_RIVALS]]
 
     def is_elsewhere(self, new: Setting, tried: Mapping[frozenset[str], Setting]) -> bool:
         """Return whether a set was not tried yet, or with coefficients that are more than a
@@ -421,6 +421,6 @@ class Posterior:
         sets = tuple(
             RankedSet(tuple(sorted(key)), p[key], *self._setting(key))
             for key in best
-            if p[key] >= SETS.least_probability
+            if p[key] >= LEAST_PROBABILITY
         )
         return Ranking(probability, sets, self.structure(quieter), self.power)

@@ -7,7 +7,7 @@ flights, resembles the residual most.
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,16 +19,9 @@ from .regression import Flights, Setting, typical_size
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class StartingSettings:
-    """How many starting points of an effect are tried."""
-
-    most_tried: int = 12  # all of them, if there are no more
-    kept_of_more: int = 4  # of more, those that resemble the residual most
-    sample_step: int = 20  # every so many samples are enough to see the resemblance
-
-
-STARTING = StartingSettings()
+MOST_TRIED = 12  # all of them, if there are no more
+KEPT_OF_MORE = 4  # of more, those that resemble the residual most
+SAMPLE_STEP = 20  # every so many samples are enough to see the resemblance
 
 
 def starting_points(
@@ -63,12 +56,12 @@ def starting_points(
             residual[seen, 3:],
         )
     )
-    if len(found) <= STARTING.most_tried:
+    if len(found) <= MOST_TRIED:
         return found
     likeness = _likeness(effect, found, flights, residual)
     # of those that are alike the later one, and none that does nothing
     order = sorted(range(len(found)), key=lambda i: (likeness[i], i), reverse=True)
-    return [found[i] for i in order[: STARTING.kept_of_more] if likeness[i] > -math.inf]
+    return [found[i] for i in order[:KEPT_OF_MORE] if likeness[i] > -math.inf]
 
 
 def _likeness(
@@ -79,7 +72,7 @@ def _likeness(
     """
     pieces = flights.pieces({})
     steady = _is_steady(flights, {effect: starts[0]})
-    steps = [max(1, STARTING.sample_step // int(p.rows[1] - p.rows[0])) for p in pieces]
+    steps = [max(1, SAMPLE_STEP // int(p.rows[1] - p.rows[0])) for p in pieces]
     at = [p.rows[::step] for p, step in zip(pieces, steps, strict=True)]
     every = np.concatenate([np.isin(p.rows, x) for p, x in zip(pieces, at, strict=True)])
     seen = flights.fit_rows[every]

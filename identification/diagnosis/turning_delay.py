@@ -25,19 +25,12 @@ from ..motion.signals import Signals
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class DelaySettings:
-    """The spectra that show the delay of commands."""
-
-    # Hz, where the commanded moments show in the angular acceleration
-    band_hz: tuple[float, float] = (1.0, 8.0)
-    # log-likelihood ratio over moments that do not show, which have one number less an axis
-    least_log_likelihood_ratio: float = 40.0
-    segment: float = 2.0  # s, of a spectrum
-    longest_delay: float = 0.12  # s
-
-
-DELAY = DelaySettings()
+# Hz, where the commanded moments show in the angular acceleration
+BAND_HZ = (1.0, 8.0)
+# log-likelihood ratio over moments that do not show, which have one number less an axis
+LEAST_LOG_LIKELIHOOD_RATIO = 40.0
+SEGMENT = 2.0  # s, of a spectrum
+LONGEST_DELAY = 0.12  # s
 
 
 @dataclass(frozen=True)
@@ -94,22 +87,22 @@ def turning_delay(pieces: Sequence[Signals], vehicle: Vehicle) -> Delay | None:
     seconds, std, least = _least(deviance)
     return (
         Delay(seconds, std, -least)
-        if -least > DELAY.least_log_likelihood_ratio and seconds > 2.0 * std
+        if -least > LEAST_LOG_LIKELIHOOD_RATIO and seconds > 2.0 * std
         else None
     )
 
 
 def _spectra(piece: Signals, vehicle: Vehicle) -> list[_Spectra]:
     rate = 1.0 / piece.period
-    length = round(DELAY.segment * rate)
-    if rate < 2.2 * DELAY.band_hz[1] or len(piece.t) < 2 * length:
+    length = round(SEGMENT * rate)
+    if rate < 2.2 * BAND_HZ[1] or len(piece.t) < 2 * length:
         return []
     out = []
     moments = vehicle.rotor_wrench(piece.rotor_speeds)[:, 1:3]
     for x, y in zip(moments.T, piece.angular_acceleration[:, :2].T, strict=True):
         f, xx = welch(x, rate, nperseg=length)
         yy, xy = welch(y, rate, nperseg=length)[1], csd(x, y, rate, nperseg=length)[1]
-        band = (f >= DELAY.band_hz[0]) & (f <= DELAY.band_hz[1])
+        band = (f >= BAND_HZ[0]) & (f <= BAND_HZ[1])
         if np.all(xx[band] > 0) and np.all(yy[band] > 0):
             out.append(
                 _Spectra(2.0 * np.pi * f[band], xx[band], yy[band], xy[band], len(x) / length)
@@ -120,7 +113,7 @@ def _spectra(piece: Signals, vehicle: Vehicle) -> list[_Spectra]:
 def _least(deviance: Callable[[float], float]) -> tuple[float, float, float]:
     """Return where a deviance is least, the standard deviation there, and its value."""
     step = 0.005
-    grid = np.arange(0.0, DELAY.longest_delay + step, step)
+    grid = np.arange(0.0, LONGEST_DELAY + step, step)
     at = float(grid[int(np.argmin([deviance(float(x)) for x in grid]))])
     best = minimize_scalar(
         deviance, bounds=(max(at - step, 0.0), at + step), method="bounded", options={"xatol": 1e-5}
