@@ -26,7 +26,8 @@ STOPPED_WITHIN = 0.1  # s, in which a flight loop stops an angular velocity that
 
 def row_nuisances(rows: Rows) -> dict[str, Array]:
     """Return columns (n, channels) by name, each in standard deviations of its prior."""
-    flights, out = rows.flights, {}
+    flights = rows.flights
+    out: dict[str, Array] = {}
     rotors = flights.rotor_wrench({}) / flights.inertias[2:]
     for i in np.unique(flights.log).tolist():
         here = (flights.log == i)[:, None].astype(np.float64)

@@ -58,43 +58,29 @@ def starting_points(
     )
     if len(found) <= MOST_TRIED:
         return found
-    likeness = _likeness(effect, found, flights, residual)
-    # of those that are alike the later one, and none that does nothing
-    order = sorted(range(len(found)), key=lambda i: (likeness[i], i), reverse=True)
-    return [found[i] for i in order[:KEPT_OF_MORE] if likeness[i] > -math.inf]
-
-
-def _likeness(
-    effect: str, starts: Sequence[Coefficients], flights: Flights, residual: Array
-) -> list[float]:
-    """Return how much of the residual goes like each start's wrench; minus infinity where it has
-    none.
-    """
-    pieces = flights.pieces({})
-    steady = _is_steady(flights, {effect: starts[0]})
-    steps = [max(1, SAMPLE_STEP // int(p.rows[1] - p.rows[0])) for p in pieces]
-    at = [p.rows[::step] for p, step in zip(pieces, steps, strict=True)]
-    every = np.concatenate([np.isin(p.rows, x) for p, x in zip(pieces, at, strict=True)])
-    seen = flights.fit_rows[every]
-    target = residual[every][seen]
-    sampled = [
-        (p.signals.at(x), slice(None)) if steady else (p.signals, x)
-        for p, x in zip(pieces, at, strict=True)
-    ]
+    steady, sampled, every = _is_steady(flights, {effect: found[0]}), [], []
+    for p in flights.pieces({}):
+        chosen = np.arange(len(p.rows)) % max(1, SAMPLE_STEP // int(p.rows[1] - p.rows[0])) == 0
+        at = p.rows[chosen]
+        sampled.append((p.signals.at(at), slice(None)) if steady else (p.signals, at))
+        every.append(chosen)
+    chosen = np.concatenate(every)
+    target = residual[chosen & seen]
     scale = 1.0 / np.maximum(np.sqrt(np.mean(np.square(target), axis=0)), 1e-12)
 
     def acting(setting: Setting) -> Array:
         parts = [flights.acting(signals, setting)[x] for signals, x in sampled]
-        return np.asarray(np.concatenate(parts)[seen] * scale)
+        return np.asarray(np.concatenate(parts)[seen[chosen]] * scale)
 
-    base, out = acting({}), []
-    for start in starts:
+    # how much of the residual goes like each start's wrench; of those that are alike the later one,
+    # and none that does nothing
+    base, likeness = acting({}), []
+    for i, start in enumerate(found):
         shape = acting({effect: start}) - base
         size = float(np.sum(shape * shape))
-        out.append(
-            float(np.sum(shape * target * scale)) / math.sqrt(size) if size > 0.0 else -math.inf
-        )
-    return out
+        if size > 0.0:
+            likeness.append((float(np.sum(shape * target * scale)) / math.sqrt(size), i))
+    return [found[i] for _, i in sorted(likeness, reverse=True)[:KEPT_OF_MORE]]
 
 
 def _is_steady(flights: Flights, setting: Setting) -> bool:

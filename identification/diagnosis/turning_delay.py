@@ -11,7 +11,7 @@ It is a pure delay that is fitted. A lag also takes gain away at high frequencie
 loop that is closed over a noisy pose: a lag of that delay is always as good.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,15 +33,6 @@ SEGMENT = 2.0  # s, of a spectrum
 LONGEST_DELAY = 0.12  # s
 
 
-@dataclass(frozen=True)
-class Delay:
-    """A delay of the rotors, its standard deviation and its log-likelihood ratio."""
-
-    seconds: float
-    std: float  # s
-    log_likelihood_ratio: float  # over moments that do not show at all
-
-
 @dataclass(frozen=True, eq=False)
 class _Spectra:
     """Spectra (frequencies in the band,) of a moment and of what turns with it, from so many
@@ -61,17 +52,16 @@ class _Spectra:
             np.square(np.abs(response)) * self.moment,
         )
         # the gain changes the noise by which it is weighted
-        gain = 0.0
+        noise = self.turning
         for _ in range(6):
-            noise = self.turning - 2.0 * gain * along + gain**2 * power
             gain = max(float(np.sum(along / noise) / np.sum(power / noise)), 0.0)
-        noise = self.turning - 2.0 * gain * along + gain**2 * power
+            noise = self.turning - 2.0 * gain * along + gain**2 * power
         return 2.0 * self.count * float(np.sum(np.log(noise / self.turning)))
 
 
-def turning_delay(pieces: Sequence[Signals], vehicle: Vehicle) -> Delay | None:
-    """Return the delay of the rotors' moments behind the commands; None where turning does not show
-    one.
+def turning_delay(pieces: Sequence[Signals], vehicle: Vehicle) -> tuple[float, float, float] | None:
+    """Return the delay of the rotors' moments behind the commands, s, its standard deviation, and
+    its log-likelihood ratio over moments that do not show; None where turning does not show one.
 
     Args:
         pieces: unbroken flight, with rotor speeds worked out from commands.
@@ -84,12 +74,16 @@ def turning_delay(pieces: Sequence[Signals], vehicle: Vehicle) -> Delay | None:
     def deviance(seconds: float) -> float:
         return sum(s.deviance(np.exp(-1j * s.omega * seconds)) for s in spectra)
 
-    seconds, std, least = _least(deviance)
-    return (
-        Delay(seconds, std, -least)
-        if -least > LEAST_LOG_LIKELIHOOD_RATIO and seconds > 2.0 * std
-        else None
+    step = 0.005
+    at = min(np.arange(0.0, LONGEST_DELAY + step, step).tolist(), key=deviance)
+    best = minimize_scalar(
+        deviance, bounds=(max(at - step, 0.0), at + step), method="bounded", options={"xatol": 1e-5}
     )
+    seconds, least, near = float(best.x), float(best.fun), 0.1 * step
+    bend = (deviance(seconds + near) - 2.0 * least + deviance(seconds - near)) / near**2
+    std = float(np.sqrt(2.0 / max(bend, 1e-6)))
+    clear = -least > LEAST_LOG_LIKELIHOOD_RATIO and seconds > 2.0 * std
+    return (seconds, std, -least) if clear else None
 
 
 def _spectra(piece: Signals, vehicle: Vehicle) -> list[_Spectra]:
@@ -108,18 +102,3 @@ def _spectra(piece: Signals, vehicle: Vehicle) -> list[_Spectra]:
                 _Spectra(2.0 * np.pi * f[band], xx[band], yy[band], xy[band], len(x) / length)
             )
     return out
-
-
-def _least(deviance: Callable[[float], float]) -> tuple[float, float, float]:
-    """Return where a deviance is least, the standard deviation there, and its value."""
-    step = 0.005
-    grid = np.arange(0.0, LONGEST_DELAY + step, step)
-    at = float(grid[int(np.argmin([deviance(float(x)) for x in grid]))])
-    best = minimize_scalar(
-        deviance, bounds=(max(at - step, 0.0), at + step), method="bounded", options={"xatol": 1e-5}
-    )
-    seconds, least = float(best.x), float(best.fun)
-    bend = (deviance(seconds + 0.1 * step) - 2.0 * least + deviance(seconds - 0.1 * step)) / (
-        0.1 * step
-    ) ** 2
-    return seconds, float(np.sqrt(2.0 / max(bend, 1e-6))), least
