@@ -27,7 +27,6 @@ from .priors import Base, Setting, Starts
 from .regression import START_PREFIX, Column, Flights, moves_time, typical_size, without
 from .row_likelihood import RowLikelihood
 from .sets import Posterior, Tried, is_possible
-from .settings import DIAGNOSIS
 from .starting_points import starting_points
 
 Array = NDArray[np.float64]
@@ -35,6 +34,9 @@ Array = NDArray[np.float64]
 
 # typical sizes at which a lag or a delay is tried as a whole: their columns change with them
 TIME_STARTS = (0.3, 0.6, 1.2)
+# share of the likeliest set's probability from which another effect in a place of it is one that
+# the flights do not tell from it: a likelihood of 20 to 1
+LEAST_RIVAL = 0.05
 ROUNDS = 6  # of fitting the noise beside the best set
 MOST_STARTS = 2  # of an effect with nonlinear coefficients, the likeliest, that are fitted by rows
 
@@ -236,7 +238,7 @@ def _behind(
         return m.explained(index, set_evidence(m, index, base.low[at], base.high[at]).mode)
 
     # up to the deviance of a rival's likelihood
-    whole = explained(set(best)) + 2.0 * math.log(DIAGNOSIS.least_rival)
+    whole = explained(set(best)) + 2.0 * math.log(LEAST_RIVAL)
     found = {e: tuple(h for h in hidden if explained({*best, h} - {e}) > whole) for e in best}
     return {e: others for e, others in found.items() if others}
 
