@@ -45,6 +45,7 @@ from .priors import (
     Base,
     Setting,
     Starts,
+    bare,
     in_prior_units,
     variants_of,
 )
@@ -299,7 +300,7 @@ class Likelihood:
         own = dict(self.flights.coefficients(self.setting, effect))
         if name.startswith(WHOLE_PREFIX):
             own[CENTRAL] = 1.0
-        name = name.removeprefix(WHOLE_PREFIX)
+        effect, name = bare(column)
         value, delta = self.flights.step(self.setting, (effect, name))
         there = {**self.setting, effect: {**own, name: value + delta}}
         with suppress(InputError, np.linalg.LinAlgError):
@@ -346,10 +347,9 @@ class Likelihood:
             if c not in acting:
                 acting[c] = self._change({**self.setting, c[0]: dict(start)})
         for effect in library:
-            for _, columns in variants_of(self.flights, effect, self.setting, starts):
+            for columns in variants_of(self.flights, effect, self.setting, starts):
                 for c in columns:
-                    if c[1].removeprefix(WHOLE_PREFIX) not in self.flights.stated(effect):
-                        self._add(c)
+                    self._add(c)
         return self._products(starts)
 
     def _add_changing_coefficients(self) -> None:

@@ -28,6 +28,7 @@ from .priors import (
     Base,
     Setting,
     Variant,
+    bare,
     declared,
     variants_of,
 )
@@ -66,7 +67,7 @@ class _Candidate:
 
     @property
     def columns(self) -> list[Column]:
-        return [c for _, columns in self.variants for c in columns]
+        return [c for columns in self.variants for c in columns]
 
 
 # by base and power of the likelihood: the evidence of sets there, None of one that cannot be
@@ -88,14 +89,14 @@ def is_possible(
         return False
     if not plausible or words.implausible is None:
         return True
-    named = {*(e for e in setting if e), *(e.name for e in vehicle.effects)} - {effect}
+    beside = {*(e for e in setting if e), *(e.name for e in vehicle.effects)} - {effect}
     return not words.implausible(
         Found(
             own,
             {name: std.get(name, 0.0) for name in own},
             {c.name: typical_size((effect, c.name), vehicle) for c in words.coefficients},
             flights.speed,
-            frozenset(get(name).family for name in named),
+            frozenset(get(name).family for name in beside),
         )
     )
 
@@ -159,8 +160,8 @@ class Posterior:
 
     def _log_prior(self, effects: int) -> float:
         p = self.inclusion
-        named = effects - len(self.given or ())
-        return named * math.log(p) + (self.asked_about - named) * math.log1p(-p)
+        found = effects - len(self.given or ())
+        return found * math.log(p) + (self.asked_about - found) * math.log1p(-p)
 
     def _counts(self, number: int, key: frozenset[str]) -> bool:
         """Return whether a set is judged beside a base."""
@@ -170,19 +171,13 @@ class Posterior:
         return key not in self.idle and len(self.bases[number].effects) == most
 
     def _variants(self, base: Base) -> list[Variant]:
-        out, known = [], self.given is not None
+        out = []
         for effect in self.library:
-            stated = self.flights.stated(effect)
-            for _, every in variants_of(self.flights, effect, base.effects, base.starts):
-                # what a file states is not asked, and a balance does not see where an effect acts
-                columns = tuple(
-                    c
-                    for c in every
-                    if c[1].removeprefix(WHOLE_PREFIX) not in stated
-                    and (c in base.columns or not known)
-                )
+            for columns in variants_of(self.flights, effect, base.effects, base.starts):
+                if self.given is not None:  # a balance does not see where an effect acts
+                    columns = tuple(c for c in columns if c in base.columns)
                 if columns and all(c in base.columns for c in columns):
-                    out.append((effect, columns))
+                    out.append(columns)
         return out
 
     def _search(self, number: int, asked_sets: Sequence[tuple[Variant, ...]] | None = None) -> None:
@@ -194,32 +189,32 @@ class Posterior:
         m = base.marginal(asked, np.concatenate([base.plain, asked]), little, self.power)
         low, high = base.low[asked], base.high[asked]
         variants = self._variants(base)
-        ways = Counter(e for e, _ in variants)
+        ways = Counter(v[0][0] for v in variants)
         tried = self._tried.setdefault((base, self.power), {})
 
         def score(some: tuple[Variant, ...]) -> float:
-            key = frozenset(e for e, _ in some)
+            key = frozenset(v[0][0] for v in some)
             if not self._counts(number, key):
                 return -math.inf
             if some not in tried:
-                index = [at[c] for v in some for c in v[1]]
+                index = [at[c] for v in some for c in v]
                 tried[some] = None
                 with suppress(np.linalg.LinAlgError):
                     found = set_evidence(m, index, low, high)
                     tried[some] = found if self._possible(base, some, found) else None
             if (evidence := tried[some]) is None:
                 return -math.inf
-            total = evidence.log_evidence - sum(math.log(ways[e]) for e, _ in some)
+            total = evidence.log_evidence - sum(math.log(ways[v[0][0]]) for v in some)
             total += self._log_prior(len(some))
             if total > self.scores.get(key, -math.inf):
                 self.scores[key] = total
                 self.known[key] = _Candidate(number, some, evidence)
             return total
 
-        first = tuple(v for v in variants if self.given is not None and v[0] in base.effects)
+        first = tuple(v for v in variants if self.given is not None and v[0][0] in base.effects)
         score(first)
         for some in asked_sets or ():
-            if all(c in at for v in some for c in v[1]):
+            if all(c in at for v in some for c in v):
                 score(some)
         level = [(*first, v) for v in variants if v not in first]
         begun, most = len(first) + 1, MOST_EFFECTS + len(self.given or ())
@@ -228,7 +223,7 @@ class Posterior:
             grown: dict[frozenset[Variant], tuple[Variant, ...]] = {}
             for some in level[: KEPT_SETS * (2 if size == begun else 1)]:
                 for v in variants:
-                    if v[0] not in {e for e, _ in some}:
+                    if v[0][0] not in {x[0][0] for x in some}:
                         grown.setdefault(frozenset((*some, v)), (*some, v))
             level = list(grown.values())
 
@@ -237,9 +232,9 @@ class Posterior:
         plausible = self.given is not None
         asked = [
             e
-            for e, columns in some
+            for (e, name), *_ in some
             if get(e).possible or (plausible and get(e).implausible)
-            if not columns[0][1].startswith(START_PREFIX)
+            if not name.startswith(START_PREFIX)
         ]
         setting, std = self._at_mode(base, some, evidence) if asked else ({}, {})
         return all(is_possible(self.flights, setting, std[e], e, plausible) for e in asked)
@@ -305,8 +300,8 @@ class Posterior:
         normal = m.normal + np.eye(len(asked))
         whole = max(float(m.right @ np.linalg.solve(normal, m.right)), 1e-12)
         out: dict[str, float] = {}
-        for effect, columns in self._variants(base):
-            if effect not in given:
+        for columns in self._variants(base):
+            if (effect := columns[0][0]) not in given:
                 own = [index[c] for c in columns]
                 z = set_evidence(m, own, base.low[at], base.high[at]).mode
                 out[effect] = max(out.get(effect, 0.0), m.explained(own, z) / whole)
@@ -329,12 +324,11 @@ class Posterior:
         m = base.marginal(base.at(base.asked), others, power=self.power)
         index = {c: i for i, c in enumerate(base.asked)}
         out: dict[str, float] = {}
-        for effect, columns in self._variants(base):
-            starts = any(c[1].startswith(START_PREFIX) for c in columns)
-            if starts or effect in {e for e, _ in best.variants}:
+        for columns in self._variants(base):
+            (effect, name), *_ = columns
+            if name.startswith(START_PREFIX) or effect in {v[0][0] for v in best.variants}:
                 continue
-            names = [(e, name.removeprefix(WHOLE_PREFIX)) for e, name in columns]
-            sign = np.sign([coefficient(c).typical[0] for c in names])
+            sign = np.sign([coefficient(bare(c)).typical[0] for c in columns])
             z, i = base.typical[base.at(columns)] * sign, [index[c] for c in columns]
             out[effect] = max(float(z @ m.normal[np.ix_(i, i)] @ z), out.get(effect, 0.0))
         return out
@@ -393,7 +387,8 @@ class Posterior:
         setting: Setting = {}
         std: Setting = {}
         found = zip(evidence.mode.tolist(), evidence.std.tolist(), strict=True)
-        for effect, columns in some:
+        for columns in some:
+            effect = columns[0][0]
             own: dict[str, float] = dict(self.flights.coefficients({}, effect))
             off: dict[str, float] = {}
             for c, (mode, deviation) in zip(columns, found, strict=False):
@@ -402,7 +397,7 @@ class Posterior:
                     if moves_time(effect):
                         own[get(effect).coefficients[0].name] *= mode
                     continue
-                name, size = c[1].removeprefix(WHOLE_PREFIX), float(base.size[base.columns[c]])
+                name, size = bare(c)[1], float(base.size[base.columns[c]])
                 limits = coefficient((effect, name))
                 value = mode * size + declared(c, self.flights)
                 own[name] = min(max(value, limits.minimum), limits.maximum)
