@@ -39,11 +39,11 @@ def weight_and_torque(vehicle: Vehicle) -> Array:
     return vehicle.weight * np.repeat([1.0, TORQUE_ARM * vehicle.arm_l], 3)
 
 
-def _joined(tracks: Sequence[State]) -> tuple[Array, State]:
-    """Return where pieces end but the last, and all of them, one after the other."""
+def joined(tracks: Sequence[State]) -> tuple[State, Array]:
+    """Return all pieces, one after the other, and where they end but the last."""
     ends = np.cumsum([len(track.position) for track in tracks])[:-1]
     columns = (np.concatenate([getattr(x, f.name) for x in tracks]) for f in fields(State))
-    return ends, State(*columns)
+    return State(*columns), ends
 
 
 def _scaled(x: Array) -> Array:
@@ -52,15 +52,15 @@ def _scaled(x: Array) -> Array:
     return x / size if size > 1e-9 else np.zeros_like(x)
 
 
-def discrepancy_columns(tracks: Sequence[State], flights: Flights) -> dict[Column, list[Array]]:
-    """Return accelerations (n, 6) of each piece by column, each of a standard deviation of the
-    weight, or of the weight times the arm.
+def discrepancy_columns(whole: State, ends: Array, flights: Flights) -> dict[Column, Array]:
+    """Return accelerations (n, 6) by column, each of a standard deviation of the weight, or of the
+    weight times the arm.
 
     Args:
-        tracks: the pieces.
+        whole: all pieces.
+        ends: where pieces end but the last.
         flights: of the vehicle.
     """
-    ends, whole = _joined(tracks)
     t, position, rotation, rotors = whole.t, whole.position, whole.rotation, whole.rotors
     rate, body = whole.angular_velocity, np.einsum("nij,ni->nj", rotation, whole.velocity)
     above = position[:, 2] - position[:, 2].min()
@@ -97,10 +97,10 @@ def discrepancy_columns(tracks: Sequence[State], flights: Flights) -> dict[Colum
         z = _resonance(rotors[:, 1 + i], hertz, period, ends)
         shapes.append(("resonance", f"a part that swings at {hertz:g} Hz", z, (3 + i,)))
     size = weight_and_torque(flights.vehicle) / flights.inertias
-    out: dict[Column, list[Array]] = {}
+    out: dict[Column, Array] = {}
 
     def add(group: str, name: str, column: Array) -> None:
-        out["", f"{UNKNOWN}{group}: {name}"] = np.split(column, ends)
+        out["", f"{UNKNOWN}{group}: {name}"] = column
 
     for group, name, x, channels in shapes:
         z = _scaled(x)
@@ -137,11 +137,10 @@ def _resonance(drive: Array, hertz: float, period: float, ends: Array) -> Array:
     return np.concatenate([lfilter(*shape, x, axis=0) for x in np.split(drive, ends)])
 
 
-def variables(tracks: Sequence[State]) -> dict[str, list[Array]]:
-    """Return what a coefficient may change with: variables (n,) of each piece by name, of mean zero
-    and standard deviation one over all.
+def variables(whole: State) -> dict[str, Array]:
+    """Return what a coefficient may change with: variables (n,) by name, of mean zero and standard
+    deviation one.
     """
-    ends, whole = _joined(tracks)
     position, rotation, velocity = whole.position, whole.rotation, whole.velocity
     heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
     speed = np.linalg.norm(velocity, axis=1)
@@ -159,21 +158,17 @@ def variables(tracks: Sequence[State]) -> dict[str, list[Array]]:
         "yaw rate": whole.angular_velocity[:, 2],
     }
     scaled = {name: _scaled(x) for name, x in found.items()}
-    return {name: np.split(x, ends) for name, x in scaled.items() if x.any()}
+    return {name: x for name, x in scaled.items() if x.any()}
 
 
-def changing_columns(
-    parts: Mapping[str, list[Array]], found: Mapping[str, list[Array]]
-) -> dict[Column, list[Array]]:
+def changing_columns(parts: Mapping[str, Array], found: Mapping[str, Array]) -> dict[Column, Array]:
     """Return columns of coefficients that change with a variable.
 
     Args:
-        parts: what each effect of a set adds (n, ...) to each piece.
+        parts: what each effect of a set adds (n, ...).
         found: ``variables``.
     """
     return {
-        ("", f"{CHANGING}{effect} with {name}"): [
-            SHARE_OF_EFFECT * x * y[:, None] for x, y in zip(part, z, strict=True)
-        ]
-        for (effect, part), (name, z) in itertools.product(parts.items(), found.items())
+        ("", f"{CHANGING}{effect} with {name}"): SHARE_OF_EFFECT * part * x[:, None]
+        for (effect, part), (name, x) in itertools.product(parts.items(), found.items())
     }

@@ -27,7 +27,7 @@ from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, log_signals
 from ..motion.smoothing import continuous, turn_between
 from .causal_filter import Poses, Track, ahead, run, sensitivities
-from .discrepancy import changing_columns, discrepancy_columns, variables
+from .discrepancy import changing_columns, discrepancy_columns, joined, variables
 from .log_offsets import (
     ATTITUDE_TIME_OFFSET,
     LAG_ASYMMETRY,
@@ -139,10 +139,11 @@ class Likelihood:
             _signals(piece, track) for piece, track in zip(self.pieces, self.tracks, strict=True)
         ]
         self._base = self._accelerations(setting, self.signals)
-        # what a unit of each column adds to the accelerations, or to the measured pose; a column
-        # that was asked for once is kept. What any flight may have changes little with effects
-        self._acting: dict[Column, list[Array]] = {}
-        self._posed: dict[Column, list[Array]] = {}
+        # what a unit of each column adds to the accelerations, or to the measured pose (n, 6), of
+        # all pieces in turn; a column that was asked for once is kept. What any flight may have
+        # changes little with effects
+        self._acting: dict[Column, Array] = {}
+        self._posed: dict[Column, Array] = {}
         if same:
             self._acting, self._posed = (
                 {c: x for c, x in part.items() if not c[0] and not c[1].startswith(UNKNOWN)}
@@ -266,23 +267,20 @@ class Likelihood:
 
     # Columns
 
-    def _accelerations(self, setting: Setting, signals: Iterable[Signals]) -> list[Array]:
-        """Return the accelerations (n, 6) that a setting makes along each piece's signals."""
-        vehicle, out = self.flights.vehicle, []
-        for s in signals:
-            wrench = self.flights.acting(s, setting)
-            turning = np.linalg.solve(vehicle.inertia, wrench[:, 3:].T).T
-            out.append(np.column_stack([wrench[:, :3] / vehicle.mass, turning]))
-        return out
+    def _accelerations(self, setting: Setting, signals: Iterable[Signals]) -> Array:
+        """Return the accelerations (n, 6) that a setting makes along the pieces' signals."""
+        wrench = np.concatenate([self.flights.acting(s, setting) for s in signals])
+        turning = np.linalg.solve(self.flights.vehicle.inertia, wrench[:, 3:].T).T
+        return np.column_stack([wrench[:, :3] / self.flights.vehicle.mass, turning])
 
     def _change(
         self, setting: Setting, step: float = 1.0, signals: Iterable[Signals] | None = None
-    ) -> list[Array]:
-        """Return what another setting, and other signals, add to the acceleration (n, 6) of each
-        piece, over a step.
+    ) -> Array:
+        """Return what another setting, and other signals, add to the acceleration (n, 6), over a
+        step.
         """
         found = self._accelerations(setting, self.signals if signals is None else signals)
-        return [(x - base) / step for x, base in zip(found, self._base, strict=True)]
+        return np.asarray((found - self._base) / step)
 
     def _add(self, column: Column) -> None:
         """Add what a unit of a coefficient does, but where it is known already, or where no vehicle
@@ -308,7 +306,7 @@ class Likelihood:
             if effect and get(effect).role == Role.CENTRE_OF_MASS:
                 self._swing(column)
 
-    def _moved(self, column: Column) -> list[Array]:
+    def _moved(self, column: Column) -> Array:
         """Return by how much a unit of a sensing effect moves the pose (n, 6), at the pose that the
         filter predicts: so the pose's own noise is no part of it.
         """
@@ -325,7 +323,7 @@ class Likelihood:
             shift = undone.position - track.predicted[:, :3]
             turn = turn_between(track.predicted[:, 3:], undone.quaternion)
             out.append(np.column_stack([shift, turn]) / delta)
-        return out
+        return np.concatenate(out)
 
     def base(self, library: Iterable[str], starts: Starts, unknown: bool = False) -> Base:
         """Return the likelihood of the coefficients of effects, and of what any flight may have.
@@ -341,7 +339,7 @@ class Likelihood:
         if playing(Role.LAG, among=self.setting):
             self._add(LAG_ASYMMETRY)
         if unknown and not any(name.startswith(UNKNOWN) for _, name in acting):
-            acting |= discrepancy_columns(self.tracks, self.flights)
+            acting |= discrepancy_columns(*joined(self.tracks), self.flights)
             self._add_changing_coefficients()
         for c, start in starts.items():
             if c not in acting:
@@ -357,14 +355,11 @@ class Likelihood:
         parts, poses = {}, {}
         for effect, own in self.setting.items():
             if get(effect).kind == "sensing" and not is_delay(effect):
-                moved = [(x, self._moved((effect, name))) for name, x in own.items()]
-                poses[effect] = [
-                    np.sum([x * column[i] for x, column in moved], axis=0)
-                    for i in range(len(self.pieces))
-                ]
+                moved = [x * self._moved((effect, name)) for name, x in own.items()]
+                poses[effect] = np.sum(moved, axis=0)
             else:
                 parts[effect] = self._change(without(self.setting, effect), -1.0)
-        found = variables(self.tracks)
+        found = variables(joined(self.tracks)[0])
         self._acting |= changing_columns(parts, found)
         self._posed |= changing_columns(poses, found)
 
@@ -374,12 +369,13 @@ class Likelihood:
         bent = map(_bent_rotors, self.signals)
         self._acting["", BETWEEN] = self._change(self.setting, signals=bent)
         self._add_model_errors()
-        moved = self._posed[ATTITUDE_TIME_OFFSET] = []
+        moved = []
         for track in self.tracks:
             # the rate before the sample is read: after it, it knows that sample's noise
             rate = track.angular_velocity + 0.5 * self.period * track.acceleration[:, 3:]
             rate = np.vstack([track.angular_velocity[:1], rate[:-1]])
             moved.append(np.column_stack([np.zeros_like(rate), -rate]))
+        self._posed[ATTITUDE_TIME_OFFSET] = np.concatenate(moved)
 
     def quieter(self, coefficients: Mapping[Column, float], starts: Starts) -> Base:
         """Return the likelihood of the same columns with the noise that is likeliest beside them
@@ -403,18 +399,15 @@ class Likelihood:
 
     def _explained(self, coefficients: Mapping[Column, float]) -> list[Array]:
         """Return what the columns move the pose of each piece by, and accelerate (n, 2, 6)."""
-        explained = []
-        for i, track in enumerate(self.tracks):
-            x = np.zeros((len(track.position), 2, 6))
-            for c, column in self._acting.items():
-                x[:, 1] += coefficients.get(c, 0.0) * column[i]
-            for c, column in self._posed.items():
-                x[:, 0] += coefficients.get(c, 0.0) * column[i]
-            x[:, 1, :3] += track.rotors[:, :1] * (
-                x[:, 0, 4:5] * track.rotation[:, :, 0] - x[:, 0, 3:4] * track.rotation[:, :, 1]
-            )
-            explained.append(x)
-        return explained
+        whole, ends = joined(self.tracks)
+        x = np.zeros((len(whole.t), 2, 6))
+        for i, columns in enumerate((self._posed, self._acting)):
+            for c, column in columns.items():
+                x[:, i] += coefficients.get(c, 0.0) * column
+        x[:, 1, :3] += whole.rotors[:, :1] * (
+            x[:, 0, 4:5] * whole.rotation[:, :, 0] - x[:, 0, 3:4] * whole.rotation[:, :, 1]
+        )
+        return np.split(x, ends)
 
     def _swing(self, column: Column) -> None:
         """Have a centre of mass move the measured point as a marker does that lies as far on the
@@ -424,12 +417,11 @@ class Likelihood:
         acceleration and of the filter's attitude, and their difference, which is noise, would fit
         the poses' own noise: of equal offsets of both only the torque of the thrust is left.
         """
-        for slope in self._acting[column]:
-            slope[:, :3] = 0.0
+        self._acting[column][:, :3] = 0.0
         axis = [c.name for c in get(column[0]).coefficients].index(column[1])
         (marker,) = playing(Role.MARKER)
         place = self._moved((marker, get(marker).coefficients[axis].name))
-        self._posed[column] = [-x for x in place]
+        self._posed[column] = -place
 
     def _add_model_errors(self) -> None:
         """Add the columns of forces and torques that are a small share larger, and of what of a
@@ -438,22 +430,19 @@ class Likelihood:
         The latter may be too small by the share of it that is rounding (errors in variables): a
         hover holds little torque, and rounding hides it.
         """
-        rounded = 2.0 * np.square(self._rounding()[3:])
-        known = [
-            track.rotors[:, 1:] - x[:, 1:]
-            for track, x in zip(self.tracks, self.answers, strict=True)
-        ]
-        share = rounded / np.maximum(np.concatenate(known).var(axis=0), rounded)
+        rounded, (whole, _) = 2.0 * np.square(self._rounding()[3:]), joined(self.tracks)
+        expected = whole.rotors[:, 1:] - np.concatenate(self.answers)[:, 1:]
+        share = rounded / np.maximum(expected.var(axis=0), rounded)
         scale = np.hypot(1.0, share / PRIORS.model_error)
-        for track, expected in zip(self.tracks, known, strict=True):
-            for i, axis in enumerate("xyz"):
-                force, torque, hidden = np.zeros((3, len(track.t), 6))
-                force[:, :3] = track.rotors[:, :1] * track.rotation[:, :, i]
-                torque[:, 3 + i] = track.rotors[:, 1 + i]
-                hidden[:, 3 + i] = scale[i] * expected[:, i]
-                errors = {"force": force, "torque": torque, "expected torque": hidden}
-                for name, x in errors.items():
-                    self._acting.setdefault(("", f"{MODEL_ERROR} of {name} {axis}"), []).append(x)
+        for i, axis in enumerate("xyz"):
+            force, torque, hidden = np.zeros((3, len(whole.t), 6))
+            force[:, :3] = whole.rotors[:, :1] * whole.rotation[:, :, i]
+            torque[:, 3 + i] = whole.rotors[:, 1 + i]
+            hidden[:, 3 + i] = scale[i] * expected[:, i]
+            errors = {"force": force, "torque": torque, "expected torque": hidden}
+            self._acting |= {
+                ("", f"{MODEL_ERROR} of {name} {axis}"): x for name, x in errors.items()
+            }
 
     def _jumps(self) -> list[Array]:
         """Return what a unit of each gain of a pair of axes adds to the states (n, 6, e) of each
@@ -483,18 +472,18 @@ class Likelihood:
         root = np.linalg.cholesky(steady.covariance)
         inverse = np.linalg.inv(root)
         length = round(BLOCK / self.period)
-        blocks, samples = [], 0
+        blocks, samples, first = [], 0, 0
         for i, (track, jumps) in enumerate(zip(self.tracks, self._jumps(), strict=True)):
             state, counts = np.zeros((6, 3, len(names))), self._counts(i)
             for begin in range(0, len(track.position), length):
                 at = slice(begin, min(begin + length, len(track.position)))
-                rows = at.stop - at.start
+                rows, here = at.stop - at.start, slice(first + at.start, first + at.stop)
                 x, y = np.zeros((rows, 6, len(asked))), np.zeros((rows, 6, len(moved)))
                 for j, c in enumerate(asked):
                     if c in acting:
-                        x[:, :, j] = acting[c][i][at]
+                        x[:, :, j] = acting[c][here]
                 for j, column in enumerate(moved.values()):
-                    y[:, :, j] = column[i][at]
+                    y[:, :, j] = column[here]
                 driven = np.zeros((rows, 6, len(DRIVEN), len(STATES)))
                 driven[:, :3, 0] = jumps[at, :3, : len(STATES)]
                 for j in range(1, len(DRIVEN)):
@@ -506,6 +495,7 @@ class Likelihood:
                 samples += int(counts[at].sum())
                 if len(kept):
                     blocks.append(kept.T @ kept)
+            first += len(track.position)
         penalty = 2.0 * samples * float(np.log(np.diagonal(root)).sum())
         return in_prior_units(self.flights, names, np.array(blocks), penalty, self.setting, starts)
 

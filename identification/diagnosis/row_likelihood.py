@@ -11,7 +11,7 @@ from scipy.linalg import cho_factor, cho_solve
 from ...dynamics.effects import Role, playing
 from .causal_filter import State
 from .climbing import Height, height, linearised, mode
-from .discrepancy import changing_columns, discrepancy_columns, variables
+from .discrepancy import changing_columns, discrepancy_columns, joined, variables
 from .log_offsets import LAG_ASYMMETRY
 from .priors import (
     NUISANCE,
@@ -122,46 +122,34 @@ class RowLikelihood:
         for c, start in starts.items():
             columns[c] = residual - rows.residual({**setting, c[0]: dict(start)})
         if unknown:
-            columns |= self._dictionary() | self._changing(setting)
+            columns |= self._dictionary(setting)
         x = self._white(np.stack([*columns.values(), residual], axis=2))
         ends = np.flatnonzero(np.diff(rows.block[self._use])) + 1
         parts = [p.reshape(-1, p.shape[2]) for p in np.split(x, ends)]
         blocks = np.array([p.T @ p for p in parts])
         return in_prior_units(flights, list(columns), blocks, 0.0, setting, starts)
 
-    def _dictionary(self) -> dict[Column, Array]:
-        flights = self.rows.flights
-        pieces, found = flights.pieces({}), discrepancy_columns(self._states(), flights)
-        out: dict[Column, Array] = {}
-        for column, parts in found.items():
-            if not self.rows.with_torques and not any(x[:, :3].any() for x in parts):
-                continue
-            sampled = np.concatenate([p.smooth(x) for x, p in zip(parts, pieces, strict=True)])
-            out[column] = self.rows.from_world(sampled[:, :3], torque=sampled[:, 3:])
-        return out
-
-    def _states(self) -> list[State]:
-        """Return the flight; the acceleration is the rotors', which knows no disturbance."""
-        vehicle, out = self.flights.vehicle, []
-        for s in (p.signals for p in self.rows.flights.pieces({})):
-            rotors = vehicle.rotor_wrench(s.rotor_speeds) / self.flights.inertias[2:]
+    def _dictionary(self, setting: Setting) -> dict[Column, Array]:
+        """Return the dictionary's columns, those of coefficients that change among them."""
+        rows, flights, vehicle = self.rows, self.flights, self.flights.vehicle
+        pieces, states = flights.pieces({}), []
+        for s in (p.signals for p in pieces):
+            rotors = vehicle.rotor_wrench(s.rotor_speeds) / flights.inertias[2:]
+            # the acceleration is the rotors', which knows no disturbance
             push, rate = rotors[:, :1] * s.rotation[:, :, 2], s.angular_velocity
-            out.append(State(s.t, s.position, s.rotation, s.velocity, rate, push, rotors))
-        return out
-
-    def _changing(self, setting: Setting) -> dict[Column, Array]:
-        """Return the dictionary's columns of effects whose coefficients change."""
-        rows, pieces = self.rows, self.rows.flights.pieces({})
+            states.append(State(s.t, s.position, s.rotation, s.velocity, rate, push, rotors))
+        whole, ends = joined(states)
+        out: dict[Column, Array] = {}
+        for column, x in discrepancy_columns(whole, ends, flights).items():
+            if rows.with_torques or x[:, :3].any():
+                parts = zip(np.split(x, ends), pieces, strict=True)
+                sampled = np.concatenate([p.smooth(part) for part, p in parts])
+                out[column] = rows.from_world(sampled[:, :3], torque=sampled[:, 3:])
         here = rows.residual(setting)
-        parts = {e: [rows.residual(without(setting, e)) - here] for e in setting}
-        found = variables(self._states())
-        at_rows = {
-            name: [
-                rows.at_rows(np.concatenate([z[p.rows] for z, p in zip(x, pieces, strict=True)]))
-            ]
-            for name, x in found.items()
-        }
-        return {c: x for c, (x,) in changing_columns(parts, at_rows).items()}
+        own = {e: rows.residual(without(setting, e)) - here for e in setting}
+        at = np.concatenate([i + p.rows for i, p in zip([0, *ends], pieces, strict=True)])
+        found = {name: rows.at_rows(x[at]) for name, x in variables(whole).items()}
+        return out | changing_columns(own, found)
 
     # Fits
 
