@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from typing import TypeVar
 
 import numpy as np
@@ -149,6 +149,7 @@ class Piece:
     signals: Signals
     rows: Index  # the samples that are rows
     needed: Array  # (rows, 6) what the motion needs, N and Nm, by the declared mass and inertia
+    felt: Array | None  # (rows, 3) as of ``Flights.felt``, where an accelerometer was read
 
     def smooth(self, x: Array) -> Array:
         """Return samples (n, ...) at the rows, through the residual's low-pass."""
@@ -200,16 +201,8 @@ class Flights:
         self._fit_logs = len(logs)
         self._drift: np.random.Generator | None = None  # of a copy whose fusion errs otherwise
         self._fused: dict[FlightLog, list[InertialSignals]] = {}
-        self._felt: dict[Piece, Array] = {}
         self._forget()
         self._first: list[Piece] = []
-        self.log: Index  # (rows,) which log
-        self.block: Index  # (rows,)
-        self.fit_rows: Mask  # (rows,)
-        self.start: Mask  # (rows,) first row of a piece
-        self.t: Array  # (rows,) s
-        self.period: float  # s, from row to row
-        self.seconds: float  # of unbroken flight
         self._lay_rows()
         # by what the accelerometers from which the motion is read may be off, and all signals
         self.biases = self._biases()
@@ -256,27 +249,23 @@ class Flights:
     def _lay_rows(self) -> None:
         """Cut the flights into pieces, and say of which of their samples rows are."""
         self._first = pieces = self.pieces({})
-        parts, count = [], 0
+        times = [piece.signals.t[piece.rows] for piece in pieces]
+        self.t: Array = np.concatenate(times)  # (rows,) s
+        self.start: Mask = np.concatenate([t == t[0] for t in times])  # first row of a piece
+        # (rows,) which log
+        self.log: Index = np.repeat([piece.log for piece in pieces], [len(t) for t in times])
+        self.period = float(np.median(np.diff(self.t)))  # s, from row to row
+        # s of unbroken flight
         self.seconds = sum(float(x.signals.t[-1] - x.signals.t[0]) for x in pieces)
         short = self.commanded and self.seconds < 8 * BLOCK
-        length = SHORT_BLOCK if short else BLOCK
-        for piece in pieces:
-            time = piece.signals.t[piece.rows]
-            number = ((time - time[0]) // length).astype(np.int64) + count
-            seen = (
-                np.full(len(time), piece.log < self._fit_logs)
-                if len(self.logs) > self._fit_logs
-                else number % BLOCKS_PER_HELD_OUT != held_out(number)
-            )
-            log = np.full(len(time), piece.log)
-            parts.append((log, number, seen, np.arange(len(time)) == 0, time))
-            count = int(number[-1]) + 1
-        self.log, self.block, self.fit_rows, self.start, self.t = map(
-            np.concatenate, zip(*parts, strict=True)
-        )
+        self.block: Index = blocks(self.t, self.start, SHORT_BLOCK if short else BLOCK)  # (rows,)
+        self.fit_rows: Mask  # (rows,)
+        if len(self.logs) > self._fit_logs:
+            self.fit_rows = self.log < self._fit_logs
+        else:
+            self.fit_rows = self.block % BLOCKS_PER_HELD_OUT != held_out(self.block)
         if self.fit_rows.all() and self.block[-1] > 0:  # fewer than four blocks
             self.fit_rows = self.block < self.block[-1]
-        self.period = float(np.median(np.diff(self.t)))
 
     def _lost_in_noise(self, noisy: "Flights") -> frozenset[str]:
         """Return the effects whose columns are noise to a large part.
@@ -432,7 +421,12 @@ class Flights:
         needed = needed_wrench(signals, self.vehicle)
         if self.commanded:
             needed[:, 3:] = 0.0
-        return Piece(log, signals, rows, _smooth(needed, signals)[rows])
+        needed, felt = _smooth(needed, signals)[rows], None
+        if not self.inertial and _reads_throughout(self.logs[log]):
+            read = resampled(signals.t, *_smooth_accelerometer(self.logs[log]))
+            force = self.vehicle.mass * np.einsum("nij,nj->ni", signals.rotation, read)
+            felt = _smooth(force, signals)[rows] - needed[:, :3]
+        return Piece(log, signals, rows, needed, felt)
 
     def _inertial_signals(self, log: FlightLog) -> list[InertialSignals]:
         # no effect of the library changes what an IMU measured: each log is fused once
@@ -547,16 +541,8 @@ class Flights:
         poses' motion needs, low-passed; None where a log has no accelerometer, or where the motion
         is read from it.
         """
-        if self.inertial or not all(map(_reads_throughout, self.logs)):
-            return None
-        pieces = self.pieces(setting)
-        return np.concatenate([_kept(self._felt, p, partial(self._felt_at, p), 40) for p in pieces])
-
-    def _felt_at(self, piece: Piece) -> Array:
-        s = piece.signals
-        read = resampled(s.t, *_smooth_accelerometer(self.logs[piece.log]))
-        force = self.vehicle.mass * np.einsum("nij,nj->ni", s.rotation, read)
-        return piece.smooth(force) - piece.needed[:, :3]
+        found = [piece.felt for piece in self.pieces(setting) if piece.felt is not None]
+        return np.concatenate(found) if len(found) == len(self._first) else None
 
     def step(self, setting: Setting, column: Column, size: float = STEP) -> tuple[float, float]:
         """Return a coefficient's value at a setting, and a step from there within its limits, of so
@@ -638,6 +624,15 @@ def _smooth_accelerometer(log: FlightLog) -> tuple[Array, Array]:
 
 def _smooth(x: Array, signals: Signals) -> Array:
     return low_pass(x, CUTOFFS.residual_hz, signals.period)
+
+
+def blocks(t: Array, begins: Mask, seconds: float) -> Index:
+    """Return the number of the block of so many seconds (n,) in which samples at ``t`` (n,) s lie,
+    which begin anew with each piece.
+    """
+    since = t - t[begins][np.cumsum(begins) - 1]
+    new = begins | (np.diff(since // seconds, prepend=-1.0) != 0.0)
+    return np.asarray(np.cumsum(new) - 1)
 
 
 def held_out(number: Index) -> Index:

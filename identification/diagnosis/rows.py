@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..motion.smoothing import CUTOFFS, low_pass
-from .regression import Column, Flights, Setting
+from .regression import Column, Flights, Setting, blocks
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -63,10 +63,7 @@ class Rows:
         self.t: Array = flights.t[self._at]
         self.log = flights.log[self._at]
         self.fit: Mask = flights.fit_rows[self._at]
-        since = self.t - self.t[self.begins][np.cumsum(self.begins) - 1]
-        number = (since // BLOCK).astype(np.int64)
-        new = self.begins | (np.diff(number, prepend=-1) != 0)
-        self.block = np.cumsum(new) - 1
+        self.block = blocks(self.t, self.begins, BLOCK)
         self.has_accelerometer = flights.felt({}) is not None
         self.channels = 3 * (1 + self.has_accelerometer + self.with_torques)
         self._inertia = flights.inertias[3:]
