@@ -37,17 +37,15 @@ from ..motion.noise_spectrum import filtering_notes, pose_was_filtered
 from ..motion.smoothing import CUTOFFS
 from ..prediction import nis_without_wrench_state, rollout_error
 from ..wrench_series import pose_notes
-from .advice import FILTERED, advice, composites, inertial_notes, outside_the_fit
+from .advice import FILTERED, advice, composites, inertial_notes, late_rotors, outside_the_fit
 from .commanded_rotors import THRUST_FACTORS, assumed_thrust_doubts
 from .commands import what_commands_show
-from .log_offsets import ROTOR_TIME_OFFSET
 from .priors import NUISANCE
 from .ranking import LEAST_RIVAL, rank, rank_by_rows
 from .regression import (
     CENTRAL,
     Flights,
     coefficient,
-    moves_time,
     typical_size,
     unit_of_change,
     without,
@@ -62,7 +60,6 @@ Array = NDArray[np.float64]
 
 LEAST_STATED = 0.001  # probability of an alternative that is reported
 LEAST_SIZE = 0.1  # typical sizes, from which a calibration is worth a name
-LEAST_ROTOR_TIME_OFFSET = 0.001  # s, worth a note
 # deviance by which an effect of typical size is sure: of one of some thirty effects, before which
 # one is expected, 20 to 1 afterwards
 LEAST_SHOWN = 13.0
@@ -230,7 +227,13 @@ class Judged:
             names[given.late.name] = 1.0
         self.effects = tuple(effects)
         structured = strange > 0.5 and structure > 0.0
-        self.structure = (self._sign(),) if structured else ()
+        self.structure: tuple[Structure, ...] = ()
+        if structured:  # the column of the dictionary that explains most beside the likeliest set
+            (_, name), _, gained = found.posterior.strangest()
+            group, what = name.removeprefix("unknown ").split(": ", 1)
+            column, _, channel = what.rpartition(" in ")
+            where = f"{CHANNELS[int(channel)]} with {column}" if column else f"the part of {what}"
+            self.structure = (Structure(group, where, gained / found.posterior.left()),)
         some = self.balance.noisy or disturbed > 0.0 or bool(self.pushes)
         self.remainder = "structured" if structured else "random" if some else "none"
         biases = [("", f"{NUISANCE}{name}") for _, name in flights.biases]
@@ -243,7 +246,7 @@ class Judged:
         self.notes = (
             *inertial_notes(flights, named),
             *(sentence for sentences in self.doubts.values() for sentence in sentences),
-            *self._late_rotors(),
+            *late_rotors(flights, found.setting, found.sensors),
         )
         sets = [
             Alternative(
@@ -361,14 +364,6 @@ class Judged:
             channels=carrying_channels(flights, found.setting, effect),
         )
 
-    def _sign(self) -> Structure:
-        """Return which column of the dictionary explains most beside the likeliest set."""
-        (_, name), _, gained = self._found.posterior.strangest()
-        group, what = name.removeprefix("unknown ").split(": ", 1)
-        column, _, channel = what.rpartition(" in ")
-        where = f"{CHANNELS[int(channel)]} with {column}" if column else f"the part of {what}"
-        return Structure(group, where, gained / self._found.posterior.left())
-
     def traces(self) -> Iterator[Trace]:
         """Yield the residual of each piece of flight over time."""
         flights, found = self._flights, self.balance
@@ -382,20 +377,6 @@ class Judged:
                 ~flights.fit_rows[rows],
                 {effect: part[rows] for effect, part in self.parts.items()},
             )
-
-    def _late_rotors(self) -> Iterator[str]:
-        """Yield, as a sentence, by how much rotor speeds act later than they are logged."""
-        flights, found = self._flights, self._found
-        offset, std = found.sensors.get(ROTOR_TIME_OFFSET[1], (0.0, math.inf))
-        least = max(LEAST_ROTOR_TIME_OFFSET, BY_CHANCE * std)
-        if flights.inertial or any(map(moves_time, found.setting)) or abs(offset) < least:
-            return
-        pose = ", or the filter of the pose delays it by as much"
-        yield (
-            f"the rotor speeds act {abs(1000 * offset):.1f} ms "
-            f"{'later' if offset > 0 else 'earlier'} than they are logged"
-            f"{pose if flights.filtered and offset > 0 else ''}"
-        )
 
 
 def _segments(flights: Flights) -> list[tuple[int, float, float]]:

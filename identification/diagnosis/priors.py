@@ -4,7 +4,7 @@ each column, and the ways in which an effect may act.
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Role
-from .evidence import Index, Marginal, marginal
+from .evidence import Index, Marginal, SetEvidence, marginal
 from .log_offsets import TIMINGS
 from .regression import (
     CENTRAL,
@@ -80,6 +80,8 @@ class Base:
     typical: Array  # (c,) typical sizes in prior standard deviations
     dictionary: Index  # columns of the discrepancy
     starts: Starts
+    # the evidence of sets, by the likelihood's power and their columns; None of one that cannot be
+    tried: dict[tuple[float, tuple[Variant, ...]], SetEvidence | None] = field(default_factory=dict)
 
     @cached_property
     def columns(self) -> dict[Column, int]:

@@ -26,7 +26,7 @@ from .likelihood import Likelihood
 from .priors import Base, Setting, Starts
 from .regression import START_PREFIX, Column, Flights, moves_time, typical_size, without
 from .row_likelihood import RowLikelihood
-from .sets import Posterior, Tried, is_possible
+from .sets import Posterior, is_possible
 from .starting_points import starting_points
 
 Array = NDArray[np.float64]
@@ -155,7 +155,6 @@ def rank_by_rows(
     fitted: dict[frozenset[str], Setting] = {given: first}
     bases: dict[frozenset[str], Base] = {given: likelihood.base(first, starts)}
     idle: set[frozenset[str]] = set()
-    tried: Tried = {}
 
     def base(setting: Setting, unknown: bool = False) -> Base:
         lags = {
@@ -191,7 +190,7 @@ def rank_by_rows(
             add(min(near, key=likelihood.objective))
 
     def posterior() -> Posterior:
-        return Posterior(flights, library, [*bases.values()], likelihood.power, given, idle, tried)
+        return Posterior(flights, library, [*bases.values()], likelihood.power, given, idle)
 
     def likeliest() -> Setting:
         """Return the likeliest set's fit, once no set is likelier that was not fitted, nor, where

@@ -61,17 +61,13 @@ ROUNDED = 0.25
 
 @dataclass(frozen=True, eq=False)
 class _Candidate:
-    base: int
+    base: Base
     variants: tuple[Variant, ...]
     evidence: SetEvidence
 
     @property
     def columns(self) -> list[Column]:
         return [c for columns in self.variants for c in columns]
-
-
-# by base and power of the likelihood: the evidence of sets there, None of one that cannot be
-Tried = dict[tuple[Base, float], dict[tuple[Variant, ...], SetEvidence | None]]
 
 
 def is_possible(
@@ -113,7 +109,6 @@ class Posterior:
             base that has most of its effects; a single one has them all. Without them each has a
             noise of its own, and of a set the likeliest counts.
         idle: sets that are none: where they fit best an effect of them does nothing.
-        tried: where the evidence of sets beside bases is kept, for posteriors of the same bases.
     """
 
     def __init__(
@@ -124,11 +119,9 @@ class Posterior:
         power: float = 1.0,
         given: frozenset[str] | None = None,
         idle: Collection[frozenset[str]] = (),
-        tried: Tried | None = None,
     ) -> None:
         self.flights, self.library, self.bases, self.power = flights, library, bases, power
-        self.idle, self._tried = idle, {} if tried is None else tried
-        self.given = given
+        self.idle, self.given = idle, given
         self.asked_about = len(library) - len(given or ())
         self.inclusion = min(PRIORS.expected / max(self.asked_about, 1), 0.5)
         self.known: dict[frozenset[str], _Candidate] = {}
@@ -142,7 +135,7 @@ class Posterior:
 
     def _likeliest(self) -> tuple[Base, _Candidate]:
         best = self.known[max(self.scores, key=self.scores.__getitem__)]
-        return self.bases[best.base], best
+        return best.base, best
 
     def tempering(self) -> float:
         """Return the power of the likelihood that the scatter beside the likeliest set allows."""
@@ -157,11 +150,6 @@ class Posterior:
         if self.given is not None:
             little[[base.names[i][1].startswith(START_PREFIX) for i in asked]] = 0.0
         return little
-
-    def _log_prior(self, effects: int) -> float:
-        p = self.inclusion
-        found = effects - len(self.given or ())
-        return found * math.log(p) + (self.asked_about - found) * math.log1p(-p)
 
     def _counts(self, number: int, key: frozenset[str]) -> bool:
         """Return whether a set is judged beside a base."""
@@ -190,25 +178,27 @@ class Posterior:
         low, high = base.low[asked], base.high[asked]
         variants = self._variants(base)
         ways = Counter(v[0][0] for v in variants)
-        tried = self._tried.setdefault((base, self.power), {})
+        p, always = self.inclusion, len(self.given or ())
 
         def score(some: tuple[Variant, ...]) -> float:
             key = frozenset(v[0][0] for v in some)
             if not self._counts(number, key):
                 return -math.inf
-            if some not in tried:
+            if (self.power, some) not in base.tried:
                 index = [at[c] for v in some for c in v]
-                tried[some] = None
+                base.tried[self.power, some] = None
                 with suppress(np.linalg.LinAlgError):
                     found = set_evidence(m, index, low, high)
-                    tried[some] = found if self._possible(base, some, found) else None
-            if (evidence := tried[some]) is None:
+                    if self._possible(base, some, found):
+                        base.tried[self.power, some] = found
+            if (evidence := base.tried[self.power, some]) is None:
                 return -math.inf
             total = evidence.log_evidence - sum(math.log(ways[v[0][0]]) for v in some)
-            total += self._log_prior(len(some))
+            more = len(some) - always
+            total += more * math.log(p) + (self.asked_about - more) * math.log1p(-p)
             if total > self.scores.get(key, -math.inf):
                 self.scores[key] = total
-                self.known[key] = _Candidate(number, some, evidence)
+                self.known[key] = _Candidate(base, some, evidence)
             return total
 
         first = tuple(v for v in variants if self.given is not None and v[0][0] in base.effects)
@@ -217,7 +207,7 @@ class Posterior:
             if all(c in at for v in some for c in v):
                 score(some)
         level = [(*first, v) for v in variants if v not in first]
-        begun, most = len(first) + 1, MOST_EFFECTS + len(self.given or ())
+        begun, most = len(first) + 1, MOST_EFFECTS + always
         for size in range(begun, begun + 1 if asked_sets is not None else max(most, begun) + 1):
             level.sort(key=score, reverse=True)
             grown: dict[frozenset[Variant], tuple[Variant, ...]] = {}
@@ -378,7 +368,7 @@ class Posterior:
 
     def _setting(self, key: frozenset[str]) -> tuple[Setting, Setting]:
         found = self.known[key]
-        return self._at_mode(self.bases[found.base], found.variants, found.evidence)
+        return self._at_mode(found.base, found.variants, found.evidence)
 
     def _at_mode(
         self, base: Base, some: Sequence[Variant], evidence: SetEvidence
