@@ -110,11 +110,10 @@ def diagnose(
     sure = said.remainder == "none" and not any(
         effect.tentative or effect.indistinguishable_from for effect in effects
     )
-    verdict = (
-        ("explained" if sure else "partly explained")
-        if effects
-        else ("nothing to explain" if said.remainder == "none" else "unexplained")
-    )
+    if effects:
+        verdict = "explained" if sure else "partly explained"
+    else:
+        verdict = "nothing to explain" if sure else "unexplained"
     report("predicting the flights")
     named = {e: x for e, x in setting.items() if e}
     amended = flights.amended(named) if named else vehicle

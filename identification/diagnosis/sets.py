@@ -189,7 +189,7 @@ class Posterior:
                 base.tried[self.power, some] = None
                 with suppress(np.linalg.LinAlgError):
                     found = set_evidence(m, index, low, high)
-                    if self._possible(base, some, found):
+                    if self._possible(_Candidate(base, some, found)):
                         base.tried[self.power, some] = found
             if (evidence := base.tried[self.power, some]) is None:
                 return -math.inf
@@ -217,16 +217,16 @@ class Posterior:
                         grown.setdefault(frozenset((*some, v)), (*some, v))
             level = list(grown.values())
 
-    def _possible(self, base: Base, some: Sequence[Variant], evidence: SetEvidence) -> bool:
+    def _possible(self, candidate: _Candidate) -> bool:
         """Return whether a vehicle can have the coefficients of a set at its mode."""
         plausible = self.given is not None
         asked = [
             e
-            for (e, name), *_ in some
+            for (e, name), *_ in candidate.variants
             if get(e).possible or (plausible and get(e).implausible)
             if not name.startswith(START_PREFIX)
         ]
-        setting, std = self._at_mode(base, some, evidence) if asked else ({}, {})
+        setting, std = self._at_mode(candidate) if asked else ({}, {})
         return all(is_possible(self.flights, setting, std[e], e, plausible) for e in asked)
 
     def structure(self, quieter: Base | None = None) -> float:
@@ -341,7 +341,7 @@ class Posterior:
     def best_setting(self, most: int = MOST_EFFECTS) -> Setting:
         """Return the coefficients of the likeliest set of at most so many effects."""
         key = max((k for k in self.scores if len(k) <= most), key=self.scores.__getitem__)
-        return self._setting(key)[0]
+        return self._at_mode(self.known[key])[0]
 
     def rivals(self, setting: Setting) -> list[Setting]:
         """Return the coefficients of the likeliest other effects that, alone, gain at least half of
@@ -350,7 +350,7 @@ class Posterior:
         least = 0.5 * (self.scores.get(frozenset(setting), -math.inf) + self.scores[frozenset()])
         found = [k for k, x in self.scores.items() if len(k) == 1 and x > least and k - {*setting}]
         found.sort(key=self.scores.__getitem__, reverse=True)
-        return [self._setting(k)[0] for k in found[:MOST_RIVALS]]
+        return [self._at_mode(self.known[k])[0] for k in found[:MOST_RIVALS]]
 
     def is_elsewhere(self, new: Setting, tried: Mapping[frozenset[str], Setting]) -> bool:
         """Return whether a set was not tried yet, or with coefficients that are more than a
@@ -359,25 +359,20 @@ class Posterior:
         if frozenset(new) not in tried:
             return True
         old = tried[frozenset(new)]
-        std = self._setting(frozenset(new))[1]
+        std = self._at_mode(self.known[frozenset(new)])[1]
         return any(
             abs(value - old[effect].get(name, 0.0)) > std[effect].get(name, math.inf)
             for effect, values in new.items()
             for name, value in values.items()
         )
 
-    def _setting(self, key: frozenset[str]) -> tuple[Setting, Setting]:
-        found = self.known[key]
-        return self._at_mode(found.base, found.variants, found.evidence)
-
-    def _at_mode(
-        self, base: Base, some: Sequence[Variant], evidence: SetEvidence
-    ) -> tuple[Setting, Setting]:
+    def _at_mode(self, candidate: _Candidate) -> tuple[Setting, Setting]:
         """Return the coefficients of a set at the mode, and their standard deviations."""
+        base, evidence = candidate.base, candidate.evidence
         setting: Setting = {}
         std: Setting = {}
         found = zip(evidence.mode.tolist(), evidence.std.tolist(), strict=True)
-        for columns in some:
+        for columns in candidate.variants:
             effect = columns[0][0]
             own: dict[str, float] = dict(self.flights.coefficients({}, effect))
             off: dict[str, float] = {}
@@ -404,7 +399,7 @@ class Posterior:
         probability = {e: sum(x for k, x in p.items() if e in k) for e in self.library}
         best = sorted(p, key=p.__getitem__, reverse=True)
         sets = tuple(
-            RankedSet(tuple(sorted(key)), p[key], *self._setting(key))
+            RankedSet(tuple(sorted(key)), p[key], *self._at_mode(self.known[key]))
             for key in best
             if p[key] >= LEAST_PROBABILITY
         )

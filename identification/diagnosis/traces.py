@@ -88,20 +88,15 @@ def carrying_channels(flights: Flights, setting: Setting, effect: str) -> tuple[
     """Return the channels that carry a named effect at a setting, in the order of ``ORDER``: those
     in which it leaves its trace, and those that its model reads.
     """
-    found = {*_traces(flights, setting, effect), *_read(flights, setting, effect)}
-    return tuple(channel for channel in ORDER if channel in found)
-
-
-def _traces(flights: Flights, setting: Setting, effect: str) -> Iterator[str]:
-    """Yield the channels in which an effect leaves its trace."""
     part = flights.residual(without(setting, effect)) - flights.residual(setting)
     noise = np.mean(np.square(flights.sensor_noise), axis=0) + 1e-30
-    power = np.mean(np.square(part), axis=0) / noise
-    whole = max(float(power.sum()), 1e-30)
-    if power[:3].sum() / whole > LEAST_SHARE:
-        yield "accelerometer" if flights.inertial else "position"
-    if power[3:].sum() / whole > LEAST_SHARE and not flights.commanded:
-        yield "gyro" if flights.inertial else "attitude"
+    force, torque = (np.mean(np.square(part), axis=0) / noise).reshape(2, 3).sum(axis=1)
+    least, found = LEAST_SHARE * max(force + torque, 1e-30), {*_read(flights, setting, effect)}
+    if force > least:
+        found.add("accelerometer" if flights.inertial else "position")
+    if torque > least and not flights.commanded:
+        found.add("gyro" if flights.inertial else "attitude")
+    return tuple(channel for channel in ORDER if channel in found)
 
 
 def _read(flights: Flights, setting: Setting, effect: str) -> Iterator[str]:
