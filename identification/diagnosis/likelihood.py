@@ -472,18 +472,14 @@ class Likelihood:
         root = np.linalg.cholesky(steady.covariance)
         inverse = np.linalg.inv(root)
         length = round(BLOCK / self.period)
-        blocks, samples, first = [], 0, 0
+        blocks, samples, first, still = [], 0, 0, np.zeros_like(self._base)
         for i, (track, jumps) in enumerate(zip(self.tracks, self._jumps(), strict=True)):
             state, counts = np.zeros((6, 3, len(names))), self._counts(i)
             for begin in range(0, len(track.position), length):
                 at = slice(begin, min(begin + length, len(track.position)))
                 rows, here = at.stop - at.start, slice(first + at.start, first + at.stop)
-                x, y = np.zeros((rows, 6, len(asked))), np.zeros((rows, 6, len(moved)))
-                for j, c in enumerate(asked):
-                    if c in acting:
-                        x[:, :, j] = acting[c][here]
-                for j, column in enumerate(moved.values()):
-                    y[:, :, j] = column[here]
+                x = np.stack([acting.get(c, still)[here] for c in asked], axis=2)
+                y = np.stack([column[here] for column in moved.values()], axis=2)
                 driven = np.zeros((rows, 6, len(DRIVEN), len(STATES)))
                 driven[:, :3, 0] = jumps[at, :3, : len(STATES)]
                 for j in range(1, len(DRIVEN)):
