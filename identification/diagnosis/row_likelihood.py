@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from ...dynamics.effects import Role, playing
 from .causal_filter import State
@@ -51,9 +50,6 @@ class RowLikelihood:
         self.power = 1.0
         self.noise: RowNoise = self._noise(first)
         self._use = self.rows.fit & self.noise.known
-        N = self._white(np.stack(list(self.nuisances.values()), axis=2))
-        self._given = N.reshape(-1, N.shape[2])
-        self._inner = self._given.T @ self._given
 
     def _noise(self, first: Setting) -> RowNoise:
         rows = self.rows
@@ -117,7 +113,10 @@ class RowLikelihood:
         rows, flights, residual = self.rows, self.flights, self.rows.residual(setting)
         if effects is None:
             effects = [e for e in self.library if not flights.is_nonlinear(e) or e in setting]
-        columns = dict(self.nuisances) | self._uneven_lag(setting)
+        columns = dict(self.nuisances)
+        if not flights.commanded and playing(Role.LAG, among=list(setting)):
+            # rotors that speed up sooner than they slow down
+            columns |= rows.columns(setting, [LAG_ASYMMETRY])
         columns |= rows.columns(setting, flights.columns_of(effects))
         for c, start in starts.items():
             columns[c] = residual - rows.residual({**setting, c[0]: dict(start)})
@@ -157,20 +156,18 @@ class RowLikelihood:
         """Return how high the posterior is at a setting, up to a constant, with the nuisances
         integrated out.
         """
-        prior = sum(
-            ((setting[e].get(name, 0.0) - declared((e, name), self.flights)) / size) ** 2
-            for e, name in self.flights.columns_of(setting)
-            if (size := prior_size((e, name), self.flights))
-        )
-        w = self._white(self.rows.residual(setting)).ravel()
-        factor, b = self._nuisance_sums(w, setting)
-        deviance = self.power * float(w @ w) - float(b @ cho_solve(factor, b))
+        base = self.base(setting, {}, ())
+        m = base.marginal(base.at(()), base.plain, power=self.power)
+        off = [
+            (setting[c[0]].get(c[1], 0.0) - declared(c, self.flights)) / prior_size(c, self.flights)
+            for c in self.flights.columns_of(setting)
+        ]
 
         def target() -> Setting:
             base = self.base(setting, {}, setting)
             return linearised(self.flights, base, base.asked, setting, self.power)[1]()
 
-        return 0.5 * (deviance + prior), target
+        return 0.5 * float(np.square(off).sum()) - m.constant, target
 
     def objective(self, setting: Setting) -> float:
         """Return minus the logarithm of likelihood and prior at a setting, up to a constant;
@@ -182,35 +179,15 @@ class RowLikelihood:
         """Return the mode of the posterior of a setting's effects."""
         return mode(setting, self._height)
 
-    def _uneven_lag(self, setting: Setting) -> dict[Column, Array]:
-        """Return what rotors that speed up sooner than they slow down do beside a lag."""
-        if self.flights.commanded or not playing(Role.LAG, among=list(setting)):
-            return {}
-        return self.rows.columns(setting, [LAG_ASYMMETRY])
-
-    def _nuisance_sums(self, w: Array, setting: Setting) -> tuple[tuple[Array, bool], Array]:
-        inner, right = self._inner, self._given.T @ w
-        for c, column in self._uneven_lag(setting).items():
-            x = self._white(column).ravel() * prior_size(c, self.flights)
-            cross = self._given.T @ x
-            inner = np.block([[inner, cross[:, None]], [cross, x @ x]])
-            right = np.append(right, x @ w)
-        return cho_factor(self.power * inner + np.eye(len(inner))), self.power * right
-
     def sensors(self, setting: Setting) -> dict[str, tuple[float, float]]:
         """Return the likeliest biases of accelerometers from which the motion was read, and the
         time offsets of logs, as ``Flights`` takes them out, with their standard deviations.
         """
-        w = self._white(self.rows.residual(setting)).ravel()
-        factor, b = self._nuisance_sums(w, setting)
-        modes = cho_solve(factor, b)
-        std = np.sqrt(np.diag(cho_solve(factor, np.eye(len(b)))))
-        at = {name: i for i, (_, name) in enumerate(self.nuisances)}
-        out = {}
+        base = self.base(setting, {}, ())
+        modes, out = base.mode(base.plain, self.power), {}
         for (_, name), offset in self.flights.offsets.items():
-            i = at[NUISANCE + name]
-            value = float(np.clip(offset.size * modes[i], *offset.range))
-            out[name] = value, offset.size * float(std[i])
+            mode, std = modes["", NUISANCE + name]
+            out[name] = float(np.clip(offset.size * mode, *offset.range)), offset.size * std
         return out
 
     def idle(self, setting: Setting, among: Iterable[str]) -> set[str]:
