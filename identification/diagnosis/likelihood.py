@@ -101,7 +101,7 @@ class Likelihood:
         self.pieces: list[Poses]
         self.tracks: list[Track]
         self.known: list[Array]
-        self._fit: list[NDArray[np.bool_]]
+        self._fit: list[NDArray[np.bool_]]  # (n,) samples that the fit may see
         if near is not None and _sensing(near.vehicle) == _sensing(self.vehicle):
             self.pieces, self._fit = near.pieces, near._fit
         else:
@@ -113,7 +113,12 @@ class Likelihood:
                 for piece in read_poses(log, self.vehicle, finer)
             ]
             self.pieces = [piece for _, piece in found]
-            self._fit = [_in_fit(flights, i, piece.t) for i, piece in found]
+            # those of whose block the rows are
+            self._fit = []
+            for i, piece in found:
+                rows = flights.log == i
+                at = np.searchsorted(flights.t[rows], piece.t).clip(max=int(rows.sum()) - 1)
+                self._fit.append(flights.fit_rows[rows][at])
         self.period = self.pieces[0].period
         self.inertias = flights.inertias
         lengths = [len(piece.t) for piece in self.pieces]
@@ -366,7 +371,12 @@ class Likelihood:
     def _add_what_any_flight_may_have(self) -> None:
         """Add the columns of time offsets, of rotors between samples and of the model's error."""
         self._add(ROTOR_TIME_OFFSET)
-        bent = map(_bent_rotors, self.signals)
+        bent = []  # beside the straight line, by the second difference
+        for s in self.signals:
+            # the speeds are of k + 1/2: nothing later than sample k + 1
+            u = s.rotor_speeds.copy()
+            u[2:] += np.diff(s.rotor_speeds, 2, axis=0)
+            bent.append(replace(s, rotor_speeds=u))
         self._acting["", BETWEEN] = self._change(self.setting, signals=bent)
         self._add_model_errors()
         moved = []
@@ -537,25 +547,6 @@ class Likelihood:
             out,
         )
         return out
-
-
-def _bent_rotors(s: Signals) -> Signals:
-    """Return signals whose rotor speeds move between samples by their second difference beside the
-    straight line.
-    """
-    u = s.rotor_speeds  # of k + 1/2: nothing later than sample k + 1
-    bent = np.zeros_like(u)
-    bent[2:] = u[2:] - 2.0 * u[1:-1] + u[:-2]
-    return replace(s, rotor_speeds=u + bent)
-
-
-def _in_fit(flights: Flights, log: int, t: Array) -> NDArray[np.bool_]:
-    """Return which samples of a log, at times ``t`` (n,) s, the fit may see: those of whose block
-    the rows are.
-    """
-    rows = flights.log == log
-    at = np.searchsorted(flights.t[rows], t).clip(max=int(rows.sum()) - 1)
-    return np.asarray(flights.fit_rows[rows][at])
 
 
 def _sensing(vehicle: Vehicle) -> tuple[EffectSetting, ...]:

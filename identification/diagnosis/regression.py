@@ -422,9 +422,9 @@ class Flights:
         if self.commanded:
             needed[:, 3:] = 0.0
         needed, felt = _smooth(needed, signals)[rows], None
-        if not self.inertial and _reads_throughout(self.logs[log]):
-            read = resampled(signals.t, *_smooth_accelerometer(self.logs[log]))
-            force = self.vehicle.mass * np.einsum("nij,nj->ni", signals.rotation, read)
+        if not self.inertial and (read := _accelerometer(self.logs[log])):
+            at = resampled(signals.t, *read)
+            force = self.vehicle.mass * np.einsum("nij,nj->ni", signals.rotation, at)
             felt = _smooth(force, signals)[rows] - needed[:, :3]
         return Piece(log, signals, rows, needed, felt)
 
@@ -600,23 +600,18 @@ def _kept(memory: dict[K, V], key: K, make: Callable[[], V], most: int) -> V:
     return memory[key]
 
 
-def _reads_throughout(log: FlightLog) -> bool:
-    """Return whether a log's accelerometer was read from its beginning to its end."""
-    if log.accelerometer is None:
-        return False
-    times = log.t[np.isfinite(log.accelerometer).all(axis=1)]
-    ends = np.concatenate([log.t[:1], times, log.t[-1:]])
-    return len(times) > 0 and float(np.diff(ends).max()) < SIGNALS.gap
-
-
 @lru_cache(maxsize=16)  # of several pieces, and again at each setting of sensing effects
-def _smooth_accelerometer(log: FlightLog) -> tuple[Array, Array]:
+def _accelerometer(log: FlightLog) -> tuple[Array, Array] | None:
     """Return times (n,) s, evenly spaced, and what the accelerometer reads (n, 3) m/s2, with the
-    same low-pass as the pose.
+    same low-pass as the pose; None where it was not read from the log's beginning to its end.
     """
-    assert log.accelerometer is not None
+    if log.accelerometer is None:
+        return None
     read = np.isfinite(log.accelerometer).all(axis=1)
     times, values = log.t[read], log.accelerometer[read]
+    ends = np.concatenate([log.t[:1], times, log.t[-1:]])
+    if not len(times) or float(np.diff(ends).max()) >= SIGNALS.gap:
+        return None
     period = float(np.median(np.diff(times)))
     even = np.arange(times[0], times[-1], period)
     return even, low_pass(resampled(even, times, values), CUTOFFS.pose_hz, period)

@@ -43,7 +43,6 @@ class Rows:
         fit: (n,) rows that the fit may see.
         begins: (n,) first row of an unbroken piece.
         block: (n,) number of the block of 4 s.
-        log: (n,) which log.
         t: (n,) s.
         channels: 3, 6 or 9.
         with_torques: whether torques are among them.
@@ -57,16 +56,14 @@ class Rows:
             self._cutoff = cutoff = COMMANDED_CUTOFF_HZ if flights.commanded else FILTERED_CUTOFF_HZ
         step = max(1, round(1.0 / (ROWS_PER_CUTOFF * cutoff * flights.period)))
         self.flights, self.fixed = flights, fixed
-        kept = [rows[::step] for rows in flights.runs]
-        self._at: Index = np.concatenate(kept)
-        self.begins: Mask = np.concatenate([np.arange(len(rows)) == 0 for rows in kept])
+        self._at: Index = np.concatenate([rows[::step] for rows in flights.runs])
+        self.begins: Mask = flights.start[self._at]
         self.t: Array = flights.t[self._at]
-        self.log = flights.log[self._at]
         self.fit: Mask = flights.fit_rows[self._at]
         self.block = blocks(self.t, self.begins, BLOCK)
         self.has_accelerometer = flights.felt({}) is not None
         self.channels = 3 * (1 + self.has_accelerometer + self.with_torques)
-        self._inertia = flights.inertias[3:]
+        self._inertias = flights.inertias
         self.rotation = flights.at_rows("rotation")
 
     def from_world(
@@ -106,18 +103,17 @@ class Rows:
         Raises:
             InputError: no vehicle is like that.
         """
-        mass, setting = self.flights.vehicle.mass, {**self.fixed, **setting}
-        wrench, felt = self.flights.residual(setting), self.flights.felt(setting)
+        setting = {**self.fixed, **setting}
+        left, felt = self.flights.residual(setting) / self._inertias, self.flights.felt(setting)
         rotation = self.flights.at_rows("rotation", setting)
-        left = in_body(wrench[:, :3] / mass, rotation)
-        shown = None if felt is None else left + in_body(felt / mass, rotation)
-        return self.from_body(left, shown, wrench[:, 3:] / self._inertia)
+        shown = in_body(left[:, :3], rotation)
+        read = None if felt is None else shown + in_body(felt / self._inertias[:3], rotation)
+        return self.from_body(shown, read, left[:, 3:])
 
     def noise(self) -> Array:
         """Return rows of the sensors' noise, as far as the logs show it."""
-        noise = self.flights.visible_noise
-        force = noise[:, :3] / self.flights.vehicle.mass
-        return self.from_world(force, np.zeros_like(force), noise[:, 3:] / self._inertia)
+        noise = self.flights.visible_noise / self._inertias
+        return self.from_world(noise[:, :3], np.zeros_like(noise[:, :3]), noise[:, 3:])
 
     def columns(self, setting: Setting, wanted: Iterable[Column]) -> dict[Column, Array]:
         """Return what a unit of each coefficient explains (n, channels), by differences."""
