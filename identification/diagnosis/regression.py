@@ -27,7 +27,7 @@ from ..motion.noise_spectrum import pose_was_filtered
 from ..motion.residual import acting_wrench, needed_wrench
 from ..motion.sensing_effects import undo_log_sensing
 from ..motion.sensor_noise import noisy_logs
-from ..motion.signals import SIGNALS, Signals, log_signals
+from ..motion.signals import LONGEST_GAP, Signals, log_signals
 from ..motion.smoothing import CUTOFFS, low_pass, resampled
 from .commanded_rotors import (
     UNSTATED_THRUST_STD,
@@ -610,7 +610,7 @@ def _accelerometer(log: FlightLog) -> tuple[Array, Array] | None:
     read = np.isfinite(log.accelerometer).all(axis=1)
     times, values = log.t[read], log.accelerometer[read]
     ends = np.concatenate([log.t[:1], times, log.t[-1:]])
-    if not len(times) or float(np.diff(ends).max()) >= SIGNALS.gap:
+    if not len(times) or float(np.diff(ends).max()) >= LONGEST_GAP:
         return None
     period = float(np.median(np.diff(times)))
     even = np.arange(times[0], times[-1], period)

@@ -14,11 +14,9 @@ from ...dynamics.model import MODEL_FIELDS, load_model, rewrite_sample
 from ...dynamics.vehicle import Array, Vehicle
 from ...runtime.compiled import Record, compiled
 from ..logs.flight_log import FlightLog
+from .signals import LONGEST_GAP
 
 _MODEL = np.dtype(MODEL_FIELDS)
-
-
-LONGEST_GAP = 0.1  # s without a pose, over which nothing is interpolated
 
 
 @compiled
