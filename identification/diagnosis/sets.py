@@ -356,9 +356,8 @@ class Posterior:
         """Return whether a set was not tried yet, or with coefficients that are more than a
         standard deviation away.
         """
-        if frozenset(new) not in tried:
+        if (old := tried.get(frozenset(new))) is None:
             return True
-        old = tried[frozenset(new)]
         std = self._at_mode(self.known[frozenset(new)])[1]
         return any(
             abs(value - old[effect].get(name, 0.0)) > std[effect].get(name, math.inf)
