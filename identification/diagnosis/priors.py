@@ -109,10 +109,9 @@ class Base:
         """Return the likelihood, to a power, of columns that are asked about, with others
         integrated out; ``size``: standard deviations of their prior, if it is not theirs.
         """
-        total = power * self.total
-        deviance = float(total[-1, -1]) + power * self.penalty
-        size = np.ones(len(others)) if size is None else size
-        return marginal(total[:-1, :-1], total[:-1, -1], deviance, asked, others, size)
+        products = power * self.total
+        products[-1, -1] += power * self.penalty
+        return marginal(products, asked, others, np.ones(len(others)) if size is None else size)
 
     def mode(self, chosen: Index, power: float = 1.0) -> dict[Column, tuple[float, float]]:
         """Return the coefficients of some columns at the mode where no other acts, and their
