@@ -83,7 +83,7 @@ def diagnose(
             which the fit never sees.
         without: effects that are taken out of the library.
         report: called with a line of progress.
-        settings: which logs are taken, when a name is sure, and what is reported.
+        settings: which logs are taken, and when a name is sure.
 
     Raises:
         InputError: a log that is not what it claims to be, or an unknown effect.
@@ -164,7 +164,7 @@ class Judged:
     Args:
         flights: of the vehicle.
         library: effects that may be named.
-        rule: when a name is sure, and what is reported.
+        rule: when a name is sure.
         report: called with a line of progress.
 
     Public attributes are those of ``Diagnosis``, and beside them:
