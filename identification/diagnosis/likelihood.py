@@ -120,7 +120,6 @@ class Likelihood:
                 at = np.searchsorted(flights.t[rows], piece.t).clip(max=int(rows.sum()) - 1)
                 self._fit.append(flights.fit_rows[rows][at])
         self.period = self.pieces[0].period
-        self.inertias = flights.inertias
         lengths = [len(piece.t) for piece in self.pieces]
         if near is not None and [len(piece.t) for piece in near.pieces] != lengths:
             near = None
@@ -222,7 +221,7 @@ class Likelihood:
         steps = wrenches[1:] - wrenches[0]
         # between two samples the mean of both counts
         wrench = np.sqrt(np.sum(np.square(steps), axis=0) / 2.0)
-        out = np.array([0.0, 0.0, *wrench]) / self.inertias
+        out = np.array([0.0, 0.0, *wrench]) / self.flights.inertias
         return np.asarray(np.maximum(out, 1e-9))
 
     def _search_noise(self, explained: Sequence[Array] | None = None) -> None:
@@ -262,11 +261,11 @@ class Likelihood:
         that reads a gyro answers most of a gust's torque before the pose shows it.
         """
         out = []
-        sizes, times = self.inertias * self.noise.disturbance, self.noise.time.tolist()
+        sizes, times = self.flights.inertias * self.noise.disturbance, self.noise.time.tolist()
         for axis, (size, time) in enumerate(zip(sizes.tolist(), times, strict=True)):
             keep = math.exp(-self.period / time)
             shown = [lfilter([1.0], [1.0, -keep], known[:, axis, 2]) for known in self.known]
-            said = float(self.inertias[axis] * np.concatenate(shown).std())
+            said = float(self.flights.inertias[axis] * np.concatenate(shown).std())
             out.append(Disturbance(CHANNELS[axis], math.hypot(size, said), time, size))
         return tuple(out)
 

@@ -58,8 +58,7 @@ class RowLikelihood:
         found = rows.columns(first, self.flights.columns_of(linear))
         traced = {c[0] for c, x in found.items() if x.any()}
         self.library = [e for e in self.library if e in traced or e not in linear]
-        wanted = self.flights.columns_of(e for e in linear if e in traced)
-        own = [found[c] * prior_size(c, self.flights) for c in wanted]
+        own = [x * prior_size(c, self.flights) for c, x in found.items() if c[0] in traced]
         signals, explained = followers(rows), np.zeros_like(y)
         # first as if all of a signal could be disturbances that it follows
         for _ in range(ROUNDS):
