@@ -26,8 +26,8 @@ HEIGHTS = (0.2, 0.6)  # m above the lowest place: where a bump falls off
 LOAD_HZ = (0.4, 0.55, 0.75, 1.0, 1.4)
 MOUNT_HZ = (1.0, 1.6, 2.5, 4.0, 6.0)
 DAMPING_RATIO = 0.08  # of these
-# times the sizes: share of an effect's own wrench by which its coefficients change with a
-# variable, at a standard deviation of it
+# times ``sets.UNKNOWN_SIZES``: share of an effect's own wrench by which its coefficients
+# change with a variable, at a standard deviation of it
 SHARE_OF_EFFECT = 30.0
 CHANGING = f"{UNKNOWN}changing coefficient: "
 

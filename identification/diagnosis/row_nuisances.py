@@ -14,14 +14,15 @@ from .rows import Rows
 Array = NDArray[np.float64]
 
 
+# standard deviations of what differs from flight to flight
 THRUST_STD = 0.02  # relative, of a flight against what is usual: cells, propellers, air
 DRIFT_STD = 0.003  # relative, of thrust over a flight, beside the fade and the battery's sag
 DELAY_STD = 0.02  # s, of commands
 TILT_STD = 0.01  # rad, of the motion capture's vertical, and of the rotors' mean axis
-BIAS_STD = 0.3  # m/s2, of a MEMS sensor between warm and cold
-SCALE_STD = 0.02  # relative
-AXES = dict(zip("xyz", np.eye(3), strict=True))
+BIAS_STD = 0.3  # m/s2, of a MEMS accelerometer between warm and cold
+SCALE_STD = 0.02  # relative, of an accelerometer
 STOPPED_WITHIN = 0.1  # s, in which a flight loop stops an angular velocity that it did not want
+AXES = dict(zip("xyz", np.eye(3), strict=True))  # of the body
 
 
 def row_nuisances(rows: Rows) -> dict[str, Array]:

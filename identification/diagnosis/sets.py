@@ -45,7 +45,7 @@ from .regression import (
 Array = NDArray[np.float64]
 
 
-MOST_EFFECTS = 5
+MOST_EFFECTS = 5  # of a set, beside those that any set has
 KEPT_SETS = 8  # of each size, to which a further effect is added
 KEPT_ASKED = 24  # sets, the best, that are asked for beside the noise of no effect too
 MOST_RIVALS = 2  # effects, alike to the likeliest one, that are tried in its place
