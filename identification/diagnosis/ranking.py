@@ -74,7 +74,7 @@ def rank(
 
         def height(x: Setting) -> Height:
             base = Likelihood(flights, x, near, same_noise=True).base(x, {})
-            return linearised(flights, base, base.asked, x)
+            return linearised(flights, base, x)
 
         tried[frozenset(setting)] = setting
         return Likelihood(flights, mode(setting, height), near)

@@ -164,7 +164,7 @@ class RowLikelihood:
 
         def target() -> Setting:
             base = self.base(setting, {}, setting)
-            return linearised(self.flights, base, base.asked, setting, self.power)[1]()
+            return linearised(self.flights, base, setting, self.power)[1]()
 
         return 0.5 * float(np.square(off).sum()) - m.constant, target
 
