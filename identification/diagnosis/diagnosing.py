@@ -213,9 +213,8 @@ class Judged:
         strange = unknown(signs(structure, disturbed, bool(self.pushes), some))
         rivals = {e: self._rivals(e) for e in named}
         for e in named:  # one of some effects, which flights do not tell apart
-            alike = {e, *rivals[e]}
-            p = sum(x.probability for x in found.ranking.sets if alike & set(x.effects))
-            known.setdefault(e, min(p, 1.0))
+            alike = [x.probability for x in found.ranking.sets if {e, *rivals[e]} & {*x.effects}]
+            known.setdefault(e, min(sum(alike), 1.0))
         self.doubts = self._doubts(named, strange)
         unsure = bool(set(self.doubts) - {"assumed thrust"})
         sizes = worth(flights, given.fixed, given.first, found.setting)
@@ -247,14 +246,11 @@ class Judged:
             *(sentence for sentences in self.doubts.values() for sentence in sentences),
             *late_rotors(flights, found.setting, found.sensors),
         )
-        sets = [
-            Alternative(
-                tuple(e for e in x.effects if e not in given.first),
-                x.probability * (1.0 - strange),
-            )
+        stated = tuple(
+            Alternative(tuple(e for e in x.effects if e not in given.first), p)
             for x in found.ranking.sets
-        ]
-        stated = tuple(x for x in sets if x.probability >= LEAST_STATED)
+            if (p := x.probability * (1.0 - strange)) >= LEAST_STATED
+        )
         self.probabilities = Probabilities(names, stated, strange)
 
     def _differs(self, effect: str) -> float:

@@ -215,17 +215,17 @@ def rank_by_rows(
     bases.pop(frozenset(best))  # the last is the one that has the dictionary
     bases[frozenset(best)] = base(best, unknown=True)
     found = posterior()
-    hidden = sorted(flights.needs_pose - flights.without_trace - set(best))
-    behind = _behind(likelihood, best, [e for e in hidden if not flights.is_nonlinear(e)])
-    return Found(found, found.ranking(), best, sensors=likelihood.sensors(best), behind=behind)
+    sensors, behind = likelihood.sensors(best), _behind(likelihood, best)
+    return Found(found, found.ranking(), best, sensors=sensors, behind=behind)
 
 
-def _behind(
-    likelihood: RowLikelihood, best: Setting, hidden: Sequence[str]
-) -> dict[str, tuple[str, ...]]:
-    """Return of each effect of a set the ``hidden`` ones, which logs do not show and which may act
-    all the same, that explain the flights as well in its place.
+def _behind(likelihood: RowLikelihood, best: Setting) -> dict[str, tuple[str, ...]]:
+    """Return of each effect of a set those which logs do not show and which may act all the same,
+    that explain the flights as well in its place.
     """
+    flights = likelihood.flights
+    unseen = sorted(flights.needs_pose - flights.without_trace - set(best))
+    hidden = [e for e in unseen if not flights.is_nonlinear(e)]
     if not hidden or not best:
         return {}
     base = likelihood.base(best, {}, [*best, *hidden])
