@@ -22,7 +22,7 @@ from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
 from ..findings import CHANNELS, Disturbance
 from ..logs.flight_log import FlightLog
-from ..motion.sensing_effects import undo_log_sensing
+from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, log_signals
 from ..motion.smoothing import continuous, turn_between
@@ -102,7 +102,7 @@ class Likelihood:
         self.tracks: list[Track]
         self.known: list[Array]
         self._fit: list[NDArray[np.bool_]]  # (n,) samples that the fit may see
-        if near is not None and _sensing(near.vehicle) == _sensing(self.vehicle):
+        if near is not None and sensing_of(near.vehicle) == sensing_of(self.vehicle):
             self.pieces, self._fit = near.pieces, near._fit
         else:
             finer = iter(near.finer if near else ())
@@ -548,18 +548,13 @@ class Likelihood:
         return out
 
 
-def _sensing(vehicle: Vehicle) -> tuple[EffectSetting, ...]:
-    """Return the effects that change what a log's poses are."""
-    return tuple(e for e in vehicle.effects if get(e.name).kind == "sensing")
-
-
 def read_poses(log: FlightLog, vehicle: Vehicle, finer: Iterator[Array]) -> list[Poses]:
     """Return the unbroken pieces of a log as they were measured, without what the vehicle's sensing
     effects did to them; ``finer`` is added to the rotor speeds (n, 4) of each.
 
     Where poses are late or early, rotor speeds are moved instead: poses would lose of their noise.
     """
-    late = [e for e in vehicle.effects if is_delay(e.name) and get(e.name).kind == "sensing"]
+    late = [e for e in sensing_of(vehicle) if is_delay(e.name)]
     offset = sum(sum(e.coefficients.values()) for e in late)
     undone = undo_log_sensing(
         log, replace(vehicle, effects=tuple(e for e in vehicle.effects if e not in late))

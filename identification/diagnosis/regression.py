@@ -25,7 +25,7 @@ from ..logs.flight_log import FlightLog
 from ..motion.inertial_signals import InertialSignals, inertial_signals, reads_imu, with_drift
 from ..motion.noise_spectrum import pose_was_filtered
 from ..motion.residual import acting_wrench, needed_wrench
-from ..motion.sensing_effects import undo_log_sensing
+from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import noisy_logs
 from ..motion.signals import LONGEST_GAP, Signals, log_signals
 from ..motion.smoothing import CUTOFFS, low_pass, resampled
@@ -381,11 +381,7 @@ class Flights:
     def pieces(self, setting: Setting) -> list[Piece]:
         """Return the pieces, with what the vehicle's sensing effects did to the logs undone."""
         vehicle = self.amended(setting)
-        sensing = tuple(
-            (e.name, *sorted(e.coefficients.items()))
-            for e in vehicle.effects
-            if get(e.name).kind == "sensing"
-        )
+        sensing = tuple((e.name, *sorted(e.coefficients.items())) for e in sensing_of(vehicle))
         size = 400 * max(sum(len(p.signals.t) for p in self._first), 1)  # bytes
         most = min(max(MEMORY // size, 1), 40)
         return _kept(self._pieces, sensing, lambda: self._cut(vehicle), most)
