@@ -58,7 +58,12 @@ def starting_points(
     )
     if len(found) <= MOST_TRIED:
         return found
-    steady, sampled, every = _is_steady(flights, {effect: found[0]}), [], []
+    # an effect that has no state of its own and goes by no clock does the same as long as nothing
+    # else changes, so not every sample need be looked at: one sample, repeated for a minute, in
+    # step with no whole Hz
+    one = flights.pieces({})[0].signals.at(np.zeros(200, dtype=np.int64))
+    acts = flights.acting(replace(one, period=0.317), {effect: found[0]})
+    steady, sampled, every = bool(np.all(acts == acts[0])), [], []
     for p in flights.pieces({}):
         chosen = np.arange(len(p.rows)) % max(1, SAMPLE_STEP // int(p.rows[1] - p.rows[0])) == 0
         at = p.rows[chosen]
@@ -81,14 +86,3 @@ def starting_points(
         if size > 0.0:
             likeness.append((float(np.sum(shape * target * scale)) / math.sqrt(size), i))
     return [found[i] for _, i in sorted(likeness, reverse=True)[:KEPT_OF_MORE]]
-
-
-def _is_steady(flights: Flights, setting: Setting) -> bool:
-    """Return whether effects do the same as long as nothing else changes: they have no state of
-    their own and go by no clock, so not every sample need be looked at.
-    """
-    # one sample, repeated for a minute, in step with no whole Hz
-    signals = flights.pieces({})[0].signals
-    same = replace(signals.at(np.zeros(200, dtype=np.int64)), period=0.317)
-    found = flights.acting(same, setting)
-    return bool(np.all(found == found[0]))
