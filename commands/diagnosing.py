@@ -15,13 +15,7 @@ if TYPE_CHECKING:
     from ..identification.logs.flight_log import FlightLog
 
 # share of a diagnosis' time at which its stages begin
-_STAGES = {
-    "looking at the logs": 0.0,
-    "asking whether every effect is needed": 0.45,
-    "asking what else it could be": 0.75,
-    "looking for structure in the residual": 0.9,
-    "predicting the flights": 0.96,
-}
+_STAGES = {"looking at the logs": 0.0, "predicting the flights": 0.96}
 
 
 def staged(progress: Callable[..., None]) -> Callable[[str], None]:

@@ -3,7 +3,8 @@ fit does not reach, and what to fly.
 """
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,9 @@ from ...dynamics.effects import Need, Role, get, needing, playing
 from ...dynamics.vehicle import Vehicle
 from ..findings import NamedEffect
 from ..motion.inertial_signals import pose_rate
-from .regression import CENTRAL, Flights, Setting, unit_of_change
+from .log_offsets import ROTOR_TIME_OFFSET
+from .regression import CENTRAL, Flights, Setting, moves_time, unit_of_change
+from .worth import BY_CHANCE
 
 Array = NDArray[np.float64]
 
@@ -21,6 +24,7 @@ FILTERED = (
     "vehicle, or follow from feedback-induced correlation, shows only in the sensors' own noise, "
     "so all names are tentative. Log the pose as it was measured"
 )
+LEAST_ROTOR_TIME_OFFSET = 0.001  # s, worth a note
 # from when on two changes are alike: standard deviations, of any component, that they may be apart,
 # and the share of the changes to which effect models are alike
 MOST_APART, SHARE = 2.5, 0.1
@@ -101,6 +105,24 @@ def inertial_notes(flights: Flights, named: Sequence[str]) -> Iterator[str]:
     )
     for effect in playing(Role.THRUST_AXIS, among=named):
         yield f"{effect}: an IMU that is mounted tilted by as much leaves the same log"
+
+
+def late_rotors(
+    flights: Flights, effects: Iterable[str], sensors: Mapping[str, tuple[float, float]]
+) -> Iterator[str]:
+    """Yield by how much rotor speeds act later than they are logged, where no effect says so;
+    ``sensors``: time offsets and their standard deviations.
+    """
+    offset, std = sensors.get(ROTOR_TIME_OFFSET[1], (0.0, math.inf))
+    least = max(LEAST_ROTOR_TIME_OFFSET, BY_CHANCE * std)
+    if flights.inertial or any(map(moves_time, effects)) or abs(offset) < least:
+        return
+    pose = ", or the filter of the pose delays it by as much"
+    yield (
+        f"the rotor speeds act {abs(1000 * offset):.1f} ms "
+        f"{'later' if offset > 0 else 'earlier'} than they are logged"
+        f"{pose if flights.filtered and offset > 0 else ''}"
+    )
 
 
 def advice(

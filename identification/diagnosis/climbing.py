@@ -8,7 +8,7 @@ import numpy as np
 from ...runtime.errors import InputError
 from .evidence import set_evidence
 from .priors import Base, Setting, declared
-from .regression import Column, Flights, coefficient
+from .regression import Flights, coefficient
 
 # minus the logarithm of likelihood and prior at a setting, and what returns the mode of the
 # linearised posterior there
@@ -51,22 +51,20 @@ def height(setting: Setting, at: Callable[[Setting], Height]) -> Height:
         return math.inf, lambda: setting
 
 
-def linearised(
-    flights: Flights, base: Base, asked: list[Column], setting: Setting, power: float = 1.0
-) -> Height:
+def linearised(flights: Flights, base: Base, setting: Setting, power: float = 1.0) -> Height:
     """Return the height of a quadratic likelihood at the setting about which it is one, and its
-    mode within the limits of the coefficients that are asked about.
+    mode within the limits of the coefficients.
     """
-    at = base.at(asked)
+    at, every = base.at(base.asked), range(len(base.asked))
     m = base.marginal(at, base.plain, power=power)
-    here = np.array([setting[e].get(n, 0.0) - declared((e, n), flights) for e, n in asked])
-    z = here / base.size[at]
-    value = -m.constant - float(m.right @ z - 0.5 * z @ m.normal @ z) + 0.5 * float(z @ z)
+    here = [setting[c[0]].get(c[1], 0.0) - declared(c, flights) for c in base.asked]
+    z = np.array(here) / base.size[at]
+    value = 0.5 * (float(z @ z) - m.explained(every, z)) - m.constant
 
     def target() -> Setting:
-        found = set_evidence(m, range(len(at)), base.low[at], base.high[at])
+        found = set_evidence(m, every, base.low[at], base.high[at])
         out: Setting = {e: dict(values) for e, values in setting.items()}
-        for c, x in zip(asked, (found.mode * base.size[at]).tolist(), strict=True):
+        for c, x in zip(base.asked, (found.mode * base.size[at]).tolist(), strict=True):
             limits = coefficient(c)
             out[c[0]][c[1]] = min(max(declared(c, flights) + x, limits.minimum), limits.maximum)
         return out

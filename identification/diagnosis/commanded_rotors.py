@@ -7,7 +7,7 @@ vertical, is for ``row_nuisances`` to say.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,21 +22,14 @@ from ..motion.smoothing import CUTOFFS, low_pass
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class CommandedSettings:
-    """What a regression allows for where rotor speeds are worked out from commands."""
-
-    period: float = 0.02  # s, of the samples that are used
-    # of the usual thrust, from which rotors carry the vehicle, and s that taking off and landing
-    # last beyond: where no height shows them
-    carrying_share: float = 0.7
-    take_off: float = 1.0
-    # relative standard deviation of the thrust that a command makes where nobody stated the motor
-    # curve: of three kinds of vehicle, measured flights had 0.69 to 1.12 of what was assumed
-    unstated_thrust_std: float = 0.3
-
-
-COMMANDED = CommandedSettings()
+PERIOD = 0.02  # s, of the samples that are used
+# of the usual thrust, from which rotors carry the vehicle, and s that taking off and landing
+# last beyond: where no height shows them
+CARRYING_SHARE = 0.7
+TAKE_OFF = 1.0
+# relative standard deviation of the thrust that a command makes where nobody stated the motor
+# curve: of three kinds of vehicle, measured flights had 0.69 to 1.12 of what was assumed
+UNSTATED_THRUST_STD = 0.3
 # what an error of the assumed thrust makes exactly
 THRUST_FACTORS = (Role.THRUST, Role.MASS)
 
@@ -64,13 +57,13 @@ def in_flight_by_thrust(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     thrust = np.square(log.rotor_speeds) @ vehicle.k
     if len(thrust) * log.period > 1.0 / CUTOFFS.flying_hz:
         thrust = low_pass(thrust, CUTOFFS.flying_hz, log.period)
-    carried = np.flatnonzero(thrust > COMMANDED.carrying_share * usual_thrust(thrust))
+    carried = np.flatnonzero(thrust > CARRYING_SHARE * usual_thrust(thrust))
     if not carried.size:
         return log
     first, last = carried[0], carried[-1]
     begin, end = log.t[first], log.t[last]
-    begin += COMMANDED.take_off if first > 0 else 0.0
-    end -= COMMANDED.take_off if last < len(thrust) - 1 else 0.0
+    begin += TAKE_OFF if first > 0 else 0.0
+    end -= TAKE_OFF if last < len(thrust) - 1 else 0.0
     keep = (log.t >= begin) & (log.t <= end)
     return with_rows(log, keep) if keep.any() else log
 
@@ -79,7 +72,7 @@ def downsampled(signals: Signals) -> Signals:
     """Return signals at 50 Hz or a little more, with the rotor speeds through the same filter as
     the pose.
     """
-    step = max(1, int(COMMANDED.period / signals.period + 1e-6))
+    step = max(1, int(PERIOD / signals.period + 1e-6))
     if step == 1:
         return signals
     smooth = np.maximum(low_pass(signals.rotor_speeds, CUTOFFS.pose_hz, signals.period), 0.0)

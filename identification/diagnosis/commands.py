@@ -45,15 +45,16 @@ def what_commands_show(flights: Flights, library: Sequence[str]) -> Given:
         library = [e for e in library if e not in same]
         if shown := turning_delay(seen, flights.vehicle, flights.logs[0].period):
             library.remove(delay)
+            seconds, std, ratio = shown
             c = get(delay).coefficients[0]
             late = NamedEffect(
                 name=delay,
-                coefficients={c.name: shown.seconds},
-                std={c.name: shown.std},
+                coefficients={c.name: seconds},
+                std={c.name: std},
                 units={c.name: c.unit},
                 tentative=False,
                 indistinguishable_from=tuple(same),
-                evidence={"log_bayes_factor": 0.5 * shown.log_likelihood_ratio},
+                evidence={"log_bayes_factor": 0.5 * ratio},
                 channels=("attitude", "motor commands"),
             )
     thrust = playing(Role.THRUST, among=library) or playing(Role.MASS, among=library)

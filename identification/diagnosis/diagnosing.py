@@ -37,30 +37,33 @@ from ..motion.noise_spectrum import filtering_notes, pose_was_filtered
 from ..motion.smoothing import CUTOFFS
 from ..prediction import nis_without_wrench_state, rollout_error
 from ..wrench_series import pose_notes
-from .advice import FILTERED, advice, composites, inertial_notes, outside_the_fit
+from .advice import FILTERED, advice, composites, inertial_notes, late_rotors, outside_the_fit
 from .commanded_rotors import THRUST_FACTORS, assumed_thrust_doubts
 from .commands import what_commands_show
-from .log_offsets import ROTOR_TIME_OFFSET
 from .priors import NUISANCE
-from .ranking import rank, rank_by_rows
+from .ranking import LEAST_RIVAL, rank, rank_by_rows
 from .regression import (
     CENTRAL,
-    Column,
     Flights,
     coefficient,
-    moves_time,
     typical_size,
     unit_of_change,
     without,
 )
 from .residuals import balance, beyond_calm, transient_disturbances
-from .row_nuisances import NUISANCES
+from .row_nuisances import THRUST_STD
 from .settings import DIAGNOSIS, DiagnosisSettings
 from .traces import carrying_channels, signature
 from .unknown import signs, unknown
-from .worth import worth
+from .worth import BY_CHANCE, worth
 
 Array = NDArray[np.float64]
+
+LEAST_STATED = 0.001  # probability of an alternative that is reported
+LEAST_SIZE = 0.1  # typical sizes, from which a calibration is worth a name
+# deviance by which an effect of typical size is sure: of one of some thirty effects, before which
+# one is expected, 20 to 1 afterwards
+LEAST_SHOWN = 13.0
 
 
 def diagnose(
@@ -81,7 +84,7 @@ def diagnose(
             which the fit never sees.
         without: effects that are taken out of the library.
         report: called with a line of progress.
-        settings: which logs are taken, when a name is sure, and what is reported.
+        settings: which logs are taken, and when a name is sure.
 
     Raises:
         InputError: a log that is not what it claims to be, or an unknown effect.
@@ -108,11 +111,10 @@ def diagnose(
     sure = said.remainder == "none" and not any(
         effect.tentative or effect.indistinguishable_from for effect in effects
     )
-    verdict = (
-        ("explained" if sure else "partly explained")
-        if effects
-        else ("nothing to explain" if said.remainder == "none" else "unexplained")
-    )
+    if effects:
+        verdict = "explained" if sure else "partly explained"
+    else:
+        verdict = "nothing to explain" if sure else "unexplained"
     report("predicting the flights")
     named = {e: x for e, x in setting.items() if e}
     amended = flights.amended(named) if named else vehicle
@@ -163,7 +165,7 @@ class Judged:
     Args:
         flights: of the vehicle.
         library: effects that may be named.
-        rule: when a name is sure, and what is reported.
+        rule: when a name is sure.
         report: called with a line of progress.
 
     Public attributes are those of ``Diagnosis``, and beside them:
@@ -193,9 +195,9 @@ class Judged:
             else rank_by_rows(flights.of_the_fit(), given.library, given.first, given.fixed, report)
         )
         self.ranking, best = found.ranking, found.ranking.sets[0]
-        sensors = {name: value for name, (value, _) in found.sensors.items()}
         self.setting = {e: dict(x) for e, x in {**given.fixed, **found.setting}.items()}
-        self.setting |= {"": sensors} if sensors else {}
+        if found.sensors:
+            self.setting[""] = {name: value for name, (value, _) in found.sensors.items()}
         self.balance = balance(flights, self.setting)
         self.parts = {
             e: flights.residual(without(self.setting, e)) - self.balance.after
@@ -204,59 +206,53 @@ class Judged:
         }
         self.gusts = found.gusts
         self.pushes = tuple(transient_disturbances(flights, self.setting))
-        differs = {e: self._differs(e) for e in given.first if e in best.effects}
-        named = [e for e in found.setting if differs.get(e, 1.0) >= rule.least_sure_probability]
+        known = {e: self._differs(e) for e in given.first if e in best.effects}
+        named = [e for e in found.setting if known.get(e, 1.0) >= rule.least_sure_probability]
         disturbed = beyond_calm(self.gusts, flights.vehicle)
-        some = any(e not in differs for e in named)
         structure = found.ranking.structure
+        some = any(e not in known for e in named)
         strange = unknown(signs(structure, disturbed, bool(self.pushes), some))
         rivals = {e: self._rivals(e) for e in named}
-        known = {
-            e: differs[e] if e in differs else self._probability({e, *rivals[e]}) for e in named
-        }
+        for e in named:  # one of some effects, which flights do not tell apart
+            alike = [x.probability for x in found.ranking.sets if {e, *rivals[e]} & {*x.effects}]
+            known.setdefault(e, min(sum(alike), 1.0))
         self.doubts = self._doubts(named, strange)
         unsure = bool(set(self.doubts) - {"assumed thrust"})
         sizes = worth(flights, given.fixed, given.first, found.setting)
         effects = [self._named(e, known[e], sizes[e], unsure, rivals[e]) for e in named]
-        names = {e: (1.0 - strange) * p for e, p in known.items()}
+        names = {e: (1.0 - strange) * known[e] for e in named}
         if given.late:
             effects.append(replace(given.late, tentative="short" in self.doubts))
             names[given.late.name] = 1.0
         self.effects = tuple(effects)
         structured = strange > 0.5 and structure > 0.0
-        self.structure = (self._sign(),) if structured else ()
+        self.structure: tuple[Structure, ...] = ()
+        if structured:  # the column of the dictionary that explains most beside the likeliest set
+            (_, name), _, gained = found.posterior.strangest()
+            group, what = name.removeprefix("unknown ").split(": ", 1)
+            column, _, channel = what.rpartition(" in ")
+            where = f"{CHANNELS[int(channel)]} with {column}" if column else f"the part of {what}"
+            self.structure = (Structure(group, where, gained / found.posterior.left()),)
         some = self.balance.noisy or disturbed > 0.0 or bool(self.pushes)
         self.remainder = "structured" if structured else "random" if some else "none"
-        unseen = self._too_small_to_show()
         biases = [("", f"{NUISANCE}{name}") for _, name in flights.biases]
-        self.hidden = unseen - self._too_small_to_show(biases)
+        by_bias = found.posterior.shown(biases)
+        unseen = {e for e, x in found.posterior.shown().items() if x < LEAST_SHOWN}
+        self.hidden = {e for e in unseen if by_bias[e] >= LEAST_SHOWN}
         self.unseen = unseen - self.hidden
-        alone = found.posterior.alone()
-        self.candidates = tuple(
-            Candidate(e, alone[e], e in named)
-            for e in sorted(alone, key=alone.__getitem__, reverse=True)
-        )
+        alone = sorted(found.posterior.alone().items(), key=lambda x: -x[1])
+        self.candidates = tuple(Candidate(e, gain, e in named) for e, gain in alone)
         self.notes = (
             *inertial_notes(flights, named),
             *(sentence for sentences in self.doubts.values() for sentence in sentences),
-            *self._late_rotors(),
+            *late_rotors(flights, found.setting, found.sensors),
         )
-        sets = [
-            Alternative(
-                tuple(e for e in x.effects if e not in given.first),
-                x.probability * (1.0 - strange),
-            )
+        stated = tuple(
+            Alternative(tuple(e for e in x.effects if e not in given.first), p)
             for x in found.ranking.sets
-        ]
-        stated = tuple(x for x in sets if x.probability >= rule.least_stated)
+            if (p := x.probability * (1.0 - strange)) >= LEAST_STATED
+        )
         self.probabilities = Probabilities(names, stated, strange)
-
-    def _too_small_to_show(self, known: Sequence[Column] = ()) -> frozenset[str]:
-        """Return the effects of which a typical size would not be sure, with some nuisances
-        known.
-        """
-        shown = self._found.posterior.shown(known)
-        return frozenset(e for e, x in shown.items() if x < self._rule.least_shown)
 
     def _std(self, effect: str) -> dict[str, float]:
         """Return the standard deviations of an effect in the likeliest set; of what stands for the
@@ -265,7 +261,7 @@ class Judged:
         flights, std = self._flights, self.ranking.sets[0].std[effect]
         if not flights.commanded or get(effect).role not in THRUST_FACTORS:
             return dict(std)
-        off = NUISANCES.thrust / math.sqrt(len(flights.logs))
+        off = THRUST_STD / math.sqrt(len(flights.logs))
         return {
             name: math.hypot(x, off * unit_of_change((effect, name), flights.vehicle))
             for name, x in std.items()
@@ -279,7 +275,7 @@ class Judged:
         own, stds, most = flights.coefficients({}, effect), self._std(effect), 0.0
         for name, value in best.coefficients[effect].items():
             off, std = abs(value - own.get(name, 0.0)), stds.get(name, 0.0)
-            least = self._rule.least_size * typical_size((effect, name), flights.vehicle)
+            least = LEAST_SIZE * typical_size((effect, name), flights.vehicle)
             if off > least and std:
                 most = max(most, math.erf(off / std / math.sqrt(2.0)))
         return most
@@ -292,20 +288,13 @@ class Judged:
             factors = playing(*THRUST_FACTORS)
             return tuple(x for x in factors if x != effect) if effect in factors else ()
         best = self.ranking.sets[0]
-        rest = set(best.effects) - {effect}
-        out: list[str] = []
-        for other in self.ranking.sets:
-            more = set(other.effects) - rest
-            in_its_place = rest < set(other.effects) and len(more) == 1 and effect not in more
-            if in_its_place and other.probability > self._rule.least_rival * best.probability:
-                out += more
-        return tuple(out)
-
-    def _probability(self, effects: set[str]) -> float:
-        """Return the probability that one of some effects acts, which flights do not tell apart, if
-        nothing acts but effects of the library.
-        """
-        return min(sum(x.probability for x in self.ranking.sets if effects & set(x.effects)), 1.0)
+        rest, least = set(best.effects) - {effect}, LEAST_RIVAL * best.probability
+        more = [
+            set(x.effects) - rest
+            for x in self.ranking.sets
+            if rest < set(x.effects) and x.probability > least
+        ]
+        return tuple(e for one in more if len(one) == 1 and effect not in one for e in one)
 
     def _doubts(self, named: Sequence[str], strange: float) -> dict[str, tuple[str, ...]]:
         """Return for each check, by its name, the sentences that say why a name may be wrong."""
@@ -339,18 +328,6 @@ class Judged:
             doubts["assumed thrust"] = assumed_thrust_doubts(named)
         return {check: sentences for check, sentences in doubts.items() if sentences}
 
-    def _energy_share(self, effect: str) -> float:
-        """Return the share of the residual's energy without an effect that it explains, each
-        channel over its sensors' noise.
-        """
-        flights, after = self._flights, self.balance.after
-        size = np.sqrt(np.mean(np.square(flights.visible_noise), axis=0)) + 1e-12
-        left, whole = (
-            float(np.mean(np.square(x[~flights.fit_rows] / size)))
-            for x in (after, after + self.parts[effect])
-        )
-        return max(1.0 - left / whole, 0.0) if whole > 0.0 else 0.0
-
     def _named(
         self, effect: str, probability: float, size: float, unsure: bool, others: tuple[str, ...]
     ) -> NamedEffect:
@@ -360,7 +337,7 @@ class Judged:
         values = {
             name: x
             for name, x in found.setting[effect].items()
-            if name != CENTRAL or x > rule.least_in_std * std.get(name, math.inf)
+            if name != CENTRAL or x > BY_CHANCE * std.get(name, math.inf)
         }
         uncertain = flights.thrust_std > 0.0 and get(effect).role in THRUST_FACTORS
         if uncertain:
@@ -371,6 +348,12 @@ class Judged:
             for name, x in values.items()
             if name != CENTRAL
         ]
+        # of the residual's energy without it, each channel over its sensors' noise
+        after, over = self.balance.after, np.square(flights.visible_noise).mean(axis=0) ** 0.5
+        left, whole = (
+            float(np.mean(np.square(x[~flights.fit_rows] / (over + 1e-12))))
+            for x in (after, after + self.parts[effect])
+        )
         return NamedEffect(
             name=effect,
             coefficients=values,
@@ -382,21 +365,13 @@ class Judged:
             or size < rule.least_worth,
             indistinguishable_from=others,
             evidence={
-                "energy_explained": self._energy_share(effect),
+                "energy_explained": max(1.0 - left / whole, 0.0) if whole > 0.0 else 0.0,
                 "log_bayes_factor": found.posterior.log_bayes_factor(effect),
                 "largest_coefficient_in_typical_sizes": max(sizes, default=0.0),
                 "size_over_what_is_left": size,
             },
             channels=carrying_channels(flights, found.setting, effect),
         )
-
-    def _sign(self) -> Structure:
-        """Return which column of the dictionary explains most beside the likeliest set."""
-        (_, name), _, gained = self._found.posterior.strangest()
-        group, what = name.removeprefix("unknown ").split(": ", 1)
-        column, _, channel = what.rpartition(" in ")
-        where = f"{CHANNELS[int(channel)]} with {column}" if column else f"the part of {what}"
-        return Structure(group, where, gained / self._found.posterior.left())
 
     def traces(self) -> Iterator[Trace]:
         """Yield the residual of each piece of flight over time."""
@@ -411,23 +386,6 @@ class Judged:
                 ~flights.fit_rows[rows],
                 {effect: part[rows] for effect, part in self.parts.items()},
             )
-
-    def _late_rotors(self) -> Iterator[str]:
-        """Yield, as a sentence, by how much rotor speeds act later than they are logged."""
-        flights, rule, found = self._flights, self._rule, self._found
-        offset, std = found.sensors.get(ROTOR_TIME_OFFSET[1], (0.0, math.inf))
-        least = max(rule.least_rotor_time_offset, rule.least_in_std * std)
-        if flights.inertial or any(map(moves_time, found.setting)) or abs(offset) < least:
-            return
-        yield (
-            f"the rotor speeds act {abs(1000 * offset):.1f} ms "
-            f"{'later' if offset > 0 else 'earlier'} than they are logged"
-            + (
-                ", or the filter of the pose delays it by as much"
-                if flights.filtered and offset > 0
-                else ""
-            )
-        )
 
 
 def _segments(flights: Flights) -> list[tuple[int, float, float]]:

@@ -6,7 +6,7 @@ They are of the state as the filter predicts it, so none knows the noise of the 
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,29 +20,15 @@ from .regression import Column, Flights
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class DiscrepancySettings:
-    """How large an effect outside the library is, and how it varies with height."""
-
-    # shares of the weight, and of the weight at a quarter of the arm: standard deviations of what a
-    # column adds
-    sizes: tuple[float, ...] = (0.001, 0.003, 0.01, 0.03)
-    torque_arm: float = 0.25
-    heights: tuple[float, ...] = (0.2, 0.6)  # m above the lowest place: where a bump falls off
-    # Hz: a load on a cable of 0.1 to 1.5 m, and a part on a soft mount
-    load_hz: tuple[float, ...] = (0.4, 0.55, 0.75, 1.0, 1.4)
-    mount_hz: tuple[float, ...] = (1.0, 1.6, 2.5, 4.0, 6.0)
-    damping_ratio: float = 0.08  # of these
-    # times the sizes: share of an effect's own wrench by which its coefficients change with a
-    # variable, at a standard deviation of it
-    share_of_effect: float = 30.0
-    model_error: float = 0.01  # share of its own wrench by which the model of an effect is wrong
-    # power of the likelihood where rotor speeds hardly leave their rounding steps: their rounding
-    # is then no noise, and follows the flight
-    rounded: float = 0.25
-
-
-DISCREPANCY = DiscrepancySettings()
+TORQUE_ARM = 0.25  # of the arm, at which a weight is a torque's unit
+HEIGHTS = (0.2, 0.6)  # m above the lowest place: where a bump falls off
+# Hz: a load on a cable of 0.1 to 1.5 m, and a part on a soft mount
+LOAD_HZ = (0.4, 0.55, 0.75, 1.0, 1.4)
+MOUNT_HZ = (1.0, 1.6, 2.5, 4.0, 6.0)
+DAMPING_RATIO = 0.08  # of these
+# times ``sets.UNKNOWN_SIZES``: share of an effect's own wrench by which its coefficients
+# change with a variable, at a standard deviation of it
+SHARE_OF_EFFECT = 30.0
 CHANGING = f"{UNKNOWN}changing coefficient: "
 
 
@@ -50,14 +36,14 @@ def weight_and_torque(vehicle: Vehicle) -> Array:
     """Return the units (6,) of unknown forces, N, and torques, Nm: the weight, and the weight at a
     quarter of the arm.
     """
-    return vehicle.weight * np.repeat([1.0, DISCREPANCY.torque_arm * vehicle.arm_l], 3)
+    return vehicle.weight * np.repeat([1.0, TORQUE_ARM * vehicle.arm_l], 3)
 
 
-def _joined(tracks: Sequence[State]) -> tuple[Array, State]:
-    """Return where pieces end but the last, and all of them, one after the other."""
+def joined(tracks: Sequence[State]) -> tuple[State, Array]:
+    """Return all pieces, one after the other, and where they end but the last."""
     ends = np.cumsum([len(track.position) for track in tracks])[:-1]
     columns = (np.concatenate([getattr(x, f.name) for x in tracks]) for f in fields(State))
-    return ends, State(*columns)
+    return State(*columns), ends
 
 
 def _scaled(x: Array) -> Array:
@@ -66,15 +52,15 @@ def _scaled(x: Array) -> Array:
     return x / size if size > 1e-9 else np.zeros_like(x)
 
 
-def discrepancy_columns(tracks: Sequence[State], flights: Flights) -> dict[Column, list[Array]]:
-    """Return accelerations (n, 6) of each piece by column, each of a standard deviation of the
-    weight, or of the weight times the arm.
+def discrepancy_columns(whole: State, ends: Array, flights: Flights) -> dict[Column, Array]:
+    """Return accelerations (n, 6) by column, each of a standard deviation of the weight, or of the
+    weight times the arm.
 
     Args:
-        tracks: the pieces.
+        whole: all pieces.
+        ends: where pieces end but the last.
         flights: of the vehicle.
     """
-    ends, whole = _joined(tracks)
     t, position, rotation, rotors = whole.t, whole.position, whole.rotation, whole.rotors
     rate, body = whole.angular_velocity, np.einsum("nij,ni->nj", rotation, whole.velocity)
     above = position[:, 2] - position[:, 2].min()
@@ -100,21 +86,21 @@ def discrepancy_columns(tracks: Sequence[State], flights: Flights) -> dict[Colum
         ]
     heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
     places = list(zip(("x", "y", "height"), position.T, strict=True))
-    places += [(f"height below {h:g} m", np.exp(-above / h)) for h in DISCREPANCY.heights]
+    places += [(f"height below {h:g} m", np.exp(-above / h)) for h in HEIGHTS]
     places += [("heading's sine", np.sin(heading)), ("heading's cosine", np.cos(heading))]
     places += [(f"tilt {axis}", rotation[:, 2, i]) for i, axis in enumerate("xy")]
     shapes += [("place", name, x, every) for name, x in places]
     along = np.pi * (t - t[0]) / max(float(t[-1] - t[0]), 1e-9)
     shapes += [("time", f"time {i}", np.cos(i * along), every) for i in (1, 2, 3)]
     period = float(np.median(np.diff(t)))
-    for hertz, i in itertools.product(DISCREPANCY.mount_hz, range(3)):
+    for hertz, i in itertools.product(MOUNT_HZ, range(3)):
         z = _resonance(rotors[:, 1 + i], hertz, period, ends)
         shapes.append(("resonance", f"a part that swings at {hertz:g} Hz", z, (3 + i,)))
     size = weight_and_torque(flights.vehicle) / flights.inertias
-    out: dict[Column, list[Array]] = {}
+    out: dict[Column, Array] = {}
 
     def add(group: str, name: str, column: Array) -> None:
-        out["", f"{UNKNOWN}{group}: {name}"] = np.split(column, ends)
+        out["", f"{UNKNOWN}{group}: {name}"] = column
 
     for group, name, x, channels in shapes:
         z = _scaled(x)
@@ -129,7 +115,7 @@ def discrepancy_columns(tracks: Sequence[State], flights: Flights) -> dict[Colum
         column = np.zeros((len(t), 6))
         column[:, channel] = size[channel]
         add("constant", f"a constant in {channel}", column)
-    for hertz in DISCREPANCY.load_hz:
+    for hertz in LOAD_HZ:
         column = np.zeros((len(t), 6))
         column[:, :2] = _resonance(whole.acceleration[:, :2], hertz, period, ends)
         column *= size[0] / max(float(column[:, :2].std()), 1e-9)
@@ -146,16 +132,15 @@ def _resonance(drive: Array, hertz: float, period: float, ends: Array) -> Array:
     """Return the reaction (n, ...) of a pendulum or a spring to the acceleration of its base."""
     # s'' = -a - rate^2 s - 2 damping rate s', which pulls by rate^2 s + 2 damping rate s'
     rate = 2.0 * np.pi * hertz
-    damping = 2.0 * DISCREPANCY.damping_ratio * rate
+    damping = 2.0 * DAMPING_RATIO * rate
     shape = bilinear([-damping, -(rate**2)], [1.0, damping, rate**2], 1.0 / period)
     return np.concatenate([lfilter(*shape, x, axis=0) for x in np.split(drive, ends)])
 
 
-def variables(tracks: Sequence[State]) -> dict[str, list[Array]]:
-    """Return what a coefficient may change with: variables (n,) of each piece by name, of mean zero
-    and standard deviation one over all.
+def variables(whole: State) -> dict[str, Array]:
+    """Return what a coefficient may change with: variables (n,) by name, of mean zero and standard
+    deviation one.
     """
-    ends, whole = _joined(tracks)
     position, rotation, velocity = whole.position, whole.rotation, whole.velocity
     heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
     speed = np.linalg.norm(velocity, axis=1)
@@ -173,21 +158,17 @@ def variables(tracks: Sequence[State]) -> dict[str, list[Array]]:
         "yaw rate": whole.angular_velocity[:, 2],
     }
     scaled = {name: _scaled(x) for name, x in found.items()}
-    return {name: np.split(x, ends) for name, x in scaled.items() if x.any()}
+    return {name: x for name, x in scaled.items() if x.any()}
 
 
-def changing_columns(
-    parts: Mapping[str, list[Array]], found: Mapping[str, list[Array]]
-) -> dict[Column, list[Array]]:
+def changing_columns(parts: Mapping[str, Array], found: Mapping[str, Array]) -> dict[Column, Array]:
     """Return columns of coefficients that change with a variable.
 
     Args:
-        parts: what each effect of a set adds (n, ...) to each piece.
+        parts: what each effect of a set adds (n, ...).
         found: ``variables``.
     """
     return {
-        ("", f"{CHANGING}{effect} with {name}"): [
-            DISCREPANCY.share_of_effect * x * y[:, None] for x, y in zip(part, z, strict=True)
-        ]
-        for (effect, part), (name, z) in itertools.product(parts.items(), found.items())
+        ("", f"{CHANGING}{effect} with {name}"): SHARE_OF_EFFECT * part * x[:, None]
+        for (effect, part), (name, x) in itertools.product(parts.items(), found.items())
     }

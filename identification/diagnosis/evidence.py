@@ -47,30 +47,24 @@ class Marginal:
         return float(2.0 * right @ z - z @ normal @ z)
 
 
-def marginal(
-    normal: Array, right: Array, deviance: float, asked: Index, others: Index, size: Array
-) -> Marginal:
+def marginal(products: Array, asked: Index, others: Index, size: Array) -> Marginal:
     """Return the log-likelihood with ``others`` integrated out over their standard normal prior.
 
     Args:
-        normal: (c, c) products of all columns, in prior standard deviations.
-        right: (c,) their products with the residual.
-        deviance: -2 log-likelihood where all coefficients are zero.
+        products: (c + 1, c + 1) of all columns, in prior standard deviations, and of the residual:
+            the last is -2 log-likelihood where all coefficients are zero.
         asked: columns that stay.
         others: columns that go; they may be among those that stay as well.
         size: (len(others),) standard deviations of their prior.
     """
-    inner = normal[np.ix_(others, others)] * size[:, None] * size + np.eye(len(others))
+    kept = np.append(asked, len(products) - 1)
+    inner = products[np.ix_(others, others)] * size[:, None] * size + np.eye(len(others))
     factor = np.linalg.cholesky(inner)
-    cross = np.column_stack([normal[np.ix_(others, asked)], right[others]]) * size[:, None]
-    both = solve_triangular(factor, cross, lower=True)
-    cross, own = both[:, :-1], both[:, -1]
-    return Marginal(
-        normal[np.ix_(asked, asked)] - cross.T @ cross,
-        right[asked] - cross.T @ own,
-        deviance - float(own @ own),
-        float(np.log(np.diagonal(factor)).sum()),
-    )
+    cross = products[np.ix_(others, kept)] * size[:, None]
+    known = solve_triangular(factor, cross, lower=True)
+    left = products[np.ix_(kept, kept)] - known.T @ known
+    volume = float(np.log(np.diagonal(factor)).sum())
+    return Marginal(left[:-1, :-1], left[:-1, -1], float(left[-1, -1]), volume)
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,12 +22,12 @@ from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
 from ..findings import CHANNELS, Disturbance
 from ..logs.flight_log import FlightLog
-from ..motion.sensing_effects import undo_log_sensing
+from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, log_signals
 from ..motion.smoothing import continuous, turn_between
 from .causal_filter import Poses, Track, level, run, sensitivities
-from .discrepancy import changing_columns, discrepancy_columns, variables
+from .discrepancy import changing_columns, discrepancy_columns, joined, variables
 from .log_offsets import (
     ATTITUDE_TIME_OFFSET,
     LAG_ASYMMETRY,
@@ -45,12 +45,13 @@ from .priors import (
     Base,
     Setting,
     Starts,
+    bare,
     in_prior_units,
     variants_of,
 )
 from .regression import (
+    BLOCK,
     CENTRAL,
-    REGRESSION,
     STEP,
     Column,
     Flights,
@@ -101,8 +102,8 @@ class Likelihood:
         self.pieces: list[Poses]
         self.tracks: list[Track]
         self.known: list[Array]
-        self._fit: list[NDArray[np.bool_]]
-        if near is not None and _sensing(near.vehicle) == _sensing(self.vehicle):
+        self._fit: list[NDArray[np.bool_]]  # (n,) samples that the fit may see
+        if near is not None and sensing_of(near.vehicle) == sensing_of(self.vehicle):
             self.pieces, self._fit = near.pieces, near._fit
         else:
             finer = iter(near.finer if near else ())
@@ -113,9 +114,13 @@ class Likelihood:
                 for piece in read_poses(log, self.vehicle, finer)
             ]
             self.pieces = [piece for _, piece in found]
-            self._fit = [_in_fit(flights, i, piece.t) for i, piece in found]
+            # those of whose block the rows are
+            self._fit = []
+            for i, piece in found:
+                rows = flights.log == i
+                at = np.searchsorted(flights.t[rows], piece.t).clip(max=int(rows.sum()) - 1)
+                self._fit.append(flights.fit_rows[rows][at])
         self.period = self.pieces[0].period
-        self.inertias = flights.inertias
         lengths = [len(piece.t) for piece in self.pieces]
         if near is not None and [len(piece.t) for piece in near.pieces] != lengths:
             near = None
@@ -139,10 +144,11 @@ class Likelihood:
             _signals(piece, track) for piece, track in zip(self.pieces, self.tracks, strict=True)
         ]
         self._base = self._accelerations(setting, self.signals)
-        # what a unit of each column adds to the accelerations, or to the measured pose; a column
-        # that was asked for once is kept. What any flight may have changes little with effects
-        self._acting: dict[Column, list[Array]] = {}
-        self._posed: dict[Column, list[Array]] = {}
+        # what a unit of each column adds to the accelerations, or to the measured pose (n, 6), of
+        # all pieces in turn; a column that was asked for once is kept. What any flight may have
+        # changes little with effects
+        self._acting: dict[Column, Array] = {}
+        self._posed: dict[Column, Array] = {}
         if same:
             self._acting, self._posed = (
                 {c: x for c, x in part.items() if not c[0] and not c[1].startswith(UNKNOWN)}
@@ -214,7 +220,7 @@ class Likelihood:
         steps = wrenches[1:] - wrenches[0]
         # between two samples the mean of both counts
         wrench = np.sqrt(np.sum(np.square(steps), axis=0) / 2.0)
-        out = np.array([0.0, 0.0, *wrench]) / self.inertias
+        out = np.array([0.0, 0.0, *wrench]) / self.flights.inertias
         return np.asarray(np.maximum(out, 1e-9))
 
     def _search_noise(self, explained: Sequence[Array] | None = None) -> None:
@@ -254,7 +260,7 @@ class Likelihood:
 
     def _blocks(self, track: Track) -> Iterator[slice]:
         """Return the parts of a piece of which the columns are in memory at a time."""
-        length, n = round(REGRESSION.block / self.period), len(track.t)
+        length, n = round(BLOCK / self.period), len(track.t)
         return (slice(begin, min(begin + length, n)) for begin in range(0, n, length))
 
     def _counts(self, piece: int) -> NDArray[np.bool_]:
@@ -268,33 +274,30 @@ class Likelihood:
         that reads a gyro answers most of a gust's torque before the pose shows it.
         """
         out = []
-        sizes, times = self.inertias * self.noise.disturbance, self.noise.time.tolist()
+        sizes, times = self.flights.inertias * self.noise.disturbance, self.noise.time.tolist()
         for axis, (size, time) in enumerate(zip(sizes.tolist(), times, strict=True)):
             keep = math.exp(-self.period / time)
             shown = [lfilter([1.0], [1.0, -keep], known[:, axis, 2]) for known in self.known]
-            said = float(self.inertias[axis] * np.concatenate(shown).std())
+            said = float(self.flights.inertias[axis] * np.concatenate(shown).std())
             out.append(Disturbance(CHANNELS[axis], math.hypot(size, said), time, size))
         return tuple(out)
 
     # Columns
 
-    def _accelerations(self, setting: Setting, signals: Iterable[Signals]) -> list[Array]:
-        """Return the accelerations (n, 6) that a setting makes along each piece's signals."""
-        vehicle, out = self.flights.vehicle, []
-        for s in signals:
-            wrench = self.flights.acting(s, setting)
-            turning = np.linalg.solve(vehicle.inertia, wrench[:, 3:].T).T
-            out.append(np.column_stack([wrench[:, :3] / vehicle.mass, turning]))
-        return out
+    def _accelerations(self, setting: Setting, signals: Iterable[Signals]) -> Array:
+        """Return the accelerations (n, 6) that a setting makes along the pieces' signals."""
+        wrench = np.concatenate([self.flights.acting(s, setting) for s in signals])
+        turning = np.linalg.solve(self.flights.vehicle.inertia, wrench[:, 3:].T).T
+        return np.column_stack([wrench[:, :3] / self.flights.vehicle.mass, turning])
 
     def _change(
         self, setting: Setting, step: float = 1.0, signals: Iterable[Signals] | None = None
-    ) -> list[Array]:
-        """Return what another setting, and other signals, add to the acceleration (n, 6) of each
-        piece, over a step.
+    ) -> Array:
+        """Return what another setting, and other signals, add to the acceleration (n, 6), over a
+        step.
         """
         found = self._accelerations(setting, self.signals if signals is None else signals)
-        return [(x - base) / step for x, base in zip(found, self._base, strict=True)]
+        return np.asarray((found - self._base) / step)
 
     def _add(self, column: Column) -> None:
         """Add what a unit of a coefficient does, but where it is known already, or where no vehicle
@@ -312,7 +315,7 @@ class Likelihood:
         own = dict(self.flights.coefficients(self.setting, effect))
         if name.startswith(WHOLE_PREFIX):
             own[CENTRAL] = 1.0
-        name = name.removeprefix(WHOLE_PREFIX)
+        effect, name = bare(column)
         value, delta = self.flights.step(self.setting, (effect, name))
         there = {**self.setting, effect: {**own, name: value + delta}}
         with suppress(InputError, np.linalg.LinAlgError):
@@ -320,7 +323,7 @@ class Likelihood:
             if effect and get(effect).role == Role.CENTRE_OF_MASS:
                 self._swing(column)
 
-    def _moved(self, column: Column) -> list[Array]:
+    def _moved(self, column: Column) -> Array:
         """Return by how much a unit of a sensing effect moves the pose (n, 6), at the pose that the
         filter predicts: so the pose's own noise is no part of it.
         """
@@ -337,7 +340,7 @@ class Likelihood:
             shift = undone.position - track.predicted[:, :3]
             turn = turn_between(track.predicted[:, 3:], undone.quaternion)
             out.append(np.column_stack([shift, turn]) / delta)
-        return out
+        return np.concatenate(out)
 
     def base(self, library: Iterable[str], starts: Starts, unknown: bool = False) -> Base:
         """Return the likelihood of the coefficients of effects, and of what any flight may have.
@@ -353,16 +356,15 @@ class Likelihood:
         if playing(Role.LAG, among=self.setting):
             self._add(LAG_ASYMMETRY)
         if unknown and not any(name.startswith(UNKNOWN) for _, name in acting):
-            acting |= discrepancy_columns(self.tracks, self.flights)
+            acting |= discrepancy_columns(*joined(self.tracks), self.flights)
             self._add_changing_coefficients()
         for c, start in starts.items():
             if c not in acting:
                 acting[c] = self._change({**self.setting, c[0]: dict(start)})
         for effect in library:
-            for _, columns in variants_of(self.flights, effect, self.setting, starts):
+            for columns in variants_of(self.flights, effect, self.setting, starts):
                 for c in columns:
-                    if c[1].removeprefix(WHOLE_PREFIX) not in self.flights.stated(effect):
-                        self._add(c)
+                    self._add(c)
         return self._products(starts)
 
     def _add_changing_coefficients(self) -> None:
@@ -370,29 +372,32 @@ class Likelihood:
         parts, poses = {}, {}
         for effect, own in self.setting.items():
             if get(effect).kind == "sensing" and not is_delay(effect):
-                moved = [(x, self._moved((effect, name))) for name, x in own.items()]
-                poses[effect] = [
-                    np.sum([x * column[i] for x, column in moved], axis=0)
-                    for i in range(len(self.pieces))
-                ]
+                moved = [x * self._moved((effect, name)) for name, x in own.items()]
+                poses[effect] = np.sum(moved, axis=0)
             else:
                 parts[effect] = self._change(without(self.setting, effect), -1.0)
-        found = variables(self.tracks)
+        found = variables(joined(self.tracks)[0])
         self._acting |= changing_columns(parts, found)
         self._posed |= changing_columns(poses, found)
 
     def _add_what_any_flight_may_have(self) -> None:
         """Add the columns of time offsets, of rotors between samples and of the model's error."""
         self._add(ROTOR_TIME_OFFSET)
-        bent = map(_bent_rotors, self.signals)
+        bent = []  # beside the straight line, by the second difference
+        for s in self.signals:
+            # the speeds are of k + 1/2: nothing later than sample k + 1
+            u = s.rotor_speeds.copy()
+            u[2:] += np.diff(s.rotor_speeds, 2, axis=0)
+            bent.append(replace(s, rotor_speeds=u))
         self._acting["", BETWEEN] = self._change(self.setting, signals=bent)
         self._add_model_errors()
-        moved = self._posed[ATTITUDE_TIME_OFFSET] = []
+        moved = []
         for track in self.tracks:
             # the rate before the sample is read: after it, it knows that sample's noise
             rate = track.angular_velocity + 0.5 * self.period * track.acceleration[:, 3:]
             rate = np.vstack([track.angular_velocity[:1], rate[:-1]])
             moved.append(np.column_stack([np.zeros_like(rate), -rate]))
+        self._posed[ATTITUDE_TIME_OFFSET] = np.concatenate(moved)
 
     def quieter(self, coefficients: Mapping[Column, float], starts: Starts) -> Base:
         """Return the likelihood of the same columns with the noise that is likeliest beside them
@@ -416,18 +421,15 @@ class Likelihood:
 
     def _explained(self, coefficients: Mapping[Column, float]) -> list[Array]:
         """Return what the columns move the pose of each piece by, and accelerate (n, 2, 6)."""
-        explained = []
-        for i, track in enumerate(self.tracks):
-            x = np.zeros((len(track.position), 2, 6))
-            for c, column in self._acting.items():
-                x[:, 1] += coefficients.get(c, 0.0) * column[i]
-            for c, column in self._posed.items():
-                x[:, 0] += coefficients.get(c, 0.0) * column[i]
-            x[:, 1, :3] += track.rotors[:, :1] * (
-                x[:, 0, 4:5] * track.rotation[:, :, 0] - x[:, 0, 3:4] * track.rotation[:, :, 1]
-            )
-            explained.append(x)
-        return explained
+        whole, ends = joined(self.tracks)
+        x = np.zeros((len(whole.t), 2, 6))
+        for i, columns in enumerate((self._posed, self._acting)):
+            for c, column in columns.items():
+                x[:, i] += coefficients.get(c, 0.0) * column
+        x[:, 1, :3] += whole.rotors[:, :1] * (
+            x[:, 0, 4:5] * whole.rotation[:, :, 0] - x[:, 0, 3:4] * whole.rotation[:, :, 1]
+        )
+        return np.split(x, ends)
 
     def _swing(self, column: Column) -> None:
         """Have a centre of mass move the measured point as a marker does that lies as far on the
@@ -437,12 +439,11 @@ class Likelihood:
         acceleration and of the filter's attitude, and their difference, which is noise, would fit
         the poses' own noise: of equal offsets of both only the torque of the thrust is left.
         """
-        for slope in self._acting[column]:
-            slope[:, :3] = 0.0
+        self._acting[column][:, :3] = 0.0
         axis = [c.name for c in get(column[0]).coefficients].index(column[1])
         (marker,) = playing(Role.MARKER)
         place = self._moved((marker, get(marker).coefficients[axis].name))
-        self._posed[column] = [-x for x in place]
+        self._posed[column] = -place
 
     def _add_model_errors(self) -> None:
         """Add the columns of forces and torques that are a small share larger, and of what of a
@@ -451,22 +452,19 @@ class Likelihood:
         The latter may be too small by the share of it that is rounding (errors in variables): a
         hover holds little torque, and rounding hides it.
         """
-        rounded = 2.0 * np.square(self._rounding()[3:])
-        known = [
-            track.rotors[:, 1:] - x[:, 1:]
-            for track, x in zip(self.tracks, self.answers, strict=True)
-        ]
-        share = rounded / np.maximum(np.concatenate(known).var(axis=0), rounded)
+        rounded, (whole, _) = 2.0 * np.square(self._rounding()[3:]), joined(self.tracks)
+        expected = whole.rotors[:, 1:] - np.concatenate(self.answers)[:, 1:]
+        share = rounded / np.maximum(expected.var(axis=0), rounded)
         scale = np.hypot(1.0, share / PRIORS.model_error)
-        for track, expected in zip(self.tracks, known, strict=True):
-            for i, axis in enumerate("xyz"):
-                force, torque, hidden = np.zeros((3, len(track.t), 6))
-                force[:, :3] = track.rotors[:, :1] * track.rotation[:, :, i]
-                torque[:, 3 + i] = track.rotors[:, 1 + i]
-                hidden[:, 3 + i] = scale[i] * expected[:, i]
-                errors = {"force": force, "torque": torque, "expected torque": hidden}
-                for name, x in errors.items():
-                    self._acting.setdefault(("", f"{MODEL_ERROR} of {name} {axis}"), []).append(x)
+        for i, axis in enumerate("xyz"):
+            force, torque, hidden = np.zeros((3, len(whole.t), 6))
+            force[:, :3] = whole.rotors[:, :1] * whole.rotation[:, :, i]
+            torque[:, 3 + i] = whole.rotors[:, 1 + i]
+            hidden[:, 3 + i] = scale[i] * expected[:, i]
+            errors = {"force": force, "torque": torque, "expected torque": hidden}
+            self._acting |= {
+                ("", f"{MODEL_ERROR} of {name} {axis}"): x for name, x in errors.items()
+            }
 
     def _jumps(self) -> list[Array]:
         """Return what a unit of each gain of a pair of axes adds to the states (n, 6, e) of each
@@ -495,17 +493,13 @@ class Likelihood:
         names = (*asked, *drives)
         root = np.linalg.cholesky(steady.covariance)
         inverse = np.linalg.inv(root)
-        blocks, samples = [], 0
+        blocks, samples, first, still = [], 0, 0, np.zeros_like(self._base)
         for i, (track, jumps) in enumerate(zip(self.tracks, self._jumps(), strict=True)):
             state, counts = np.zeros((6, 3, len(names))), self._counts(i)
             for at in self._blocks(track):
-                rows = at.stop - at.start
-                x, y = np.zeros((rows, 6, len(asked))), np.zeros((rows, 6, len(moved)))
-                for j, c in enumerate(asked):
-                    if c in acting:
-                        x[:, :, j] = acting[c][i][at]
-                for j, column in enumerate(moved.values()):
-                    y[:, :, j] = column[i][at]
+                rows, here = at.stop - at.start, slice(first + at.start, first + at.stop)
+                x = np.stack([acting.get(c, still)[here] for c in asked], axis=2)
+                y = np.stack([column[here] for column in moved.values()], axis=2)
                 driven = np.zeros((rows, 6, len(DRIVEN), len(STATES)))
                 driven[:, :3, 0] = jumps[at, :3, : len(STATES)]
                 for j in range(1, len(DRIVEN)):
@@ -517,6 +511,7 @@ class Likelihood:
                 samples += int(counts[at].sum())
                 if len(kept):
                     blocks.append(kept.T @ kept)
+            first += len(track.position)
         penalty = 2.0 * samples * float(np.log(np.diagonal(root)).sum())
         return in_prior_units(self.flights, names, np.array(blocks), penalty, self.setting, starts)
 
@@ -578,37 +573,13 @@ def gyration(vehicle: Vehicle, rate: Array) -> Array:
     return np.einsum("nk,kji->nij", rate, twist + twist.swapaxes(0, 1))
 
 
-def _bent_rotors(s: Signals) -> Signals:
-    """Return signals whose rotor speeds move between samples by their second difference beside the
-    straight line.
-    """
-    u = s.rotor_speeds  # of k + 1/2: nothing later than sample k + 1
-    bent = np.zeros_like(u)
-    bent[2:] = u[2:] - 2.0 * u[1:-1] + u[:-2]
-    return replace(s, rotor_speeds=u + bent)
-
-
-def _in_fit(flights: Flights, log: int, t: Array) -> NDArray[np.bool_]:
-    """Return which samples of a log, at times ``t`` (n,) s, the fit may see: those of whose block
-    the rows are.
-    """
-    rows = flights.log == log
-    at = np.searchsorted(flights.t[rows], t).clip(max=int(rows.sum()) - 1)
-    return np.asarray(flights.fit_rows[rows][at])
-
-
-def _sensing(vehicle: Vehicle) -> tuple[EffectSetting, ...]:
-    """Return the effects that change what a log's poses are."""
-    return tuple(e for e in vehicle.effects if get(e.name).kind == "sensing")
-
-
 def read_poses(log: FlightLog, vehicle: Vehicle, finer: Iterator[Array]) -> list[Poses]:
     """Return the unbroken pieces of a log as they were measured, without what the vehicle's sensing
     effects did to them; ``finer`` is added to the rotor speeds (n, 4) of each.
 
     Where poses are late or early, rotor speeds are moved instead: poses would lose of their noise.
     """
-    late = [e for e in vehicle.effects if is_delay(e.name) and get(e.name).kind == "sensing"]
+    late = [e for e in sensing_of(vehicle) if is_delay(e.name)]
     offset = sum(sum(e.coefficients.values()) for e in late)
     undone = undo_log_sensing(
         log, replace(vehicle, effects=tuple(e for e in vehicle.effects if e not in late))

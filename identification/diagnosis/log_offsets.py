@@ -82,26 +82,17 @@ def with_uneven_lag(signals: Signals, vehicle: Vehicle, asymmetry: float) -> Sig
 
 def with_time_offsets(signals: Signals, offsets: Mapping[str, float]) -> Signals:
     """Return the signals with the time offsets of rotor speeds, velocity and attitude applied."""
-    rotors, attitude, velocity, spread = (
-        offsets.get(name, 0.0)
-        for _, name in (
-            ROTOR_TIME_OFFSET,
-            ATTITUDE_TIME_OFFSET,
-            VELOCITY_TIME_OFFSET,
-            ROTOR_SPREAD,
-        )
-    )
-    if rotors != 0.0:
+    if rotors := offsets.get(ROTOR_TIME_OFFSET[1]):
         n = np.arange(len(signals.t), dtype=np.float64)
         speeds = resampled(n - rotors / signals.period, n, signals.rotor_speeds)
         signals = replace(signals, rotor_speeds=speeds)
-    if spread != 0.0:
+    if spread := offsets.get(ROTOR_SPREAD[1]):
         over = np.sqrt(spread) / signals.period
         smooth = gaussian_filter1d(signals.rotor_speeds, over, axis=0, mode="nearest")
         signals = replace(signals, rotor_speeds=smooth)
-    if velocity != 0.0:
+    if velocity := offsets.get(VELOCITY_TIME_OFFSET[1]):
         signals = replace(signals, velocity=signals.velocity - velocity * signals.acceleration)
-    if attitude != 0.0:
+    if attitude := offsets.get(ATTITUDE_TIME_OFFSET[1]):
         turn = Rotation.from_rotvec(-attitude * signals.angular_velocity).as_matrix()
         signals = replace(signals, rotation=signals.rotation @ turn)
     return signals

@@ -4,7 +4,7 @@ each column, and the ways in which an effect may act.
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Role
-from .evidence import Index, Marginal, marginal
+from .evidence import Index, Marginal, SetEvidence, marginal
 from .log_offsets import TIMINGS
 from .regression import (
     CENTRAL,
@@ -61,8 +61,8 @@ class PriorSettings:
 
 
 PRIORS = PriorSettings()
-# one way in which an effect may act: all coefficients, or one of those starting points
-Variant = tuple[str, tuple[Column, ...]]
+# columns of one way in which an effect may act: all coefficients, or one of those starting points
+Variant = tuple[Column, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +80,8 @@ class Base:
     typical: Array  # (c,) typical sizes in prior standard deviations
     dictionary: Index  # columns of the discrepancy
     starts: Starts
+    # the evidence of sets, by the likelihood's power and their columns; None of one that cannot be
+    tried: dict[tuple[float, tuple[Variant, ...]], SetEvidence | None] = field(default_factory=dict)
 
     @cached_property
     def columns(self) -> dict[Column, int]:
@@ -107,10 +109,9 @@ class Base:
         """Return the likelihood, to a power, of columns that are asked about, with others
         integrated out; ``size``: standard deviations of their prior, if it is not theirs.
         """
-        total = power * self.total
-        deviance = float(total[-1, -1]) + power * self.penalty
-        size = np.ones(len(others)) if size is None else size
-        return marginal(total[:-1, :-1], total[:-1, -1], deviance, asked, others, size)
+        products = power * self.total
+        products[-1, -1] += power * self.penalty
+        return marginal(products, asked, others, np.ones(len(others)) if size is None else size)
 
     def mode(self, chosen: Index, power: float = 1.0) -> dict[Column, tuple[float, float]]:
         """Return the coefficients of some columns at the mode where no other acts, and their
@@ -124,22 +125,27 @@ class Base:
         return {self.names[i]: (x, s) for i, x, s in found}
 
 
+def bare(column: Column) -> Column:
+    """Return a column's coefficient, of an effect that may act as a whole."""
+    return column[0], column[1].removeprefix(WHOLE_PREFIX)
+
+
 def variants_of(
     flights: Flights, effect: str, setting: Collection[str], starts: Starts
 ) -> list[Variant]:
-    """Return the ways in which an effect may act beside the effects of a setting."""
-    names = [c.name for c in get(effect).coefficients if c.name != CENTRAL]
-    own = tuple((effect, name) for name in names)
-    wholes: list[Variant] = [(effect, (c,)) for c in starts if c[0] == effect]
+    """Return the ways in which an effect may act beside the effects of a setting, without what the
+    vehicle's file fixes.
+    """
+    own, wholes = tuple(flights.columns_of([effect])), [(c,) for c in starts if c[0] == effect]
     if moves_time(effect) and effect not in setting:
-        return [(effect, own), *wholes]
+        return [own, *wholes]
     if flights.is_nonlinear(effect) and effect not in setting:
-        return wholes
-    if len(names) == len(get(effect).coefficients):
-        return [(effect, own)]
+        return list(wholes)
+    if all(c.name != CENTRAL for c in get(effect).coefficients):
+        return [own]
     if effect in setting:
-        return [(effect, (*own, (effect, CENTRAL)))]
-    return [(effect, own), (effect, tuple((effect, WHOLE_PREFIX + name) for name in names))]
+        return [(*own, (effect, CENTRAL))]
+    return [own, tuple((effect, WHOLE_PREFIX + name) for _, name in own)]
 
 
 def prior_size(column: Column, flights: Flights) -> float:
@@ -155,9 +161,8 @@ def prior_size(column: Column, flights: Flights) -> float:
         return PRIORS.model_error if name.startswith(MODEL_ERROR) else 1.0
     if name.startswith(START_PREFIX) or name == CENTRAL:
         return 1.0
-    column = (effect, name.removeprefix(WHOLE_PREFIX))
     factor = PRIORS.any_size if get(effect).any_size else 1.0
-    size = factor * typical_size(column, flights.vehicle)
+    size = factor * typical_size(bare(column), flights.vehicle)
     return math.hypot(size, flights.thrust_std) if get(effect).role == Role.THRUST else size
 
 
@@ -167,7 +172,7 @@ def _bounds(column: Column, flights: Flights) -> tuple[float, float]:
         return -math.inf, math.inf
     if name.startswith(START_PREFIX):
         return PRIORS.near_start if moves_time(effect) else (0.0, math.inf)
-    c = coefficient((effect, name.removeprefix(WHOLE_PREFIX)))
+    c = coefficient(bare(column))
     low, high = c.minimum, min(c.maximum, c.plausible)
     if get(effect).role == Role.MASS:
         low = max(low, -PRIORS.most_missing_mass * unit_of_change(column, flights.vehicle))
@@ -179,8 +184,8 @@ def declared(column: Column, flights: Flights) -> float:
     """Return what the vehicle's file states of a column's coefficient, from which a coefficient of
     the likelihood counts; 0 where it states nothing.
     """
-    effect, name = column
-    return flights.coefficients({}, effect).get(name.removeprefix(WHOLE_PREFIX), 0.0)
+    effect, name = bare(column)
+    return flights.coefficients({}, effect).get(name, 0.0)
 
 
 def in_prior_units(
@@ -205,9 +210,9 @@ def in_prior_units(
     """
     size = np.array([prior_size(c, flights) for c in names])
     # about zero, not about the setting: the residual with all its effects taken away
-    bare = [(e, n.removeprefix(WHOLE_PREFIX)) for e, n in names]
-    here = [flights.coefficients(setting, e).get(n, 0.0) for e, n in bare]
-    back = np.append(np.subtract(here, [declared(c, flights) for c in bare]), 1.0)
+    own = [*map(bare, names)]
+    here = [flights.coefficients(setting, e).get(n, 0.0) for e, n in own]
+    back = np.append(np.subtract(here, [declared(c, flights) for c in own]), 1.0)
     whole = blocks @ back
     blocks = blocks.copy()
     blocks[:, :, -1] = blocks[:, -1, :] = whole
@@ -217,7 +222,7 @@ def in_prior_units(
     low, high = np.array([_bounds(c, flights) for c in names]).T / size
     plain = [i for i, c in enumerate(names) if not c[0] and not c[1].startswith(UNKNOWN)]
     dictionary = [i for i, c in enumerate(names) if not c[0] and c[1].startswith(UNKNOWN)]
-    typical = np.array([typical_size(c, flights.vehicle) for c in bare])
+    typical = np.array([typical_size(c, flights.vehicle) for c in own])
     return Base(
         names,
         size,

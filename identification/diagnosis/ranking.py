@@ -26,8 +26,7 @@ from .likelihood import Likelihood
 from .priors import Base, Setting, Starts
 from .regression import START_PREFIX, Column, Flights, moves_time, typical_size, without
 from .row_likelihood import RowLikelihood
-from .sets import Posterior, Tried, is_possible
-from .settings import DIAGNOSIS
+from .sets import Posterior, is_possible
 from .starting_points import starting_points
 
 Array = NDArray[np.float64]
@@ -35,6 +34,9 @@ Array = NDArray[np.float64]
 
 # typical sizes at which a lag or a delay is tried as a whole: their columns change with them
 TIME_STARTS = (0.3, 0.6, 1.2)
+# share of the likeliest set's probability from which another effect in a place of it is one that
+# the flights do not tell from it: a likelihood of 20 to 1
+LEAST_RIVAL = 0.05
 ROUNDS = 6  # of fitting the noise beside the best set
 MOST_STARTS = 2  # of an effect with nonlinear coefficients, the likeliest, that are fitted by rows
 
@@ -72,7 +74,7 @@ def rank(
 
         def height(x: Setting) -> Height:
             base = Likelihood(flights, x, near, same_noise=True).base(x, {})
-            return linearised(flights, base, base.asked, x)
+            return linearised(flights, base, x)
 
         tried[frozenset(setting)] = setting
         return Likelihood(flights, mode(setting, height), near)
@@ -153,7 +155,6 @@ def rank_by_rows(
     fitted: dict[frozenset[str], Setting] = {given: first}
     bases: dict[frozenset[str], Base] = {given: likelihood.base(first, starts)}
     idle: set[frozenset[str]] = set()
-    tried: Tried = {}
 
     def base(setting: Setting, unknown: bool = False) -> Base:
         lags = {
@@ -189,7 +190,7 @@ def rank_by_rows(
             add(min(near, key=likelihood.objective))
 
     def posterior() -> Posterior:
-        return Posterior(flights, library, [*bases.values()], likelihood.power, given, idle, tried)
+        return Posterior(flights, library, [*bases.values()], likelihood.power, given, idle)
 
     def likeliest() -> Setting:
         """Return the likeliest set's fit, once no set is likelier that was not fitted, nor, where
@@ -214,17 +215,17 @@ def rank_by_rows(
     bases.pop(frozenset(best))  # the last is the one that has the dictionary
     bases[frozenset(best)] = base(best, unknown=True)
     found = posterior()
-    hidden = sorted(flights.needs_pose - flights.without_trace - set(best))
-    behind = _behind(likelihood, best, [e for e in hidden if not flights.is_nonlinear(e)])
-    return Found(found, found.ranking(), best, sensors=likelihood.sensors(best), behind=behind)
+    sensors, behind = likelihood.sensors(best), _behind(likelihood, best)
+    return Found(found, found.ranking(), best, sensors=sensors, behind=behind)
 
 
-def _behind(
-    likelihood: RowLikelihood, best: Setting, hidden: Sequence[str]
-) -> dict[str, tuple[str, ...]]:
-    """Return of each effect of a set the ``hidden`` ones, which logs do not show and which may act
-    all the same, that explain the flights as well in its place.
+def _behind(likelihood: RowLikelihood, best: Setting) -> dict[str, tuple[str, ...]]:
+    """Return of each effect of a set those which logs do not show and which may act all the same,
+    that explain the flights as well in its place.
     """
+    flights = likelihood.flights
+    unseen = sorted(flights.needs_pose - flights.without_trace - set(best))
+    hidden = [e for e in unseen if not flights.is_nonlinear(e)]
     if not hidden or not best:
         return {}
     base = likelihood.base(best, {}, [*best, *hidden])
@@ -236,7 +237,7 @@ def _behind(
         return m.explained(index, set_evidence(m, index, base.low[at], base.high[at]).mode)
 
     # up to the deviance of a rival's likelihood
-    whole = explained(set(best)) + 2.0 * math.log(DIAGNOSIS.least_rival)
+    whole = explained(set(best)) + 2.0 * math.log(LEAST_RIVAL)
     found = {e: tuple(h for h in hidden if explained({*best, h} - {e}) > whole) for e in best}
     return {e: others for e, others in found.items() if others}
 

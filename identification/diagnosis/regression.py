@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from typing import TypeVar
 
 import numpy as np
@@ -25,12 +25,12 @@ from ..logs.flight_log import FlightLog
 from ..motion.inertial_signals import InertialSignals, inertial_signals, reads_imu, with_drift
 from ..motion.noise_spectrum import pose_was_filtered
 from ..motion.residual import acting_wrench, needed_wrench
-from ..motion.sensing_effects import undo_log_sensing
+from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import noisy_logs
-from ..motion.signals import SIGNALS, Signals, log_signals
+from ..motion.signals import LONGEST_GAP, Signals, log_signals
 from ..motion.smoothing import CUTOFFS, low_pass, resampled
 from .commanded_rotors import (
-    COMMANDED,
+    UNSTATED_THRUST_STD,
     downsampled,
     in_flight,
     in_flight_by_thrust,
@@ -57,26 +57,19 @@ K = TypeVar("K")
 V = TypeVar("V")
 
 
-@dataclass(frozen=True)
-class RegressionSettings:
-    """Rows and blocks of the regression, what flights must excite, and how much memory is used."""
-
-    rows_per_cutoff: float = 5.0  # rows in a period of the residual's cut-off
-    margin: float = 0.6  # s at either end of a piece, where the filters lack half of what they need
-    # share of sensor noise in the power of an effect's column, from which the effect is not
-    # identifiable. One that scales a measurement could cancel the measurement's own noise: of its
-    # column it is the share in the amplitude
-    most_noise_share: float = 0.1
-    # rounding steps by which rotor speeds must vary; with less, the rounding is no noise but looks
-    # like an effect
-    least_steps_of_rotor_speed: float = 1.4
-    block: float = 3.0  # s of flight held out, or left out in cross-validation, in one piece
-    short_block: float = 1.0  # s, the same of commanded flights of fewer than eight blocks
-    blocks_per_held_out: int = 4  # one of so many blocks is held out
-    memory: int = 2**28  # bytes, of pieces that are kept
-
-
-REGRESSION = RegressionSettings()
+ROWS_PER_CUTOFF = 5.0  # rows in a period of the residual's cut-off
+MARGIN = 0.6  # s at either end of a piece, where the filters lack half of what they need
+# share of sensor noise in the power of an effect's column, from which the effect is not
+# identifiable. One that scales a measurement could cancel the measurement's own noise: of its
+# column it is the share in the amplitude
+MOST_NOISE_SHARE = 0.1
+# rounding steps by which rotor speeds must vary; with less, the rounding is no noise but looks
+# like an effect
+LEAST_STEPS_OF_ROTOR_SPEED = 1.4
+BLOCK = 3.0  # s of flight held out, or left out in cross-validation, in one piece
+SHORT_BLOCK = 1.0  # s, the same of commanded flights of fewer than eight blocks
+BLOCKS_PER_HELD_OUT = 4  # one of so many blocks is held out
+MEMORY = 2**28  # bytes, of pieces that are kept
 # what logs lack whose rotor speeds are worked out from commands: torque is left out, the thrust
 # curve is a guess, and commands do not tell small differences between rotors
 NOT_COMMANDED = (Need.MOMENTS, Need.SINGLE_ROTORS)
@@ -156,6 +149,7 @@ class Piece:
     signals: Signals
     rows: Index  # the samples that are rows
     needed: Array  # (rows, 6) what the motion needs, N and Nm, by the declared mass and inertia
+    felt: Array | None  # (rows, 3) as of ``Flights.felt``, where an accelerometer was read
 
     def smooth(self, x: Array) -> Array:
         """Return samples (n, ...) at the rows, through the residual's low-pass."""
@@ -193,9 +187,7 @@ class Flights:
         elif self.commanded:
             self.logs = tuple(in_flight(log, vehicle) for log in self.logs)
         # relative standard deviation of the thrust that is assumed
-        self.thrust_std = (
-            COMMANDED.unstated_thrust_std if thrust_is_assumed(self.logs, vehicle) else 0.0
-        )
+        self.thrust_std = UNSTATED_THRUST_STD if thrust_is_assumed(self.logs, vehicle) else 0.0
         # the noise of a filtered pose cannot be read from its log, nor can what the filter's delay
         # and bandwidth took away
         self.filtered = not (self.commanded or self.inertial) and any(
@@ -209,16 +201,8 @@ class Flights:
         self._fit_logs = len(logs)
         self._drift: np.random.Generator | None = None  # of a copy whose fusion errs otherwise
         self._fused: dict[FlightLog, list[InertialSignals]] = {}
-        self._felt: dict[Piece, Array] = {}
         self._forget()
         self._first: list[Piece] = []
-        self.log: Index  # (rows,) which log
-        self.block: Index  # (rows,)
-        self.fit_rows: Mask  # (rows,)
-        self.start: Mask  # (rows,) first row of a piece
-        self.t: Array  # (rows,) s
-        self.period: float  # s, from row to row
-        self.seconds: float  # of unbroken flight
         self._lay_rows()
         # by what the accelerometers from which the motion is read may be off, and all signals
         self.biases = self._biases()
@@ -265,27 +249,23 @@ class Flights:
     def _lay_rows(self) -> None:
         """Cut the flights into pieces, and say of which of their samples rows are."""
         self._first = pieces = self.pieces({})
-        parts, count = [], 0
+        times = [piece.signals.t[piece.rows] for piece in pieces]
+        self.t: Array = np.concatenate(times)  # (rows,) s
+        self.start: Mask = np.concatenate([t == t[0] for t in times])  # first row of a piece
+        # (rows,) which log
+        self.log: Index = np.repeat([piece.log for piece in pieces], [len(t) for t in times])
+        self.period = float(np.median(np.diff(self.t)))  # s, from row to row
+        # s of unbroken flight
         self.seconds = sum(float(x.signals.t[-1] - x.signals.t[0]) for x in pieces)
-        short = self.commanded and self.seconds < 8 * REGRESSION.block
-        length = REGRESSION.short_block if short else REGRESSION.block
-        for piece in pieces:
-            time = piece.signals.t[piece.rows]
-            number = ((time - time[0]) // length).astype(np.int64) + count
-            seen = (
-                np.full(len(time), piece.log < self._fit_logs)
-                if len(self.logs) > self._fit_logs
-                else number % REGRESSION.blocks_per_held_out != held_out(number)
-            )
-            log = np.full(len(time), piece.log)
-            parts.append((log, number, seen, np.arange(len(time)) == 0, time))
-            count = int(number[-1]) + 1
-        self.log, self.block, self.fit_rows, self.start, self.t = map(
-            np.concatenate, zip(*parts, strict=True)
-        )
+        short = self.commanded and self.seconds < 8 * BLOCK
+        self.block: Index = blocks(self.t, self.start, SHORT_BLOCK if short else BLOCK)  # (rows,)
+        self.fit_rows: Mask  # (rows,)
+        if len(self.logs) > self._fit_logs:
+            self.fit_rows = self.log < self._fit_logs
+        else:
+            self.fit_rows = self.block % BLOCKS_PER_HELD_OUT != held_out(self.block)
         if self.fit_rows.all() and self.block[-1] > 0:  # fewer than four blocks
             self.fit_rows = self.block < self.block[-1]
-        self.period = float(np.median(np.diff(self.t)))
 
     def _lost_in_noise(self, noisy: "Flights") -> frozenset[str]:
         """Return the effects whose columns are noise to a large part.
@@ -332,7 +312,7 @@ class Flights:
                 turned = loud if noisy._drift is None else self._in_own_axes(loud, noisy)
                 noise += float(weight @ np.mean(np.square(turned - quiet), axis=0))
                 whole += float(weight @ np.mean(np.square(quiet), axis=0))
-            most = REGRESSION.most_noise_share ** (2 if get(effect).scales_noise else 1)
+            most = MOST_NOISE_SHARE ** (2 if get(effect).scales_noise else 1)
             if self.inertial and whole == 0.0:
                 traceless.add(effect)
             if effect in traceless or noise > most * whole:
@@ -399,19 +379,15 @@ class Flights:
         """Whether the rotor speeds vary by enough of their rounding steps."""
         return (
             float(np.median(self.at_rows("rotor_speeds").std(axis=0)))
-            > REGRESSION.least_steps_of_rotor_speed * self.vehicle.omega_lsb
+            > LEAST_STEPS_OF_ROTOR_SPEED * self.vehicle.omega_lsb
         )
 
     def pieces(self, setting: Setting) -> list[Piece]:
         """Return the pieces, with what the vehicle's sensing effects did to the logs undone."""
         vehicle = self.amended(setting)
-        sensing = tuple(
-            (e.name, *sorted(e.coefficients.items()))
-            for e in vehicle.effects
-            if get(e.name).kind == "sensing"
-        )
+        sensing = tuple((e.name, *sorted(e.coefficients.items())) for e in sensing_of(vehicle))
         size = 400 * max(sum(len(p.signals.t) for p in self._first), 1)  # bytes
-        most = min(max(REGRESSION.memory // size, 1), 40)
+        most = min(max(MEMORY // size, 1), 40)
         return _kept(self._pieces, sensing, lambda: self._cut(vehicle), most)
 
     def _cut(self, vehicle: Vehicle) -> list[Piece]:
@@ -445,7 +421,12 @@ class Flights:
         needed = needed_wrench(signals, self.vehicle)
         if self.commanded:
             needed[:, 3:] = 0.0
-        return Piece(log, signals, rows, _smooth(needed, signals)[rows])
+        needed, felt = _smooth(needed, signals)[rows], None
+        if not self.inertial and (read := _accelerometer(self.logs[log])):
+            at = resampled(signals.t, *read)
+            force = self.vehicle.mass * np.einsum("nij,nj->ni", signals.rotation, at)
+            felt = _smooth(force, signals)[rows] - needed[:, :3]
+        return Piece(log, signals, rows, needed, felt)
 
     def _inertial_signals(self, log: FlightLog) -> list[InertialSignals]:
         # no effect of the library changes what an IMU measured: each log is fused once
@@ -560,16 +541,8 @@ class Flights:
         poses' motion needs, low-passed; None where a log has no accelerometer, or where the motion
         is read from it.
         """
-        if self.inertial or not all(map(_reads_throughout, self.logs)):
-            return None
-        pieces = self.pieces(setting)
-        return np.concatenate([_kept(self._felt, p, partial(self._felt_at, p), 40) for p in pieces])
-
-    def _felt_at(self, piece: Piece) -> Array:
-        s = piece.signals
-        read = resampled(s.t, *_smooth_accelerometer(self.logs[piece.log]))
-        force = self.vehicle.mass * np.einsum("nij,nj->ni", s.rotation, read)
-        return piece.smooth(force) - piece.needed[:, :3]
+        found = [piece.felt for piece in self.pieces(setting) if piece.felt is not None]
+        return np.concatenate(found) if len(found) == len(self._first) else None
 
     def step(self, setting: Setting, column: Column, size: float = STEP) -> tuple[float, float]:
         """Return a coefficient's value at a setting, and a step from there within its limits, of so
@@ -583,16 +556,30 @@ class Flights:
             delta = delta if c.minimum <= value + delta <= c.maximum else -delta
         return value, delta
 
-    def _slope(self, setting: Setting, column: Column, step: float) -> Array:
-        """Return what a unit of a coefficient adds (rows, 6), by a difference from the residual at
-        a setting.
+    def columns(
+        self,
+        setting: Setting,
+        wanted: Iterable[Column],
+        step: float = STEP,
+        residual: Callable[[Setting], Array] | None = None,
+    ) -> dict[Column, Array]:
+        """Return what each unit of a coefficient adds to a residual, (rows, 6) of these flights.
+
+        So ``residual(setting + d) = residual(setting) - column * d``, by a difference of ``step``
+        typical sizes.
         """
+        left = residual or self.residual
+        return {column: self._slope(setting, column, step, left) for column in wanted}
+
+    def _slope(
+        self, setting: Setting, column: Column, step: float, residual: Callable[[Setting], Array]
+    ) -> Array:
         effect, name = column
         own = self.coefficients(setting, effect)
         value, delta = self.step(setting, column, step)
 
         def at(moved: float) -> Array:
-            return self.residual({**setting, effect: {**own, name: moved}})
+            return residual({**setting, effect: {**own, name: moved}})
 
         # moving signals in time moves their noise as well, and a step to one side would seem to
         # reduce it: the difference is taken to both sides
@@ -600,18 +587,7 @@ class Flights:
             c, far = coefficient(column), abs(delta)
             if c.minimum <= value - far and value + far <= c.maximum:
                 return (at(value - delta) - at(value + delta)) / (2.0 * delta)
-        return (self.residual(setting) - at(value + delta)) / delta
-
-    def columns(
-        self, setting: Setting, wanted: Iterable[Column], step: float = STEP
-    ) -> dict[Column, Array]:
-        """Return what each unit of a coefficient adds to the residual that the model leaves, (rows,
-        6) each.
-
-        So ``residual(setting + d) = residual(setting) - column * d``, by a difference of ``step``
-        typical sizes.
-        """
-        return {column: self._slope(setting, column, step) for column in wanted}
+        return (residual(setting) - at(value + delta)) / delta
 
 
 def _kept(memory: dict[K, V], key: K, make: Callable[[], V], most: int) -> V:
@@ -624,23 +600,18 @@ def _kept(memory: dict[K, V], key: K, make: Callable[[], V], most: int) -> V:
     return memory[key]
 
 
-def _reads_throughout(log: FlightLog) -> bool:
-    """Return whether a log's accelerometer was read from its beginning to its end."""
-    if log.accelerometer is None:
-        return False
-    times = log.t[np.isfinite(log.accelerometer).all(axis=1)]
-    ends = np.concatenate([log.t[:1], times, log.t[-1:]])
-    return len(times) > 0 and float(np.diff(ends).max()) < SIGNALS.gap
-
-
 @lru_cache(maxsize=16)  # of several pieces, and again at each setting of sensing effects
-def _smooth_accelerometer(log: FlightLog) -> tuple[Array, Array]:
+def _accelerometer(log: FlightLog) -> tuple[Array, Array] | None:
     """Return times (n,) s, evenly spaced, and what the accelerometer reads (n, 3) m/s2, with the
-    same low-pass as the pose.
+    same low-pass as the pose; None where it was not read from the log's beginning to its end.
     """
-    assert log.accelerometer is not None
+    if log.accelerometer is None:
+        return None
     read = np.isfinite(log.accelerometer).all(axis=1)
     times, values = log.t[read], log.accelerometer[read]
+    ends = np.concatenate([log.t[:1], times, log.t[-1:]])
+    if not len(times) or float(np.diff(ends).max()) >= LONGEST_GAP:
+        return None
     period = float(np.median(np.diff(times)))
     even = np.arange(times[0], times[-1], period)
     return even, low_pass(resampled(even, times, values), CUTOFFS.pose_hz, period)
@@ -650,16 +621,25 @@ def _smooth(x: Array, signals: Signals) -> Array:
     return low_pass(x, CUTOFFS.residual_hz, signals.period)
 
 
+def blocks(t: Array, begins: Mask, seconds: float) -> Index:
+    """Return the number of the block of so many seconds (n,) in which samples at ``t`` (n,) s lie,
+    which begin anew with each piece.
+    """
+    since = t - t[begins][np.cumsum(begins) - 1]
+    new = begins | (np.diff(since // seconds, prepend=-1.0) != 0.0)
+    return np.asarray(np.cumsum(new) - 1)
+
+
 def held_out(number: Index) -> Index:
     """Return which block of its four is held out, of each block: the last of the first, then as
     evenly as can be: by the golden ratio, with which no flight keeps step.
     """
     golden = 0.5 * (5.0**0.5 - 1.0)
-    turn = (0.75 + golden * (number // REGRESSION.blocks_per_held_out)) % 1.0
-    return np.asarray(REGRESSION.blocks_per_held_out * turn, dtype=np.int64)
+    turn = (0.75 + golden * (number // BLOCKS_PER_HELD_OUT)) % 1.0
+    return np.asarray(BLOCKS_PER_HELD_OUT * turn, dtype=np.int64)
 
 
 def _rows(signals: Signals) -> Index:
-    step = max(1, round(1.0 / (REGRESSION.rows_per_cutoff * CUTOFFS.residual_hz * signals.period)))
-    edge = round(REGRESSION.margin / signals.period)
+    step = max(1, round(1.0 / (ROWS_PER_CUTOFF * CUTOFFS.residual_hz * signals.period)))
+    edge = round(MARGIN / signals.period)
     return np.arange(edge, len(signals.t) - edge, step)

@@ -18,23 +18,16 @@ from .regression import Flights, Setting
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class ResidualSettings:
-    """What of a residual is noise, and what a transient disturbance."""
-
-    # times the noise floor; a residual up to that is the sensors' noise
-    most_floor_ratio: float = 1.2
-    # of ``weight_and_torque``: a weaker disturbance, below the cut-off ``CUTOFFS.calm_hz``, is none
-    calm: float = 0.006
-    # standard deviations; 378 flights that a model explains had up to 6.6, in strong turbulence up
-    # to 4.6
-    least_significance: float = 10.0
-    least_transient: float = 0.01  # of the weight, or of the weight times the arm
-    # s at either end of a piece, where the transients' filters lack half of what they need
-    margin: float = 1.0
-
-
-RESIDUAL = ResidualSettings()
+# times the noise floor; a residual up to that is the sensors' noise
+MOST_FLOOR_RATIO = 1.2
+# of ``weight_and_torque``: a weaker disturbance, below the cut-off ``CUTOFFS.calm_hz``, is none
+CALM = 0.006
+# standard deviations; 378 flights that a model explains had up to 6.6, in strong turbulence up
+# to 4.6
+LEAST_SIGNIFICANCE = 10.0
+LEAST_TRANSIENT = 0.01  # of the weight, or of the weight times the arm
+# s at either end of a piece, where the transients' filters lack half of what they need
+MARGIN = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +61,9 @@ def balance(flights: Flights, setting: Setting) -> Balance:
     floor = _rms(flights.visible_noise)
     error = _rms(after[held_out])
     # an IMU's own noise, and what a filter left of a pose's, is below what counts for none
-    quiet = RESIDUAL.calm * weight_and_torque(flights.vehicle)[[0, 3]]
+    quiet = CALM * weight_and_torque(flights.vehicle)[[0, 3]]
     least = np.hypot(floor, quiet) if flights.inertial or flights.filtered else np.array(floor)
-    noisy = bool(np.any(np.array(error) > RESIDUAL.most_floor_ratio * least))
+    noisy = bool(np.any(np.array(error) > MOST_FLOOR_RATIO * least))
     old, new = np.square(before[held_out]), np.square(after[held_out])
     change = np.mean((new - old) / (old.mean(axis=0) + 1e-30), axis=1)
     block = flights.block[held_out]
@@ -91,7 +84,7 @@ def beyond_calm(disturbances: Sequence[Disturbance], vehicle: Vehicle) -> float:
     counts for none; ``-inf`` where none was fitted.
     """
     slow = [x.unanswered_below(CUTOFFS.calm_hz) for x in disturbances]
-    calm = RESIDUAL.calm * weight_and_torque(vehicle)
+    calm = CALM * weight_and_torque(vehicle)
     return float(np.log(np.max(slow / calm))) if slow else -np.inf
 
 
@@ -103,12 +96,12 @@ def transient_disturbances(flights: Flights, setting: Setting) -> list[Transient
     But noise of one strength, however fast, has peaks of about four standard deviations in a
     minute, and a transient disturbance has more, in terms of the median.
     """
-    residual, edge = flights.residual(setting), round(RESIDUAL.margin / flights.period)
+    residual, edge = flights.residual(setting), round(MARGIN / flights.period)
     inner = np.concatenate([rows[edge : len(rows) - edge] for rows in flights.runs])
     if not inner.size:
         return []
     weight = flights.vehicle.weight
-    least = RESIDUAL.least_transient * weight * np.repeat([1.0, flights.vehicle.arm_l], 3)
+    least = LEAST_TRANSIENT * weight * np.repeat([1.0, flights.vehicle.arm_l], 3)
     found: dict[str, tuple[float, TransientDisturbance]] = {}
     for cutoff in CUTOFFS.transient_hz:
         slow = np.concatenate(
@@ -120,7 +113,7 @@ def transient_disturbances(flights: Flights, setting: Setting) -> list[Transient
             row = inner[np.argmax(size[:, i])]
             peak = float(slow[row, i])
             above = abs(peak) / max(float(std[i]), 1e-30)
-            before, _ = found.get(channel, (RESIDUAL.least_significance, None))
+            before, _ = found.get(channel, (LEAST_SIGNIFICANCE, None))
             if above > before and abs(peak) > least[i]:
                 log, t = flights.logs[flights.log[row]].name, float(flights.t[row])
                 found[channel] = above, TransientDisturbance(channel, log, t, peak)

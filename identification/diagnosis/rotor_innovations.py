@@ -38,15 +38,10 @@ def rotor_innovations(pieces: list[tuple[Poses, Track]]) -> list[Array]:
     Args:
         pieces: as they were measured, and as the filter sees them.
     """
-    sides = []
-    for poses, track in pieces:
-        now = _accelerations(poses, track)
-        sides.append((_known_before(track, now), now[LAGS:]))
-    out = []
-    for (poses, _), (_, y), predicted in zip(pieces, sides, _predicted(sides), strict=True):
-        found = np.zeros((len(poses.t), 4))
-        found[LAGS:] = y - predicted
-        out.append(found)
+    rotors = [_accelerations(poses, track) for poses, track in pieces]
+    out = [np.zeros_like(now) for now in rotors]
+    for found, now, predicted in zip(out, rotors, _predicted(pieces, rotors), strict=True):
+        found[LAGS:] = now[LAGS:] - predicted
     return out
 
 
@@ -62,12 +57,7 @@ def unrounded(pieces: list[tuple[Poses, Track]], step: float) -> list[Array]:
     logged = [poses.rotor_speeds for poses, _ in pieces]
     speeds, variance = [x.copy() for x in logged], [np.zeros_like(x) for x in logged]
     for _ in range(ROUNDS):
-        sides = [
-            (_known_before(track, now), now[LAGS:])
-            for (_, track), now in zip(pieces, speeds, strict=True)
-        ]
-        predicted = _predicted(sides)
-        each = list(zip(logged, speeds, variance, predicted, strict=True))
+        each = list(zip(logged, speeds, variance, _predicted(pieces, speeds), strict=True))
         left = [np.square(now[LAGS:] - z) + v[LAGS:] for _, now, v, z in each]
         std = np.maximum(np.sqrt(np.concatenate(left).mean(axis=0)), 1e-6 * step)
         for log, now, v, z in each:
@@ -82,18 +72,19 @@ def unrounded(pieces: list[tuple[Poses, Track]], step: float) -> list[Array]:
     return [now - log for log, now in zip(logged, speeds, strict=True)]
 
 
-def _predicted(sides: list[tuple[Array, Array]]) -> list[Array]:
-    """Return the least-squares predictions of each piece, of regressors (n, c) and what they
-    predict (n, 4).
-    """
-    x, y = (np.concatenate(part) for part in zip(*sides, strict=True))
+def _predicted(pieces: list[tuple[Poses, Track]], rotors: list[Array]) -> list[Array]:
+    """Return the least-squares predictions (n - LAGS, 4) of each piece's rotors (n, 4)."""
+    each = list(zip(pieces, rotors, strict=True))
+    x = np.concatenate([_known_before(track, now) for (_, track), now in each])
+    later = [now[LAGS:] for now in rotors]
+    y = np.concatenate(later)
     mean, size = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-12)
     z = np.column_stack([(x - mean) / size, np.ones(len(x))])
     normal = z.T @ z
     # against columns that are alike, and those that do not vary: all others have a square of one
     normal += 1e-6 * len(z) * np.eye(len(normal))
     predicted = z @ np.linalg.solve(normal, z.T @ y)
-    return np.split(predicted, np.cumsum([len(part) for part, _ in sides])[:-1])
+    return np.split(predicted, np.cumsum([len(part) for part in later])[:-1])
 
 
 def _accelerations(poses: Poses, track: Track) -> Array:

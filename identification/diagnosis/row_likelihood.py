@@ -6,12 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from ...dynamics.effects import Role, playing
 from .causal_filter import State
 from .climbing import Height, height, linearised, mode
-from .discrepancy import changing_columns, discrepancy_columns, variables
+from .discrepancy import changing_columns, discrepancy_columns, joined, variables
 from .log_offsets import LAG_ASYMMETRY
 from .priors import (
     NUISANCE,
@@ -23,7 +22,7 @@ from .priors import (
     prior_size,
 )
 from .regression import Column, Flights, without
-from .row_noise import ROW_NOISE, RowNoise, fitted_noise, white_noise
+from .row_noise import ROUNDS, RowNoise, fitted_noise, white_noise
 from .row_nuisances import answered, followers, row_nuisances
 from .rows import Rows
 
@@ -51,9 +50,6 @@ class RowLikelihood:
         self.power = 1.0
         self.noise: RowNoise = self._noise(first)
         self._use = self.rows.fit & self.noise.known
-        N = self._white(np.stack(list(self.nuisances.values()), axis=2))
-        self._given = N.reshape(-1, N.shape[2])
-        self._inner = self._given.T @ self._given
 
     def _noise(self, first: Setting) -> RowNoise:
         rows = self.rows
@@ -62,11 +58,10 @@ class RowLikelihood:
         found = rows.columns(first, self.flights.columns_of(linear))
         traced = {c[0] for c, x in found.items() if x.any()}
         self.library = [e for e in self.library if e in traced or e not in linear]
-        wanted = self.flights.columns_of(e for e in linear if e in traced)
-        own = [found[c] * prior_size(c, self.flights) for c in wanted]
+        own = [x * prior_size(c, self.flights) for c, x in found.items() if c[0] in traced]
         signals, explained = followers(rows), np.zeros_like(y)
         # first as if all of a signal could be disturbances that it follows
-        for _ in range(ROW_NOISE.rounds):
+        for _ in range(ROUNDS):
             answers = _named(answered(rows, signals, y - explained))
             noise, explained = self._noise_beside(y, own, answers)
         self.nuisances |= answers
@@ -88,7 +83,7 @@ class RowLikelihood:
         X = np.stack([*own, *self.nuisances.values(), *answers.values()], axis=2)
         known = X.shape[2] - len(answers)
         noise = white_noise(y, rows.begins, rows.fit, rows.least)
-        for _ in range(ROW_NOISE.rounds):
+        for _ in range(ROUNDS):
             use = rows.fit & noise.known
             x = noise.white(X)[use].reshape(-1, X.shape[2])
             z = noise.white(y)[use].ravel()
@@ -118,51 +113,42 @@ class RowLikelihood:
         rows, flights, residual = self.rows, self.flights, self.rows.residual(setting)
         if effects is None:
             effects = [e for e in self.library if not flights.is_nonlinear(e) or e in setting]
-        columns = dict(self.nuisances) | self._uneven_lag(setting)
+        columns = dict(self.nuisances)
+        if not flights.commanded and playing(Role.LAG, among=list(setting)):
+            # rotors that speed up sooner than they slow down
+            columns |= rows.columns(setting, [LAG_ASYMMETRY])
         columns |= rows.columns(setting, flights.columns_of(effects))
         for c, start in starts.items():
             columns[c] = residual - rows.residual({**setting, c[0]: dict(start)})
         if unknown:
-            columns |= self._dictionary() | self._changing(setting)
+            columns |= self._dictionary(setting)
         x = self._white(np.stack([*columns.values(), residual], axis=2))
         ends = np.flatnonzero(np.diff(rows.block[self._use])) + 1
         parts = [p.reshape(-1, p.shape[2]) for p in np.split(x, ends)]
         blocks = np.array([p.T @ p for p in parts])
         return in_prior_units(flights, list(columns), blocks, 0.0, setting, starts)
 
-    def _dictionary(self) -> dict[Column, Array]:
-        flights = self.rows.flights
-        pieces, found = flights.pieces({}), discrepancy_columns(self._states(), flights)
-        out: dict[Column, Array] = {}
-        for column, parts in found.items():
-            if not self.rows.with_torques and not any(x[:, :3].any() for x in parts):
-                continue
-            sampled = np.concatenate([p.smooth(x) for x, p in zip(parts, pieces, strict=True)])
-            out[column] = self.rows.from_world(sampled[:, :3], torque=sampled[:, 3:])
-        return out
-
-    def _states(self) -> list[State]:
-        """Return the flight; the acceleration is the rotors', which knows no disturbance."""
-        vehicle, out = self.flights.vehicle, []
-        for s in (p.signals for p in self.rows.flights.pieces({})):
-            rotors = vehicle.rotor_wrench(s.rotor_speeds) / self.flights.inertias[2:]
+    def _dictionary(self, setting: Setting) -> dict[Column, Array]:
+        """Return the dictionary's columns, those of coefficients that change among them."""
+        rows, flights, vehicle = self.rows, self.flights, self.flights.vehicle
+        pieces, states = flights.pieces({}), []
+        for s in (p.signals for p in pieces):
+            rotors = vehicle.rotor_wrench(s.rotor_speeds) / flights.inertias[2:]
+            # the acceleration is the rotors', which knows no disturbance
             push, rate = rotors[:, :1] * s.rotation[:, :, 2], s.angular_velocity
-            out.append(State(s.t, s.position, s.rotation, s.velocity, rate, push, rotors))
-        return out
-
-    def _changing(self, setting: Setting) -> dict[Column, Array]:
-        """Return the dictionary's columns of effects whose coefficients change."""
-        rows, pieces = self.rows, self.rows.flights.pieces({})
+            states.append(State(s.t, s.position, s.rotation, s.velocity, rate, push, rotors))
+        whole, ends = joined(states)
+        out: dict[Column, Array] = {}
+        for column, x in discrepancy_columns(whole, ends, flights).items():
+            if rows.with_torques or x[:, :3].any():
+                parts = zip(np.split(x, ends), pieces, strict=True)
+                sampled = np.concatenate([p.smooth(part) for part, p in parts])
+                out[column] = rows.from_world(sampled[:, :3], torque=sampled[:, 3:])
         here = rows.residual(setting)
-        parts = {e: [rows.residual(without(setting, e)) - here] for e in setting}
-        found = variables(self._states())
-        at_rows = {
-            name: [
-                rows.at_rows(np.concatenate([z[p.rows] for z, p in zip(x, pieces, strict=True)]))
-            ]
-            for name, x in found.items()
-        }
-        return {c: x for c, (x,) in changing_columns(parts, at_rows).items()}
+        own = {e: rows.residual(without(setting, e)) - here for e in setting}
+        at = np.concatenate([i + p.rows for i, p in zip([0, *ends], pieces, strict=True)])
+        found = {name: rows.at_rows(x[at]) for name, x in variables(whole).items()}
+        return out | changing_columns(own, found)
 
     # Fits
 
@@ -170,20 +156,18 @@ class RowLikelihood:
         """Return how high the posterior is at a setting, up to a constant, with the nuisances
         integrated out.
         """
-        prior = sum(
-            ((setting[e].get(name, 0.0) - declared((e, name), self.flights)) / size) ** 2
-            for e, name in self.flights.columns_of(setting)
-            if (size := prior_size((e, name), self.flights))
-        )
-        w = self._white(self.rows.residual(setting)).ravel()
-        factor, b = self._nuisance_sums(w, setting)
-        deviance = self.power * float(w @ w) - float(b @ cho_solve(factor, b))
+        base = self.base(setting, {}, ())
+        m = base.marginal(base.at(()), base.plain, power=self.power)
+        off = [
+            (setting[c[0]].get(c[1], 0.0) - declared(c, self.flights)) / prior_size(c, self.flights)
+            for c in self.flights.columns_of(setting)
+        ]
 
         def target() -> Setting:
             base = self.base(setting, {}, setting)
-            return linearised(self.flights, base, base.asked, setting, self.power)[1]()
+            return linearised(self.flights, base, setting, self.power)[1]()
 
-        return 0.5 * (deviance + prior), target
+        return 0.5 * float(np.square(off).sum()) - m.constant, target
 
     def objective(self, setting: Setting) -> float:
         """Return minus the logarithm of likelihood and prior at a setting, up to a constant;
@@ -195,35 +179,15 @@ class RowLikelihood:
         """Return the mode of the posterior of a setting's effects."""
         return mode(setting, self._height)
 
-    def _uneven_lag(self, setting: Setting) -> dict[Column, Array]:
-        """Return what rotors that speed up sooner than they slow down do beside a lag."""
-        if self.flights.commanded or not playing(Role.LAG, among=list(setting)):
-            return {}
-        return self.rows.columns(setting, [LAG_ASYMMETRY])
-
-    def _nuisance_sums(self, w: Array, setting: Setting) -> tuple[tuple[Array, bool], Array]:
-        inner, right = self._inner, self._given.T @ w
-        for c, column in self._uneven_lag(setting).items():
-            x = self._white(column).ravel() * prior_size(c, self.flights)
-            cross = self._given.T @ x
-            inner = np.block([[inner, cross[:, None]], [cross, x @ x]])
-            right = np.append(right, x @ w)
-        return cho_factor(self.power * inner + np.eye(len(inner))), self.power * right
-
     def sensors(self, setting: Setting) -> dict[str, tuple[float, float]]:
         """Return the likeliest biases of accelerometers from which the motion was read, and the
         time offsets of logs, as ``Flights`` takes them out, with their standard deviations.
         """
-        w = self._white(self.rows.residual(setting)).ravel()
-        factor, b = self._nuisance_sums(w, setting)
-        modes = cho_solve(factor, b)
-        std = np.sqrt(np.diag(cho_solve(factor, np.eye(len(b)))))
-        at = {name: i for i, (_, name) in enumerate(self.nuisances)}
-        out = {}
+        base = self.base(setting, {}, ())
+        modes, out = base.mode(base.plain, self.power), {}
         for (_, name), offset in self.flights.offsets.items():
-            i = at[NUISANCE + name]
-            value = float(np.clip(offset.size * modes[i], *offset.range))
-            out[name] = value, offset.size * float(std[i])
+            mode, std = modes["", NUISANCE + name]
+            out[name] = float(np.clip(offset.size * mode, *offset.range)), offset.size * std
         return out
 
     def idle(self, setting: Setting, among: Iterable[str]) -> set[str]:

@@ -15,21 +15,11 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class RowNoiseSettings:
-    """The autoregression."""
-
-    rounds: int = 3  # of the noise and of what is explained beside it
-    most_lags: int = 3
-    rows_per_number: int = 12  # and channel, that a lag must have
-    # share of the variance added as white noise, so that what the low-pass took is not blown up
-    loading: float = 0.01
-    # of the weight, and of it at a quarter of the arm: how well a log shows motion at best, for a
-    # simulator's may have no noise
-    least: float = 1e-4
-
-
-ROW_NOISE = RowNoiseSettings()
+ROUNDS = 3  # of the noise and of what is explained beside it
+MOST_LAGS = 3
+ROWS_PER_NUMBER = 12  # and channel, that a lag must have
+# share of the variance added as white noise, so that what the low-pass took is not blown up
+LOADING = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +72,7 @@ def fitted_noise(x: Array, begins: Mask, fit: Mask, least: Array) -> RowNoise:
     """
     channels = x.shape[1]
     rows = int(fit.sum())
-    lags = int(np.clip(rows // (ROW_NOISE.rows_per_number * channels), 1, ROW_NOISE.most_lags))
+    lags = int(np.clip(rows // (ROWS_PER_NUMBER * channels), 1, MOST_LAGS))
     size = _size(x[fit], least)
     z = x / size
     use = fit & RowNoise(np.zeros((lags, channels, channels)), np.eye(channels), begins).known
@@ -91,7 +81,7 @@ def fitted_noise(x: Array, begins: Mask, fit: Mask, least: Array) -> RowNoise:
     at = np.flatnonzero(use)
     past = np.column_stack([z[at - k] for k in range(1, lags + 1)])
     now = z[at]
-    loading = len(at) * (ROW_NOISE.loading + np.square(least / size))
+    loading = len(at) * (LOADING + np.square(least / size))
     normal = past.T @ past + np.diag(np.tile(loading, lags))
     found = np.linalg.solve(normal, past.T @ now)
     left = now.T @ now + np.diag(loading) - found.T @ (past.T @ now)

@@ -8,34 +8,26 @@ decide what commands do, and they say nothing of torques.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...dynamics.effects import get
 from ..motion.smoothing import CUTOFFS, low_pass
 from .discrepancy import weight_and_torque
-from .regression import Column, Flights, Setting
-from .row_noise import ROW_NOISE
+from .regression import Column, Flights, Setting, blocks
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.intp]
 
 
-@dataclass(frozen=True)
-class RowSettings:
-    """The rows."""
-
-    cutoff_hz: float = 3.5  # where rotors are known by commands
-    # where the pose was filtered: well below any filter
-    filtered_cutoff_hz: float = 2.0
-    rows_per_cutoff: float = 25.0 / 10.5  # rows in a period of the cut-off
-    block: float = 4.0  # s, of the sums by which the likelihood's scatter is judged
-
-
-ROWS = RowSettings()
+COMMANDED_CUTOFF_HZ = 3.5  # where rotors are known by commands
+FILTERED_CUTOFF_HZ = 2.0  # where the pose was filtered: well below any filter
+ROWS_PER_CUTOFF = 25.0 / 10.5  # rows in a period of the cut-off
+# of the weight, and of it at a quarter of the arm: how well a log shows motion at best, for one of
+# a simulator may have no noise
+LEAST = 1e-4
+BLOCK = 4.0  # s, of the sums by which the likelihood's scatter is judged
 
 
 class Rows:
@@ -55,7 +47,6 @@ class Rows:
         fit: (n,) rows that the fit may see.
         begins: (n,) first row of an unbroken piece.
         block: (n,) number of the block of 4 s.
-        log: (n,) which log.
         t: (n,) s.
         channels: 3, 6 or 9.
         least: (channels,) to which a motion is known at best.
@@ -64,60 +55,50 @@ class Rows:
     """
 
     def __init__(self, flights: Flights, fixed: Setting) -> None:
-        self.with_torques, cutoff, use = not flights.commanded, CUTOFFS.residual_hz, ROWS
+        self.with_torques, cutoff = not flights.commanded, CUTOFFS.residual_hz
         self._cutoff = np.inf
         if flights.commanded or flights.filtered:
-            self._cutoff = cutoff = use.cutoff_hz if flights.commanded else use.filtered_cutoff_hz
-        step = max(1, round(1.0 / (use.rows_per_cutoff * cutoff * flights.period)))
+            self._cutoff = cutoff = COMMANDED_CUTOFF_HZ if flights.commanded else FILTERED_CUTOFF_HZ
+        step = max(1, round(1.0 / (ROWS_PER_CUTOFF * cutoff * flights.period)))
         self.flights, self.fixed = flights, fixed
-        kept = [rows[::step] for rows in flights.runs]
-        self._at: Index = np.concatenate(kept)
-        self.begins: Mask = np.concatenate([np.arange(len(rows)) == 0 for rows in kept])
+        self._at: Index = np.concatenate([rows[::step] for rows in flights.runs])
+        self.begins: Mask = flights.start[self._at]
         self.t: Array = flights.t[self._at]
-        self.log = flights.log[self._at]
         self.fit: Mask = flights.fit_rows[self._at]
-        since = self.t - self.t[self.begins][np.cumsum(self.begins) - 1]
-        number = (since // ROWS.block).astype(np.int64)
-        new = self.begins | (np.diff(number, prepend=-1) != 0)
-        self.block = np.cumsum(new) - 1
+        self.block = blocks(self.t, self.begins, BLOCK)
         self.has_accelerometer = flights.felt({}) is not None
         self.channels = 3 * (1 + self.has_accelerometer + self.with_torques)
-        force, torque = np.split(
-            ROW_NOISE.least * weight_and_torque(flights.vehicle) / flights.inertias, 2
+        self._inertias = flights.inertias
+        least = LEAST * weight_and_torque(flights.vehicle) / flights.inertias
+        force, torque = np.split(least, 2)
+        self.least = np.concatenate(
+            [force] * (1 + self.has_accelerometer) + [torque] * self.with_torques
         )
-        forces, torques = [force] * (1 + self.has_accelerometer), [torque] * self.with_torques
-        self.least = np.concatenate([*forces, *torques])
-        self._inertia = flights.inertias[3:]
         self.rotation = flights.at_rows("rotation")
 
     def from_world(
         self, pose: Array, accelerometer: Array | None = None, torque: Array | None = None
     ) -> Array:
-        """Return rows (n, channels, ...) of accelerations (samples, 3, ...) m/s2 in the world frame
-        at the samples of ``flights``.
-
-        Args:
-            pose: that the pose shows.
-            accelerometer: that the accelerometer shows, where there is one; default: the same.
-            torque: the angular acceleration (samples, 3, ...) rad/s2, body axes; default: none.
-        """
-        both = [pose, pose if accelerometer is None else accelerometer]
-        return self._thinned([self._in_body(x, self.rotation) for x in both], torque)
+        """Return rows of accelerations in the world frame; arguments as of ``from_body``."""
+        felt = None if accelerometer is None else in_body(accelerometer, self.rotation)
+        return self.from_body(in_body(pose, self.rotation), felt, torque)
 
     def from_body(
         self, pose: Array, accelerometer: Array | None = None, torque: Array | None = None
     ) -> Array:
-        """Return rows of accelerations in body axes; arguments as of ``from_world``."""
-        return self._thinned([pose, pose if accelerometer is None else accelerometer], torque)
+        """Return rows (n, channels) of accelerations (samples, 3) m/s2 in body axes at the samples
+        of ``flights``.
 
-    @staticmethod
-    def _in_body(x: Array, rotation: Array) -> Array:
-        return np.asarray(np.einsum("nji,nj...->ni...", rotation, x))
-
-    def _thinned(self, forces: list[Array], torque: Array | None) -> Array:
-        channels = forces[: 1 + self.has_accelerometer]
+        Args:
+            pose: that the pose shows.
+            accelerometer: that the accelerometer shows, where there is one; default: the same.
+            torque: the angular acceleration (samples, 3) rad/s2, body axes; default: none.
+        """
+        channels = [pose]
+        if self.has_accelerometer:
+            channels.append(pose if accelerometer is None else accelerometer)
         if self.with_torques:
-            channels = [*channels, np.zeros_like(forces[0]) if torque is None else torque]
+            channels.append(np.zeros_like(pose) if torque is None else torque)
         return self.at_rows(np.concatenate(channels, axis=1))
 
     def at_rows(self, x: Array) -> Array:
@@ -132,41 +113,23 @@ class Rows:
         Raises:
             InputError: no vehicle is like that.
         """
-        mass, setting = self.flights.vehicle.mass, {**self.fixed, **setting}
-        wrench = self.flights.residual(setting)
-        left = wrench[:, :3] / mass
-        felt = self.flights.felt(setting)
-        both = [left] if felt is None else [left, left + felt / mass]
+        setting = {**self.fixed, **setting}
+        left, felt = self.flights.residual(setting) / self._inertias, self.flights.felt(setting)
         rotation = self.flights.at_rows("rotation", setting)
-        return self._thinned(
-            [self._in_body(x, rotation) for x in both], wrench[:, 3:] / self._inertia
-        )
+        shown = in_body(left[:, :3], rotation)
+        read = None if felt is None else shown + in_body(felt / self._inertias[:3], rotation)
+        return self.from_body(shown, read, left[:, 3:])
 
     def noise(self) -> Array:
         """Return rows of the sensors' noise, as far as the logs show it."""
-        noise = self.flights.visible_noise
-        force = noise[:, :3] / self.flights.vehicle.mass
-        return self.from_world(force, np.zeros_like(force), noise[:, 3:] / self._inertia)
+        noise = self.flights.visible_noise / self._inertias
+        return self.from_world(noise[:, :3], np.zeros_like(noise[:, :3]), noise[:, 3:])
 
     def columns(self, setting: Setting, wanted: Iterable[Column]) -> dict[Column, Array]:
         """Return what a unit of each coefficient explains (n, channels), by differences."""
-        wanted = list(wanted)
-        if not wanted:
-            return {}
-        mass, setting = self.flights.vehicle.mass, {**self.fixed, **setting}
-        found = self.flights.columns(setting, wanted)
-        pose = np.stack([found[c][:, :3] / mass for c in wanted], axis=2)
-        torque = np.stack([found[c][:, 3:] / self._inertia for c in wanted], axis=2)
-        rows = self.from_world(pose, torque=torque)
-        out = {c: rows[:, :, i] for i, c in enumerate(wanted)}
-        # what is felt is not what the pose shows
-        sensing = [c for c in wanted if c[0] and get(c[0]).kind == "sensing"]
-        if not (sensing and self.has_accelerometer):
-            return out
-        here = self.residual(setting)
-        for effect, name in sensing:
-            own = self.flights.coefficients(setting, effect)
-            value, delta = self.flights.step(setting, (effect, name))
-            moved = self.residual({**setting, effect: {**own, name: value + delta}})
-            out[effect, name] = (here - moved) / delta
-        return out
+        return self.flights.columns({**self.fixed, **setting}, wanted, residual=self.residual)
+
+
+def in_body(x: Array, rotation: Array) -> Array:
+    """Return world vectors (n, 3) in body axes."""
+    return np.asarray(np.einsum("nji,nj->ni", rotation, x))

@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Found
 from ..findings import RankedSet, Ranking
-from .discrepancy import CHANGING, DISCREPANCY
+from .discrepancy import CHANGING, SHARE_OF_EFFECT
 from .evidence import (
     Index,
     Marginal,
@@ -28,6 +28,7 @@ from .priors import (
     Base,
     Setting,
     Variant,
+    bare,
     declared,
     variants_of,
 )
@@ -44,33 +45,29 @@ from .regression import (
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class SetSettings:
-    """How much of the sets is looked at."""
-
-    most_effects: int = 5
-    kept_sets: int = 8  # of each size, to which a further effect is added
-    kept_asked: int = 24  # sets, the best, that are asked for beside the noise of no effect too
-    most_rivals: int = 2  # effects, alike to the likeliest one, that are tried in its place
-    least_probability: float = 1e-6  # of a set that is kept
-
-
-SETS = SetSettings()
+MOST_EFFECTS = 5  # of a set, beside those that any set has
+KEPT_SETS = 8  # of each size, to which a further effect is added
+KEPT_ASKED = 24  # sets, the best, that are asked for beside the noise of no effect too
+MOST_RIVALS = 2  # effects, alike to the likeliest one, that are tried in its place
+LEAST_PROBABILITY = 1e-6  # of a set that is kept
+# shares of the weight, and of the weight at a quarter of the arm: standard deviations of what a
+# column of the dictionary adds
+UNKNOWN_SIZES = (0.001, 0.003, 0.01, 0.03)
+EFFECT_ERROR = 0.01  # share of its own wrench by which the model of an effect is wrong
+# power of the likelihood where rotor speeds hardly leave their rounding steps: their rounding is
+# then no noise, and follows the flight
+ROUNDED = 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class _Candidate:
-    base: int
+    base: Base
     variants: tuple[Variant, ...]
     evidence: SetEvidence
 
     @property
     def columns(self) -> list[Column]:
-        return [c for _, columns in self.variants for c in columns]
-
-
-# by base and power of the likelihood: the evidence of sets there, None of one that cannot be
-Tried = dict[tuple[Base, float], dict[tuple[Variant, ...], SetEvidence | None]]
+        return [c for columns in self.variants for c in columns]
 
 
 def is_possible(
@@ -88,14 +85,14 @@ def is_possible(
         return False
     if not plausible or words.implausible is None:
         return True
-    named = {*(e for e in setting if e), *(e.name for e in vehicle.effects)} - {effect}
+    beside = {*(e for e in setting if e), *(e.name for e in vehicle.effects)} - {effect}
     return not words.implausible(
         Found(
             own,
             {name: std.get(name, 0.0) for name in own},
             {c.name: typical_size((effect, c.name), vehicle) for c in words.coefficients},
             flights.speed,
-            frozenset(get(name).family for name in named),
+            frozenset(get(name).family for name in beside),
         )
     )
 
@@ -112,7 +109,6 @@ class Posterior:
             base that has most of its effects; a single one has them all. Without them each has a
             noise of its own, and of a set the likeliest counts.
         idle: sets that are none: where they fit best an effect of them does nothing.
-        tried: where the evidence of sets beside bases is kept, for posteriors of the same bases.
     """
 
     def __init__(
@@ -123,11 +119,9 @@ class Posterior:
         power: float = 1.0,
         given: frozenset[str] | None = None,
         idle: Collection[frozenset[str]] = (),
-        tried: Tried | None = None,
     ) -> None:
         self.flights, self.library, self.bases, self.power = flights, library, bases, power
-        self.idle, self._tried = idle, {} if tried is None else tried
-        self.given = given
+        self.idle, self.given = idle, given
         self.asked_about = len(library) - len(given or ())
         self.inclusion = min(PRIORS.expected / max(self.asked_about, 1), 0.5)
         self.known: dict[frozenset[str], _Candidate] = {}
@@ -137,11 +131,11 @@ class Posterior:
             self._search(i)
         if given is None:
             found = sorted(self.scores, key=self.scores.__getitem__, reverse=True)
-            self._search(0, [self.known[k].variants for k in found[: SETS.kept_asked]])
+            self._search(0, [self.known[k].variants for k in found[:KEPT_ASKED]])
 
     def _likeliest(self) -> tuple[Base, _Candidate]:
         best = self.known[max(self.scores, key=self.scores.__getitem__)]
-        return self.bases[best.base], best
+        return best.base, best
 
     def tempering(self) -> float:
         """Return the power of the likelihood that the scatter beside the likeliest set allows."""
@@ -157,11 +151,6 @@ class Posterior:
             little[[base.names[i][1].startswith(START_PREFIX) for i in asked]] = 0.0
         return little
 
-    def _log_prior(self, effects: int) -> float:
-        p = self.inclusion
-        named = effects - len(self.given or ())
-        return named * math.log(p) + (self.asked_about - named) * math.log1p(-p)
-
     def _counts(self, number: int, key: frozenset[str]) -> bool:
         """Return whether a set is judged beside a base."""
         if self.given is None:  # of a set in another base the columns are that base's
@@ -170,19 +159,13 @@ class Posterior:
         return key not in self.idle and len(self.bases[number].effects) == most
 
     def _variants(self, base: Base) -> list[Variant]:
-        out, known = [], self.given is not None
+        out = []
         for effect in self.library:
-            stated = self.flights.stated(effect)
-            for _, every in variants_of(self.flights, effect, base.effects, base.starts):
-                # what a file states is not asked, and a balance does not see where an effect acts
-                columns = tuple(
-                    c
-                    for c in every
-                    if c[1].removeprefix(WHOLE_PREFIX) not in stated
-                    and (c in base.columns or not known)
-                )
+            for columns in variants_of(self.flights, effect, base.effects, base.starts):
+                if self.given is not None:  # a balance does not see where an effect acts
+                    columns = tuple(c for c in columns if c in base.columns)
                 if columns and all(c in base.columns for c in columns):
-                    out.append((effect, columns))
+                    out.append(columns)
         return out
 
     def _search(self, number: int, asked_sets: Sequence[tuple[Variant, ...]] | None = None) -> None:
@@ -194,54 +177,56 @@ class Posterior:
         m = base.marginal(asked, np.concatenate([base.plain, asked]), little, self.power)
         low, high = base.low[asked], base.high[asked]
         variants = self._variants(base)
-        ways = Counter(e for e, _ in variants)
-        tried = self._tried.setdefault((base, self.power), {})
+        ways = Counter(v[0][0] for v in variants)
+        p, always = self.inclusion, len(self.given or ())
 
         def score(some: tuple[Variant, ...]) -> float:
-            key = frozenset(e for e, _ in some)
+            key = frozenset(v[0][0] for v in some)
             if not self._counts(number, key):
                 return -math.inf
-            if some not in tried:
-                index = [at[c] for v in some for c in v[1]]
-                tried[some] = None
+            if (self.power, some) not in base.tried:
+                index = [at[c] for v in some for c in v]
+                base.tried[self.power, some] = None
                 with suppress(np.linalg.LinAlgError):
                     found = set_evidence(m, index, low, high)
-                    tried[some] = found if self._possible(base, some, found) else None
-            if (evidence := tried[some]) is None:
+                    if self._possible(_Candidate(base, some, found)):
+                        base.tried[self.power, some] = found
+            if (evidence := base.tried[self.power, some]) is None:
                 return -math.inf
-            total = evidence.log_evidence - sum(math.log(ways[e]) for e, _ in some)
-            total += self._log_prior(len(some))
+            total = evidence.log_evidence - sum(math.log(ways[v[0][0]]) for v in some)
+            more = len(some) - always
+            total += more * math.log(p) + (self.asked_about - more) * math.log1p(-p)
             if total > self.scores.get(key, -math.inf):
                 self.scores[key] = total
-                self.known[key] = _Candidate(number, some, evidence)
+                self.known[key] = _Candidate(base, some, evidence)
             return total
 
-        first = tuple(v for v in variants if self.given is not None and v[0] in base.effects)
+        first = tuple(v for v in variants if self.given is not None and v[0][0] in base.effects)
         score(first)
         for some in asked_sets or ():
-            if all(c in at for v in some for c in v[1]):
+            if all(c in at for v in some for c in v):
                 score(some)
         level = [(*first, v) for v in variants if v not in first]
-        begun, most = len(first) + 1, SETS.most_effects + len(self.given or ())
+        begun, most = len(first) + 1, MOST_EFFECTS + always
         for size in range(begun, begun + 1 if asked_sets is not None else max(most, begun) + 1):
             level.sort(key=score, reverse=True)
             grown: dict[frozenset[Variant], tuple[Variant, ...]] = {}
-            for some in level[: SETS.kept_sets * (2 if size == begun else 1)]:
+            for some in level[: KEPT_SETS * (2 if size == begun else 1)]:
                 for v in variants:
-                    if v[0] not in {e for e, _ in some}:
+                    if v[0][0] not in {x[0][0] for x in some}:
                         grown.setdefault(frozenset((*some, v)), (*some, v))
             level = list(grown.values())
 
-    def _possible(self, base: Base, some: Sequence[Variant], evidence: SetEvidence) -> bool:
+    def _possible(self, candidate: _Candidate) -> bool:
         """Return whether a vehicle can have the coefficients of a set at its mode."""
         plausible = self.given is not None
         asked = [
             e
-            for e, columns in some
+            for (e, name), *_ in candidate.variants
             if get(e).possible or (plausible and get(e).implausible)
-            if not columns[0][1].startswith(START_PREFIX)
+            if not name.startswith(START_PREFIX)
         ]
-        setting, std = self._at_mode(base, some, evidence) if asked else ({}, {})
+        setting, std = self._at_mode(candidate) if asked else ({}, {})
         return all(is_possible(self.flights, setting, std[e], e, plausible) for e in asked)
 
     def structure(self, quieter: Base | None = None) -> float:
@@ -259,7 +244,7 @@ class Posterior:
             groups: dict[str, list[int]] = {}
             for i, at in enumerate(base.dictionary.tolist()):
                 groups.setdefault(base.names[at][1].split(": ")[0], []).append(i)
-            found = [evidence_of_one_more(m, i, DISCREPANCY.sizes) for i in groups.values()]
+            found = [evidence_of_one_more(m, i, UNKNOWN_SIZES) for i in groups.values()]
             none.append(m.constant)
             more.append(m.constant + float(logsumexp(found)) - math.log(len(found)))
         return max(more) - max(none)
@@ -305,8 +290,8 @@ class Posterior:
         normal = m.normal + np.eye(len(asked))
         whole = max(float(m.right @ np.linalg.solve(normal, m.right)), 1e-12)
         out: dict[str, float] = {}
-        for effect, columns in self._variants(base):
-            if effect not in given:
+        for columns in self._variants(base):
+            if (effect := columns[0][0]) not in given:
                 own = [index[c] for c in columns]
                 z = set_evidence(m, own, base.low[at], base.high[at]).mode
                 out[effect] = max(out.get(effect, 0.0), m.explained(own, z) / whole)
@@ -329,12 +314,11 @@ class Posterior:
         m = base.marginal(base.at(base.asked), others, power=self.power)
         index = {c: i for i, c in enumerate(base.asked)}
         out: dict[str, float] = {}
-        for effect, columns in self._variants(base):
-            starts = any(c[1].startswith(START_PREFIX) for c in columns)
-            if starts or effect in {e for e, _ in best.variants}:
+        for columns in self._variants(base):
+            (effect, name), *_ = columns
+            if name.startswith(START_PREFIX) or effect in {v[0][0] for v in best.variants}:
                 continue
-            names = [(e, name.removeprefix(WHOLE_PREFIX)) for e, name in columns]
-            sign = np.sign([coefficient(c).typical[0] for c in names])
+            sign = np.sign([coefficient(bare(c)).typical[0] for c in columns])
             z, i = base.typical[base.at(columns)] * sign, [index[c] for c in columns]
             out[effect] = max(float(z @ m.normal[np.ix_(i, i)] @ z), out.get(effect, 0.0))
         return out
@@ -347,17 +331,17 @@ class Posterior:
         asked = base.at(base.asked)
         # an effect of the set is true to some per cent, whatever it changes with
         changing = base.at(c for c in base.columns if c[1].startswith(CHANGING))
-        wrong = np.full(len(changing), DISCREPANCY.model_error / DISCREPANCY.share_of_effect)
+        wrong = np.full(len(changing), EFFECT_ERROR / SHARE_OF_EFFECT)
         little, ones = self._negligible(base, asked), np.ones(len(base.plain) + len(own))
         chosen = np.concatenate([base.plain, own, asked, changing])
         varied = self.flights.commanded or self.flights.rotor_speeds_vary
-        power = self.power * (1.0 if varied else DISCREPANCY.rounded)
+        power = self.power * (1.0 if varied else ROUNDED)
         return base.marginal(base.dictionary, chosen, np.concatenate([ones, little, wrong]), power)
 
-    def best_setting(self, most: int = SETS.most_effects) -> Setting:
+    def best_setting(self, most: int = MOST_EFFECTS) -> Setting:
         """Return the coefficients of the likeliest set of at most so many effects."""
         key = max((k for k in self.scores if len(k) <= most), key=self.scores.__getitem__)
-        return self._setting(key)[0]
+        return self._at_mode(self.known[key])[0]
 
     def rivals(self, setting: Setting) -> list[Setting]:
         """Return the coefficients of the likeliest other effects that, alone, gain at least half of
@@ -366,34 +350,29 @@ class Posterior:
         least = 0.5 * (self.scores.get(frozenset(setting), -math.inf) + self.scores[frozenset()])
         found = [k for k, x in self.scores.items() if len(k) == 1 and x > least and k - {*setting}]
         found.sort(key=self.scores.__getitem__, reverse=True)
-        return [self._setting(k)[0] for k in found[: SETS.most_rivals]]
+        return [self._at_mode(self.known[k])[0] for k in found[:MOST_RIVALS]]
 
     def is_elsewhere(self, new: Setting, tried: Mapping[frozenset[str], Setting]) -> bool:
         """Return whether a set was not tried yet, or with coefficients that are more than a
         standard deviation away.
         """
-        if frozenset(new) not in tried:
+        if (old := tried.get(frozenset(new))) is None:
             return True
-        old = tried[frozenset(new)]
-        std = self._setting(frozenset(new))[1]
+        std = self._at_mode(self.known[frozenset(new)])[1]
         return any(
             abs(value - old[effect].get(name, 0.0)) > std[effect].get(name, math.inf)
             for effect, values in new.items()
             for name, value in values.items()
         )
 
-    def _setting(self, key: frozenset[str]) -> tuple[Setting, Setting]:
-        found = self.known[key]
-        return self._at_mode(self.bases[found.base], found.variants, found.evidence)
-
-    def _at_mode(
-        self, base: Base, some: Sequence[Variant], evidence: SetEvidence
-    ) -> tuple[Setting, Setting]:
+    def _at_mode(self, candidate: _Candidate) -> tuple[Setting, Setting]:
         """Return the coefficients of a set at the mode, and their standard deviations."""
+        base, evidence = candidate.base, candidate.evidence
         setting: Setting = {}
         std: Setting = {}
         found = zip(evidence.mode.tolist(), evidence.std.tolist(), strict=True)
-        for effect, columns in some:
+        for columns in candidate.variants:
+            effect = columns[0][0]
             own: dict[str, float] = dict(self.flights.coefficients({}, effect))
             off: dict[str, float] = {}
             for c, (mode, deviation) in zip(columns, found, strict=False):
@@ -402,7 +381,7 @@ class Posterior:
                     if moves_time(effect):
                         own[get(effect).coefficients[0].name] *= mode
                     continue
-                name, size = c[1].removeprefix(WHOLE_PREFIX), float(base.size[base.columns[c]])
+                name, size = bare(c)[1], float(base.size[base.columns[c]])
                 limits = coefficient((effect, name))
                 value = mode * size + declared(c, self.flights)
                 own[name] = min(max(value, limits.minimum), limits.maximum)
@@ -419,8 +398,8 @@ class Posterior:
         probability = {e: sum(x for k, x in p.items() if e in k) for e in self.library}
         best = sorted(p, key=p.__getitem__, reverse=True)
         sets = tuple(
-            RankedSet(tuple(sorted(key)), p[key], *self._setting(key))
+            RankedSet(tuple(sorted(key)), p[key], *self._at_mode(self.known[key]))
             for key in best
-            if p[key] >= SETS.least_probability
+            if p[key] >= LEAST_PROBABILITY
         )
         return Ranking(probability, sets, self.structure(quieter), self.power)

@@ -7,7 +7,7 @@ flights, resembles the residual most.
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,16 +19,9 @@ from .regression import Flights, Setting, typical_size
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class StartingSettings:
-    """How many starting points of an effect are tried."""
-
-    most_tried: int = 12  # all of them, if there are no more
-    kept_of_more: int = 4  # of more, those that resemble the residual most
-    sample_step: int = 20  # every so many samples are enough to see the resemblance
-
-
-STARTING = StartingSettings()
+MOST_TRIED = 12  # all of them, if there are no more
+KEPT_OF_MORE = 4  # of more, those that resemble the residual most
+SAMPLE_STEP = 20  # every so many samples are enough to see the resemblance
 
 
 def starting_points(
@@ -63,53 +56,33 @@ def starting_points(
             residual[seen, 3:],
         )
     )
-    if len(found) <= STARTING.most_tried:
+    if len(found) <= MOST_TRIED:
         return found
-    likeness = _likeness(effect, found, flights, residual)
-    # of those that are alike the later one, and none that does nothing
-    order = sorted(range(len(found)), key=lambda i: (likeness[i], i), reverse=True)
-    return [found[i] for i in order[: STARTING.kept_of_more] if likeness[i] > -math.inf]
-
-
-def _likeness(
-    effect: str, starts: Sequence[Coefficients], flights: Flights, residual: Array
-) -> list[float]:
-    """Return how much of the residual goes like each start's wrench; minus infinity where it has
-    none.
-    """
-    pieces = flights.pieces({})
-    steady = _is_steady(flights, {effect: starts[0]})
-    steps = [max(1, STARTING.sample_step // int(p.rows[1] - p.rows[0])) for p in pieces]
-    at = [p.rows[::step] for p, step in zip(pieces, steps, strict=True)]
-    every = np.concatenate([np.isin(p.rows, x) for p, x in zip(pieces, at, strict=True)])
-    seen = flights.fit_rows[every]
-    target = residual[every][seen]
-    sampled = [
-        (p.signals.at(x), slice(None)) if steady else (p.signals, x)
-        for p, x in zip(pieces, at, strict=True)
-    ]
+    # an effect that has no state of its own and goes by no clock does the same as long as nothing
+    # else changes, so not every sample need be looked at: one sample, repeated for a minute, in
+    # step with no whole Hz
+    one = flights.pieces({})[0].signals.at(np.zeros(200, dtype=np.int64))
+    acts = flights.acting(replace(one, period=0.317), {effect: found[0]})
+    steady, sampled, every = bool(np.all(acts == acts[0])), [], []
+    for p in flights.pieces({}):
+        chosen = np.arange(len(p.rows)) % max(1, SAMPLE_STEP // int(p.rows[1] - p.rows[0])) == 0
+        at = p.rows[chosen]
+        sampled.append((p.signals.at(at), slice(None)) if steady else (p.signals, at))
+        every.append(chosen)
+    chosen = np.concatenate(every)
+    target = residual[chosen & seen]
     scale = 1.0 / np.maximum(np.sqrt(np.mean(np.square(target), axis=0)), 1e-12)
 
     def acting(setting: Setting) -> Array:
         parts = [flights.acting(signals, setting)[x] for signals, x in sampled]
-        return np.asarray(np.concatenate(parts)[seen] * scale)
+        return np.asarray(np.concatenate(parts)[seen[chosen]] * scale)
 
-    base, out = acting({}), []
-    for start in starts:
+    # how much of the residual goes like each start's wrench; of those that are alike the later one,
+    # and none that does nothing
+    base, likeness = acting({}), []
+    for i, start in enumerate(found):
         shape = acting({effect: start}) - base
         size = float(np.sum(shape * shape))
-        out.append(
-            float(np.sum(shape * target * scale)) / math.sqrt(size) if size > 0.0 else -math.inf
-        )
-    return out
-
-
-def _is_steady(flights: Flights, setting: Setting) -> bool:
-    """Return whether effects do the same as long as nothing else changes: they have no state of
-    their own and go by no clock, so not every sample need be looked at.
-    """
-    # one sample, repeated for a minute, in step with no whole Hz
-    signals = flights.pieces({})[0].signals
-    same = replace(signals.at(np.zeros(200, dtype=np.int64)), period=0.317)
-    found = flights.acting(same, setting)
-    return bool(np.all(found == found[0]))
+        if size > 0.0:
+            likeness.append((float(np.sum(shape * target * scale)) / math.sqrt(size), i))
+    return [found[i] for _, i in sorted(likeness, reverse=True)[:KEPT_OF_MORE]]

@@ -17,6 +17,7 @@ from ...dynamics.effects import get
 from ..findings import CHANNELS, Signature
 from ..motion.signals import Signals
 from .regression import Flights, Setting, without
+from .rows import in_body
 
 Array = NDArray[np.float64]
 
@@ -63,7 +64,7 @@ def explanatory_variables(flights: Flights, setting: Setting) -> list[tuple[str,
     t, position, rotation, velocity = (flights.at_rows(name, setting) for name in names)
     pieces = flights.pieces(setting)
     rate = np.concatenate([p.smooth(p.signals.angular_velocity) for p in pieces])
-    body = np.einsum("nij,ni->nj", rotation, velocity)
+    body = in_body(velocity, rotation)
     speed = np.linalg.norm(body, axis=1)
     heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
     found = [
@@ -88,20 +89,15 @@ def carrying_channels(flights: Flights, setting: Setting, effect: str) -> tuple[
     """Return the channels that carry a named effect at a setting, in the order of ``ORDER``: those
     in which it leaves its trace, and those that its model reads.
     """
-    found = {*_traces(flights, setting, effect), *_read(flights, setting, effect)}
-    return tuple(channel for channel in ORDER if channel in found)
-
-
-def _traces(flights: Flights, setting: Setting, effect: str) -> Iterator[str]:
-    """Yield the channels in which an effect leaves its trace."""
     part = flights.residual(without(setting, effect)) - flights.residual(setting)
     noise = np.mean(np.square(flights.sensor_noise), axis=0) + 1e-30
-    power = np.mean(np.square(part), axis=0) / noise
-    whole = max(float(power.sum()), 1e-30)
-    if power[:3].sum() / whole > LEAST_SHARE:
-        yield "accelerometer" if flights.inertial else "position"
-    if power[3:].sum() / whole > LEAST_SHARE and not flights.commanded:
-        yield "gyro" if flights.inertial else "attitude"
+    force, torque = (np.mean(np.square(part), axis=0) / noise).reshape(2, 3).sum(axis=1)
+    least, found = LEAST_SHARE * max(force + torque, 1e-30), {*_read(flights, setting, effect)}
+    if force > least:
+        found.add("accelerometer" if flights.inertial else "position")
+    if torque > least and not flights.commanded:
+        found.add("gyro" if flights.inertial else "attitude")
+    return tuple(channel for channel in ORDER if channel in found)
 
 
 def _read(flights: Flights, setting: Setting, effect: str) -> Iterator[str]:
@@ -109,8 +105,18 @@ def _read(flights: Flights, setting: Setting, effect: str) -> Iterator[str]:
     if get(effect).kind == "sensing":
         yield from ("position", "attitude")
         return
+    vehicle, less = flights.vehicle, without(setting, effect)
+    unit = vehicle.weight * np.repeat([1.0, vehicle.arm_l], 3)
+
+    def added(s: Signals) -> Array:
+        """Return what the effect adds (n, 6) in body axes, over the weight and the weight times the
+        arm.
+        """
+        off = flights.acting(s, setting) - flights.acting(s, less)
+        return np.column_stack([in_body(off[:, :3], s.rotation), off[:, 3:]]) / unit
+
     s = flights.pieces(setting)[0].signals.at(slice(2000))  # enough to see a change
-    own = _wrench(flights, setting, effect, s)
+    own = added(s)
     placed = any(np.isfinite(log.position).any() for log in flights.logs)
     place = "position" if placed else "accelerometer"
     turn = "gyro" if flights.inertial else "attitude"
@@ -127,21 +133,10 @@ def _read(flights: Flights, setting: Setting, effect: str) -> Iterator[str]:
     if s.voltage is not None:
         changed.append(("battery voltage", {"voltage": 0.97 * s.voltage}))
     for channel, moved in changed:
-        off = _wrench(flights, setting, effect, replace(s, **moved)) - own
-        if _size(off) > LEAST_CHANGE * max(_size(own), 1e-12):
+        if _size(added(replace(s, **moved)) - own) > LEAST_CHANGE * max(_size(own), 1e-12):
             yield channel
 
 
 def _size(wrench: Array) -> float:
     """Return the sum of a wrench's RMS (n, 6) over its axes."""
     return float(np.sqrt(np.mean(np.square(wrench), axis=0)).sum())
-
-
-def _wrench(flights: Flights, setting: Setting, effect: str, s: Signals) -> Array:
-    """Return what an effect adds (n, 6) by the rotor speeds, both in body axes: force over the
-    weight, torque over the weight times the arm.
-    """
-    vehicle = flights.vehicle
-    off = flights.acting(s, setting) - flights.acting(s, without(setting, effect))
-    force = np.einsum("nji,nj->ni", s.rotation, off[:, :3])
-    return np.column_stack([force / vehicle.weight, off[:, 3:] / (vehicle.weight * vehicle.arm_l)])

@@ -13,7 +13,7 @@ declares of either is no part of the delay.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,28 +29,12 @@ from .regression import moves_time
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class DelaySettings:
-    """The spectra that show the delay of commands."""
-
-    # Hz, where the commanded moments show in the angular acceleration
-    band_hz: tuple[float, float] = (1.0, 8.0)
-    # log-likelihood ratio over moments that do not show, which have one number less an axis
-    least_log_likelihood_ratio: float = 40.0
-    segment: float = 2.0  # s, of a spectrum
-    longest_delay: float = 0.12  # s
-
-
-DELAY = DelaySettings()
-
-
-@dataclass(frozen=True)
-class Delay:
-    """A delay of the rotors, its standard deviation and its log-likelihood ratio."""
-
-    seconds: float
-    std: float  # s
-    log_likelihood_ratio: float  # over moments that do not show at all
+# Hz, where the commanded moments show in the angular acceleration
+BAND_HZ = (1.0, 8.0)
+# log-likelihood ratio over moments that do not show, which have one number less an axis
+LEAST_LOG_LIKELIHOOD_RATIO = 40.0
+SEGMENT = 2.0  # s, of a spectrum
+LONGEST_DELAY = 0.12  # s
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,17 +56,18 @@ class _Spectra:
             np.square(np.abs(response)) * self.moment,
         )
         # the gain changes the noise by which it is weighted
-        gain = 0.0
+        noise = self.turning
         for _ in range(6):
-            noise = self.turning - 2.0 * gain * along + gain**2 * power
             gain = max(float(np.sum(along / noise) / np.sum(power / noise)), 0.0)
-        noise = self.turning - 2.0 * gain * along + gain**2 * power
+            noise = self.turning - 2.0 * gain * along + gain**2 * power
         return 2.0 * self.count * float(np.sum(np.log(noise / self.turning)))
 
 
-def turning_delay(pieces: Sequence[Signals], vehicle: Vehicle, held: float = 0.0) -> Delay | None:
-    """Return the delay of the rotors' moments behind the commands; None where turning does not show
-    one.
+def turning_delay(
+    pieces: Sequence[Signals], vehicle: Vehicle, held: float = 0.0
+) -> tuple[float, float, float] | None:
+    """Return the delay of the rotors' moments behind the commands, s, its standard deviation, and
+    its log-likelihood ratio over moments that do not show; None where turning does not show one.
 
     Args:
         pieces: unbroken flight, with rotor speeds worked out from commands.
@@ -100,40 +85,32 @@ def turning_delay(pieces: Sequence[Signals], vehicle: Vehicle, held: float = 0.0
     def deviance(seconds: float) -> float:
         return sum(s.deviance(np.exp(-1j * s.omega * (declared + seconds))) for s in spectra)
 
-    seconds, std, least = _least(deviance)
+    step = 0.005
+    at = min(np.arange(0.0, LONGEST_DELAY + step, step).tolist(), key=deviance)
+    best = minimize_scalar(
+        deviance, bounds=(max(at - step, 0.0), at + step), method="bounded", options={"xatol": 1e-5}
+    )
+    seconds, least, near = float(best.x), float(best.fun), 0.1 * step
+    bend = (deviance(seconds + near) - 2.0 * least + deviance(seconds - near)) / near**2
+    std = float(np.sqrt(2.0 / max(bend, 1e-6)))
     std = math.hypot(std, 0.5 * held / math.sqrt(12.0))
-    late = -least > DELAY.least_log_likelihood_ratio and seconds - 0.25 * held > 2.0 * std
-    return Delay(seconds, std, -least) if late else None
+    clear = -least > LEAST_LOG_LIKELIHOOD_RATIO and seconds - 0.25 * held > 2.0 * std
+    return (seconds, std, -least) if clear else None
 
 
 def _spectra(piece: Signals, vehicle: Vehicle) -> list[_Spectra]:
     rate = 1.0 / piece.period
-    length = round(DELAY.segment * rate)
-    if rate < 2.2 * DELAY.band_hz[1] or len(piece.t) < 2 * length:
+    length = round(SEGMENT * rate)
+    if rate < 2.2 * BAND_HZ[1] or len(piece.t) < 2 * length:
         return []
     out = []
     moments = vehicle.rotor_wrench(piece.rotor_speeds)[:, 1:3]
     for x, y in zip(moments.T, piece.angular_acceleration[:, :2].T, strict=True):
         f, xx = welch(x, rate, nperseg=length)
         yy, xy = welch(y, rate, nperseg=length)[1], csd(x, y, rate, nperseg=length)[1]
-        band = (f >= DELAY.band_hz[0]) & (f <= DELAY.band_hz[1])
+        band = (f >= BAND_HZ[0]) & (f <= BAND_HZ[1])
         if np.all(xx[band] > 0) and np.all(yy[band] > 0):
             out.append(
                 _Spectra(2.0 * np.pi * f[band], xx[band], yy[band], xy[band], len(x) / length)
             )
     return out
-
-
-def _least(deviance: Callable[[float], float]) -> tuple[float, float, float]:
-    """Return where a deviance is least, the standard deviation there, and its value."""
-    step = 0.005
-    grid = np.arange(0.0, DELAY.longest_delay + step, step)
-    at = float(grid[int(np.argmin([deviance(float(x)) for x in grid]))])
-    best = minimize_scalar(
-        deviance, bounds=(max(at - step, 0.0), at + step), method="bounded", options={"xatol": 1e-5}
-    )
-    seconds, least = float(best.x), float(best.fun)
-    bend = (deviance(seconds + 0.1 * step) - 2.0 * least + deviance(seconds - 0.1 * step)) / (
-        0.1 * step
-    ) ** 2
-    return seconds, float(np.sqrt(2.0 / max(bend, 1e-6))), least

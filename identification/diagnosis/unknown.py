@@ -9,7 +9,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
+# nats, beyond which more says nothing more
+MOST_STRUCTURE, MOST_DISTURBANCE = 15.0, 3.0
 
 
 @dataclass(frozen=True)
@@ -19,9 +20,6 @@ class UnknownSettings:
     nothing: float = -2.3  # log odds where nothing speaks for it
     disturbance: float = 1.89  # a nat of a disturbance over what counts for none
     push: float = 0.17
-    # nats, beyond which more says nothing more
-    structure_range: tuple[float, float] = (0.0, 15.0)
-    disturbance_range: tuple[float, float] = (0.0, 3.0)
 
 
 UNKNOWN = UnknownSettings()
@@ -37,17 +35,12 @@ def signs(structure: float, disturbance: float, push: bool, named: bool) -> tupl
         push: whether a transient disturbance was found.
         named: whether an effect is named.
     """
-    strength = 0.0 if named else disturbance
-    return (
-        1.0,
-        float(np.clip(structure, *UNKNOWN.structure_range)),
-        float(np.clip(strength, *UNKNOWN.disturbance_range)),
-        float(push),
-    )
+    strength = 0.0 if named else min(max(disturbance, 0.0), MOST_DISTURBANCE)
+    return 1.0, min(max(structure, 0.0), MOST_STRUCTURE), strength, float(push)
 
 
-def unknown(found: Sequence[float], weights: UnknownSettings = UNKNOWN) -> float:
+def unknown(found: Sequence[float]) -> float:
     """Return the probability, by the ``signs``, that the likeliest set is not all that acts."""
-    by_sign = (weights.nothing, 1.0, weights.disturbance, weights.push)
-    odds = sum(a * x for a, x in zip(by_sign, found, strict=True))
+    weights = (UNKNOWN.nothing, 1.0, UNKNOWN.disturbance, UNKNOWN.push)
+    odds = sum(a * x for a, x in zip(weights, found, strict=True))
     return 1.0 / (1.0 + math.exp(-odds))

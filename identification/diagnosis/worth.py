@@ -11,12 +11,14 @@ from .priors import prior_size
 from .regression import Flights, Setting, without
 from .row_nuisances import row_nuisances
 from .rows import Rows
-from .settings import DIAGNOSIS
 
 Array = NDArray[np.float64]
 
 
 NOISE_KNOWN = 0.2  # share of the sensors' noise, to which it is known
+# standard deviations that chance makes: of a prior, by which others may differ in an effect's
+# place, and of a nuisance that is worth a note
+BY_CHANCE = 3.0
 
 
 def worth(
@@ -55,7 +57,6 @@ def worth(
         ]
         X = np.stack([*nuisances, *own], axis=2)[fit] / size[:, None]
         y = part[fit] / size
-        most = DIAGNOSIS.least_in_std
-        done = lsq_linear(X.reshape(-1, X.shape[2]), y.ravel(), (-most, most)).x
+        done = lsq_linear(X.reshape(-1, X.shape[2]), y.ravel(), (-BY_CHANCE, BY_CHANCE)).x
         out[effect] = float(np.sqrt(np.mean(np.square(y - X @ done), axis=0)).max())
     return out

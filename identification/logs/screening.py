@@ -21,7 +21,7 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..motion.inertial_signals import inertial_pieces, reads_imu
-from ..motion.signals import SIGNALS, pose_pieces
+from ..motion.signals import SHORTEST_PIECE, pose_pieces
 from ..motion.smoothing import CUTOFFS, low_pass, runs_of
 from .evidence import Evidence, departures
 from .excerpt import excerpt
@@ -353,7 +353,7 @@ def _length(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
     whole, runs = float(step.sum()), len(runs_of(~log.valid))
     lost = f"the pose is lost in {runs} run(s), {int(np.sum(~log.valid))} of {len(log.t)} rows; "
     words = f"{lost if runs else ''}{left:.3g} of {whole:.3g} s of flight lie in unbroken runs of "
-    words += f"poses of more than {SIGNALS.shortest_piece:g} s"
+    words += f"poses of more than {SHORTEST_PIECE:g} s"
     if not pieces or left < least - 1e-9:
         yield Refused(f"{words}; expected at least {least:g} s")
     if left < (1.0 - _LOST_SHARE) * whole:

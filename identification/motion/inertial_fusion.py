@@ -31,36 +31,28 @@ Measurements = tuple[Index, Index, Array, Array, Array]
 Nominal = tuple[float, float, Array, Array, Array, Array, Array]
 
 
-@dataclass(frozen=True)
-class FusionSettings:
-    """What is known of a flight and of its inertial sensors beforehand."""
-
-    knot: float = 0.02  # s from state to state; between them the IMU is integrated
-    # m/s, by which a velocity that nothing measured varies, and s between two that are
-    # independent. A steady velocity besides changes nothing that an IMU feels
-    velocity_std: float = 2.0
-    velocity_every: float = 3.0
-    steady_velocity_std: float = 5.0  # m/s, of that one, which stays unknown
-    position_std: float = 10.0  # m, where the flight begins, if nothing measured it
-    tilt_std: float = 0.3  # rad, at the start, from the mean specific force
-    heading_std: float = 0.3  # rad, where positions showed it; exact where nothing can
-    # of MEMS sensors, from one switching-on to the next: rad/s and m/s2, and their walk in a second
-    gyro_bias_std: float = 0.03
-    accelerometer_bias_std: float = 0.2
-    gyro_bias_walk: float = 3e-4
-    accelerometer_bias_walk: float = 3e-3
-    # of one sample, the least that is believed: rad/s and m/s2
-    least_gyro_noise: float = 0.001
-    least_accelerometer_noise: float = 0.01
-    levelling: float = 5.0  # s, time constant of the first guess, which takes gravity for up
-    iterations: int = 6
-    settled: float = 1e-4  # rad, change of attitude by which an iteration is the last
-    # attitude (body), velocity, position (world), gyro bias, accelerometer bias: three each
-    states: int = 15
-
-
-FUSION = FusionSettings()
-N = FUSION.states
+KNOT = 0.02  # s from state to state; between them the IMU is integrated
+# m/s, by which a velocity that nothing measured varies, and s between two that are
+# independent. A steady velocity besides changes nothing that an IMU feels
+VELOCITY_STD = 2.0
+VELOCITY_EVERY = 3.0
+STEADY_VELOCITY_STD = 5.0  # m/s, of that one, which stays unknown
+POSITION_STD = 10.0  # m, where the flight begins, if nothing measured it
+TILT_STD = 0.3  # rad, at the start, from the mean specific force
+HEADING_STD = 0.3  # rad, where positions showed it; exact where nothing can
+# of MEMS sensors, from one switching-on to the next: rad/s and m/s2, and their walk in a second
+GYRO_BIAS_STD = 0.03
+ACCELEROMETER_BIAS_STD = 0.2
+GYRO_BIAS_WALK = 3e-4
+ACCELEROMETER_BIAS_WALK = 3e-3
+# of one sample, the least that is believed: rad/s and m/s2
+LEAST_GYRO_NOISE = 0.001
+LEAST_ACCELEROMETER_NOISE = 0.01
+LEVELLING = 5.0  # s, time constant of the first guess, which takes gravity for up
+ITERATIONS = 6
+SETTLED = 1e-4  # rad, change of attitude by which an iteration is the last
+# attitude (body), velocity, position (world), gyro bias, accelerometer bias: three each
+N = 15
 ATTITUDE, VELOCITY, POSITION = 0, 3, 6  # the first of their three
 
 
@@ -259,7 +251,7 @@ def fuse(
         attitudes: likewise. Without positions and attitudes the heading is zero at the start.
     """
     dt = float((t[-1] - t[0]) / (len(t) - 1))
-    stride = max(1, round(FUSION.knot / dt))
+    stride = max(1, round(KNOT / dt))
     count = (len(t) - 1) // stride
     T = stride * dt
     gyro, force = (np.ascontiguousarray(x[: count * stride + 1]) for x in (gyro, force))
@@ -271,36 +263,34 @@ def fuse(
     linear = np.zeros((count + 1, 12))
     if positions is not None:
         linear[:, 3:6] = resampled(times, positions.t, positions.values)
-    bound = np.arange(times[0], times[-1], FUSION.velocity_every)
-    still = Readings(bound, np.zeros((len(bound), 3)), FUSION.velocity_std)
+    bound = np.arange(times[0], times[-1], VELOCITY_EVERY)
+    still = Readings(bound, np.zeros((len(bound), 3)), VELOCITY_STD)
     readings = {VELOCITY: still} if positions is None else {POSITION: positions}
     readings |= {} if attitudes is None else {ATTITUDE: attitudes}
-    sizes = np.maximum(noise, [FUSION.least_gyro_noise, FUSION.least_accelerometer_noise])
-    walks = np.array([FUSION.gyro_bias_walk, FUSION.accelerometer_bias_walk])
+    sizes = np.maximum(noise, [LEAST_GYRO_NOISE, LEAST_ACCELEROMETER_NOISE])
+    walks = np.array([GYRO_BIAS_WALK, ACCELEROMETER_BIAS_WALK])
     gyro_noise, force_noise = sizes**2 * dt * T
     spread = np.repeat([gyro_noise, force_noise, force_noise * T**2 / 3.0, *(walks**2 * T)], 3)
     started = rotation[0].copy()
     up = np.abs(started[2])  # a heading is a turn about the world's vertical, in body axes
-    angles = np.sqrt((FUSION.tilt_std * (1.0 - up)) ** 2 + (heading_std * up) ** 2)
-    priors = [FUSION.steady_velocity_std, FUSION.position_std, FUSION.gyro_bias_std]
-    prior_std = np.concatenate(
-        [angles + 1e-4, np.repeat([*priors, FUSION.accelerometer_bias_std], 3)]
-    )
+    angles = np.sqrt((TILT_STD * (1.0 - up)) ** 2 + (heading_std * up) ** 2)
+    priors = [STEADY_VELOCITY_STD, POSITION_STD, GYRO_BIAS_STD]
+    prior_std = np.concatenate([angles + 1e-4, np.repeat([*priors, ACCELEROMETER_BIAS_STD], 3)])
     begun = linear[0].copy()
     begun[6:] = 0.0
     nominal = (T, gravity, rotation, linear, turns, ways, moves)
     change, std = np.zeros((2, count + 1, N))
-    for _ in range(FUSION.iterations):
+    for _ in range(ITERATIONS):
         prior = np.concatenate([_log(rotation[0].T @ started), begun - linear[0]])
         measured = _measured(times, rates, rotation, linear, readings)
         _smooth(nominal, spread, prior, prior_std, measured, change, std)
         turn = Rotation.from_rotvec(change[:, :3])
         rotation[:] = (Rotation.from_matrix(rotation) * turn).as_matrix()
         linear += change[:, 3:]
-        if turn.magnitude().max() < FUSION.settled:
+        if turn.magnitude().max() < SETTLED:
             break
     if positions is None:
-        std[:, 3:6] = np.hypot(std[:, 3:6], FUSION.steady_velocity_std)
+        std[:, 3:6] = np.hypot(std[:, 3:6], STEADY_VELOCITY_STD)
     return FusedMotion(
         times, rotation, linear[:, :3], linear[:, 3:6], linear[:, 6:9], linear[:, 9:], std
     )
@@ -322,12 +312,12 @@ def _first_guess(
     out = np.empty((len(times), 3, 3))
     # roll and pitch come back to where they were: their mean rate is the bias
     rates = gyro - np.append(gyro.mean(axis=0)[:2], 0.0)
-    first = force[: max(1, round(FUSION.levelling / dt))].mean(axis=0)
+    first = force[: max(1, round(LEVELLING / dt))].mean(axis=0)
     up = first / np.linalg.norm(first)
     forward = np.array([1.0, 0.0, 0.0]) - up[0] * up
     forward /= max(float(np.linalg.norm(forward)), 1e-9)
     level = np.stack([forward, np.cross(up, forward), up])
-    _levelled(rates, force, dt, FUSION.levelling, np.ascontiguousarray(level), out)
+    _levelled(rates, force, dt, LEVELLING, np.ascontiguousarray(level), out)
     if attitudes is not None and len(attitudes.t):
         nearest_knot = np.abs(np.subtract.outer(attitudes.t[:1], times)).argmin(axis=1)[0]
         turned = attitudes.values[0] @ out[nearest_knot].T
@@ -336,7 +326,7 @@ def _first_guess(
         heading = _heading(times, out, force, gravity, noise, gyro, positions)
     else:
         return out, 0.0
-    return np.ascontiguousarray(_exp(0.0, 0.0, heading) @ out), FUSION.heading_std
+    return np.ascontiguousarray(_exp(0.0, 0.0, heading) @ out), HEADING_STD
 
 
 def _heading(

@@ -17,32 +17,24 @@ from scipy.spatial.transform import Rotation
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from .inertial_fusion import FusedMotion, Readings, fuse
-from .signals import SIGNALS, Signals
+from .signals import LONGEST_GAP, SHORTEST_PIECE, Signals
 from .smoothing import CUTOFFS, derivative, high_pass, low_pass, resampled, robust_std, unbroken
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class InertialSignalSettings:
-    """Which logs are read by their IMU, and at which rate."""
-
-    # poses a second, from which the pose alone tells the motion; with fewer the IMU is needed
-    least_pose_hz: float = 45.0
-    most_hz: float = 250.0  # of the signals; faster IMUs are low-passed and thinned out
-    gap: float = 0.1  # s without a reading, which ends a piece
-    # m and rad, of a first guess, and the least that is believed, of a measured pose's axis
-    first_position_std: float = 0.02
-    least_position_std: float = 0.0005
-    first_attitude_std: float = 0.01
-    least_attitude_std: float = 0.001
-    # standard deviations from which a position or an attitude is a leap and is left out
-    outlier: float = 10.0
-    drift_time: float = 3.0  # s, over which what the fusion does not know drifts, in a sample of it
-
-
-INERTIAL_SIGNALS = InertialSignalSettings()
+# poses a second, from which the pose alone tells the motion; with fewer the IMU is needed
+LEAST_POSE_HZ = 45.0
+MOST_HZ = 250.0  # of the signals; faster IMUs are low-passed and thinned out
+# m and rad, of a first guess, and the least that is believed, of a measured pose's axis
+FIRST_POSITION_STD = 0.02
+LEAST_POSITION_STD = 0.0005
+FIRST_ATTITUDE_STD = 0.01
+LEAST_ATTITUDE_STD = 0.001
+# standard deviations from which a position or an attitude is a leap and is left out
+OUTLIER = 10.0
+DRIFT_TIME = 3.0  # s, over which what the fusion does not know drifts, in a sample of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +58,7 @@ def reads_imu(log: FlightLog) -> bool:
     """Return whether a log's motion is that of its IMU: it has one, and no pose that is fast
     enough.
     """
-    return (
-        log.gyro is not None
-        and log.accelerometer is not None
-        and pose_rate(log) < INERTIAL_SIGNALS.least_pose_hz
-    )
+    return log.gyro is not None and log.accelerometer is not None and pose_rate(log) < LEAST_POSE_HZ
 
 
 def imu_noise(log: FlightLog) -> tuple[float, float]:
@@ -92,7 +80,7 @@ def inertial_pieces(log: FlightLog) -> list[NDArray[np.intp]]:
     if log.gyro is None or log.accelerometer is None:
         return []
     read = np.flatnonzero(np.isfinite(log.gyro[:, 0]) & np.isfinite(log.accelerometer[:, 0]))
-    return unbroken(log.t, read, INERTIAL_SIGNALS.gap, 50, SIGNALS.shortest_piece)
+    return unbroken(log.t, read, LONGEST_GAP, 50, SHORTEST_PIECE)
 
 
 def inertial_signals(log: FlightLog, gravity: float = 9.81) -> list[InertialSignals]:
@@ -110,7 +98,7 @@ def inertial_signals(log: FlightLog, gravity: float = 9.81) -> list[InertialSign
     if not pieces:
         raise InputError(
             f"{log.name}: no unbroken piece of gyro and accelerometer is longer than "
-            f"{SIGNALS.shortest_piece:g} s"
+            f"{SHORTEST_PIECE:g} s"
         )
     noise = imu_noise(log)
     return [_piece(log, rows, gravity, noise) for rows in pieces]
@@ -123,7 +111,7 @@ def _piece(
     assert log.accelerometer is not None
     imu_times = log.t[rows]
     fine = float(np.median(np.diff(imu_times)))
-    thin = max(1, int(np.ceil(1.0 / (INERTIAL_SIGNALS.most_hz * fine) - 1e-6)))
+    thin = max(1, int(np.ceil(1.0 / (MOST_HZ * fine) - 1e-6)))
     period = thin * fine
     even = np.arange(imu_times[0], imu_times[-1] + 0.5 * fine, fine)
     even = even[even <= imu_times[-1]]
@@ -177,22 +165,21 @@ def _fused(
     it.
     """
     thinned_noise = (noise[0] / np.sqrt(thin), noise[1] / np.sqrt(thin))
-    use = INERTIAL_SIGNALS
     placed = _measured(log, np.asarray(np.isfinite(log.position).all(axis=1)), t)
     turned = _measured(log, np.asarray(np.isfinite(log.quaternion).all(axis=1) & log.valid), t)
     positions = attitudes = None
     if len(placed) > 3:
-        positions = Readings(log.t[placed], log.position[placed], use.first_position_std)
+        positions = Readings(log.t[placed], log.position[placed], FIRST_POSITION_STD)
     if len(turned) > 3:
         matrices = Rotation.from_quat(log.quaternion[turned], scalar_first=True).as_matrix()
-        attitudes = Readings(log.t[turned], matrices, use.first_attitude_std)
+        attitudes = Readings(log.t[turned], matrices, FIRST_ATTITUDE_STD)
     fused = fuse(t, gyro, force, gravity, thinned_noise, positions, attitudes)
     if positions is None:
         return fused
     off = positions.values - resampled(positions.t, fused.t, fused.position)
     off -= np.median(off, axis=0)
-    std = max(1.3 * robust_std(off), use.least_position_std)  # a smoother leaves less than noise
-    kept = np.linalg.norm(off, axis=1) < use.outlier * std
+    std = max(1.3 * robust_std(off), LEAST_POSITION_STD)  # a smoother leaves less than noise
+    kept = np.linalg.norm(off, axis=1) < OUTLIER * std
     positions = Readings(positions.t[kept], positions.values[kept], std)
     if attitudes is not None:
         kept = np.clip(np.searchsorted(fused.t, attitudes.t), 0, len(fused.t) - 1)  # within a knot
@@ -201,7 +188,7 @@ def _fused(
             off = Rotation.from_matrix(
                 np.swapaxes(fused.rotation[kept[at_knot]], 1, 2) @ attitudes.values[at_knot]
             ).as_rotvec()
-            std = max(1.3 * robust_std(off - np.median(off, axis=0)), use.least_attitude_std)
+            std = max(1.3 * robust_std(off - np.median(off, axis=0)), LEAST_ATTITUDE_STD)
             attitudes = replace(attitudes, std=std)
     return fuse(t, gyro, force, gravity, thinned_noise, positions, attitudes)
 
@@ -236,9 +223,7 @@ def with_drift(
     """Return signals as they would be with other errors of what the IMU does not know, drawn from
     the fusion's standard deviations: attitude, velocity and position that drift slowly.
     """
-    slow = gaussian_filter1d(
-        rng.standard_normal((len(s.t), 9)), INERTIAL_SIGNALS.drift_time / s.period, axis=0
-    )
+    slow = gaussian_filter1d(rng.standard_normal((len(s.t), 9)), DRIFT_TIME / s.period, axis=0)
     slow /= np.sqrt(np.mean(np.square(slow), axis=0)) + 1e-30
     turn = Rotation.from_rotvec(slow[:, :3] * s.attitude_std).as_matrix()
     down, rotation = np.array([0.0, 0.0, gravity]), s.rotation @ turn

@@ -20,33 +20,26 @@ from .smoothing import turned, unbroken
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class NoiseSpectrumSettings:
-    """When the spectrum of a channel is that of filtered noise."""
-
-    # shares of half the sampling rate between which the slope is read: above a vehicle's motion,
-    # below the last bins, which rounding and jitter of the clock fill
-    band: tuple[float, float] = (0.5, 0.95)
-    gap: float = 2.5  # median time steps, from which a piece ends; a single lost sample is none
-    segment: int = 128  # samples of a spectrum's segment
-    least_segments: int = 8  # half overlapping; of fewer the slope's own error is above 0.2
-    # power of 1/f by which the amplitude falls over the band. White noise has 0, cameras' poses and
-    # onboard attitudes that were not filtered up to 1.0 (vibration), a first-order low-pass 1
-    most_slope: float = 1.2
-    # more of it in rotor speeds: a rotor with a lag is a first-order low-pass itself, and what it
-    # turns at is no sensor's noise. Recordings of the presets have up to 1.9
-    of_rotors: float = 1.0
-    # where the log is fast enough: level between these shares of half the sampling rate, over that
-    # at the top of the band. White noise has 1; a first-order filter, as an estimator's own is, has
-    # 2 there though its slope is no larger than a vibrating camera's
-    lower_band: tuple[float, float] = (0.2, 0.35)
-    least_lower_hz: float = 20.0  # of that lower band: a vehicle's motion ends below
-    top_from: float = 0.8  # share of half the sampling rate, of the top of the band
-    most_fall: float = 1.5
-    differences: int = 2  # taken before the spectrum, so that slow motion leaks nowhere
-
-
-NOISE_SPECTRUM = NoiseSpectrumSettings()
+# shares of half the sampling rate between which the slope is read: above a vehicle's motion,
+# below the last bins, which rounding and jitter of the clock fill
+BAND = (0.5, 0.95)
+GAP = 2.5  # median time steps, from which a piece ends; a single lost sample is none
+SEGMENT = 128  # samples of a spectrum's segment
+LEAST_SEGMENTS = 8  # half overlapping; of fewer the slope's own error is above 0.2
+# power of 1/f by which the amplitude falls over the band. White noise has 0, cameras' poses and
+# onboard attitudes that were not filtered up to 1.0 (vibration), a first-order low-pass 1
+MOST_SLOPE = 1.2
+# more of it in rotor speeds: a rotor with a lag is a first-order low-pass itself, and what it
+# turns at is no sensor's noise. Recordings of the presets have up to 1.9
+MORE_OF_ROTORS = 1.0
+# where the log is fast enough: level between these shares of half the sampling rate, over that
+# at the top of the band. White noise has 1; a first-order filter, as an estimator's own is, has
+# 2 there though its slope is no larger than a vibrating camera's
+LOWER_BAND = (0.2, 0.35)
+LEAST_LOWER_HZ = 20.0  # of that lower band: a vehicle's motion ends below
+TOP_FROM = 0.8  # share of half the sampling rate, of the top of the band
+MOST_FALL = 1.5
+DIFFERENCES = 2  # taken before the spectrum, so that slow motion leaks nowhere
 
 
 @dataclass(frozen=True)
@@ -63,10 +56,8 @@ class ChannelNoise:
     @property
     def filtered(self) -> bool:
         """Whether it falls faster than an unfiltered sensor's noise does."""
-        most = NOISE_SPECTRUM.most_slope + (self.channel == ROTORS) * NOISE_SPECTRUM.of_rotors
-        return self.slope > most or (
-            self.fall > NOISE_SPECTRUM.most_fall and self.channel in POSE_CHANNELS
-        )
+        most = MOST_SLOPE + (self.channel == ROTORS) * MORE_OF_ROTORS
+        return self.slope > most or (self.fall > MOST_FALL and self.channel in POSE_CHANNELS)
 
 
 POSE_CHANNELS = ("position", "attitude")
@@ -83,7 +74,7 @@ def noise_spectra(log: FlightLog) -> list[ChannelNoise]:
         found = _amplitudes(pieces)
         if found is not None:
             nyquist = 0.5 / period
-            low, high = NOISE_SPECTRUM.band
+            low, high = BAND
             out.append(
                 ChannelNoise(
                     channel, _slope(*found), _fall(*found, nyquist), (low * nyquist, high * nyquist)
@@ -104,11 +95,11 @@ def _channels(log: FlightLog) -> Iterator[tuple[str, list[Array], float]]:
         (ROTORS, None if log.commanded else log.rotor_speeds),
     ):
         rows = np.flatnonzero(np.isfinite(x).all(axis=1)) if x is not None else np.zeros(0, int)
-        if x is None or len(rows) <= NOISE_SPECTRUM.segment:
+        if x is None or len(rows) <= SEGMENT:
             continue
         period = float(np.median(np.diff(log.t[rows])))
-        gap = NOISE_SPECTRUM.gap * period
-        pieces = unbroken(log.t, rows, gap, NOISE_SPECTRUM.segment)
+        gap = GAP * period
+        pieces = unbroken(log.t, rows, gap, SEGMENT)
         turning = name == "attitude"
         yield name, [turned(quaternion[r]) if turning else x[r] for r in pieces], period
 
@@ -120,10 +111,10 @@ def _amplitudes(pieces: Sequence[Array]) -> tuple[Array, Array] | None:
     The power is the median of half overlapping segments: a leap of the pose, or a touch of the
     ground, spoils some of them.
     """
-    n, order = NOISE_SPECTRUM.segment, NOISE_SPECTRUM.differences
+    n, order = SEGMENT, DIFFERENCES
     rough = [np.diff(piece, order, axis=0) for piece in pieces]
     segments = [x[a : a + n] for x in rough for a in range(0, len(x) - n + 1, n // 2)]
-    if len(segments) < NOISE_SPECTRUM.least_segments:
+    if len(segments) < LEAST_SEGMENTS:
         return None
     power = np.square(
         np.abs(np.fft.rfft(np.hanning(n)[None, :, None] * np.array(segments), axis=1))
@@ -139,7 +130,7 @@ def _amplitudes(pieces: Sequence[Array]) -> tuple[Array, Array] | None:
 
 def _slope(share: Array, amplitude: Array) -> float:
     """Return the power of 1/f by which the amplitude falls over the band: the median channel's."""
-    inside = (share >= NOISE_SPECTRUM.band[0]) & (share <= NOISE_SPECTRUM.band[1])
+    inside = (share >= BAND[0]) & (share <= BAND[1])
     at = np.log(share[inside])
     at -= at.mean()
     return float(np.median(-(at @ amplitude[inside] / (at @ at))))
@@ -149,11 +140,11 @@ def _fall(share: Array, amplitude: Array, nyquist: float) -> float:
     """Return the amplitude in the lower band over that at the top; NaN where motion may be in
     that band.
     """
-    low, high = NOISE_SPECTRUM.lower_band
-    if low * nyquist < NOISE_SPECTRUM.least_lower_hz:
+    low, high = LOWER_BAND
+    if low * nyquist < LEAST_LOWER_HZ:
         return float("nan")
     lower = (share >= low) & (share <= high)
-    top = (share >= NOISE_SPECTRUM.top_from) & (share <= NOISE_SPECTRUM.band[1])
+    top = (share >= TOP_FROM) & (share <= BAND[1])
     return float(np.exp(np.median(amplitude[lower].mean(axis=0) - amplitude[top].mean(axis=0))))
 
 
@@ -171,13 +162,13 @@ def _sentence(group: Sequence[ChannelNoise]) -> str:
     """Return what is said of channels of one kind; the clearest of them is the evidence."""
     clearest = max(group, key=lambda noise: (noise.slope, noise.fall))
     low, high = clearest.band_hz
-    if clearest.slope > NOISE_SPECTRUM.most_slope:
+    if clearest.slope > MOST_SLOPE:
         known = (
             f"between {low:.3g} and {high:.3g} Hz, above a vehicle's motion, the amplitude of the "
             f"{clearest.channel} falls with the power {clearest.slope:.1f} of the frequency"
         )
     else:
-        first, last = (share * high / NOISE_SPECTRUM.band[1] for share in NOISE_SPECTRUM.lower_band)
+        first, last = (share * high / BAND[1] for share in LOWER_BAND)
         known = (
             f"between {first:.3g} and {last:.3g} Hz, above a vehicle's motion, the amplitude of "
             f"the {clearest.channel} is {clearest.fall:.1f} times that near {high:.3g} Hz"

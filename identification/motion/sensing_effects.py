@@ -11,14 +11,12 @@ import numpy as np
 
 from ...dynamics.effects import Role, get
 from ...dynamics.model import MODEL_FIELDS, load_model, rewrite_sample
-from ...dynamics.vehicle import Array, Vehicle
+from ...dynamics.vehicle import Array, EffectSetting, Vehicle
 from ...runtime.compiled import Record, compiled
 from ..logs.flight_log import FlightLog
+from .signals import LONGEST_GAP
 
 _MODEL = np.dtype(MODEL_FIELDS)
-
-
-LONGEST_GAP = 0.1  # s without a pose, over which nothing is interpolated
 
 
 @compiled
@@ -39,6 +37,11 @@ def _undo(models: Record, t: Array, seen: np.ndarray, samples: Array) -> None:
             samples[k, i] = f.sample[i]
 
 
+def sensing_of(vehicle: Vehicle) -> tuple[EffectSetting, ...]:
+    """Return the effects of a vehicle that change what a log's poses are."""
+    return tuple(e for e in vehicle.effects if get(e.name).kind == "sensing")
+
+
 def undo_log_sensing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     """Return the log with the vehicle's declared sensing effects taken out of its poses and rotor
     speeds.
@@ -48,17 +51,14 @@ def undo_log_sensing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     after a break of more than 0.1 s have no pose; the voltage, which is of the row's own instant,
     is that of then, and the truth stays as it is.
     """
-    if not any(get(setting.name).kind == "sensing" for setting in vehicle.effects):
+    if not (sensing := sensing_of(vehicle)):
         return log
     models = np.zeros(1, dtype=_MODEL)
     load_model(models[0], vehicle)
     samples = np.column_stack([log.rotor_speeds, log.position, log.quaternion])
     _undo(models, np.ascontiguousarray(log.t), np.ascontiguousarray(log.valid), samples)
-    delay = sum(
-        abs(get(s.name).vector(s.coefficients)[0])
-        for s in vehicle.effects
-        if get(s.name).kind == "sensing" and get(s.name).role == Role.DELAY
-    )
+    late = [e for e in sensing if get(e.name).role == Role.DELAY]
+    delay = sum(abs(get(e.name).vector(e.coefficients)[0]) for e in late)
     valid = log.valid & _settled(log, delay)
     samples[~valid, 4:] = np.nan
     voltage = None if log.voltage is None else np.interp(log.t - delay, log.t, log.voltage)

@@ -20,15 +20,8 @@ from .smoothing import CUTOFFS, continuous, derivative, low_pass, resampled, tur
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class SignalSettings:
-    """Which pieces of a log have signals."""
-
-    shortest_piece: float = 3.0  # s of unbroken pose; a shorter one is all edge to the filters
-    gap: float = 0.1  # s without a pose, which ends a piece of a fast log
-
-
-SIGNALS = SignalSettings()
+SHORTEST_PIECE = 3.0  # s of unbroken pose; a shorter one is all edge to the filters
+LONGEST_GAP = 0.1  # s without a pose, or a reading of an IMU, over which nothing is interpolated
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,15 +70,15 @@ def log_signals(log: FlightLog, wide_hz: float = CUTOFFS.pose_hz) -> list[Signal
     out = [_piece(log, piece, wide_hz) for piece in pose_pieces(log)]
     if not out:
         raise InputError(
-            f"{log.name}: no unbroken piece of pose is longer than {SIGNALS.shortest_piece:g} s"
+            f"{log.name}: no unbroken piece of pose is longer than {SHORTEST_PIECE:g} s"
         )
     return out
 
 
 def pose_pieces(log: FlightLog) -> list[NDArray[np.intp]]:
     """Return the rows of each unbroken run of poses that is long enough to say something."""
-    gap = max(SIGNALS.gap, 3.5 * log.period)
-    return unbroken(log.t, np.flatnonzero(log.valid), gap, 8, SIGNALS.shortest_piece)
+    gap = max(LONGEST_GAP, 3.5 * log.period)
+    return unbroken(log.t, np.flatnonzero(log.valid), gap, 8, SHORTEST_PIECE)
 
 
 def _piece(log: FlightLog, rows: NDArray[np.intp], wide_hz: float) -> Signals:

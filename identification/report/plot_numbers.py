@@ -24,24 +24,17 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 
-@dataclass(frozen=True)
-class PlotSettings:
-    """How much of a flight the page carries."""
-
-    # all series over time together, packed: beside library and text a page of 60 s of flight stays
-    # below 600 kB
-    most_bytes: int = 170_000
-    least_columns: int = 150  # of a plot over time, however many effects share the bytes
-    steps: int = 32_000  # of a packed series, between zero and its largest value
-    tick: float = 1e-4  # s, of packed times
-    rows: int = 16  # of a table over time or frequency
-    points: int = 360  # of a signature
-    spectrum_seconds: float = 8.0  # of the segments of a spectrum
-    frequencies: int = 160  # of a spectrum
-    most_pieces: int = 40  # of flight that have rows of their own
-
-
-PLOTS = PlotSettings()
+# all series over time together, packed: beside library and text a page of 60 s of flight stays
+# below 600 kB
+_MOST_BYTES = 170_000
+_LEAST_COLUMNS = 150  # of a plot over time, however many effects share the bytes
+_STEPS = 32_000  # of a packed series, between zero and its largest value
+_TICK = 1e-4  # s, of packed times
+_ROWS = 16  # of a table over time or frequency
+_POINTS = 360  # of a signature
+_SPECTRUM_SECONDS = 8.0  # of the segments of a spectrum
+_FREQUENCIES = 160  # of a spectrum
+_MOST_PIECES = 40  # of flight that have rows of their own
 _BASE64 = 4.0 / 3.0  # letters a byte
 _GROUPS = (("force", slice(0, 3), "N"), ("torque", slice(3, 6), "Nm"))
 _SYMBOLS = ("Fx", "Fy", "Fz", "τx", "τy", "τz")
@@ -108,7 +101,7 @@ class _Joined:
     def kept(self, i: int) -> list[Index]:
         """Return the samples of each piece that stand for channel ``i``."""
         a_sample = _BASE64 * 2.0 * (3 + len(self.parts)) * len(CHANNELS)
-        share = max(int(PLOTS.most_bytes / a_sample / 4), PLOTS.least_columns) / len(self.x)
+        share = max(int(_MOST_BYTES / a_sample / 4), _LEAST_COLUMNS) / len(self.x)
         return [
             first + telling_samples(trace, i, max(round(share * len(trace.t)), 1))
             for first, trace in zip(self.first_rows, self.traces, strict=True)
@@ -184,7 +177,7 @@ def _plot_over_time(joined: _Joined, i: int) -> Plot:
     kept = joined.kept(i)
     rows = np.concatenate(kept)
     times = [joined.x[k] - joined.x[k[0]] for k in kept]
-    tick = max(PLOTS.tick, max(np.diff(t, prepend=0.0).max() for t in times) / PLOTS.steps)
+    tick = max(_TICK, max(np.diff(t, prepend=0.0).max() for t in times) / _STEPS)
     steps = np.concatenate([np.diff(np.rint(t / tick), prepend=0.0) for t in times])
     return Plot(
         {
@@ -215,12 +208,12 @@ def _plot_of_spectrum(
     traces: Sequence[Trace], what: str, group: slice, unit: str, cutoff_hz: float
 ) -> Plot:
     longest = max(len(trace.t) * trace.period for trace in traces)
-    lowest = 1.0 / min(longest, PLOTS.spectrum_seconds)
-    x = np.linspace(lowest, max(cutoff_hz, 1.0), PLOTS.frequencies)
+    lowest = 1.0 / min(longest, _SPECTRUM_SECONDS)
+    x = np.linspace(lowest, max(cutoff_hz, 1.0), _FREQUENCIES)
     before, after = (_spectrum(traces, side, group, x) for side in ("before", "after"))
     factor, unit = scale_of([float(np.max(before))], unit)
     before, after = factor * before, factor * after
-    rows = np.linspace(0, len(x) - 1, PLOTS.rows).astype(int)
+    rows = np.linspace(0, len(x) - 1, _ROWS).astype(int)
     name = f"{what} ({unit}/√Hz)"
     return Plot(
         {
@@ -250,7 +243,7 @@ def _spectrum(traces: Sequence[Trace], side: str, group: slice, grid: Array) -> 
     total, weight = np.zeros(len(grid)), 0.0
     for trace in traces:
         x, rate = getattr(trace, side)[:, group], 1.0 / trace.period
-        longest = min(len(x), round(PLOTS.spectrum_seconds * rate))
+        longest = min(len(x), round(_SPECTRUM_SECONDS * rate))
         f, power = welch(x, rate, nperseg=longest, axis=0)
         total += len(x) / rate * np.interp(grid, f, power.sum(axis=1))
         weight += len(x) / rate
@@ -265,7 +258,7 @@ def _plot_of_signature(signature: Signature, number: int) -> Plot:
     factor, unit = scale_of(np.abs(columns[:, 1:]).ravel(), unit)
     x, residual, fitted = (columns * [1.0, factor, factor]).T
     middle, mean = binned(x, residual)
-    kept = np.linspace(0, len(x) - 1, min(len(x), PLOTS.points)).astype(int)
+    kept = np.linspace(0, len(x) - 1, min(len(x), _POINTS)).astype(int)
     kept = kept[np.argsort(x[kept], kind="stable")]
     correlation = (
         f"; correlation {rounded(float(np.corrcoef(residual, fitted)[0, 1]), 2)}"
@@ -335,10 +328,10 @@ def telling_samples(trace: Trace, i: int, columns: int) -> Index:
 
 def _table_over_time(traces: Sequence[Trace], i: int, factor: float, unit: str) -> PlotTable:
     """Return the residual's rms before and after in a channel, interval by interval."""
-    many, each = len(traces) > PLOTS.most_pieces, max(PLOTS.rows // len(traces), 1)
+    many, each = len(traces) > _MOST_PIECES, max(_ROWS // len(traces), 1)
     head: tuple[str, ...] = ("Piece", "Time (s)", "Held out", "Before", "After")
     rows: list[tuple[str, ...]] = []
-    for number, trace in enumerate(traces[: PLOTS.most_pieces], 1):
+    for number, trace in enumerate(traces[:_MOST_PIECES], 1):
         for part in np.array_split(np.arange(len(trace.t)), min(each, len(trace.t))):
             held = {0.0: "no", 1.0: "yes"}.get(trace.held_out[part].mean(), "in part")
             time = f"{trace.t[part[0]]:.1f} to {trace.t[part[-1]]:.1f}"
@@ -346,7 +339,7 @@ def _table_over_time(traces: Sequence[Trace], i: int, factor: float, unit: str) 
             rows.append((str(number), time, held, *sides))
     if len(traces) == 1:
         head, rows = head[1:], [row[1:] for row in rows]
-    more = f", the first {PLOTS.most_pieces} of {len(traces)} pieces" if many else ""
+    more = f", the first {_MOST_PIECES} of {len(traces)} pieces" if many else ""
     return PlotTable(f"Residual {_SYMBOLS[i]}, rms ({unit}){more}", head, rows)
 
 
@@ -394,7 +387,7 @@ def packed_series(x: Array) -> dict[str, Any] | None:
     largest = float(np.abs(x).max(initial=0.0))
     if largest < 1e-12:
         return None
-    scale = largest / PLOTS.steps
+    scale = largest / _STEPS
     return {"scale": scale, "data": _base64(np.rint(x / scale), "<i2")}
 
 

@@ -1,14 +1,13 @@
 """What kept flights say of names, and the weights of signs that something unknown acts."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from windwrench.identification.diagnosis.unknown import UNKNOWN, UnknownSettings, signs
+from windwrench.identification.diagnosis.unknown import UnknownSettings, signs
 from windwrench.studies.scoring import EQUIVALENTS
 
 Array = NDArray[np.float64]
@@ -71,5 +70,4 @@ def fit(flights: Sequence[dict[str, Any]]) -> UnknownSettings:
         )
 
     found = minimize(loss, np.zeros(len(scale))).x.round(_DECIMALS).tolist()
-    names = ("nothing", "disturbance", "push")
-    return replace(UNKNOWN, **dict(zip(names, found, strict=True)))
+    return UnknownSettings(*found)

@@ -10,7 +10,7 @@ import pytest
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import Need, needing
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.diagnosis.commanded_rotors import COMMANDED
+from windwrench.identification.diagnosis.commanded_rotors import UNSTATED_THRUST_STD
 from windwrench.identification.diagnosis.regression import Flights
 from windwrench.identification.diagnosis.residuals import transient_disturbances
 from windwrench.identification.report.headline import headline
@@ -37,7 +37,7 @@ def test_a_factor_on_thrust_from_commands_alone_is_never_sure(name, value):
         (other,) = {"thrust_scale", "mass"} - {effect.name}
         assert effect.tentative
         assert other in effect.indistinguishable_from
-        size = COMMANDED.unstated_thrust_std * (VEHICLE.mass if effect.name == "mass" else 1.0)
+        size = UNSTATED_THRUST_STD * (VEHICLE.mass if effect.name == "mass" else 1.0)
         assert all(std >= size for std in effect.std.values())
         assert any(
             note.startswith(f"{effect.name}: the log holds motor commands") for note in found.notes

@@ -77,7 +77,8 @@ def test_one_more_column_is_worth_the_mean_of_its_bayes_factors():
         return 0.5 * b @ np.linalg.solve(inner, b) - 0.5 * np.linalg.slogdet(inner)[1]
 
     sizes = (0.1, 1.0)
-    m = marginal(normal, right, 0.0, np.array([2, 3]), np.array([0, 1]), np.ones(2))
+    products = np.block([[normal, right[:, None]], [right, 0.0]])
+    m = marginal(products, np.array([2, 3]), np.array([0, 1]), np.ones(2))
     found = evidence_of_one_more(m, [0, 1], sizes)
     each = [evidence([0, 1, c], s) - evidence([0, 1], s) for c in (2, 3) for s in sizes]
     assert found == pytest.approx(np.logaddexp.reduce(each) - math.log(4.0))

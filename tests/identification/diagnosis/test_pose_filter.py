@@ -148,7 +148,7 @@ def test_the_search_follows_the_likelihood_where_a_vehicle_spins(monkeypatch):
     monkeypatch.setattr(NoiseSearch, "likeliest", lambda *x: searches.append(x) or x[1:])
     Likelihood(Flights([replace(log, quaternion=q.as_quat(scalar_first=True))], VEHICLE), {})
     search, near, gains = searches[0]
-    at = np.append(gains, _free(near) + [0.0, 0.0, 0.0, 0.1])
+    at = np.append(gains, _free(near) + np.array([0.0, 0.0, 0.0, 0.1]))
     right = search._slopes(at)[2]
     for i in range(-24, 0):
         step = 1e-4 * np.eye(len(at))[i]

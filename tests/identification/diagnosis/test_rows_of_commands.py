@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from tests.support.flown import VEHICLE
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.diagnosis.diagnosing import diagnose
-from windwrench.identification.diagnosis.row_nuisances import NUISANCES
+from windwrench.identification.diagnosis.row_nuisances import THRUST_STD
 from windwrench.identification.logs.flight_log import FlightLog
 
 SECONDS, PERIOD = 20.0, 0.01
@@ -70,7 +70,7 @@ def test_a_hover_shows_a_load_by_the_mean_thrust_alone():
     scale, std = thrust.coefficients["s"], thrust.std["s"]
     assert abs(scale - (1.0 / 1.3 - 1.0)) < 1.96 * std
     # a command makes another thrust in each flight
-    assert std > 0.9 * NUISANCES.thrust * (1.0 + scale)
+    assert std > 0.9 * THRUST_STD * (1.0 + scale)
 
 
 def test_in_a_hover_without_a_load_nothing_is_sure():

@@ -119,16 +119,17 @@ def test_a_share_of_what_follows_disturbances_counts_as_one(weak):
     is far from one.
     """
     rows = Rows(weak, {})
-    signals = followers(rows)
     size = np.zeros((len(rows.t), rows.channels))
-    for signal in signals:
-        spread = signal.size[rows.fit].std()
+    for name, (signal, channels) in followers(rows).items():
+        spread = signal[rows.fit].std()
         calm, rough = (
-            answered(rows, [signal], x * spread * size_like(size))[f"answer by {signal.name}"]
+            answered(rows, {name: (signal, channels)}, x * spread * size_like(size))[
+                f"answer by {name}"
+            ]
             for x in (0.1, 1.0)
         )
-        moved = signal.size - signal.size[rows.fit].mean()
-        np.testing.assert_allclose(rough[:, signal.channels[0]], moved, rtol=0.05)
+        moved = signal - signal[rows.fit].mean()
+        np.testing.assert_allclose(rough[:, channels[0]], moved, rtol=0.05)
         np.testing.assert_allclose(calm, 0.01 * rough, rtol=0.1)
 
 

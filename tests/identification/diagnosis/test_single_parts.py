@@ -12,7 +12,7 @@ from tests.support.flown import VEHICLE, recorded
 from tests.support.own_effects import HOSE, joined
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.identification.diagnosis.advice import composites
-from windwrench.identification.diagnosis.commanded_rotors import COMMANDED, in_flight_by_thrust
+from windwrench.identification.diagnosis.commanded_rotors import TAKE_OFF, in_flight_by_thrust
 from windwrench.identification.diagnosis.log_offsets import LAG_ASYMMETRY
 from windwrench.identification.diagnosis.priors import prior_size
 from windwrench.identification.diagnosis.ranking import rank, starts_of
@@ -110,8 +110,8 @@ def test_only_the_time_in_the_air_counts():
     speeds[(log.t < 4.0) | (log.t > 15.0)] *= 0.3
     found = in_flight_by_thrust(still(20.0, speeds=speeds), VEHICLE)
     # taking off and landing last beyond
-    assert found.t[0] == pytest.approx(4.0 + COMMANDED.take_off, abs=0.5)
-    assert found.t[-1] == pytest.approx(15.0 - COMMANDED.take_off, abs=0.5)
+    assert found.t[0] == pytest.approx(4.0 + TAKE_OFF, abs=0.5)
+    assert found.t[-1] == pytest.approx(15.0 - TAKE_OFF, abs=0.5)
     whole = in_flight_by_thrust(log, VEHICLE)
     assert len(whole.t) == len(log.t)
 
@@ -125,8 +125,9 @@ def test_the_delay_that_was_flown(vehicle):
     model = load_vehicle(vehicle)
     found = turning_delay(flown_signals(model, latency={"d": 0.035}), model)
     assert found is not None
-    assert found.seconds == pytest.approx(0.035, abs=0.004)
-    assert found.std < 0.004
+    seconds, std, _ = found
+    assert seconds == pytest.approx(0.035, abs=0.004)
+    assert std < 0.004
 
 
 def test_moments_of_another_flight_show_no_delay():
