@@ -145,7 +145,7 @@ class Disturbance:
     """The disturbance of one channel: an Ornstein-Uhlenbeck process of maximum likelihood.
 
     Attributes:
-        channel: one of CHANNELS; of force along the heading, to its left and up.
+        channel: one of CHANNELS; of a raw pose roll and pitch are about the world's x and y.
         rms: N, or Nm.
         time: s, correlation time.
         unanswered: N, or Nm, what of it the rotors do not answer before the pose shows it.

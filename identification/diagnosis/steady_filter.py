@@ -1,11 +1,10 @@
 """The steady Kalman filter of a pose near level flight, from the noise of its six axes.
 
-The axes are the position along the heading, to its left and up, and the turns about the body's
-axes. The states of an axis are its pose, the pose's rate, and a disturbance: an Ornstein-Uhlenbeck
-acceleration. A white acceleration beside it stands for the rotors' rounding, and for whatever else
-changes from sample to sample. A pitch pulls the vehicle along its heading and a roll to its right:
-forward and pitch are one filter, and left and roll another. Up and yaw are a pair that nothing
-joins.
+The axes are the world's: position along them, and turns about them. The states of an axis are its
+pose, the pose's rate, and a disturbance: an Ornstein-Uhlenbeck acceleration. A white acceleration
+beside it stands for the rotors' rounding, and for whatever else changes from sample to sample. A
+pitch pulls the vehicle along x and a roll against y: x and pitch are one filter, y and roll
+another, whatever way the vehicle yaws. Up and yaw are a pair that nothing joins.
 """
 
 from dataclasses import dataclass
