@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from .log_map import UNITS, Attitude, Battery, Columns, Commands, LogMap, Rotors, Sensor, constant
-from .table import Array, Mask, Rows, Table
+from .table import Array, Mask, Rows, Table, finite_rows
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])
 # from the log's world, or its body axes, to the kit's
@@ -50,7 +50,7 @@ class Samples:
 
     def there(self, part: Columns) -> Mask:
         """Return in which rows (N,) a section has all of its values."""
-        return np.asarray(np.isfinite(self.values(part)).all(axis=1))
+        return finite_rows(self.values(part))
 
     def has(self, part: Columns) -> bool:
         """Return whether a section's columns are there."""

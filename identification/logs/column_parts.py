@@ -17,7 +17,7 @@ import numpy as np
 from ..motion.smoothing import resampled, second_difference
 from .column_names import Group, Name, groups_of, named_alone, side_by_side, words
 from .magnitudes import likely_unit
-from .table import Array
+from .table import Array, finite_rows
 
 _FOURS = (("1", "2", "3", "4"), ("0", "1", "2", "3"))
 _TRIPLES = (("x", "y", "z"), ("roll", "pitch", "yaw"))  # of which no column is another group's
@@ -63,7 +63,9 @@ class Numbers:
         self.t = t[self.order]
         self.data = {name: x for name, x in data.items() if np.isfinite(x[self.order]).any()}
         self._rows: dict[tuple[str, ...], tuple[Array, Array]] = {}
-        self._attitude = np.empty(0), np.empty((0, 4))  # times (n,) and quaternions (n, 4)
+        self.attitude: Sequence[
+            str
+        ] = ()  # a quaternion, whose tilt a position's acceleration follows
         self.felt: list[Array] = []  # what may be the specific force, at ``self.clock``
 
     @cached_property
@@ -76,7 +78,7 @@ class Numbers:
         """Return the times (n,) and values (n, k) of the rows in which columns are all there."""
         if (key := tuple(columns)) not in self._rows:
             values = np.column_stack([self.data[name][self.order] for name in columns])
-            there = np.isfinite(values).all(axis=1)
+            there = finite_rows(values)
             self._rows[key] = self.t[there], values[there]
         return self._rows[key]
 
@@ -111,12 +113,6 @@ class Numbers:
         is_one = np.quantile(off, 0.98) < PARTS.length[1]
         return (1.0 if is_one else -np.inf), "their length is 1"
 
-    def take_attitude(self, columns: Sequence[str]) -> None:
-        """Keep a quaternion, whose tilt a position's acceleration follows."""
-        t, q = self.rows(columns)
-        step = max(1, len(t) // PARTS.samples)
-        self._attitude = t[::step], q[::step]
-
     def gravity(self, columns: Sequence[str]) -> tuple[float, str]:
         """Return 1 where three columns have the size of gravity, or less where it does not lie
         along the third.
@@ -133,7 +129,10 @@ class Numbers:
         """Return how the second difference of two of three columns follows the tilt, at most 1; 0
         where it does not.
         """
-        times, attitude = self._attitude
+        if not self.attitude:
+            return 0.0, ""
+        every = slice(None, None, max(1, len(self.rows(self.attitude)[0]) // PARTS.samples))
+        times, attitude = (x[every] for x in self.rows(self.attitude))
         if min(len(times), len(self.rows(columns)[0])) < PARTS.fewest:
             return 0.0, ""
         force, best = second_difference(times, PARTS.window, *self.rows(columns)).T, 0.0

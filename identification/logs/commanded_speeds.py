@@ -80,7 +80,10 @@ def _speeds(
     share = np.clip((command - least) / (most - least), 0.0, None)
     relative = model.thrust_factor * np.square(share) + (1.0 - model.thrust_factor) * share
     total = relative.sum(axis=1)
-    felt = _felt(log)
+    x, felt = log.accelerometer, None
+    if x is not None:  # beside a pose, one whose size is not usual in flight tells nothing
+        usual = within(float(np.nanmedian(np.linalg.norm(x, axis=1))), _FELT)
+        felt = x[:, 2] if usual or not log.has_pose else None
     where = "a pose" if felt is None else "an accelerometer"
     if felt is None and not log.has_pose:
         return None, [
@@ -160,15 +163,6 @@ def _words(model: Commands) -> str:
     words = f"{factor:g} {a}^2 + {1.0 - factor:.4g} {a}"
     words = {0.0: a, 1.0: f"{a}^2"}.get(factor, words)
     return words if a == "u" else f"{words} with a = (u - {least:g}) / {most - least:g}"
-
-
-def _felt(log: FlightLog) -> Array | None:
-    """Return the accelerometer's readings (N,) in m/s2 along the rotors' axis, NaN where there is
-    none; None where it has none, or a pose is there and its size is not usual in flight.
-    """
-    x = log.accelerometer
-    usual = x is not None and within(float(np.nanmedian(np.linalg.norm(x, axis=1))), _FELT)
-    return x[:, 2] if x is not None and (usual or not log.has_pose) else None
 
 
 def _scale(log: FlightLog, total: Array, felt: Array | None, vehicle: Vehicle) -> float | None:

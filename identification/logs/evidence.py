@@ -38,7 +38,7 @@ from .flight_log import FlightLog
 from .flight_phases import carrying
 from .log_map import UNITS
 from .readings import DECLARED, OFFSET, Reading, as_written, log_readings
-from .table import Array, Rows
+from .table import Array, Rows, finite_rows, median_step
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ class _Piece:
         """
         inside = slice(self.rows[0], self.rows[-1] + 1)
         x, at = values[inside], t[inside]
-        there = np.isfinite(x).all(axis=1) & np.isfinite(at)
+        there = finite_rows(x) & np.isfinite(at)
         if not there.any():
             return np.full((len(self.t), x.shape[1]), np.nan)
         return resampled(self.t, at[there], x[there])
@@ -182,8 +182,11 @@ class Evidence:
             most = EVIDENCE.most_thrust * float(np.nanquantile(thrusts, 0.99))
             self._thrusts = np.minimum(thrusts, most)
         moving = [x for x in (position, attitude, gyro) if x is not None]
-        there = np.isfinite(t) & np.all([np.isfinite(x).all(axis=1) for x in moving], axis=0)
+        there = np.isfinite(t) & np.all([finite_rows(x) for x in moving], axis=0)
         self._pieces = self._cut(np.flatnonzero(there))
+        self.has_pose = attitude is not None
+        # whether the flight is long enough to decide something
+        self.enough = sum(len(p.compared) for p in self._pieces) >= EVIDENCE.fewest
         self._motion, self._delayed = lru_cache(self._moving), lru_cache(2)(self._pushes)
         self._moved = lru_cache(2)(self._balances)
 
@@ -204,7 +207,7 @@ class Evidence:
         """Return the pieces in which the motion is known, and of each which samples fly."""
         if len(rows) < 2:
             return []
-        step = float(np.median(np.diff(self._t[rows])))
+        step = median_step(self._t[rows])
         period = max(step, EVIDENCE.period)
         count = len(rows) * step * EVIDENCE.rate_hz
         every = np.ceil(count / EVIDENCE.most) / (EVIDENCE.rate_hz * period)
@@ -227,16 +230,6 @@ class Evidence:
             replace(p, compared=p.compared[x[p.compared]])
             for p, x in zip(pieces, aloft, strict=True)
         ]
-
-    @property
-    def has_pose(self) -> bool:
-        """Whether the motion is that of a pose."""
-        return self._attitude is not None
-
-    @property
-    def enough(self) -> bool:
-        """Whether the flight is long enough to decide something."""
-        return sum(len(p.compared) for p in self._pieces) >= EVIDENCE.fewest
 
     def _compared(self, values: Callable[[_Piece], Array]) -> Array:
         """Return values on the pieces' clocks at the samples compared."""
@@ -267,23 +260,21 @@ class Evidence:
         gravity.
         """
         thrusts = [p.even(self._t, self._thrusts) for p in self._pieces]
-        totals = np.concatenate([(x @ self._k)[p.compared] for x, p in self._each(thrusts)])
+        each = list(zip(thrusts, self._pieces, strict=True))
+        totals = np.concatenate([(x @ self._k)[p.compared] for x, p in each])
         scale = _G / max(float(np.median(totals)), 1e-300)
         out = []
-        for x, p in self._each(thrusts):
+        for x, p in each:
             total = scale * (x @ self._k)
             out.append(np.column_stack([p.band(x).reshape(-1, 8), p.slow(total), total]))
         return out
-
-    def _each(self, values: list[Array]) -> Iterator[tuple[Array, _Piece]]:
-        return zip(values, self._pieces, strict=True)
 
     def _pushes(self, *delays: float) -> tuple[Array, Array]:
         """Return which samples compared less each delay (d, n) lie within their piece (1, or 0),
         and the first thrusts (d, 9, n) of ``_driving`` there less their means; zero elsewhere.
         """
         there, out = [], []
-        for x, p in self._each(self._driving):
+        for x, p in zip(self._driving, self._pieces, strict=True):
             at = p.compared - np.array(delays)[:, None] / p.period
             row = np.clip(np.floor(at).astype(int), 0, len(x) - 2)
             part = (at - row)[..., None]
@@ -318,7 +309,7 @@ class Evidence:
         """
         axes, turns = [], []
         turned = self._turned(Reading(*attitude))
-        for (thrusts, p), (matrices, w) in zip(self._each(self._driving), turned, strict=True):
+        for p, thrusts, (matrices, w) in zip(self._pieces, self._driving, turned, strict=True):
             axes.append(p.slow(thrusts[:, 9:] * matrices.reshape(-1, 9))[p.compared])
             products = np.einsum("ni,nj->nij", w, w).reshape(-1, 9)
             columns = np.column_stack([w, derivative(w, p.period), products])

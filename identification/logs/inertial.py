@@ -22,7 +22,7 @@ from .evidence import EVIDENCE, likelihood
 from .flight_log import ACCELEROMETER, GYRO, FlightLog
 from .magnitudes import MAGNITUDES
 from .readings import ACCELEROMETER_READINGS, AS_DECLARED, GYRO_READINGS, OTHER, SensorReading
-from .table import Array
+from .table import Array, finite_rows
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def gyro_shares(
         attitude: (M) body to world.
         turns: (3, 3) each, by which a reading multiplies the gyro.
     """
-    read = np.isfinite(t) & np.isfinite(gyro).all(axis=1)
+    read = np.isfinite(t) & finite_rows(gyro)
     t, gyro = t[read], gyro[read]
     begins = _windows(pose_times, t, before=0.0)
     if len(begins) < INERTIAL.fewest:

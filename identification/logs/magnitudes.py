@@ -15,7 +15,7 @@ from .column_names import Group, words
 from .flight_log import FlightLog, parts_of
 from .flight_phases import usual_thrust
 from .log_map import UNITS
-from .table import Array
+from .table import Array, finite_rows
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def motor_unit(
     pulses = low >= 850.0 and high <= 2250.0
     carrying: list[str] = []
     if vehicle is not None and not commanded:
-        there = values[np.isfinite(values).all(axis=1)]
+        there = values[finite_rows(values)]
         carrying = [
             u for u in carrying_units(thrust_by_weight(there, vehicle)) if u in UNITS["rotors"]
         ]

@@ -140,11 +140,8 @@ def _time_column(names: Sequence[Name], data: Mapping[str, Array]) -> Name | Non
         steps = np.diff(values[np.isfinite(values)])
         if np.any(steps > 0.0) and np.mean(steps >= 0.0) > 0.9:
             return name
-    for name in there:
-        values = data[name.column]
-        if len(values) > 2 and np.all(np.diff(values) > 0.0):
-            return name
-    return None
+    rises = (n for n in there if len(x := data[n.column]) > 2 and np.all(np.diff(x) > 0.0))
+    return next(rises, None)
 
 
 class _Guessing:
@@ -175,7 +172,7 @@ class _Guessing:
         attitude = self.choose("attitude", numbers.quaternion)
         force = self.choose("accelerometer", numbers.gravity)
         if attitude and len(attitude.columns) == 4:
-            numbers.take_attitude(attitude.columns)
+            numbers.attitude = attitude.columns
         place = self.choose("position", numbers.follows_tilt)
         numbers.feel(force.columns if force else (), place.columns if place else ())
         motors = [part for part in _MOTORS if self.choose(part, numbers.moves_together)]

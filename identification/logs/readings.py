@@ -17,7 +17,7 @@ from ...runtime.yaml_file import read_yaml
 from .channels import quaternions, scaled
 from .log_map import SENSES, UNITS, Attitude
 from .rotor_orders import ORDERS, Order, order_names
-from .table import Array, Mask
+from .table import Array, Mask, finite_rows
 
 _I = np.eye(3)
 _STATED: dict[str, Any] = read_yaml(Path(__file__).with_name("conventions.yaml"), "conventions")
@@ -312,7 +312,7 @@ def rotations(columns: Array, reading: Reading) -> tuple[Mask, Rotation]:
 def as_written(columns: Array, reading: Reading) -> tuple[Mask, Rotation]:
     """Return the same, body to world, in the columns' own frames."""
     part = reading.part()
-    good: Mask = np.asarray(np.isfinite(columns).all(axis=1))
+    good = finite_rows(columns)
     if not reading.euler:
         good &= np.linalg.norm(np.nan_to_num(columns), axis=1) > 0.5
     turns = quaternions(part, scaled(part, columns[good]))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..motion.smoothing import resampled
-from .table import Array, Rows
+from .table import Array, Rows, finite_rows, median_step
 
 
 @dataclass(frozen=True)
@@ -57,12 +57,12 @@ def source_rate(t: Array, values: Array) -> float:
         t: (N,) s, increasing.
         values: (N, K); a row with NaN is no sample.
     """
-    good = np.isfinite(values).all(axis=1)
+    good = finite_rows(values)
     t, values = t[good], values[good]
     if len(t) < 2:
         return 0.0
     changes = np.flatnonzero(np.any(np.diff(values, axis=0) != 0.0, axis=1))
-    step = float(np.median(np.diff(t)))
+    step = median_step(t)
     return 1.0 / (step * max(_spacing(changes), _spacing(_corners(t, values))))
 
 

@@ -18,7 +18,7 @@ from .commanded_speeds import flown_vehicle, speeds_of_wrench, with_commanded_sp
 from .flight_log import FlightLog, time_notes
 from .log_map import LogMap
 from .source_rates import source_rate
-from .table import Array, Mask
+from .table import Array, finite_rows, median_step
 from .what_flew import UNSTATED, WhatFlew
 
 _SENSOR_GAP = 3.5  # median steps, across which an inertial sensor is not interpolated
@@ -41,7 +41,7 @@ class Stream:
 
     def whole(self) -> "Stream":
         """Return the samples whose values are all finite."""
-        good = np.isfinite(self.values).all(axis=1)
+        good = finite_rows(self.values)
         return self if good.all() else Stream(self.name, self.t[good], self.values[good])
 
     def at(self, t: Array) -> Array:
@@ -143,7 +143,7 @@ class Recording:
                 f"{motors.name}: up to {longest:.2g} s between messages; the {_MOTORS[kind]} there "
                 "are interpolated",
             )
-        valid: Mask = np.asarray(np.isfinite(pose).all(axis=1))
+        valid = finite_rows(pose)
         if np.isfinite(pose[:, 3:]).any():  # else positions without an attitude, which are kept
             pose[~valid] = np.nan
         pose[valid, 3:] /= np.linalg.norm(pose[valid, 3:], axis=1)[:, None]
@@ -247,7 +247,9 @@ def _rows(
         InputError: fewer than two rows lie within the span of the motors' stream.
     """
     sensor = sensors[0] if sensors else None
-    own = sensor is not None and (pose is None or _step(pose.t) > _OWN_ROWS * _step(sensor.t) > 0.0)
+    own = sensor is not None and (
+        pose is None or median_step(pose.t) > _OWN_ROWS * median_step(sensor.t) > 0.0
+    )
     stream = sensor if own else pose
     assert stream is not None
     inside = (stream.t >= motors.t[0]) & (stream.t <= motors.t[-1])
@@ -264,7 +266,7 @@ def _rows(
     if not own:
         assert pose is not None
         return t, pose.values[inside], ()
-    rows = f"rows are those of {stream.name}, {1.0 / _step(stream.t):.4g} Hz"
+    rows = f"rows are those of {stream.name}, {1.0 / median_step(stream.t):.4g} Hz"
     placed = np.full((len(t), 7), np.nan)
     if pose is None:
         return t, placed, (rows,)
@@ -272,17 +274,11 @@ def _rows(
     if len(seen.t) >= 2:
         near = np.clip(np.searchsorted(t, seen.t), 1, len(t) - 1)
         near -= seen.t - t[near - 1] < t[near] - seen.t
-        reach = max(0.6 * _step(t), 0.5 * _step(seen.t) / _OWN_ROWS)
+        reach = max(0.6 * median_step(t), 0.5 * median_step(seen.t) / _OWN_ROWS)
         near = np.unique(near[np.abs(t[near] - seen.t) <= reach])
         near = near[(t[near] >= seen.t[0]) & (t[near] <= seen.t[-1])]
         placed[near, :3] = Stream(pose.name, seen.t, seen.values[:, :3]).at(t[near])
         placed[near, 3:] = slerp(t[near], Stream(pose.name, seen.t, seen.values[:, 3:]))
-    rows += (
-        f"; the pose of {pose.name}, {1.0 / _step(pose.t):.4g} Hz, stands in the nearest of them"
-    )
+    rate = 1.0 / median_step(pose.t)
+    rows += f"; the pose of {pose.name}, {rate:.4g} Hz, stands in the nearest of them"
     return t, placed, (rows,)
-
-
-def _step(t: Array) -> float:
-    """Return the median time step, s."""
-    return float(np.median(np.diff(t)))

@@ -19,7 +19,7 @@ from ...runtime.yaml_file import read_yaml
 from .column_names import words
 from .log_map import MAPS
 from .rotor_orders import Order
-from .table import Array
+from .table import Array, finite_rows
 
 QUADROTOR = "a quadrotor"
 _ROTORS = {QUADROTOR: 4, "a tricopter": 3, "a hexarotor": 6, "an octorotor": 8}
@@ -99,7 +99,7 @@ def more_rotors(
     turning = [*columns]
     for name in _numbered_on(columns, others):
         rows = np.column_stack(list(read([*columns, name]).values()))
-        rows = rows[np.isfinite(rows).all(axis=1)]
+        rows = rows[finite_rows(rows)]
         if len(rows) < _FEWEST or np.ptp(rows[:, 4]) == 0.0:
             continue
         size = abs(float(np.median(rows[:, 4]) / max(np.median(np.abs(rows[:, :4])), 1e-12)))
