@@ -22,6 +22,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.fft import next_fast_len
 
 from ...dynamics.vehicle import Vehicle
@@ -86,20 +87,22 @@ _G = 9.81
 _SIDES = np.array([[1.0, 1.0, -1.0, -1.0], [-1.0, 1.0, 1.0, -1.0]])
 
 
-def likelihood(shares: Sequence[float]) -> float:
+def likelihood(left: Sequence[float]) -> float:
     """Return the log-likelihood, up to a constant, of shares of one component each."""
-    bounded = (min(max(x, EVIDENCE.least_share), EVIDENCE.most_share) for x in shares)
+    bounded = (min(max(x, EVIDENCE.least_share), EVIDENCE.most_share) for x in left)
     return -0.5 * EVIDENCE.samples * sum(map(math.log, bounded))
 
 
-def share(total: float, power: float, cross: float, gain: tuple[float, float]) -> float:
-    """Return the share of a variance ``total`` that a signal of variance ``power`` and covariance
-    ``cross``, times a gain in range, leaves.
+def shares(total: Array, power: Array, cross: Array, gain: ArrayLike) -> Array:
+    """Return the shares of variances ``total`` (...) that signals of variance ``power`` and
+    covariance ``cross`` leave, times a gain in range: ``gain`` (2, ...).
     """
-    if not (total > 0.0 and power > 0.0):
-        return 1.0
-    factor = min(max(cross / power, gain[0]), gain[1])
-    return float(min(1.0 - factor * (2.0 * cross - factor * power) / total, EVIDENCE.most_share))
+    with np.errstate(divide="ignore", invalid="ignore"):  # of a variance of zero all is left
+        factor = np.clip(cross / power, *np.asarray(gain))
+        left = np.minimum(
+            1.0 - factor * (2.0 * cross - factor * power) / total, EVIDENCE.most_share
+        )
+    return np.where((total > 0.0) & (power > 0.0), left, 1.0)
 
 
 @dataclass(frozen=True)
@@ -346,13 +349,12 @@ class Evidence:
         force = self._acceleration @ frames.position.T * UNITS["position"][reading.length]
         force += np.array([0.0, 0.0, _G])
         needed, given = (np.ravel(x[:, :2] - x[:, :2].mean(axis=0)) for x in (force, push))
-        variances = float(needed @ needed), float(given @ given), float(needed @ given)
         mean, size = push.mean(axis=0), np.linalg.norm(push, axis=1)
         along = np.sum(force * push, axis=1) / np.maximum(size, 1e-9)
         cost = EVIDENCE.fallen * (mean[2] <= EVIDENCE.good * np.linalg.norm(mean))
         cost += EVIDENCE.below * ((frames.position @ self._middle)[2] < 0.0)
-        left = share(*variances, EVIDENCE.force_gain)
-        return left, float(cost), self._needed(along, reading)
+        left = shares(needed @ needed, given @ given, needed @ given, EVIDENCE.force_gain)
+        return float(left), float(cost), self._needed(along, reading)
 
     def fit(self, reading: Reading, torques: bool = True) -> Fit:
         """Return how well a reading explains the flight; without torques, by forces alone."""
@@ -368,20 +370,14 @@ class Evidence:
         delays = EVIDENCE.delays if torques else (0.0,)
         there, thrusts = self._delayed(*delays)
         given = rows @ thrusts
-        products = zip(
+        left = shares(
             there @ np.square(needed).T,
             np.sum(given * given, axis=2),
             np.sum(given * needed, axis=2),
-            there.sum(axis=1) >= EVIDENCE.fewest,
-            strict=True,
+            np.transpose(gains),
         )
-        left = [
-            [share(*each) for each in zip(*sums, gains, strict=True)]
-            if enough
-            else [EVIDENCE.most_share] * len(rows)
-            for *sums, enough in products
-        ]
-        vertical, *others = max(left, key=likelihood)
+        left[there.sum(axis=1) < EVIDENCE.fewest] = EVIDENCE.most_share
+        vertical, *others = max(left.tolist(), key=likelihood)
         score = likelihood([horizontal, horizontal, vertical, *others]) - cost - reading.unlikely
         return Fit(reading, horizontal, tuple(others), score)
 

@@ -79,7 +79,7 @@ class FlightLog:
             be trusted.
         command: (N, 4) motor commands, 0 to 1, in the rotors' order.
         vehicle: name of the vehicle that flew, where the log or its reader knows it.
-        rates: Hz, how often each channel was measured (``source_rates``), by its section of a log
+        rates: Hz, how often each channel was measured (``streams``), by its section of a log
             map: position, rotors, commands, wrench, battery, accelerometer, gyro. A channel that
             is not named was measured in every row.
         flown: what the log states of its vehicle.

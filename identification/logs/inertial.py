@@ -232,6 +232,6 @@ def _windows(pose_times: Array, sensor_times: Array, before: float) -> Array:
     times: Array = np.linspace(first, last, count + 1)
     for clock in (pose_times, sensor_times):
         gaps = np.flatnonzero(np.diff(clock) > INERTIAL.gap)
-        for a, b in ((clock[i], clock[i + 1]) for i in gaps[:1000]):
-            times = times[(times - before >= b) | (times + INERTIAL.window <= a)]
+        begun = np.searchsorted(clock[gaps], times + INERTIAL.window)
+        times = times[begun == np.searchsorted(clock[gaps + 1], times - before, "right")]
     return times

@@ -18,8 +18,7 @@ import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from .channels import Samples, in_kit_axes, in_kit_units, quaternions
-from .clocks import on_one_clock
+from .channels import Samples, in_kit_axes, in_kit_units, on_one_clock, quaternions
 from .commanded_speeds import flown_vehicle
 from .flight_log import NORM_TOLERANCE, VEHICLE, FlightLog
 from .log_map import (

@@ -30,7 +30,7 @@ from .flight_phases import carrying, flying
 from .inertial import INERTIAL, gravity_doubt, is_stuck
 from .magnitudes import MAGNITUDES, rotor_doubt, thrust_by_weight, time_doubt, within
 from .readings import Reading
-from .source_rates import MOTOR_RATES
+from .streams import MOTOR_RATES
 from .table import Array, Mask, median_step
 
 LEAST_SECONDS = 10.0  # of unbroken pose in flight
@@ -114,7 +114,6 @@ def screen_log(
             if kind is not Needed:
                 notes.append(str(text) if kind is Note else f"warning: {text}")
 
-    hear(_channels(log, vehicle, by_imu))
     hear(_rotors(log, vehicle, by_imu))
     above = log.rotor_speeds > _most_rad_s(log, vehicle)
     if above.any():
@@ -149,8 +148,10 @@ def screen_log(
     return log, tuple(notes)
 
 
-def _channels(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
-    """Check that there are a motion, rotor speeds and the declared vehicle."""
+def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
+    """Check that there are a motion and the declared vehicle, and that all four rotors turned, at
+    speeds (rad/s) that carry it.
+    """
     if not by_imu and not log.valid.any():
         yield Refused(
             "no row has a pose; expected at least one to start from, or gyro and accelerometer "
@@ -165,10 +166,6 @@ def _channels(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
         yield Note(
             f"warning: the log names the vehicle {log.vehicle}; it is read as {vehicle.name}"
         )
-
-
-def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
-    """Check that all four rotors turned, at speeds (rad/s) that carry the vehicle."""
     speeds = log.rotor_speeds
     with np.errstate(over="ignore"):
         thrust = np.square(speeds) @ vehicle.k / vehicle.weight

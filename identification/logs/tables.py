@@ -116,9 +116,6 @@ def _csv_text(
 def _open_arrays(path: Path) -> Table:
     """Open the arrays of a file. Rows are as many as most arrays have; arrays of other lengths are
     left out, with a note.
-
-    Raises:
-        InputError: unreadable, no arrays of numbers, or more than ``FileLimits`` allows.
     """
     data = read_bytes(path, WHAT, LIMITS.binary_log)
     with one_line(f"{path}: cannot be read as {WHAT}"):
@@ -179,11 +176,7 @@ def _matlab(path: Path, data: bytes) -> bytes:
 
 
 def _open_parquet(path: Path) -> Table:
-    """Open a Parquet file.
-
-    Raises:
-        InputError: unreadable, not Parquet, or more than ``FileLimits`` allows.
-    """
+    """Open a Parquet file."""
     need("pyarrow", "parquet", path)
     import pyarrow
     from pyarrow import parquet

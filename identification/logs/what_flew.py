@@ -7,17 +7,13 @@ one gate refuses what is none, before four of six motors are taken for a quadrot
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from itertools import takewhile
-from typing import Any
 
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from ...runtime.yaml_file import read_yaml
-from .column_names import words
-from .log_map import MAPS
+from .column_names import WORDS
 from .rotor_orders import Order
 from .table import Array, finite_rows
 
@@ -31,15 +27,6 @@ _APART = np.radians(30.0)  # by which a motor may stand off the rotor that it is
 # of a further rotor's column: share of its variance that the four leave, and its median by theirs
 _LEFT, _SIZES = 0.5, (0.5, 2.0)
 _FEWEST = 30  # rows that decide
-
-
-@cache
-def airframes() -> dict[str, dict[Any, str]]:
-    """Return what numbers and words of autopilots stand for, as ``airframes.yaml`` states."""
-    found: dict[str, dict[Any, str]] = read_yaml(
-        MAPS / "recordings" / "airframes.yaml", "airframes"
-    )
-    return found
 
 
 @dataclass(frozen=True)
@@ -106,7 +93,7 @@ def more_rotors(
         moves = rows - rows.mean(axis=0)
         left = np.linalg.lstsq(moves[:, :4], moves[:, 4])[1]
         share = float(left[0] / np.sum(moves[:, 4] ** 2)) if len(left) else 0.0
-        is_motor = are_speeds or re.search(words()["motor_words"], name.lower())
+        is_motor = are_speeds or re.search(WORDS["motor_words"], name.lower())
         if (is_motor or share < _LEFT) and _SIZES[0] <= size <= _SIZES[1]:
             turning.append(name)
     if len(turning) == len(columns):

@@ -37,15 +37,14 @@ from ....runtime.compiled import compiled
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
-from ..channels import Samples
-from ..clocks import in_order
+from ..channels import Samples, in_order
 from ..flight_log import FlightLog
-from ..log_map import Commands, LogMap, shipped_map
+from ..log_map import Commands, LogMap, shipped_map, stated
 from ..mapped_log import recording_of
 from ..rotor_orders import ORDERS, Order, order_words
 from ..streams import MOST_VOLTS, Stream
 from ..table import Array
-from ..what_flew import PLUS, UNSTATED, WhatFlew, airframes, order_by_places, slots_of_motors
+from ..what_flew import PLUS, UNSTATED, WhatFlew, order_by_places, slots_of_motors
 
 Bytes = NDArray[np.uint8]
 Parameters = Mapping[str, float]
@@ -153,7 +152,7 @@ def _texts(messages: Messages, column: str) -> list[str]:
 
 def _what_flew(parameters: Parameters, messages: Messages) -> WhatFlew:
     """Return what a log states of its vehicle: by its texts, else by its parameters."""
-    known = airframes()
+    known = stated("airframes")
     for text in _texts(messages, "Message"):
         for begin, airframe in known["ardupilot_text"].items():
             if text.startswith(begin):
@@ -189,7 +188,7 @@ def _order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> tuple
     if kind == _PLUS and (found := order_by_places(PLUS, vehicle)) is not None:
         motors = ", ".join(map(str, found))
         return found, f"{name} {kind}, a plus: rotors 1, 2, 3, 4 of the vehicle are motors {motors}"
-    known = airframes()["ardupilot_order"]
+    known = stated("airframes")["ardupilot_order"]
     if kind not in known:
         what = f"{kind}, a plus," if kind == _PLUS else str(kind)
         raise InputError(

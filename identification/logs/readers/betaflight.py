@@ -23,7 +23,7 @@ serves the tests as a second opinion on whole logs without that encoding.
 """
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from itertools import zip_longest
 from pathlib import Path
 
@@ -33,8 +33,7 @@ from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
-from ..channels import Samples
-from ..clocks import check_piece
+from ..channels import Samples, check_piece
 from ..flight_log import FlightLog
 from ..log_map import shipped_map
 from ..mapped_log import recording_of
@@ -61,15 +60,58 @@ _HEADERS = re.compile(rb"(H [^\n]{0,20000}\n){0,2000}")
 def read(
     path: Path, vehicle: Vehicle | None = None, option: str = "", piece: int | None = None
 ) -> FlightLog:
-    """Read a blackbox; ``option``: number of the motors' magnet poles, for eRPM.
+    """Read a blackbox: the longest log in it, or that of the number ``piece``, from 1; ``option``:
+    number of the motors' magnet poles, for eRPM.
 
     Raises:
-        InputError: the file cannot be read, is no blackbox, is damaged from its start, or has no
-            motors or inertial sensors.
+        InputError: the file cannot be read, has no such log, is no blackbox, is damaged from its
+            start, or has no times, motors or inertial sensors.
     """
     _magnet_poles(path, option, "")  # a wrong option is said before a wrong file
+    data = read_bytes(path, WHAT, LIMITS.binary_log)
+    if not data.startswith(BEGINS):
+        raise InputError(
+            f"{path}: cannot be read as {WHAT}: it does not begin with {BEGINS.decode()!r}"
+        )
+    starts = [match.start() for match in re.finditer(re.escape(BEGINS), data)]
+    ends = [*starts[1:], len(data)]
+    check_piece(path, piece, len(starts))
+    longest = max(range(len(starts)), key=lambda i: ends[i] - starts[i])
+    chosen = longest if piece is None else piece - 1
+    block = _HEADERS.match(data, starts[chosen], ends[chosen])
+    begin = starts[chosen] if block is None else block.end()
+    if data[begin : begin + 2] == b"H ":
+        raise InputError(f"{path}: its headers do not end; expected frames behind them")
+    lines = data[starts[chosen] : begin].decode("ascii", "replace").split("\n")
+    pairs = (line.removeprefix("H ").partition(":") for line in lines)
+    headers = {key.strip(): value.strip() for key, _, value in pairs}
+    version = headers.get("Data version", "2")
+    if version != "2":
+        raise InputError(f"{path}: header Data version: {version[:20]!r}; expected 2")
+    names = headers.get("Field I name", "").split(",")
+    layout = _layout(path, headers, names)
     wanted = [*shipped_map("recordings/betaflight").wanted, *_MORE_MOTORS]
-    headers, fields, notes = read_blackbox(path, wanted, piece)
+    keep = [name for name in wanted if name in names]
+    if "time" not in keep:
+        raise InputError(f"{path}: no field time; found {', '.join(names[:20])}")
+    where = np.array([names.index(name) for name in keep], dtype=np.int64)
+    frames = np.frombuffer(data[: ends[chosen]], np.uint8)
+    most = min(LIMITS.table_rows, LIMITS.table_numbers // len(keep))
+    rows = np.empty((most + 1, len(keep)), np.int64)  # takes memory as it is filled
+    count, lost = decode(frames, begin, layout, where, rows)
+    check_count(path, count, most, "frames")
+    if count < 2:
+        raise InputError(f"{path}: {count} frame(s) that can be decoded; expected at least two")
+    rows = rows[:count]
+    notes = [f"blackbox of {headers.get('Firmware revision', 'an unknown firmware')[:60]}"]
+    if len(starts) > 1:
+        notes.append(
+            f"the file holds {len(starts)} logs; number {chosen + 1} was read"
+            + ("" if piece else ", the longest; --piece reads another")
+        )
+    if lost:
+        notes.append(f"{lost} frame(s) of {count + lost} could not be decoded and were left out")
+    fields = dict(zip(keep, rows.T.astype(np.float64), strict=True))
     return _log(path, "betaflight", fields, set(), headers, option, vehicle, notes)
 
 
@@ -219,65 +261,6 @@ def _one_g(t: Array, force: list[Array], headers: Mapping[str, str]) -> tuple[fl
         f"accelerometer: {counts:g} counts taken as 1 g, from its {middle:.4g} in the first "
         f"{_STANDING:g} s; no header says it"
     )
-
-
-def read_blackbox(
-    path: Path, wanted: Sequence[str], piece: int | None = None
-) -> tuple[dict[str, str], dict[str, Array], list[str]]:
-    """Return the headers of a file's longest log, its fields (N,) by name, and notes.
-
-    Args:
-        path: the file.
-        wanted: names of fields, ``time`` among them; those that the log lacks are left out.
-        piece: which of its logs is read, from 1; default: the longest.
-
-    Raises:
-        InputError: the file cannot be read, has no such log, is no blackbox, is damaged from its
-            start, or has no times.
-    """
-    data = read_bytes(path, WHAT, LIMITS.binary_log)
-    if not data.startswith(BEGINS):
-        raise InputError(
-            f"{path}: cannot be read as {WHAT}: it does not begin with {BEGINS.decode()!r}"
-        )
-    starts = [match.start() for match in re.finditer(re.escape(BEGINS), data)]
-    ends = [*starts[1:], len(data)]
-    check_piece(path, piece, len(starts))
-    longest = max(range(len(starts)), key=lambda i: ends[i] - starts[i])
-    chosen = longest if piece is None else piece - 1
-    block = _HEADERS.match(data, starts[chosen], ends[chosen])
-    begin = starts[chosen] if block is None else block.end()
-    if data[begin : begin + 2] == b"H ":
-        raise InputError(f"{path}: its headers do not end; expected frames behind them")
-    lines = data[starts[chosen] : begin].decode("ascii", "replace").split("\n")
-    pairs = (line.removeprefix("H ").partition(":") for line in lines)
-    headers = {key.strip(): value.strip() for key, _, value in pairs}
-    version = headers.get("Data version", "2")
-    if version != "2":
-        raise InputError(f"{path}: header Data version: {version[:20]!r}; expected 2")
-    names = headers.get("Field I name", "").split(",")
-    layout = _layout(path, headers, names)
-    keep = [name for name in wanted if name in names]
-    if "time" not in keep:
-        raise InputError(f"{path}: no field time; found {', '.join(names[:20])}")
-    where = np.array([names.index(name) for name in keep], dtype=np.int64)
-    frames = np.frombuffer(data[: ends[chosen]], np.uint8)
-    most = min(LIMITS.table_rows, LIMITS.table_numbers // len(keep))
-    rows = np.empty((most + 1, len(keep)), np.int64)  # takes memory as it is filled
-    count, lost = decode(frames, begin, layout, where, rows)
-    check_count(path, count, most, "frames")
-    if count < 2:
-        raise InputError(f"{path}: {count} frame(s) that can be decoded; expected at least two")
-    rows = rows[:count]
-    notes = [f"blackbox of {headers.get('Firmware revision', 'an unknown firmware')[:60]}"]
-    if len(starts) > 1:
-        notes.append(
-            f"the file holds {len(starts)} logs; number {chosen + 1} was read"
-            + ("" if piece else ", the longest; --piece reads another")
-        )
-    if lost:
-        notes.append(f"{lost} frame(s) of {count + lost} could not be decoded and were left out")
-    return headers, dict(zip(keep, rows.T.astype(np.float64), strict=True)), notes
 
 
 def whole_number(text: str, least: int, most: int) -> int | None:

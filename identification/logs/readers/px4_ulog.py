@@ -34,12 +34,12 @@ from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import check_regular, open_regular
 from ..channels import Samples
 from ..flight_log import FlightLog
-from ..log_map import LogMap, shipped_map
+from ..log_map import shipped_map, stated
 from ..mapped_log import recording_of
 from ..rotor_orders import ORDERS, Order
 from ..streams import Recording
 from ..table import Array, one_line
-from ..what_flew import PLUS, QUADROTOR, WhatFlew, airframes, order_by_places, slots_of_motors
+from ..what_flew import PLUS, QUADROTOR, WhatFlew, order_by_places, slots_of_motors
 
 Fields = Mapping[str, Array]  # (N,) of an instance of a topic, by name
 Parameters = Mapping[str, float]
@@ -113,7 +113,17 @@ def channels(
     outputs = outputs_of(path, topics.get("actuator_outputs", []), parameters)
     flown = replace(flown, outputs=outputs.words)
     order, order_note = motor_order(path, stated, vehicle)
-    log_map = with_motors(shipped_map("recordings/px4"), order, parameters, outputs)
+    log_map = shipped_map("recordings/px4").with_order(order)
+    motors, sent = log_map.ways("commands")
+    factor = min(max(parameters.get("THR_MDL_FAC", 0.0), 0.0), 1.0)
+    note = (
+        f"commands: actuator_outputs, x = 0 to 1 ({outputs.words}), gives relative thrust "
+        f"f x^2 + (1 - f) x with THR_MDL_FAC f = {factor:g}; motors 1 to 4 at outputs "
+        f"{', '.join(str(slot + 1) for slot in outputs.slots)}"
+    )
+    columns = tuple(f"output[{slot}]" for slot in outputs.slots)
+    sent = replace(sent, columns=columns, thrust_factor=factor, note=note)
+    log_map = log_map.with_ways({"commands": [motors, sent]})
     notes = [*log_map.notes, order_note]
     if is_damaged:
         notes.append("the file is damaged or was cut; what could be read of it was used")
@@ -310,7 +320,7 @@ def what_flew(parameters: Parameters, statuses: Sequence[Fields]) -> WhatFlew:
         parameters: as the log begins.
         statuses: of the topic vehicle_status.
     """
-    known = airframes()
+    known = stated("airframes")
     count, frame, kind, start = (
         int(parameters.get(name, 0))
         for name in ("CA_ROTOR_COUNT", "CA_AIRFRAME", "MAV_TYPE", "SYS_AUTOSTART")
@@ -356,20 +366,6 @@ def motor_order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> 
         )
     motors = ", ".join(map(str, order))
     return order, f"motors renumbered {whence}: rotors 1, 2, 3, 4 are motors {motors}"
-
-
-def with_motors(log_map: LogMap, order: Order, parameters: Parameters, outputs: Outputs) -> LogMap:
-    """Return the map with the order of the motors, and with the thrust curve of their outputs."""
-    factor = min(max(parameters.get("THR_MDL_FAC", 0.0), 0.0), 1.0)
-    motors, sent = log_map.ways("commands")
-    note = (
-        f"commands: actuator_outputs, x = 0 to 1 ({outputs.words}), gives relative thrust "
-        f"f x^2 + (1 - f) x with THR_MDL_FAC f = {factor:g}; motors 1 to 4 at outputs "
-        f"{', '.join(str(slot + 1) for slot in outputs.slots)}"
-    )
-    columns = tuple(f"output[{slot}]" for slot in outputs.slots)
-    sent = replace(sent, columns=columns, thrust_factor=factor, note=note)
-    return log_map.with_ways({"commands": [motors, sent]}).with_order(order)
 
 
 def outputs_of(path: Path, sent: Sequence[Fields], parameters: Parameters) -> Outputs:

@@ -5,7 +5,6 @@
 
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping
-from functools import cache
 from itertools import islice
 from operator import attrgetter
 from typing import Any
@@ -14,8 +13,7 @@ import numpy as np
 
 from ....runtime.errors import InputError, unknown_name
 from ....runtime.file_limits import LIMITS, check_count
-from ....runtime.yaml_file import read_yaml
-from ..log_map import MAPS, LogMap, parse_map
+from ..log_map import LogMap, parse_map, stated
 from ..table import Array
 from .px4_ulog import unified
 
@@ -82,7 +80,7 @@ def map_of(
     for section in lacks[:1]:
         why = refused.get(section) or f"{section}: {_missing(types, section, where)}"
         raise InputError(f"{source}: {why}")
-    is_ned = types.get(_topic_of(found.get("position")) or "") in stated()["ned"]
+    is_ned = types.get(_topic_of(found.get("position")) or "") in stated("ros")["ned"]
     clock: dict[str, Any] = {"time": {"column": "stamp", "unit": "ns"}}
     clock |= {"world": "ned", "body": "frd"} if is_ned else {}
     log_map = parse_map({**clock, **given, **found}, where)
@@ -108,8 +106,8 @@ def _usual(
     """
     if topic not in types:
         raise unknown_name("topic", topic, types, f"named in {where}")
-    kind, known = types[topic], stated()[section]
-    array = stated()["arrays"].get(kind) if section in MOTORS else None
+    kind, known = types[topic], stated("ros")[section]
+    array = stated("ros")["arrays"].get(kind) if section in MOTORS else None
     if array and "unit" not in said:
         units = "rad/s, rpm, Hz" if section == "rotors" else "normalised, us"
         raise InputError(
@@ -136,9 +134,9 @@ def _chosen(
     """
 
     def named_by(topic: str, words: str) -> bool:
-        return any(word in topic.lower() for word in stated()[words])
+        return any(word in topic.lower() for word in stated("ros")[words])
 
-    fitting = {*stated()[section], *(stated()["arrays"] if "unit" in said else ())}
+    fitting = {*stated("ros")[section], *(stated("ros")["arrays"] if "unit" in said else ())}
     several = sorted(topic for topic, kind in types.items() if kind in fitting)
     if section in ("position", "rotors"):
         flown = [topic for topic in several if not named_by(topic, "setpoint_words")]
@@ -165,8 +163,8 @@ def _missing(types: Mapping[str, str], section: str, where: str) -> str:
     """
     topics = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(types.items())) or "none"
     names = MOTORS if section == "rotors" else (section,)
-    known = dict.fromkeys(kind for name in names for kind in stated()[name])
-    arrays = sorted(topic for topic, kind in types.items() if kind in stated()["arrays"])
+    known = dict.fromkeys(kind for name in names for kind in stated("ros")[name])
+    arrays = sorted(topic for topic, kind in types.items() if kind in stated("ros")["arrays"])
     left_out = sorted(topic for topic, kind in types.items() if kind in known)
     found = "no topic of a type that fits"
     found = f"no topic but set-points by their names ({', '.join(left_out)})" if left_out else found
@@ -180,18 +178,11 @@ def _missing(types: Mapping[str, str], section: str, where: str) -> str:
     return f"{found}; expected {wanted}. The topics: {topics}"
 
 
-@cache
-def stated() -> dict[str, Any]:
-    """Return what ``maps/recordings/ros.yaml`` states."""
-    found: dict[str, Any] = read_yaml(MAPS / "recordings" / "ros.yaml", "a map of messages")
-    return found
-
-
 def definitions() -> list[dict[str, str]]:
     """Return the definitions of the types that rosbags does not know, in several variants: the
     newest of each comes first.
     """
-    known: dict[str, list[str]] = stated()["definitions"]
+    known: dict[str, list[str]] = stated("ros")["definitions"]
     return [
         {name: texts[min(variant, len(texts) - 1)] for name, texts in known.items()}
         for variant in range(max(map(len, known.values())))
@@ -219,7 +210,7 @@ class Fields:
     """
 
     def __init__(self, where: str, kind: str, wanted: Collection[str]) -> None:
-        self._where, self._kind, self._wanted = where, kind, wanted
+        self.where, self._kind, self._wanted = where, kind, wanted
         self._names: list[str] = []
         self._getters: list[Callable[[Any], Any]] = []
 
@@ -231,7 +222,7 @@ class Fields:
         """
         if not self._names:
             found = list(islice(_paths(message), LIMITS.log_fields + 1))
-            check_count(self._where, len(found), LIMITS.log_fields, "fields of a message")
+            check_count(self.where, len(found), LIMITS.log_fields, "fields of a message")
             arrays = set(map(array_of, self._wanted))
             is_px4 = self._kind.startswith(_PX4)
             if not is_px4 and not set(self._wanted) <= set(found):
@@ -261,7 +252,7 @@ class Fields:
     def _lack(self, wanted: Collection[str], found: Collection[str]) -> InputError:
         missing = [name for name in wanted if name not in found]
         return InputError(
-            f"{self._where}: no field {', '.join(missing)} in its {self._kind}; found "
+            f"{self.where}: no field {', '.join(missing)} in its {self._kind}; found "
             f"{', '.join(islice(found, _SHOWN)) or 'no number'}"
         )
 

@@ -35,7 +35,7 @@ import re
 import sqlite3
 from array import array
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
@@ -95,9 +95,7 @@ def read(
             wanted = dict.fromkeys(name for part in held.values() for name in part.named)
             fields = Fields(f"{path}: topic {topic}", types[topic], wanted)
             try:
-                times, columns, doubt = _decoded_topic(
-                    f"{path}: topic {topic}", fields, messages(topic)
-                )
+                times, columns, doubt = _decoded_topic(fields, messages(topic))
             except InputError as error:
                 if held.keys() & {*given, "position", "rotors"}:
                     raise
@@ -212,7 +210,7 @@ def _decoded(raw: Any, kind: str, stores: list[Any], ros1: bool) -> Any:
 
 
 def _decoded_topic(
-    where: str, fields: Fields, messages: Iterator[tuple[int, Any]]
+    fields: Fields, messages: Iterator[tuple[int, Any]]
 ) -> tuple[NDArray[np.int64], dict[str, Array], str]:
     """Return times (N,) in ns and columns (N,) of a topic by name, and what is wrong with its time
     stamps.
@@ -222,12 +220,12 @@ def _decoded_topic(
     """
     recorded, stamped, values = array("q"), array("q"), array("d")
     for index, (received, message) in enumerate(messages):
-        check_count(where, index + 1, LIMITS.table_rows, "messages")
+        check_count(fields.where, index + 1, LIMITS.table_rows, "messages")
         recorded.append(received)
         stamped.append(stamp(message))
         values.extend(fields.take(message))
     if not recorded:
-        raise InputError(f"{where} has no messages; expected at least two")
+        raise InputError(f"{fields.where} has no messages; expected at least two")
     columns = fields.columns(np.array(values).reshape(len(recorded), -1))
     received_at, sampled_at = np.array(recorded), np.array(stamped)
     if not np.any(sampled_at):
@@ -314,29 +312,23 @@ def check_bag_files(path: Path) -> None:
         files += [path / name for name in _LISTED.findall(text) if (path / name).exists()]
     for file in files:
         check_regular(file, "a file of a ROS 2 bag")
-        if file.suffix.lower() == ".db3":
-            _check_database(file)
-    if found := _WHOLE.search(text):
+        if file.suffix.lower() != ".db3":
+            continue
+        # a view or a computed column of a few bytes of SQL may give any number of rows of any size
+        found = []
+        with suppress(sqlite3.Error):  # the reader says what is wrong with it
+            uri = f"{file.resolve().as_uri()}?mode=ro&immutable=1"
+            with closing(sqlite3.connect(uri, uri=True)) as database:
+                query = "SELECT name, type, sql FROM sqlite_master WHERE type IN ('table', 'view')"
+                found = database.execute(query).fetchmany(_TABLES)
+        for name, kind, sql in found:
+            if kind == "view" or _COMPUTED.search(sql or "") or len(found) == _TABLES:
+                raise InputError(
+                    f"{file}: its {kind} {name!r} is computed; expected a ROS 2 bag, whose tables "
+                    "hold what was recorded"
+                )
+    if packed := _WHOLE.search(text):
         raise InputError(
-            f"{metadata}: compression_mode {found.group(1).lower()}: expected a bag that is not "
+            f"{metadata}: compression_mode {packed[1].lower()}: expected a bag that is not "
             "packed, or by chunks (MCAP); `ros2 bag convert` makes one"
         )
-
-
-def _check_database(path: Path) -> None:
-    """Raise InputError where a view or a computed column stands for a bag's tables: a few bytes of
-    SQL may give any number of rows of any size.
-    """
-    try:
-        uri = f"{path.resolve().as_uri()}?mode=ro&immutable=1"
-        with closing(sqlite3.connect(uri, uri=True)) as database:
-            query = "SELECT name, type, sql FROM sqlite_master WHERE type IN ('table', 'view')"
-            found = database.execute(query).fetchmany(_TABLES)
-    except sqlite3.Error:
-        return  # the reader says what is wrong with it
-    for name, kind, sql in found:
-        if kind == "view" or _COMPUTED.search(sql or "") or len(found) == _TABLES:
-            raise InputError(
-                f"{path}: its {kind} {name!r} is computed; expected a ROS 2 bag, whose tables hold "
-                f"what was recorded"
-            )
