@@ -12,7 +12,7 @@ which they were written.
 import math
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -39,13 +39,6 @@ class Samples:
     topic: str = ""  # of the message in which they stood, where a log has several
     table: Table | None = None  # in which they stand
     rows: Rows | None = None  # (N,) of it
-
-    @property
-    def beside(self) -> tuple[Sequence[str], Callable[[Sequence[str]], Mapping[str, Array]]]:
-        """The names of all columns of their table or message, and what reads some of these."""
-        if self.table is not None:
-            return self.table.numeric or self.table.header, self.table.read
-        return list(self.columns), lambda names: {name: self.columns[name] for name in names}
 
     def values(self, part: Columns) -> Array:
         """Return a section's columns (N, k), with their signs and scale; a constant such as ``=0``
@@ -81,7 +74,7 @@ class Samples:
 def scaled(part: Columns, values: Array) -> Array:
     """Return what columns (N, k) hold, with the section's signs and scale."""
     signs = np.array(part.signs, dtype=np.float64) if part.signs else 1.0
-    return np.asarray(values * signs * part.scale)
+    return values * signs * part.scale
 
 
 def in_kit_units(log_map: LogMap, section: str, part: Columns, values: Array) -> Array:
@@ -90,15 +83,15 @@ def in_kit_units(log_map: LogMap, section: str, part: Columns, values: Array) ->
     """
     unit = UNITS.get(section, {}).get(part.unit, 1.0)
     if isinstance(part, Rotors):
-        return np.asarray(values[:, [m - 1 for m in part.order]] * (unit / part.pole_pairs))
+        return values[:, [m - 1 for m in part.order]] * (unit / part.pole_pairs)
     if isinstance(part, Commands):
         assert part.range is not None
         low, high = part.range
-        return np.asarray((values[:, [m - 1 for m in part.order]] - low) / (high - low))
+        return (values[:, [m - 1 for m in part.order]] - low) / (high - low)
     if isinstance(part, Battery):
-        return np.asarray(values * unit * part.cells)
+        return values * unit * part.cells
     if isinstance(part, Sensor):
-        return np.asarray(values * unit @ BODY_TURNS[part.body or log_map.body].T)
+        return values * unit @ BODY_TURNS[part.body or log_map.body].T
     return values if section == "wrench" else values * unit @ WORLD_TURNS[log_map.world].T
 
 

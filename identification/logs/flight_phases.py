@@ -27,7 +27,7 @@ def flying(total: Array) -> Mask:
     """Return at which samples (N,) the rotors carry a vehicle, by their thrust (N,) in any unit:
     above half of the level that a tenth of the samples exceed.
     """
-    return np.asarray(total > 0.5 * np.quantile(total, 0.9))
+    return total > 0.5 * np.quantile(total, 0.9)
 
 
 def usual_thrust(total: Array) -> float:
@@ -42,7 +42,7 @@ def carrying(total: Array) -> Mask:
     """Return at which samples (N,) the rotors carry a vehicle that hovers most of the time, by
     their thrust (N,) in any unit: above half of the usual one.
     """
-    return np.asarray(total > 0.5 * usual_thrust(total))
+    return total > 0.5 * usual_thrust(total)
 
 
 def flew(log: FlightLog) -> tuple[str, str]:

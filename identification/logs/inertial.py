@@ -180,7 +180,7 @@ def _force_shares(
         lead = likelihood([in_world] * 2) - likelihood([in_body] * 2)
         if in_world <= EVIDENCE.good and lead >= OTHER:
             up[2] = gravity if np.median(measured[inside, 2]) < 0.5 * gravity else 0.0
-            turned = measured = np.asarray(body.inv().apply(measured + up))
+            turned = measured = body.inv().apply(measured + up)
     up[2] = gravity
     needed += up
     return [

@@ -52,7 +52,6 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-import numpy as np
 from pydantic import (
     AfterValidator,
     BeforeValidator,
@@ -179,7 +178,7 @@ class TimeColumn:
         raw = columns[self.column]
         if not self.nanoseconds:
             return raw
-        return np.asarray(raw + 1e-9 / UNITS["time"][self.unit] * columns[self.nanoseconds])
+        return raw + 1e-9 / UNITS["time"][self.unit] * columns[self.nanoseconds]
 
 
 @dataclass(frozen=True)

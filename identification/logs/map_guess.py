@@ -399,8 +399,7 @@ class _Guessing:
         values = self.values(part)
         power = self.numbers.elasticity(values)
         kind, unit, sure, why = motor_unit(group, values, self.vehicle, power)
-        there = self.table.numeric or self.table.header
-        if more := more_rotors(group.columns, there, self.table.read):
+        if more := more_rotors(group.columns, self.table):
             self.further[part] = more
             return
         if kind in self.sections:

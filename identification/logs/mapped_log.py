@@ -129,7 +129,7 @@ def recording_of(
         samples = sources[name]
         if isinstance(part, Rotors | Commands) and not flown.airframe:
             are_speeds = isinstance(part, Rotors) and samples.table is None
-            if more := more_rotors(part.columns, *samples.beside, are_speeds):
+            if more := more_rotors(part.columns, samples.table or samples.columns, are_speeds):
                 raise InputError(f"{path}: {f'{part.topic}: ' if part.topic else ''}{more}")
         if name == "position":
             streams[name], words = _pose(path, log_map, samples, sources.get("attitude"))

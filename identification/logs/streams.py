@@ -351,7 +351,7 @@ def between_samples(t: Array, values: Array, rate: float) -> Array:
     """
     beats = np.arange(t[0], t[-1], 1.0 / rate)
     off = 0.5 * np.diff(resampled(beats, t, values), n=2, axis=0)
-    return np.asarray(np.sqrt(np.mean(np.square(off), axis=0))) if len(off) else np.zeros(4)
+    return np.sqrt(np.mean(np.square(off), axis=0)) if len(off) else np.zeros(4)
 
 
 def _corners(t: Array, values: Array) -> Rows:

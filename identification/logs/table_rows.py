@@ -213,6 +213,6 @@ def _longest_gap(samples: Samples, name: str, column: Array) -> float:
     words = (
         f"it has no value for {gap:.3g} s, and gaps of up to {limit:.3g} s are interpolated over"
     )
-    bad: Mask = np.asarray(is_long & (np.arange(len(t)) == first))
+    bad: Mask = is_long & (np.arange(len(t)) == first)
     _refuse(samples, name, column, bad, f"{_FINITE}: {words}")
     return float(steps.max(initial=0.0))

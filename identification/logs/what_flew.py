@@ -5,7 +5,7 @@ one gate refuses what is none, before four of six motors are taken for a quadrot
 """
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 
@@ -15,7 +15,7 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from .column_names import WORDS
 from .rotor_orders import Order
-from .table import Array, finite_rows
+from .table import Array, Table, finite_rows
 
 QUADROTOR = "a quadrotor"
 _ROTORS = {QUADROTOR: 4, "a tricopter": 3, "a hexarotor": 6, "an octorotor": 8}
@@ -64,10 +64,7 @@ UNSTATED = WhatFlew()
 
 
 def more_rotors(
-    columns: Sequence[str],
-    others: Sequence[str],
-    read: Callable[[Sequence[str]], Mapping[str, Array]],
-    are_speeds: bool = False,
+    columns: Sequence[str], source: Table | Mapping[str, Array], are_speeds: bool = False
 ) -> str:
     """Return in words that a vehicle has more than four rotors; nothing where it has not: columns
     go on with the numbers of four motors', and turn as they do. An output that is not a motor's by
@@ -76,16 +73,17 @@ def more_rotors(
 
     Args:
         columns: the four.
-        others: the columns that are there.
-        read: returns columns (N,) by their names.
+        source: all columns (N,) that are there, by their names.
         are_speeds: the four are measured speeds, which no servo has.
 
     Raises:
         InputError: a table cannot be read.
     """
     turning = [*columns]
+    others = source.numeric or source.header if isinstance(source, Table) else [*source]
     for name in _numbered_on(columns, others):
-        rows = np.column_stack(list(read([*columns, name]).values()))
+        found = source.read([*columns, name]) if isinstance(source, Table) else source
+        rows = np.column_stack([found[column] for column in (*columns, name)])
         rows = rows[finite_rows(rows)]
         if len(rows) < _FEWEST or np.ptp(rows[:, 4]) == 0.0:
             continue

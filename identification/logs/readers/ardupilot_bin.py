@@ -122,8 +122,8 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
 def _times(messages: Messages) -> Array:
     """Return times (N,) in s of the vehicle's clock."""
     if "TimeUS" in messages:
-        return np.asarray(1e-6 * messages["TimeUS"])
-    return np.asarray(1e-3 * messages.get("TimeMS", np.empty(0)))
+        return 1e-6 * messages["TimeUS"]
+    return 1e-3 * messages.get("TimeMS", np.empty(0))
 
 
 def _samples(name: str, messages: Messages, columns: set[str]) -> Samples | None:
