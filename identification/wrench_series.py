@@ -33,7 +33,7 @@ from ..runtime.errors import InputError
 from .inertial_wrench import inertial_wrench
 from .logs.flight_log import FlightLog
 from .logs.screening import screen_log
-from .logs.source_rates import MOTOR_RATES, between_samples
+from .logs.streams import MOTOR_RATES, between_samples
 from .logs.tables import write_csv
 from .motion.inertial_signals import reads_imu
 

@@ -8,37 +8,20 @@ Names are read as people write them: ``pos_x``, ``Position.X [mm]``, ``qw``, ``q
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 from ...runtime.yaml_file import read_yaml
 
-
-@cache
-def words() -> dict[str, Any]:
-    """Return the words of ``column_words.yaml``."""
-    found: dict[str, Any] = read_yaml(Path(__file__).with_name("column_words.yaml"), "words")
-    return found
-
-
-@cache
-def _units() -> dict[str, str]:
-    """Return the units by their spellings; nothing for one that no map uses."""
-    return {word: unit for unit, spellings in words()["units"].items() for word in spellings}
-
-
-def unit_spelled(text: str) -> str:
-    """Return the unit that a text is a spelling of, or nothing."""
-    return _units().get(text, "") or str(words()["unit_words"].get(text, ""))
-
-
-@cache
-def _ending() -> re.Pattern[str]:
-    plain = [word for word, unit in _units().items() if unit and re.fullmatch("[a-z0-9_]+", word)]
-    return re.compile(rf"[_ ]({'|'.join(plain)})$", re.IGNORECASE)
-
-
+WORDS: dict[str, Any] = read_yaml(Path(__file__).with_name("column_words.yaml"), "words")
+# by their spellings; nothing for one that no map uses
+_UNITS: dict[str, str] = {
+    word: unit for unit, spellings in WORDS["units"].items() for word in spellings
+}
+_PLAIN = "|".join(
+    word for word, unit in _UNITS.items() if unit and re.fullmatch(r"\w+", word, re.A)
+)
+_ENDING = re.compile(rf"[_ ]({_PLAIN})$", re.IGNORECASE)
 _BRACKETS = re.compile(r"\s*[\[(]\s*([^\[\]()\d][^\[\]()]*?)\s*[\])]\s*$")
 
 
@@ -49,6 +32,11 @@ class Name:
     column: str
     base: str  # lower case, without its unit, words joined by underscores
     unit: str = ""
+
+
+def unit_spelled(text: str) -> str:
+    """Return the unit that a text is a spelling of, or nothing."""
+    return _UNITS.get(text, "") or str(WORDS["unit_words"].get(text, ""))
 
 
 @dataclass(frozen=True)
@@ -71,12 +59,12 @@ def take_apart(header: Sequence[str], units: Sequence[str] = ()) -> list[Name]:
     out = []
     for i, column in enumerate(header):
         text, unit = column.strip(), ""
-        found = _BRACKETS.search(text) or _ending().search(text)
+        found = _BRACKETS.search(text) or _ENDING.search(text)
         if found and found.start() > 0:
-            unit = _units().get(found[1].lower(), "")
+            unit = _UNITS.get(found[1].lower(), "")
             text = text[: found.start()]
         if not unit and i < len(units):
-            unit = _units().get(_bare(units[i]), "")
+            unit = _UNITS.get(_bare(units[i]), "")
         base = re.sub(r"[^0-9a-zA-Z]+", "_", text).strip("_").lower()
         base = re.sub(r"(?<!\d)0+(\d)$", r"\1", base)  # q.00 is q.0
         out.append(Name(column, base or column.lower(), unit))
@@ -85,7 +73,7 @@ def take_apart(header: Sequence[str], units: Sequence[str] = ()) -> list[Name]:
 
 def is_unit(text: str) -> bool:
     """Return whether a field is a unit, as one stands in a line of units."""
-    return _bare(text) in _units()
+    return _bare(text) in _UNITS
 
 
 def _bare(text: str) -> str:
@@ -124,8 +112,8 @@ def groups_of(names: Iterable[Name], endings: Sequence[str]) -> list[Group]:
             group = Group(tuple(name.column for name in named), key, unit, tuple(endings))
             if group not in out:
                 out.append(group)
-    wanted = words()["not_measured"]
-    wanted += "" if endings[0].isdigit() else f"|{words()['sticks']}"
+    wanted = WORDS["not_measured"]
+    wanted += "" if endings[0].isdigit() else f"|{WORDS['sticks']}"
     return [group for group in out if not re.search(wanted, group.key)]
 
 
@@ -133,17 +121,7 @@ def named_alone(names: Sequence[Name], part: str) -> list[Name]:
     """Return the names that speak for a part of one column, the likeliest first: the time, or the
     battery's voltage.
     """
-    known = words()[part]
+    known = WORDS[part]
     whole = [name for word in known for name in names if name.base == word]
     tails = [word if len(word) > 3 else f"_{word}" for word in known]
     return [*whole, *(name for tail in tails for name in names if name.base.endswith(tail))]
-
-
-def side_by_side(names: Sequence[Name], width: int) -> list[Group]:
-    """Return the groups of ``width`` columns that stand beside one another."""
-    wanted = re.compile(words()["not_measured"])
-    measured = [name for name in names if not wanted.search(name.base)]
-    return [
-        Group(tuple(name.column for name in measured[i : i + width]), "")
-        for i in range(len(measured) - width + 1)
-    ]

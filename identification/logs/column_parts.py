@@ -10,14 +10,13 @@ whose names say nothing are looked at by threes and fours that stand side by sid
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from ..motion.smoothing import resampled, second_difference
-from .column_names import Group, Name, groups_of, named_alone, side_by_side, words
+from .column_names import WORDS, Group, Name, groups_of, named_alone
 from .magnitudes import likely_unit
-from .table import Array
+from .table import Array, finite_rows
 
 _FOURS = (("1", "2", "3", "4"), ("0", "1", "2", "3"))
 _TRIPLES = (("x", "y", "z"), ("roll", "pitch", "yaw"))  # of which no column is another group's
@@ -61,22 +60,21 @@ class Numbers:
         order = np.argsort(t, kind="stable")[: int(np.isfinite(t).sum())]
         self.order = order[max(0, (len(order) - PARTS.rows) // 2) :][: PARTS.rows]
         self.t = t[self.order]
+        count = min(PARTS.samples, len(self.t))
+        # times (n,) in s at which motors are compared
+        self.clock = self.t[np.linspace(0, len(self.t) - 1, count).astype(int)]
         self.data = {name: x for name, x in data.items() if np.isfinite(x[self.order]).any()}
         self._rows: dict[tuple[str, ...], tuple[Array, Array]] = {}
-        self._attitude = np.empty(0), np.empty((0, 4))  # times (n,) and quaternions (n, 4)
+        self.attitude: Sequence[
+            str
+        ] = ()  # a quaternion, whose tilt a position's acceleration follows
         self.felt: list[Array] = []  # what may be the specific force, at ``self.clock``
-
-    @cached_property
-    def clock(self) -> Array:
-        """Times (n,) in s at which motors are compared."""
-        count = min(PARTS.samples, len(self.t))
-        return np.asarray(self.t[np.linspace(0, len(self.t) - 1, count).astype(int)])
 
     def rows(self, columns: Sequence[str]) -> tuple[Array, Array]:
         """Return the times (n,) and values (n, k) of the rows in which columns are all there."""
         if (key := tuple(columns)) not in self._rows:
             values = np.column_stack([self.data[name][self.order] for name in columns])
-            there = np.isfinite(values).all(axis=1)
+            there = finite_rows(values)
             self._rows[key] = self.t[there], values[there]
         return self._rows[key]
 
@@ -111,12 +109,6 @@ class Numbers:
         is_one = np.quantile(off, 0.98) < PARTS.length[1]
         return (1.0 if is_one else -np.inf), "their length is 1"
 
-    def take_attitude(self, columns: Sequence[str]) -> None:
-        """Keep a quaternion, whose tilt a position's acceleration follows."""
-        t, q = self.rows(columns)
-        step = max(1, len(t) // PARTS.samples)
-        self._attitude = t[::step], q[::step]
-
     def gravity(self, columns: Sequence[str]) -> tuple[float, str]:
         """Return 1 where three columns have the size of gravity, or less where it does not lie
         along the third.
@@ -133,7 +125,10 @@ class Numbers:
         """Return how the second difference of two of three columns follows the tilt, at most 1; 0
         where it does not.
         """
-        times, attitude = self._attitude
+        if not self.attitude:
+            return 0.0, ""
+        every = slice(None, None, max(1, len(self.rows(self.attitude)[0]) // PARTS.samples))
+        times, attitude = (x[every] for x in self.rows(self.attitude))
         if min(len(times), len(self.rows(columns)[0])) < PARTS.fewest:
             return 0.0, ""
         force, best = second_difference(times, PARTS.window, *self.rows(columns)).T, 0.0
@@ -195,7 +190,7 @@ def _named(group: Group, part: str = "") -> bool:
     """Return whether the names of a group speak for a part, but ``part``."""
     return any(
         re.fullmatch(word, group.key)
-        for other, ways in words()["parts"].items()
+        for other, ways in WORDS["parts"].items()
         for way in ways
         if other != part and list(group.endings) in way["endings"]
         for word in way["words"]
@@ -204,7 +199,7 @@ def _named(group: Group, part: str = "") -> bool:
 
 def named_columns(names: Sequence[Name]) -> set[str]:
     """Return the columns whose names speak for a part."""
-    endings = [e for ways in words()["parts"].values() for way in ways for e in way["endings"]]
+    endings = [e for ways in WORDS["parts"].values() for way in ways for e in way["endings"]]
     groups = [group for ending in endings for group in groups_of(names, ending) if _named(group)]
     alone = [name.column for part in ("time", "battery") for name in named_alone(names, part)]
     return {*alone, *(column for group in groups for column in group.columns)}
@@ -230,7 +225,7 @@ def candidates(
     fours = (group for ending in _FOURS for group in groups_of(names, ending))
     commanded = part == "motors" and any(_named(group, part) for group in fours)
     ways: list[tuple[Group, float, str]] = []
-    for number, way in enumerate(words()["parts"][part]):
+    for number, way in enumerate(WORDS["parts"][part]):
         for group in (group for endings in way["endings"] for group in groups_of(names, endings)):
             places = (i for i, word in enumerate(way["words"]) if re.fullmatch(word, group.key))
             if (i := next(places, None)) is not None:
@@ -242,11 +237,11 @@ def candidates(
                 ways.append((group, -1.0, "their names go together"))
             named |= set(group.columns)
     if part != "commands" and not commanded:
-        loose = [name for name in names if name.column not in named and numbers.varies(name.column)]
-        ways += [
-            (group, 0.0, "")
-            for group in side_by_side(loose, 4 if part in ("attitude", "motors") else 3)
-        ]
+        wanted, width = WORDS["not_measured"], 4 if part in ("attitude", "motors") else 3
+        loose = [n for n in names if n.column not in named and numbers.varies(n.column)]
+        measured = tuple(name.column for name in loose if not re.search(wanted, name.base))
+        for i in range(len(measured) - width + 1):  # those that stand beside one another
+            ways.append((Group(measured[i : i + width], ""), 0.0, ""))
     found: dict[tuple[str, ...], Candidate] = {}
     for group, score, why in ways:
         there = len(numbers.rows(group.columns)[0]) > 0

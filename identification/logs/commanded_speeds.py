@@ -75,12 +75,33 @@ def _speeds(
             "the motors' lag"
         ]
     if model.thrust:
-        return _by_stated_thrust(command, vehicle, model)
+        low, high = model.range or (0.0, 1.0)
+        reference = vehicle.voltage_ref if vehicle.voltage_ref > 0.0 else model.full_voltage
+        counts = low + command * (high - low)
+        thrust = np.polynomial.polynomial.polyval(
+            counts * (reference / model.full_voltage), model.thrust
+        )
+        source = f" ({model.thrust_source})" if model.thrust_source else ""
+        notes = [
+            f"thrust model: no rotor speeds in the log; a motor is assumed to give "
+            f"{_polynomial(model.thrust)} N{source} at "
+            f"u = command * {reference:g} V / {model.full_voltage:g} V, and rotor speeds are "
+            f"sqrt(thrust / k) with the k of {vehicle.name}, at {reference:g} V whatever the "
+            "battery's voltage. A constant factor on thrust and the mass cannot be found from this "
+            "log"
+        ]
+        saturated = float(np.mean(command.max(axis=1) >= _SATURATED))
+        if saturated > 0.0:
+            notes.append(f"a motor is at full command in {100.0 * saturated:.1f} % of the samples")
+        return np.sqrt(np.where(command > 0.0, np.maximum(thrust, 0.0), 0.0) / vehicle.k), notes
     least, most = model.thrust_span
     share = np.clip((command - least) / (most - least), 0.0, None)
     relative = model.thrust_factor * np.square(share) + (1.0 - model.thrust_factor) * share
     total = relative.sum(axis=1)
-    felt = _felt(log)
+    x, felt = log.accelerometer, None
+    if x is not None:  # beside a pose, one whose size is not usual in flight tells nothing
+        usual = within(float(np.nanmedian(np.linalg.norm(x, axis=1))), _FELT)
+        felt = x[:, 2] if usual or not log.has_pose else None
     where = "a pose" if felt is None else "an accelerometer"
     if felt is None and not log.has_pose:
         return None, [
@@ -97,35 +118,17 @@ def _speeds(
         else f"the thrust in flight is, on the median, the mass of {vehicle.name} "
         f"({vehicle.mass:.4g} kg) times the accelerometer along the rotors' axis"
     )
+    factor, a = model.thrust_factor, "u" if (least, most) == (0.0, 1.0) else "a"
+    assumed = {0.0: a, 1.0: f"{a}^2"}.get(factor, f"{factor:g} {a}^2 + {1.0 - factor:.4g} {a}")
+    if a == "a":
+        assumed += f" with a = (u - {least:g}) / {most - least:g}"
     return np.sqrt(scale * relative / vehicle.k), [
         "thrust model: no rotor speeds in the log; the relative thrust of a motor command u is "
-        f"assumed to be {_words(model)}, and its unknown scale is set so that {balance}: "
+        f"assumed to be {assumed}, and its unknown scale is set so that {balance}: "
         f"{scale:.4g} N a motor at full command. Mass or a factor on thrust cannot be found from "
         "this log, nor a thrust curve or the battery's sag; rotor speeds are sqrt(thrust / k) of "
         "commands, without the motors' lag. State motor_curve in the vehicle file to mend that"
     ]
-
-
-def _by_stated_thrust(command: Array, vehicle: Vehicle, model: Commands) -> tuple[Array, list[str]]:
-    """Return the rotor speeds of commands (N, 4) by the thrust that a map states, and notes."""
-    low, high = model.range or (0.0, 1.0)
-    reference = vehicle.voltage_ref if vehicle.voltage_ref > 0.0 else model.full_voltage
-    counts = low + command * (high - low)
-    thrust = np.polynomial.polynomial.polyval(
-        counts * (reference / model.full_voltage), model.thrust
-    )
-    source = f" ({model.thrust_source})" if model.thrust_source else ""
-    notes = [
-        f"thrust model: no rotor speeds in the log; a motor is assumed to give "
-        f"{_polynomial(model.thrust)} N{source} at "
-        f"u = command * {reference:g} V / {model.full_voltage:g} V, and rotor speeds are "
-        f"sqrt(thrust / k) with the k of {vehicle.name}, at {reference:g} V whatever the "
-        "battery's voltage. A constant factor on thrust and the mass cannot be found from this log"
-    ]
-    saturated = float(np.mean(command.max(axis=1) >= _SATURATED))
-    if saturated > 0.0:
-        notes.append(f"a motor is at full command in {100.0 * saturated:.1f} % of the samples")
-    return np.sqrt(np.where(command > 0.0, np.maximum(thrust, 0.0), 0.0) / vehicle.k), notes
 
 
 def speeds_of_wrench(wrench: Array, vehicle: Vehicle) -> tuple[Array, list[str]]:
@@ -152,23 +155,6 @@ def _polynomial(coefficients: Sequence[float]) -> str:
     """Return a polynomial of u in words, by the coefficients of its powers 0, 1, 2 ..."""
     powers = ("", " u", *(f" u^{i}" for i in range(2, len(coefficients))))
     return " + ".join(f"{c:.4g}{u}" for c, u in zip(coefficients, powers, strict=False) if c)
-
-
-def _words(model: Commands) -> str:
-    least, most = model.thrust_span
-    factor, a = model.thrust_factor, "u" if (least, most) == (0.0, 1.0) else "a"
-    words = f"{factor:g} {a}^2 + {1.0 - factor:.4g} {a}"
-    words = {0.0: a, 1.0: f"{a}^2"}.get(factor, words)
-    return words if a == "u" else f"{words} with a = (u - {least:g}) / {most - least:g}"
-
-
-def _felt(log: FlightLog) -> Array | None:
-    """Return the accelerometer's readings (N,) in m/s2 along the rotors' axis, NaN where there is
-    none; None where it has none, or a pose is there and its size is not usual in flight.
-    """
-    x = log.accelerometer
-    usual = x is not None and within(float(np.nanmedian(np.linalg.norm(x, axis=1))), _FELT)
-    return x[:, 2] if x is not None and (usual or not log.has_pose) else None
 
 
 def _scale(log: FlightLog, total: Array, felt: Array | None, vehicle: Vehicle) -> float | None:

@@ -22,6 +22,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.fft import next_fast_len
 
 from ...dynamics.vehicle import Vehicle
@@ -38,7 +39,7 @@ from .flight_log import FlightLog
 from .flight_phases import carrying
 from .log_map import UNITS
 from .readings import DECLARED, OFFSET, Reading, as_written, log_readings
-from .table import Array, Rows
+from .table import Array, Rows, finite_rows, median_step
 
 
 @dataclass(frozen=True)
@@ -86,20 +87,22 @@ _G = 9.81
 _SIDES = np.array([[1.0, 1.0, -1.0, -1.0], [-1.0, 1.0, 1.0, -1.0]])
 
 
-def likelihood(shares: Sequence[float]) -> float:
+def likelihood(left: Sequence[float]) -> float:
     """Return the log-likelihood, up to a constant, of shares of one component each."""
-    bounded = (min(max(x, EVIDENCE.least_share), EVIDENCE.most_share) for x in shares)
+    bounded = (min(max(x, EVIDENCE.least_share), EVIDENCE.most_share) for x in left)
     return -0.5 * EVIDENCE.samples * sum(map(math.log, bounded))
 
 
-def share(total: float, power: float, cross: float, gain: tuple[float, float]) -> float:
-    """Return the share of a variance ``total`` that a signal of variance ``power`` and covariance
-    ``cross``, times a gain in range, leaves.
+def shares(total: Array, power: Array, cross: Array, gain: ArrayLike) -> Array:
+    """Return the shares of variances ``total`` (...) that signals of variance ``power`` and
+    covariance ``cross`` leave, times a gain in range: ``gain`` (2, ...).
     """
-    if not (total > 0.0 and power > 0.0):
-        return 1.0
-    factor = min(max(cross / power, gain[0]), gain[1])
-    return float(min(1.0 - factor * (2.0 * cross - factor * power) / total, EVIDENCE.most_share))
+    with np.errstate(divide="ignore", invalid="ignore"):  # of a variance of zero all is left
+        factor = np.clip(cross / power, *np.asarray(gain))
+        left = np.minimum(
+            1.0 - factor * (2.0 * cross - factor * power) / total, EVIDENCE.most_share
+        )
+    return np.where((total > 0.0) & (power > 0.0), left, 1.0)
 
 
 @dataclass(frozen=True)
@@ -132,7 +135,7 @@ class _Piece:
         """
         inside = slice(self.rows[0], self.rows[-1] + 1)
         x, at = values[inside], t[inside]
-        there = np.isfinite(x).all(axis=1) & np.isfinite(at)
+        there = finite_rows(x) & np.isfinite(at)
         if not there.any():
             return np.full((len(self.t), x.shape[1]), np.nan)
         return resampled(self.t, at[there], x[there])
@@ -182,8 +185,11 @@ class Evidence:
             most = EVIDENCE.most_thrust * float(np.nanquantile(thrusts, 0.99))
             self._thrusts = np.minimum(thrusts, most)
         moving = [x for x in (position, attitude, gyro) if x is not None]
-        there = np.isfinite(t) & np.all([np.isfinite(x).all(axis=1) for x in moving], axis=0)
+        there = np.isfinite(t) & np.all([finite_rows(x) for x in moving], axis=0)
         self._pieces = self._cut(np.flatnonzero(there))
+        self.has_pose = attitude is not None
+        # whether the flight is long enough to decide something
+        self.enough = sum(len(p.compared) for p in self._pieces) >= EVIDENCE.fewest
         self._motion, self._delayed = lru_cache(self._moving), lru_cache(2)(self._pushes)
         self._moved = lru_cache(2)(self._balances)
 
@@ -204,7 +210,7 @@ class Evidence:
         """Return the pieces in which the motion is known, and of each which samples fly."""
         if len(rows) < 2:
             return []
-        step = float(np.median(np.diff(self._t[rows])))
+        step = median_step(self._t[rows])
         period = max(step, EVIDENCE.period)
         count = len(rows) * step * EVIDENCE.rate_hz
         every = np.ceil(count / EVIDENCE.most) / (EVIDENCE.rate_hz * period)
@@ -227,16 +233,6 @@ class Evidence:
             replace(p, compared=p.compared[x[p.compared]])
             for p, x in zip(pieces, aloft, strict=True)
         ]
-
-    @property
-    def has_pose(self) -> bool:
-        """Whether the motion is that of a pose."""
-        return self._attitude is not None
-
-    @property
-    def enough(self) -> bool:
-        """Whether the flight is long enough to decide something."""
-        return sum(len(p.compared) for p in self._pieces) >= EVIDENCE.fewest
 
     def _compared(self, values: Callable[[_Piece], Array]) -> Array:
         """Return values on the pieces' clocks at the samples compared."""
@@ -267,23 +263,21 @@ class Evidence:
         gravity.
         """
         thrusts = [p.even(self._t, self._thrusts) for p in self._pieces]
-        totals = np.concatenate([(x @ self._k)[p.compared] for x, p in self._each(thrusts)])
+        each = list(zip(thrusts, self._pieces, strict=True))
+        totals = np.concatenate([(x @ self._k)[p.compared] for x, p in each])
         scale = _G / max(float(np.median(totals)), 1e-300)
         out = []
-        for x, p in self._each(thrusts):
+        for x, p in each:
             total = scale * (x @ self._k)
             out.append(np.column_stack([p.band(x).reshape(-1, 8), p.slow(total), total]))
         return out
-
-    def _each(self, values: list[Array]) -> Iterator[tuple[Array, _Piece]]:
-        return zip(values, self._pieces, strict=True)
 
     def _pushes(self, *delays: float) -> tuple[Array, Array]:
         """Return which samples compared less each delay (d, n) lie within their piece (1, or 0),
         and the first thrusts (d, 9, n) of ``_driving`` there less their means; zero elsewhere.
         """
         there, out = [], []
-        for x, p in self._each(self._driving):
+        for x, p in zip(self._driving, self._pieces, strict=True):
             at = p.compared - np.array(delays)[:, None] / p.period
             row = np.clip(np.floor(at).astype(int), 0, len(x) - 2)
             part = (at - row)[..., None]
@@ -318,7 +312,7 @@ class Evidence:
         """
         axes, turns = [], []
         turned = self._turned(Reading(*attitude))
-        for (thrusts, p), (matrices, w) in zip(self._each(self._driving), turned, strict=True):
+        for p, thrusts, (matrices, w) in zip(self._pieces, self._driving, turned, strict=True):
             axes.append(p.slow(thrusts[:, 9:] * matrices.reshape(-1, 9))[p.compared])
             products = np.einsum("ni,nj->nij", w, w).reshape(-1, 9)
             columns = np.column_stack([w, derivative(w, p.period), products])
@@ -355,13 +349,12 @@ class Evidence:
         force = self._acceleration @ frames.position.T * UNITS["position"][reading.length]
         force += np.array([0.0, 0.0, _G])
         needed, given = (np.ravel(x[:, :2] - x[:, :2].mean(axis=0)) for x in (force, push))
-        variances = float(needed @ needed), float(given @ given), float(needed @ given)
         mean, size = push.mean(axis=0), np.linalg.norm(push, axis=1)
         along = np.sum(force * push, axis=1) / np.maximum(size, 1e-9)
         cost = EVIDENCE.fallen * (mean[2] <= EVIDENCE.good * np.linalg.norm(mean))
         cost += EVIDENCE.below * ((frames.position @ self._middle)[2] < 0.0)
-        left = share(*variances, EVIDENCE.force_gain)
-        return left, float(cost), self._needed(along, reading)
+        left = shares(needed @ needed, given @ given, needed @ given, EVIDENCE.force_gain)
+        return float(left), float(cost), self._needed(along, reading)
 
     def fit(self, reading: Reading, torques: bool = True) -> Fit:
         """Return how well a reading explains the flight; without torques, by forces alone."""
@@ -377,20 +370,14 @@ class Evidence:
         delays = EVIDENCE.delays if torques else (0.0,)
         there, thrusts = self._delayed(*delays)
         given = rows @ thrusts
-        products = zip(
+        left = shares(
             there @ np.square(needed).T,
             np.sum(given * given, axis=2),
             np.sum(given * needed, axis=2),
-            there.sum(axis=1) >= EVIDENCE.fewest,
-            strict=True,
+            np.transpose(gains),
         )
-        left = [
-            [share(*each) for each in zip(*sums, gains, strict=True)]
-            if enough
-            else [EVIDENCE.most_share] * len(rows)
-            for *sums, enough in products
-        ]
-        vertical, *others = max(left, key=likelihood)
+        left[there.sum(axis=1) < EVIDENCE.fewest] = EVIDENCE.most_share
+        vertical, *others = max(left.tolist(), key=likelihood)
         score = likelihood([horizontal, horizontal, vertical, *others]) - cost - reading.unlikely
         return Fit(reading, horizontal, tuple(others), score)
 

@@ -34,8 +34,7 @@ from typing import Any
 
 import numpy as np
 
-from ...runtime.errors import InputError
-from .table import Array, Mask, Table
+from .table import Array, Mask, finite_rows, median_step
 from .tables import write_table
 from .what_flew import UNSTATED, WhatFlew
 
@@ -80,7 +79,7 @@ class FlightLog:
             be trusted.
         command: (N, 4) motor commands, 0 to 1, in the rotors' order.
         vehicle: name of the vehicle that flew, where the log or its reader knows it.
-        rates: Hz, how often each channel was measured (``source_rates``), by its section of a log
+        rates: Hz, how often each channel was measured (``streams``), by its section of a log
             map: position, rotors, commands, wrench, battery, accelerometer, gyro. A channel that
             is not named was measured in every row.
         flown: what the log states of its vehicle.
@@ -109,11 +108,11 @@ class FlightLog:
     def __post_init__(self) -> None:
         if len(self.valid) != len(self.t):
             pose = np.column_stack([self.position, self.quaternion])
-            there = np.isfinite(pose).all(axis=1)
+            there = finite_rows(pose)
             object.__setattr__(self, "valid", there)
         for name in ("accelerometer", "gyro"):
             x = getattr(self, name)
-            if x is not None and not (read := np.isfinite(x).all(axis=1)).all():
+            if x is not None and not (read := finite_rows(x)).all():
                 object.__setattr__(self, name, np.where(read[:, None], x, np.nan))
 
     def __repr__(self) -> str:
@@ -141,21 +140,7 @@ class FlightLog:
     @property
     def period(self) -> float:
         """Median time step, s."""
-        return float(np.median(np.diff(self.t)))
-
-
-def vehicle_of_columns(table: Table) -> str:
-    """Return the name of the vehicle that a column's name gives, or nothing.
-
-    Raises:
-        InputError: two columns name one each.
-    """
-    found = [match[1] for name in table.header if (match := VEHICLE.fullmatch(name))]
-    if len(found) > 1:
-        raise InputError(
-            f"{table.path}: the columns name the vehicles {' and '.join(found)}; expected one"
-        )
-    return found[0] if found else ""
+        return median_step(self.t)
 
 
 def time_notes(t: Array) -> tuple[str, ...]:

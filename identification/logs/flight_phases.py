@@ -8,7 +8,7 @@ import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from .flight_log import FlightLog
-from .table import Array, Mask
+from .table import Array, Mask, finite_rows
 
 GROUND, TAKE_OFF, FLIGHT, LANDING = "ground", "take-off", "flight", "landing"
 
@@ -27,7 +27,7 @@ def flying(total: Array) -> Mask:
     """Return at which samples (N,) the rotors carry a vehicle, by their thrust (N,) in any unit:
     above half of the level that a tenth of the samples exceed.
     """
-    return np.asarray(total > 0.5 * np.quantile(total, 0.9))
+    return total > 0.5 * np.quantile(total, 0.9)
 
 
 def usual_thrust(total: Array) -> float:
@@ -42,7 +42,7 @@ def carrying(total: Array) -> Mask:
     """Return at which samples (N,) the rotors carry a vehicle that hovers most of the time, by
     their thrust (N,) in any unit: above half of the usual one.
     """
-    return np.asarray(total > 0.5 * usual_thrust(total))
+    return total > 0.5 * usual_thrust(total)
 
 
 def flew(log: FlightLog) -> tuple[str, str]:
@@ -60,7 +60,7 @@ def flew(log: FlightLog) -> tuple[str, str]:
         return "no", "the motors never turn"
     aloft = carrying(total)
     told = f"yes, {float(aloft.sum()) * log.period:.3g} s"
-    place = log.position[aloft & np.isfinite(log.position).all(axis=1)]
+    place = log.position[aloft & finite_rows(log.position)]
     if len(place) > 1:
         way = np.ptp(np.quantile(place, [0.01, 0.99], axis=0), axis=0)
         far = float(np.linalg.norm(way))
@@ -68,7 +68,7 @@ def flew(log: FlightLog) -> tuple[str, str]:
         drove = float(np.hypot(*way[:2])) > _DROVE[0] and way[2] < _DROVE[1]
         return "not shown" if far < _MOVES or drove else told, said
     if log.gyro is not None:
-        rates = log.gyro[aloft & np.isfinite(log.gyro).all(axis=1)]
+        rates = log.gyro[aloft & finite_rows(log.gyro)]
         count = max(1, round(_MEAN / log.period))
         means = rates[: len(rates) // count * count].reshape(-1, count, 3).mean(axis=1)
         turns = float(np.std(means, axis=0).max(initial=0.0)) if len(means) else 0.0

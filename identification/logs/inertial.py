@@ -22,7 +22,7 @@ from .evidence import EVIDENCE, likelihood
 from .flight_log import ACCELEROMETER, GYRO, FlightLog
 from .magnitudes import MAGNITUDES
 from .readings import ACCELEROMETER_READINGS, AS_DECLARED, GYRO_READINGS, OTHER, SensorReading
-from .table import Array
+from .table import Array, finite_rows
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def gyro_shares(
         attitude: (M) body to world.
         turns: (3, 3) each, by which a reading multiplies the gyro.
     """
-    read = np.isfinite(t) & np.isfinite(gyro).all(axis=1)
+    read = np.isfinite(t) & finite_rows(gyro)
     t, gyro = t[read], gyro[read]
     begins = _windows(pose_times, t, before=0.0)
     if len(begins) < INERTIAL.fewest:
@@ -180,7 +180,7 @@ def _force_shares(
         lead = likelihood([in_world] * 2) - likelihood([in_body] * 2)
         if in_world <= EVIDENCE.good and lead >= OTHER:
             up[2] = gravity if np.median(measured[inside, 2]) < 0.5 * gravity else 0.0
-            turned = measured = np.asarray(body.inv().apply(measured + up))
+            turned = measured = body.inv().apply(measured + up)
     up[2] = gravity
     needed += up
     return [
@@ -232,6 +232,6 @@ def _windows(pose_times: Array, sensor_times: Array, before: float) -> Array:
     times: Array = np.linspace(first, last, count + 1)
     for clock in (pose_times, sensor_times):
         gaps = np.flatnonzero(np.diff(clock) > INERTIAL.gap)
-        for a, b in ((clock[i], clock[i + 1]) for i in gaps[:1000]):
-            times = times[(times - before >= b) | (times + INERTIAL.window <= a)]
+        begun = np.searchsorted(clock[gaps], times + INERTIAL.window)
+        times = times[begun == np.searchsorted(clock[gaps + 1], times - before, "right")]
     return times

@@ -45,7 +45,6 @@ columns the log has, with numbers in them.
 * ``extra``: what else is kept, by name: columns and scale
 """
 
-import math
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -53,7 +52,6 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-import numpy as np
 from pydantic import (
     AfterValidator,
     BeforeValidator,
@@ -67,7 +65,7 @@ from pydantic import (
 from ...runtime.errors import InputError, unknown_name
 from ...runtime.forms import STRICT, Number, Positive, checked, expected
 from ...runtime.yaml_file import read_yaml
-from .column_names import unit_spelled
+from .column_names import WORDS, unit_spelled
 from .rotor_orders import ORDERS, Order, rotor_order
 from .table import Array
 
@@ -77,27 +75,9 @@ UNKNOWN = "?"  # what a guessed map leaves to a person to choose
 
 WORLDS = {"enu": "enu", "nwu": "enu", "flu": "enu", "ned": "ned", "frd": "ned", "y_up": "y_up"}
 BODIES = ("flu", "frd", "y_up")
-# units of each section in the kit's; the first is taken where a section states none. A rotor's of
-# eRPM is divided by the pairs of poles
-UNITS: dict[str, dict[str, float]] = {
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
-    "position": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "ft": 0.3048},
-    "attitude": {"deg": math.pi / 180.0, "rad": 1.0},
-    "rotors": {"rad/s": 1.0, "rpm": math.pi / 30.0, "Hz": 2.0 * math.pi, "eRPM": math.pi / 30.0},
-    "battery": {"V": 1.0, "mV": 1e-3, "cV": 1e-2},
-    "accelerometer": {"m/s2": 1.0, "g": 9.80665, "raw": 1.0},
-    "gyro": {"rad/s": 1.0, "deg/s": math.pi / 180.0, "raw": 1.0},
-    "force": {"N": 1.0, "mN": 1e-3},
-    "torque": {"Nm": 1.0, "mNm": 1e-3},
-}
-# what stands for no and for full command; None: must be said
+UNITS: dict[str, dict[str, float]] = WORDS["factors"]
 COMMAND_UNITS: dict[str, tuple[float, float] | None] = {
-    "normalised": (0.0, 1.0),
-    "us": (1000.0, 2000.0),
-    "duty": (0.0, 1.0),
-    "percent": (0.0, 100.0),
-    "dshot": (48.0, 2047.0),
-    "counts": None,
+    unit: ends and (ends[0], ends[1]) for unit, ends in WORDS["commands"].items()
 }
 SENSES = ("body_to_world", "world_to_body")
 QUATERNIONS = ("wxyz", "xyzw")
@@ -198,7 +178,7 @@ class TimeColumn:
         raw = columns[self.column]
         if not self.nanoseconds:
             return raw
-        return np.asarray(raw + 1e-9 / UNITS["time"][self.unit] * columns[self.nanoseconds])
+        return raw + 1e-9 / UNITS["time"][self.unit] * columns[self.nanoseconds]
 
 
 @dataclass(frozen=True)
@@ -425,6 +405,13 @@ def shipped_map(name: str) -> LogMap:
     messages, which its reader decodes.
     """
     return parse_map(read_yaml(MAPS / f"{name}.yaml", "a map"), f"map {name}", name)
+
+
+@cache
+def stated(name: str) -> dict[str, Any]:
+    """Return what a file in ``maps/recordings`` states that is no map."""
+    found: dict[str, Any] = read_yaml(MAPS / "recordings" / f"{name}.yaml", name)
+    return found
 
 
 def parse_map(value: object, where: str, name: str = "") -> LogMap:

@@ -11,11 +11,11 @@ import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from .column_names import Group, words
+from .column_names import WORDS, Group
 from .flight_log import FlightLog, parts_of
 from .flight_phases import usual_thrust
 from .log_map import UNITS
-from .table import Array
+from .table import Array, finite_rows
 
 
 @dataclass(frozen=True)
@@ -145,13 +145,13 @@ def motor_unit(
         return "commands", "normalised", False, "all are zero"
     low, middle, high = (float(x) for x in np.quantile(turning, [0.01, 0.5, 1.0]))
     named = group.unit or next((unit for unit in ("eRPM", "rpm") if unit.lower() in names), "")
-    commanded = any(word in names for word in words()["command_words"])
+    commanded = any(word in names for word in WORDS["command_words"])
     speeds = any(word in names for word in ("omega", "speed", "rotor", "rpm"))
     speeds |= within(power, MAGNITUDES.squares) and not commanded
     pulses = low >= 850.0 and high <= 2250.0
     carrying: list[str] = []
     if vehicle is not None and not commanded:
-        there = values[np.isfinite(values).all(axis=1)]
+        there = values[finite_rows(values)]
         carrying = [
             u for u in carrying_units(thrust_by_weight(there, vehicle)) if u in UNITS["rotors"]
         ]
@@ -198,29 +198,12 @@ def motor_unit(
 
 
 def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
-    """Return what the sizes of a log's numbers say against its units."""
-    doubts = [time_doubt(log.period)]
-    if log.valid.any():
-        spread = float(np.max(np.ptp(log.position[log.valid], axis=0)))
-        if spread > MAGNITUDES.widest:
-            doubts.append(
-                f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected "
-                f"metres"
-            )
-    if vehicle is not None and log.has_rotor_speeds:
-        doubts.append(rotor_doubt(thrust_by_weight(log.rotor_speeds, vehicle), vehicle))
-    return [doubt for doubt in doubts if doubt]
-
-
-def check_magnitudes(log: FlightLog) -> None:
-    """Check that a log's numbers are in the range of a flight's.
+    """Return what the sizes of a log's numbers say against its units.
 
     Raises:
-        InputError: one is not; the message says which.
+        InputError: a number is none that a flight has; the message says which.
     """
     step = np.diff(log.t)
-    if not len(step):
-        return
     where, longest = f"{log.source}: column", int(np.argmax(step))
     if not log.period >= MAGNITUDES.shortest_period:
         raise InputError(
@@ -239,3 +222,14 @@ def check_magnitudes(log: FlightLog) -> None:
                 f"{where} {names[column]}, row {row + 1}: {values[row, column]:.3g}; expected a "
                 f"number within {MAGNITUDES.largest:g}"
             )
+    doubts = [time_doubt(log.period)]
+    if log.valid.any():
+        spread = float(np.max(np.ptp(log.position[log.valid], axis=0)))
+        if spread > MAGNITUDES.widest:
+            doubts.append(
+                f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected "
+                f"metres"
+            )
+    if vehicle is not None and log.has_rotor_speeds:
+        doubts.append(rotor_doubt(thrust_by_weight(log.rotor_speeds, vehicle), vehicle))
+    return [doubt for doubt in doubts if doubt]

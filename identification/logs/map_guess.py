@@ -22,7 +22,7 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS
 from .channels import BODY_TURNS
-from .column_names import Group, Name, named_alone, take_apart, words
+from .column_names import WORDS, Group, Name, named_alone, take_apart
 from .column_parts import PARTS, Candidate, Numbers, candidates, named_columns
 from .evidence import EVIDENCE, Evidence, Fit, Ranking, likelihood
 from .excerpt import LONGEST
@@ -140,11 +140,8 @@ def _time_column(names: Sequence[Name], data: Mapping[str, Array]) -> Name | Non
         steps = np.diff(values[np.isfinite(values)])
         if np.any(steps > 0.0) and np.mean(steps >= 0.0) > 0.9:
             return name
-    for name in there:
-        values = data[name.column]
-        if len(values) > 2 and np.all(np.diff(values) > 0.0):
-            return name
-    return None
+    rises = (n for n in there if len(x := data[n.column]) > 2 and np.all(np.diff(x) > 0.0))
+    return next(rises, None)
 
 
 class _Guessing:
@@ -153,6 +150,7 @@ class _Guessing:
     def __init__(self, table: Table, vehicle: Vehicle | None) -> None:
         self.table, self.vehicle = table, vehicle
         self.sections: dict[str, Any] = {}
+        self.time_columns: tuple[str, ...] = ()
         self.reasons: list[Reason] = []
         self.ranked: dict[str, list[Candidate]] = {}  # of each part
         self.parts: dict[str, Group] = {}  # the first of them, where one is likely
@@ -166,7 +164,7 @@ class _Guessing:
         if self.clock is not None:
             # a column of nanoseconds may stand beside a clock of whole seconds
             key = re.sub("(^|_)secs?$", "", self.clock.base)
-            fine = {f"{key}_{word}".strip("_") for word in words()["nanoseconds"]}
+            fine = {f"{key}_{word}".strip("_") for word in WORDS["nanoseconds"]}
             beside = next((name.column for name in names if name.base in fine), "")
             self.t = self.time(self.clock, beside)
         self.free = [name for name in names if name.column not in self.time_columns]
@@ -175,7 +173,7 @@ class _Guessing:
         attitude = self.choose("attitude", numbers.quaternion)
         force = self.choose("accelerometer", numbers.gravity)
         if attitude and len(attitude.columns) == 4:
-            numbers.take_attitude(attitude.columns)
+            numbers.attitude = attitude.columns
         place = self.choose("position", numbers.follows_tilt)
         numbers.feel(force.columns if force else (), place.columns if place else ())
         motors = [part for part in _MOTORS if self.choose(part, numbers.moves_together)]
@@ -230,30 +228,24 @@ class _Guessing:
                 if part not in has and part not in half:
                     why = f"no columns look like one (such as {_EXAMPLES[part]})"
                     lack(part, part, why)
-            for part in half:
-                self.half_pose(part)
+            for part in half:  # for a person to complete
+                columns, unit = self.parts[part].columns, self.parts[part].unit
+                most = float(np.max(np.abs(self.numbers.some(columns)), initial=0.0))
+                made: Columns = Columns(columns, unit or "m")
+                if part == "attitude":
+                    euler = "zyx" if len(columns) == 3 else ""
+                    unit = euler and (unit or ("deg" if most > 2.0 * np.pi else "rad"))
+                    made = Attitude(columns, unit, euler=euler)
+                self.say(part, "columns", False, self.ranked[part][0].why)
+                if made.unit:
+                    self.say(part, "unit", False, f"{made.unit}: values up to {most:.3g}")
+                self.sections[part] = made
         for part, why in self.further.items():
             lack(part, "rotors", why)
         if not {"rotors", "commands"} & set(self.sections) and not self.further:
             why = "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
             lack("motors", "rotors", why)
         return out
-
-    def half_pose(self, part: str) -> None:
-        """Keep a position without an attitude, or an attitude without a position, for a person to
-        complete.
-        """
-        columns, unit = self.parts[part].columns, self.parts[part].unit
-        most = float(np.max(np.abs(self.numbers.some(columns)), initial=0.0))
-        made: Columns = Columns(columns, unit or "m")
-        if part == "attitude":
-            euler = "zyx" if len(columns) == 3 else ""
-            unit = euler and (unit or ("deg" if most > 2.0 * np.pi else "rad"))
-            made = Attitude(columns, unit, euler=euler)
-        self.say(part, "columns", False, self.ranked[part][0].why)
-        if made.unit:
-            self.say(part, "unit", False, f"{made.unit}: values up to {most:.3g}")
-        self.sections[part] = made
 
     def say(self, section: str, name: str, certain: bool, why: str) -> None:
         """Keep why a field is what it is."""
@@ -276,11 +268,6 @@ class _Guessing:
             choice = choice[0], False, f"{choice[2]}, though the columns' names say {named}"
         return self.take(section, "unit", choice)
 
-    @property
-    def time_columns(self) -> tuple[str, ...]:
-        """The columns of the time."""
-        return self.sections["time"].named if "time" in self.sections else ()
-
     def time(self, clock: Name, nanoseconds: str) -> Array:
         """Find the unit of the time; return times (N,) in s of the middle of a long flight, NaN
         elsewhere.
@@ -297,7 +284,8 @@ class _Guessing:
         t = np.asarray((raw - raw[np.isfinite(raw)][0]) * UNITS["time"][unit])
         middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
         t[~(np.abs(t - middle) <= 0.5 * LONGEST)] = np.nan
-        self.sections["time"] = TimeColumn(clock.column, unit, nanoseconds)
+        self.sections["time"] = found = TimeColumn(clock.column, unit, nanoseconds)
+        self.time_columns = found.named
         return t
 
     def pose(self, place: Group, group: Group) -> None:
@@ -411,8 +399,7 @@ class _Guessing:
         values = self.values(part)
         power = self.numbers.elasticity(values)
         kind, unit, sure, why = motor_unit(group, values, self.vehicle, power)
-        there = self.table.numeric or self.table.header
-        if more := more_rotors(group.columns, there, self.table.read):
+        if more := more_rotors(group.columns, self.table):
             self.further[part] = more
             return
         if kind in self.sections:
@@ -440,9 +427,7 @@ class _Guessing:
         if not group.numbered:
             return ORDERS["windwrench"], True, "the columns are named by the rotors' places"
         text = " ".join(group.columns).lower()
-        hint = next(
-            (name for word, name in words()["orders"].items() if word in text), "windwrench"
-        )
+        hint = next((name for word, name in WORDS["orders"].items() if word in text), "windwrench")
         evidence, best = None, DECLARED
         if "gyro" in self.sections:
             sensor = self.sections["gyro"]

@@ -18,10 +18,9 @@ import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from .channels import Samples, in_kit_axes, in_kit_units, quaternions
-from .clocks import on_one_clock
+from .channels import Samples, in_kit_axes, in_kit_units, on_one_clock, quaternions
 from .commanded_speeds import flown_vehicle
-from .flight_log import NORM_TOLERANCE, FlightLog, vehicle_of_columns
+from .flight_log import NORM_TOLERANCE, VEHICLE, FlightLog
 from .log_map import (
     Attitude,
     Battery,
@@ -36,7 +35,7 @@ from .log_map import (
 )
 from .rotor_orders import order_names, order_words
 from .streams import Recording, Stream, readable, slerp
-from .table import Mask, Table
+from .table import Mask, Table, finite_rows
 from .table_rows import LONGEST_STEPS, check_rows, rows_apart, rows_of
 from .what_flew import UNSTATED, WhatFlew, more_rotors
 
@@ -69,7 +68,12 @@ def map_table(
             message says which column and row.
     """
     if log_map.is_own:
-        log_map = replace(log_map, vehicle=vehicle_of_columns(table))
+        named = [match[1] for name in table.header if (match := VEHICLE.fullmatch(name))]
+        if len(named) > 1:
+            raise InputError(
+                f"{table.path}: the columns name the vehicles {' and '.join(named)}; expected one"
+            )
+        log_map = replace(log_map, vehicle="".join(named))
     vehicle = flown_vehicle(vehicle, log_map.vehicle)
     log_map = fitted(table.header, table.path, log_map, vehicle, reader)
     columns = table.read(log_map.wanted)
@@ -125,7 +129,7 @@ def recording_of(
         samples = sources[name]
         if isinstance(part, Rotors | Commands) and not flown.airframe:
             are_speeds = isinstance(part, Rotors) and samples.table is None
-            if more := more_rotors(part.columns, *samples.beside, are_speeds):
+            if more := more_rotors(part.columns, samples.table or samples.columns, are_speeds):
                 raise InputError(f"{path}: {f'{part.topic}: ' if part.topic else ''}{more}")
         if name == "position":
             streams[name], words = _pose(path, log_map, samples, sources.get("attitude"))
@@ -188,7 +192,7 @@ def _pose(
     keep = _kept_rows(samples, log_map, place)
     t = samples.t[keep]
     position = in_kit_units(log_map, "position", place, samples.values(place)[keep])
-    placed: Mask = np.asarray(np.isfinite(position).all(axis=1))
+    placed = finite_rows(position)
     if not placed.any() and log_map.rows != "whole":
         raise InputError(
             f"{path}: map {log_map.name}: position: no row has all of {', '.join(place.columns)}; "
@@ -225,7 +229,7 @@ def _pose(
     steps = np.diff(attitude.t)
     longest = max(_ATTITUDE_GAP, LONGEST_STEPS * float(np.median(steps))) if len(steps) else 0.0
     pose[placed] = np.column_stack([position[placed], slerp(t[placed], attitude, longest)])
-    if placed.any() and not np.isfinite(pose).all(axis=1).any():
+    if placed.any() and not finite_rows(pose).any():
         raise InputError(
             f"{path}: position and attitude do not overlap in time; expected both over the same "
             "flight"
@@ -385,7 +389,7 @@ def _is_measured(section: str, way: Columns, samples: Samples, rows: str) -> boo
     ``messages`` a position that changes, and two samples of others.
     """
     values = samples.values(way)
-    values = values[np.isfinite(values).all(axis=1)]
+    values = values[finite_rows(values)]
     if isinstance(way, Attitude) and not way.euler:
         return bool(np.any(np.linalg.norm(values, axis=1) > NO_QUATERNION))
     if section in ("rotors", "battery"):

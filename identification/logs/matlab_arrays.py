@@ -1,6 +1,6 @@
 """A program that reads a MATLAB file from its input and writes the arrays of numbers in it as a
 NumPy archive (.npz): a field of a struct is ``struct.field``. scipy's reader, and HDF5's, may end
-the process at a spoiled file, so ``array_table`` gives them one of their own.
+the process at a spoiled file, so ``tables`` gives them one of their own.
 
     python matlab_arrays.py MOST_BYTES < flight.mat > flight.npz
 """

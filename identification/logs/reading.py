@@ -11,21 +11,13 @@ import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
+from . import readers
 from .commanded_speeds import flown_vehicle
 from .flight_log import ACCELEROMETER, COMMANDS, GYRO, POSE, REQUIRED, ROTORS, FlightLog
 from .inertial import check_inertial
 from .log_map import OWN_MAP, load_map
-from .magnitudes import check_magnitudes, unit_doubts
+from .magnitudes import unit_doubts
 from .mapped_log import map_table
-from .readers import (
-    READERS,
-    find_reader,
-    reader_by_columns,
-    reader_by_content,
-    rosbag,
-    table_readers,
-    unknown_content,
-)
 from .table import Table
 from .tables import is_table, open_table
 
@@ -51,7 +43,7 @@ def read_log(
         map: for a table of other columns or another layout: the name of a map that ships with the
             kit, or the path of a map file (``log_map``).
         piece: which part of the file is read, from 1, where its clock started anew or it holds
-            several logs (``clocks``); None: the longest.
+            several logs (``channels``); None: the longest.
 
     Raises:
         InputError: the file cannot be read or breaks a rule of the form; the message says where and
@@ -74,10 +66,10 @@ def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
     Raises:
         InputError: a number is none that a flight has.
     """
-    check_magnitudes(log)
     vehicle = flown_vehicle(vehicle, log.vehicle)
+    of_units = unit_doubts(log, vehicle)
     log, wrong = check_inertial(log, 9.81 if vehicle is None else vehicle.gravity)
-    doubts = [*wrong, *unit_doubts(log, vehicle)]
+    doubts = [*wrong, *of_units]
     for doubt in doubts:
         warnings.warn(f"{log.source}: {doubt}", UserWarning, stacklevel=3)
     return replace(log, notes=(*log.notes, *(f"warning: {doubt}" for doubt in doubts)))
@@ -99,10 +91,10 @@ def unknown_table(path: Path) -> Table | None:
     Raises:
         InputError: it is a table by its name, and none that can be read.
     """
-    if not is_table(path) or reader_by_content(path) is not None:
+    if not is_table(path) or readers.reader_by_content(path) is not None:
         return None
     table = open_table(path)
-    known = is_own(table.header) or reader_by_columns(path, table.header) is not None
+    known = is_own(table.header) or readers.reader_by_columns(path, table.header) is not None
     return None if known else table
 
 
@@ -117,18 +109,18 @@ def _read(
     if map is not None:
         if reader is not None:
             raise InputError(f"{path}: both a reader and a map; expected one of them")
-        if reader_by_content(path) is READERS["rosbag"]:
-            return rosbag.read(path, vehicle, str(map), piece)
+        if readers.reader_by_content(path) is readers.READERS["rosbag"]:
+            return readers.rosbag.read(path, vehicle, str(map), piece)
         return map_table(open_table(path), load_map(map), vehicle, piece=piece)
-    chosen = reader_by_content(path) if reader is None else find_reader(reader)
+    chosen = readers.reader_by_content(path) if reader is None else readers.find_reader(reader)
     if chosen is not None and not chosen.signature:
         return chosen.read(path, vehicle, piece=piece)
     if chosen is None and not is_table(path):
-        raise unknown_content(path)
+        raise readers.unknown_content(path)
     table = open_table(path)
     if chosen is None and is_own(table.header):
         return map_table(table, load_map(OWN_MAP), vehicle, piece=piece)
-    chosen = chosen or reader_by_columns(path, table.header)
+    chosen = chosen or readers.reader_by_columns(path, table.header)
     if chosen is not None:
         if missing := [name for name in chosen.signature if name not in table.header]:
             raise InputError(
@@ -142,7 +134,7 @@ def _read(
         log = map_table(table, guess.log_map, vehicle, piece=piece)
         said = "columns: by a map that was guessed without a doubt; windwrench check shows it"
         return replace(log, notes=(said, *log.notes))
-    known = ", ".join(f"{r.name} ({r.signature[0]} ...)" for r in table_readers())
+    known = ", ".join(f"{r.name} ({r.signature[0]} ...)" for r in readers.table_readers())
     has_imu = {*ACCELEROMETER, *GYRO} <= set(table.header)
     needed = ("t", *ROTORS) if has_imu else REQUIRED
     missing = [name for name in needed if name not in table.header]

@@ -17,7 +17,7 @@ from ...runtime.yaml_file import read_yaml
 from .channels import quaternions, scaled
 from .log_map import SENSES, UNITS, Attitude
 from .rotor_orders import ORDERS, Order, order_names
-from .table import Array, Mask
+from .table import Array, Mask, finite_rows
 
 _I = np.eye(3)
 _STATED: dict[str, Any] = read_yaml(Path(__file__).with_name("conventions.yaml"), "conventions")
@@ -162,7 +162,25 @@ class Reading:
                 f"px, py, pz look like {name}metres; expected metres: divide them by "
                 f"{1.0 / UNITS['position'][self.length]:.0f}"
             )
-        return "; ".join([*self._pose_words(), *self._rotor_words()])
+        words = self._pose_words()
+        if self.rotors != ROTORS:
+            known = " or ".join(order_names(self.motors))
+            words.append(
+                f"the rotors look permuted: omega1..omega4 are rotors "
+                f"{','.join(map(str, self.rotors))} of this vehicle"
+                f"{f' (the order {known})' if known else ''}"
+                "; expected 1 front-left, 2 rear-left, 3 rear-right, 4 front-right: reorder the "
+                "columns"
+            )
+        if self.mirrored:
+            words.append(
+                "the rotors turn against the declared spin: mirror spin in the vehicle file"
+            )
+        if self.rotors == (3, 4, 1, 2) and not self.mirrored:
+            words.append(
+                "body axes that point backward and right instead of forward and left look the same"
+            )
+        return "; ".join(words)
 
     def _pose_words(self) -> list[str]:
         orders = {
@@ -183,27 +201,6 @@ class Reading:
             "expected one world, z up, body axes forward, left, up, and a quaternion scalar first, "
             f"body to world: take {' and '.join(take)}",
         ]
-
-    def _rotor_words(self) -> list[str]:
-        words = []
-        if self.rotors != ROTORS:
-            known = " or ".join(order_names(self.motors))
-            words.append(
-                f"the rotors look permuted: omega1..omega4 are rotors "
-                f"{','.join(map(str, self.rotors))} of this vehicle"
-                f"{f' (the order {known})' if known else ''}"
-                "; expected 1 front-left, 2 rear-left, 3 rear-right, 4 front-right: reorder the "
-                "columns"
-            )
-        if self.mirrored:
-            words.append(
-                "the rotors turn against the declared spin: mirror spin in the vehicle file"
-            )
-        if self.rotors == (3, 4, 1, 2) and not self.mirrored:
-            words.append(
-                "body axes that point backward and right instead of forward and left look the same"
-            )
-        return words
 
 
 def _combined(matrix: Array, columns: Sequence[str]) -> str:
@@ -312,7 +309,7 @@ def rotations(columns: Array, reading: Reading) -> tuple[Mask, Rotation]:
 def as_written(columns: Array, reading: Reading) -> tuple[Mask, Rotation]:
     """Return the same, body to world, in the columns' own frames."""
     part = reading.part()
-    good: Mask = np.asarray(np.isfinite(columns).all(axis=1))
+    good = finite_rows(columns)
     if not reading.euler:
         good &= np.linalg.norm(np.nan_to_num(columns), axis=1) > 0.5
     turns = quaternions(part, scaled(part, columns[good]))

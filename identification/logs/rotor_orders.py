@@ -1,25 +1,18 @@
 """Orders in which vehicles number their motors, by name.
 
 An order says which motor each of the kit's rotors is: 1 front-left, 2 rear-left, 3 rear-right,
-4 front-right. Sources: PX4's airframe reference (quad x), ArduPilot's motor order (QUAD/X),
-Betaflight's and INAV's mixer QUADX, Bitcraze's manual of the Crazyflie 2.
+4 front-right. ``column_words.yaml`` states them and their sources.
 """
 
 from ...runtime.errors import InputError, unknown_name
+from .column_names import WORDS
 
 Order = tuple[int, int, int, int]
 
 PLACES = ("front-left", "rear-left", "rear-right", "front-right")  # of the kit's rotors 1 to 4
 
-# motor, from 1, of each of the kit's rotors
 ORDERS: dict[str, Order] = {
-    "windwrench": (1, 2, 3, 4),
-    "px4-x": (3, 2, 4, 1),  # 1 front-right, 2 rear-left, 3 front-left, 4 rear-right
-    "ardupilot-x": (3, 2, 4, 1),  # the same
-    "betaflight": (4, 3, 1, 2),  # 1 rear-right, 2 front-right, 3 rear-left, 4 front-left
-    "crazyflie": (4, 3, 2, 1),  # 1 front-right, 2 rear-right, 3 rear-left, 4 front-left
-    "ardrone": (1, 4, 3, 2),  # 1 front-left, 2 front-right, 3 rear-right, 4 rear-left
-    "dji": (2, 3, 4, 1),  # 1 front-right, 2 front-left, 3 rear-left, 4 rear-right
+    name: (a, b, c, d) for name, (a, b, c, d) in WORDS["rotor_orders"].items()
 }
 
 

@@ -30,8 +30,8 @@ from .flight_phases import carrying, flying
 from .inertial import INERTIAL, gravity_doubt, is_stuck
 from .magnitudes import MAGNITUDES, rotor_doubt, thrust_by_weight, time_doubt, within
 from .readings import Reading
-from .source_rates import MOTOR_RATES
-from .table import Array, Mask
+from .streams import MOTOR_RATES
+from .table import Array, Mask, median_step
 
 LEAST_SECONDS = 10.0  # of unbroken pose in flight
 _LEAST_RATE_HZ = 50.0
@@ -114,7 +114,6 @@ def screen_log(
             if kind is not Needed:
                 notes.append(str(text) if kind is Note else f"warning: {text}")
 
-    hear(_channels(log, vehicle, by_imu))
     hear(_rotors(log, vehicle, by_imu))
     above = log.rotor_speeds > _most_rad_s(log, vehicle)
     if above.any():
@@ -130,9 +129,8 @@ def screen_log(
         seen, same = np.flatnonzero(log.valid), np.zeros(len(log.t), np.bool_)
         pose = np.column_stack([log.position, log.quaternion])[seen]
         same[seen[1:]] = np.all(pose[1:] == pose[:-1], axis=1)
-        hear(_held_pose(log, same))
+        hear(_new_poses(log, same))
         log = replace(log, valid=log.valid & ~same)
-        hear(_pose_rate(log))
     hear(stuck_channels(log, vehicle))
     others: list[Reading] = []
     if by_imu or pose_pieces(log):
@@ -150,8 +148,10 @@ def screen_log(
     return log, tuple(notes)
 
 
-def _channels(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
-    """Check that there are a motion, rotor speeds and the declared vehicle."""
+def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
+    """Check that there are a motion and the declared vehicle, and that all four rotors turned, at
+    speeds (rad/s) that carry it.
+    """
     if not by_imu and not log.valid.any():
         yield Refused(
             "no row has a pose; expected at least one to start from, or gyro and accelerometer "
@@ -166,10 +166,6 @@ def _channels(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
         yield Note(
             f"warning: the log names the vehicle {log.vehicle}; it is read as {vehicle.name}"
         )
-
-
-def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
-    """Check that all four rotors turned, at speeds (rad/s) that carry the vehicle."""
     speeds = log.rotor_speeds
     with np.errstate(over="ignore"):
         thrust = np.square(speeds) @ vehicle.k / vehicle.weight
@@ -200,7 +196,7 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
             "the rotors do between them is not known"
         )
     times = log.t if by_imu or log.valid.sum() < 2 else log.t[log.valid]
-    if doubt := time_doubt(float(np.median(np.diff(times)))):
+    if doubt := time_doubt(median_step(times)):
         yield Refused(doubt)
     carried = carrying(np.square(speeds).max(axis=1))
     for i, column in enumerate(speeds.T):
@@ -243,7 +239,7 @@ def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
     for names, x in (("ax, ay, az", log.accelerometer), ("gx, gy, gz", log.gyro)):
         if is_stuck(x[rows]):
             yield Refused(f"{names} never change: the sensor was not read")
-    rate = 1.0 / float(np.median(np.diff(log.t[rows])))
+    rate = 1.0 / median_step(log.t[rows])
     rate = min(rate, *(log.rates.get(name, np.inf) for name in ("gyro", "accelerometer")))
     if rate < _LEAST_IMU_HZ:
         yield Refused(
@@ -261,8 +257,10 @@ def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
         yield Refused(f"ax, ay, az {doubt}")
 
 
-def _held_pose(log: FlightLog, same: Mask) -> Findings:
-    """Check that the pose changes; ``same`` (N,): the pose is the one before, to the last digit."""
+def _new_poses(log: FlightLog, same: Mask) -> Findings:
+    """Check that the pose changes, and how often; ``same`` (N,): the pose is the one before, to the
+    last digit.
+    """
     seen = np.flatnonzero(log.valid)
     if log.t[seen[-1]] - log.t[seen[0]] > _NEVER and np.all(same[seen[1:]]):
         yield Refused("the pose never changes, to the last digit; expected the poses of a flight")
@@ -272,12 +270,8 @@ def _held_pose(log: FlightLog, same: Mask) -> Findings:
             f"warning: the pose is frozen for {held}: it repeats to the last digit while the "
             "rotors turn. These rows count as without a pose"
         )
-
-
-def _pose_rate(log: FlightLog) -> Findings:
-    """Check the rate of the poses."""
-    times = log.t[log.valid]
-    period = float(np.median(np.diff(times))) if len(times) > 1 else np.inf
+    times = log.t[log.valid & ~same]
+    period = median_step(times) if len(times) > 1 else np.inf
     if period * _LEAST_RATE_HZ > _SLACK:
         yield Needed(
             f"{1 / period:.3g} new poses a second; expected at least {_LEAST_RATE_HZ:g}: "

@@ -2,6 +2,9 @@
 
 Rows are the pose's samples. Where an inertial sensor is much faster than the pose, or where there
 is no pose, rows are the sensor's: the kit's form has room for rows without a pose.
+
+A log that holds its slow channels between their samples, or that was resampled along straight
+lines, has rows that no sensor measured: ``source_rate`` says how often a channel was.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,8 +20,7 @@ from ..motion.smoothing import resampled
 from .commanded_speeds import flown_vehicle, speeds_of_wrench, with_commanded_speeds
 from .flight_log import FlightLog, time_notes
 from .log_map import LogMap
-from .source_rates import source_rate
-from .table import Array, Mask
+from .table import Array, Rows, finite_rows, median_step
 from .what_flew import UNSTATED, WhatFlew
 
 _SENSOR_GAP = 3.5  # median steps, across which an inertial sensor is not interpolated
@@ -41,7 +43,7 @@ class Stream:
 
     def whole(self) -> "Stream":
         """Return the samples whose values are all finite."""
-        good = np.isfinite(self.values).all(axis=1)
+        good = finite_rows(self.values)
         return self if good.all() else Stream(self.name, self.t[good], self.values[good])
 
     def at(self, t: Array) -> Array:
@@ -143,7 +145,7 @@ class Recording:
                 f"{motors.name}: up to {longest:.2g} s between messages; the {_MOTORS[kind]} there "
                 "are interpolated",
             )
-        valid: Mask = np.asarray(np.isfinite(pose).all(axis=1))
+        valid = finite_rows(pose)
         if np.isfinite(pose[:, 3:]).any():  # else positions without an attitude, which are kept
             pose[~valid] = np.nan
         pose[valid, 3:] /= np.linalg.norm(pose[valid, 3:], axis=1)[:, None]
@@ -247,7 +249,9 @@ def _rows(
         InputError: fewer than two rows lie within the span of the motors' stream.
     """
     sensor = sensors[0] if sensors else None
-    own = sensor is not None and (pose is None or _step(pose.t) > _OWN_ROWS * _step(sensor.t) > 0.0)
+    own = sensor is not None and (
+        pose is None or median_step(pose.t) > _OWN_ROWS * median_step(sensor.t) > 0.0
+    )
     stream = sensor if own else pose
     assert stream is not None
     inside = (stream.t >= motors.t[0]) & (stream.t <= motors.t[-1])
@@ -264,7 +268,7 @@ def _rows(
     if not own:
         assert pose is not None
         return t, pose.values[inside], ()
-    rows = f"rows are those of {stream.name}, {1.0 / _step(stream.t):.4g} Hz"
+    rows = f"rows are those of {stream.name}, {1.0 / median_step(stream.t):.4g} Hz"
     placed = np.full((len(t), 7), np.nan)
     if pose is None:
         return t, placed, (rows,)
@@ -272,17 +276,105 @@ def _rows(
     if len(seen.t) >= 2:
         near = np.clip(np.searchsorted(t, seen.t), 1, len(t) - 1)
         near -= seen.t - t[near - 1] < t[near] - seen.t
-        reach = max(0.6 * _step(t), 0.5 * _step(seen.t) / _OWN_ROWS)
+        reach = max(0.6 * median_step(t), 0.5 * median_step(seen.t) / _OWN_ROWS)
         near = np.unique(near[np.abs(t[near] - seen.t) <= reach])
         near = near[(t[near] >= seen.t[0]) & (t[near] <= seen.t[-1])]
         placed[near, :3] = Stream(pose.name, seen.t, seen.values[:, :3]).at(t[near])
         placed[near, 3:] = slerp(t[near], Stream(pose.name, seen.t, seen.values[:, 3:]))
-    rows += (
-        f"; the pose of {pose.name}, {1.0 / _step(pose.t):.4g} Hz, stands in the nearest of them"
-    )
+    rate = 1.0 / median_step(pose.t)
+    rows += f"; the pose of {pose.name}, {rate:.4g} Hz, stands in the nearest of them"
     return t, placed, (rows,)
 
 
-def _step(t: Array) -> float:
-    """Return the median time step, s."""
-    return float(np.median(np.diff(t)))
+@dataclass(frozen=True)
+class MotorRates:
+    """How often rotor speeds or commands must be measured.
+
+    Between samples they are taken along a straight line, which passes 0.9 of an oscillation's
+    amplitude up to 0.18 of their rate. Forces are judged up to 3.5 Hz. Torques turn a vehicle
+    within a tenth of a second: they need what a pose and a gyro need.
+    """
+
+    force_hz: float = 20.0
+    torque_hz: float = 45.0
+    jitter: float = 1.1  # times too slow that a rate may be
+
+    def serves(self, rate: float, least: float) -> bool:
+        """Return whether a rate is as high as it must be, Hz."""
+        return rate * self.jitter >= least
+
+
+MOTOR_RATES = MotorRates()
+
+
+@dataclass(frozen=True)
+class SourceRateSettings:
+    """When values repeat because nothing was measured, and not because they were rounded."""
+
+    # of the median spacing of changes: rounded values change at any spacing, held ones at their own
+    least_spacing: float = 0.6
+    least_rows: float = 2.0  # of the median spacing; below, each row is a sample
+    early: float = 0.05  # quantile of spacings that is compared with the median
+    # of the RMS distance from the line between both neighbours: on the line
+    on_line: float = 1e-3
+    most_corners: float = 2 / 3  # of the rows; with more no two corners can be told apart
+    least_changes: int = 8  # that tell a spacing
+
+
+SOURCE_RATE = SourceRateSettings()
+
+
+def source_rate(t: Array, values: Array) -> float:
+    """Return how often a channel was measured, Hz; 0 where it holds less than two samples.
+
+    Args:
+        t: (N,) s, increasing.
+        values: (N, K); a row with NaN is no sample.
+    """
+    good = finite_rows(values)
+    t, values = t[good], values[good]
+    if len(t) < 2:
+        return 0.0
+    changes = np.flatnonzero(np.any(np.diff(values, axis=0) != 0.0, axis=1))
+    step = median_step(t)
+    return 1.0 / (step * max(_spacing(changes), _spacing(_corners(t, values))))
+
+
+def between_samples(t: Array, values: Array, rate: float) -> Array:
+    """Return by how much a channel (N, K) leaves the line between its samples (K,), one standard
+    deviation: at most as much as a sample leaves the line between its neighbours.
+
+    Args:
+        t: (N,) s, increasing.
+        values: (N, K), finite, of a channel that was measured less often.
+        rate: at which it was, Hz.
+    """
+    beats = np.arange(t[0], t[-1], 1.0 / rate)
+    off = 0.5 * np.diff(resampled(beats, t, values), n=2, axis=0)
+    return np.sqrt(np.mean(np.square(off), axis=0)) if len(off) else np.zeros(4)
+
+
+def _corners(t: Array, values: Array) -> Rows:
+    """Return where values (N, K) leave the straight line between their neighbours: of two or more
+    rows in a row the first, since a sample between rows bends the line in both.
+    """
+    if len(t) < 3:
+        return np.empty(0, dtype=np.intp)
+    share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
+    off = np.abs(values[1:-1] - (values[:-2] + share * (values[2:] - values[:-2])))
+    rms = np.sqrt(np.mean(np.square(off), axis=0))
+    is_corner = (off > SOURCE_RATE.on_line * rms).any(axis=1)
+    if np.mean(is_corner) > SOURCE_RATE.most_corners:
+        return np.empty(0, dtype=np.intp)
+    return np.flatnonzero(is_corner & ~np.append(False, is_corner[:-1]))
+
+
+def _spacing(events: Rows) -> float:
+    """Return the usual number of rows between events that come in a beat of their own; else 1."""
+    use, spacing = SOURCE_RATE, np.diff(events)
+    if len(spacing) < use.least_changes:
+        return 1.0
+    median = float(np.median(spacing))
+    beat = float(np.quantile(spacing, use.early)) >= use.least_spacing * median
+    usual = spacing[spacing < median / use.least_spacing]  # no gap
+    return float(np.mean(usual)) if beat and median >= use.least_rows else 1.0

@@ -76,6 +76,16 @@ class Table:
         return f"row {index + 1} (line {line})"
 
 
+def finite_rows(values: Array) -> Mask:
+    """Return which rows (N,) of values (N, k) are finite throughout."""
+    return np.asarray(np.isfinite(values).all(axis=1))
+
+
+def median_step(t: Array) -> float:
+    """Return the median step of times (N,), s."""
+    return float(np.median(np.diff(t)))
+
+
 @contextmanager
 def one_line(what: str, expected: str = "") -> Iterator[None]:
     """Make an InputError of one line of whatever a parser raises of bytes that are none of its own.

@@ -75,13 +75,24 @@ def rows_of(
     samples = replace(samples, t=t)
     if is_whole:
         _check_whole(samples, log_map)
-        stray, words = _stray_rows(t, log_map.stray_rows)
-        return samples.cut(slice(stray, None)), notes + words
-    first = np.flatnonzero(np.diff(raw, prepend=np.nan) != 0.0)
-    if len(first) < len(t):
-        notes.append(f"{len(t) - len(first)} row(s) repeat a time and were joined to the one row")
-        joined = {name: _last_of(column, first) for name, column in samples.columns.items()}
-        samples = replace(samples.cut(np.append(first[1:], len(t)) - 1), columns=joined)
+        step = np.diff(t)
+        gaps = np.flatnonzero(step[: log_map.stray_rows] > _STRAY_GAP * np.median(step))
+        if gaps.size:
+            first, gap = int(gaps[-1]) + 1, step[gaps[-1]]
+            notes.append(
+                f"dropped {first} stray sample(s) before a gap of {gap:.2g} s at the start"
+            )
+            samples = samples.cut(slice(first, None))
+        return samples, notes
+    begins = np.flatnonzero(np.diff(raw, prepend=np.nan) != 0.0)
+    if len(begins) < len(t):
+        notes.append(f"{len(t) - len(begins)} row(s) repeat a time and were joined to the one row")
+        joined = {}
+        for name, column in samples.columns.items():  # of each the last value that is there
+            there = np.where(np.isnan(column), -1, np.arange(len(t)))
+            last = np.maximum.reduceat(there, begins)
+            joined[name] = np.where(last >= 0, column[last], np.nan)
+        samples = replace(samples.cut(np.append(begins[1:], len(t)) - 1), columns=joined)
     return samples, notes
 
 
@@ -115,25 +126,6 @@ def _check_whole(samples: Samples, log_map: LogMap) -> None:
         check(names, there, f"{_FINITE}; only {', '.join(names)} together may be empty")
     others = names_of(log_map.wrench, log_map.force, log_map.torque, *log_map.extra.values())
     check([name for name in others if name not in pose], True, _FINITE)
-
-
-def _stray_rows(t: Array, most: int) -> tuple[int, list[str]]:
-    """Return the first row behind a gap that follows the first few, and a note where some are to be
-    dropped.
-    """
-    step = np.diff(t)
-    gaps = np.flatnonzero(step[:most] > _STRAY_GAP * np.median(step))
-    if not gaps.size:
-        return 0, []
-    gap, first = step[gaps[-1]], int(gaps[-1]) + 1
-    return first, [f"dropped {first} stray sample(s) before a gap of {gap:.2g} s at the start"]
-
-
-def _last_of(column: Array, first: Rows) -> Array:
-    """Return the last value that is there of each group of rows, which begin at ``first``."""
-    at = np.where(np.isnan(column), -1, np.arange(len(column)))
-    last = np.maximum.reduceat(at, first)
-    return np.where(last >= 0, column[last], np.nan)
 
 
 def rows_apart(samples: Samples, log_map: LogMap) -> bool:
@@ -221,6 +213,6 @@ def _longest_gap(samples: Samples, name: str, column: Array) -> float:
     words = (
         f"it has no value for {gap:.3g} s, and gaps of up to {limit:.3g} s are interpolated over"
     )
-    bad: Mask = np.asarray(is_long & (np.arange(len(t)) == first))
+    bad: Mask = is_long & (np.arange(len(t)) == first)
     _refuse(samples, name, column, bad, f"{_FINITE}: {words}")
     return float(steps.max(initial=0.0))

@@ -1,19 +1,47 @@
 """Tables of numbers in text, Parquet, MATLAB and NumPy files: read with errors that say where,
 written whole or not at all.
+
+Of Parquet a field of a struct is the column ``struct.field``, an item of a list ``name[0]``,
+``name[1]`` ...; arrays of MATLAB (.mat) and NumPy (.npz) files make the columns of one table in the
+same way. What a Parquet file says of its columns' sizes is looked at before they are unpacked. A
+dictionary of one text may stand for any number of its copies, so its columns must be numbers.
 """
 
 import gzip
-from collections.abc import Callable, Mapping
+import io
+import os
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from ...runtime.errors import InputError
 from ...runtime.extras import need
+from ...runtime.file_limits import LIMITS, check_count
 from ...runtime.page_files import write_text
+from ...runtime.regular_files import check_archive, check_regular, read_bytes
 from ...runtime.whole_files import replaced
-from .array_table import open_arrays
-from .parquet_table import open_parquet
-from .table import ARRAY_SUFFIXES, SUFFIXES, TEXT_SUFFIXES, Array, Table, file_kind
+from ...runtime.workers import SINGLE_THREADED
+from .table import (
+    ARRAY_SUFFIXES,
+    SUFFIXES,
+    TEXT_SUFFIXES,
+    WHAT,
+    Array,
+    Table,
+    file_kind,
+    one_line,
+)
 from .text_table import open_text
+
+_MEMORY = 4  # times the bytes that a file may unpack to, of the process that reads MATLAB's
+_SHOWN = 10  # arrays that a note lists
+_BUFFER = 2**20  # bytes of a column of Parquet that are read at a time
 
 
 def is_table(path: Path) -> bool:
@@ -38,8 +66,8 @@ def open_table(path: Path) -> Table:
         )
     name = path.name.lower()
     if name.endswith(ARRAY_SUFFIXES):
-        return open_arrays(path)
-    return open_parquet(path) if name.endswith(".parquet") else open_text(path)
+        return _open_arrays(path)
+    return _open_parquet(path) if name.endswith(".parquet") else open_text(path)
 
 
 def write_table(columns: Mapping[str, Array], path: Path) -> None:
@@ -83,3 +111,175 @@ def _csv_text(
         for i, column in enumerate(columns.values())
     ]
     return "\n".join([",".join(columns), *map(",".join, zip(*texts, strict=True))]) + "\n"
+
+
+def _open_arrays(path: Path) -> Table:
+    """Open the arrays of a file. Rows are as many as most arrays have; arrays of other lengths are
+    left out, with a note.
+    """
+    data = read_bytes(path, WHAT, LIMITS.binary_log)
+    with one_line(f"{path}: cannot be read as {WHAT}"):
+        is_matlab = not path.name.lower().endswith(".npz")
+        data = _matlab(path, data) if is_matlab else data
+        check_archive(path, io.BytesIO(data), LIMITS.table_text, WHAT)
+        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+            read = {name[is_matlab:]: array for name, array in archive.items()}
+        for name, array in list(read.items()):
+            read |= {f"{name}.{field}": array[field] for field in array.dtype.names or ()}
+        arrays = {name: x.squeeze() for name, x in read.items() if x.dtype.kind in "biuf"}
+    lengths = Counter(n for array in arrays.values() for n in set(array.shape) if n > 1)
+    if not lengths:
+        raise InputError(f"{path}: no arrays of numbers; expected a flight's, of one length")
+    rows = max(lengths, key=lambda n: (lengths[n], n))
+    columns: dict[str, Any] = {}
+    other = []
+    for name, array in arrays.items():
+        array = array if array.shape[:1] == (rows,) else array.T
+        if array.shape[:1] != (rows,):
+            other += [name] if array.size > 1 else []
+            continue
+        flat = array.reshape(rows, -1)
+        names = [name] if array.ndim == 1 else [f"{name}[{i}]" for i in range(flat.shape[1])]
+        columns |= dict(zip(names, flat.T, strict=True))
+    notes = [f"arrays of other lengths than {rows} were left out: {', '.join(other[:_SHOWN])}"]
+
+    def load(_: Table, names: Sequence[str]) -> Iterator[Array]:
+        return (columns[name] for name in names)
+
+    return Table(path, tuple(columns), rows, load, notes=tuple(notes if other else ()))
+
+
+def _matlab(path: Path, data: bytes) -> bytes:
+    """Return the arrays of numbers in a MATLAB file as a NumPy archive.
+
+    scipy reads it in a process of its own: of 8 x 400 files with spoiled bytes, one in each 8 ended
+    the process by a segmentation fault before the 214th.
+
+    Raises:
+        InputError: it is of version 7.3 and h5py is not installed.
+        ValueError: it is no such file, is spoiled, or unpacks to too much.
+    """
+    if data.startswith(b"MATLAB 7.3") and find_spec("h5py") is None:
+        raise InputError(
+            f"{path}: is MATLAB's version 7.3; expected version 7, as save('flight.mat', '-v7') "
+            "writes, or h5py installed"
+        )
+    program = str(Path(__file__).with_name("matlab_arrays.py"))
+    command = [sys.executable, "-P", program, str(_MEMORY * LIMITS.table_text)]
+    # threads of linear algebra would take memory of what the file may
+    alone = {**os.environ, **SINGLE_THREADED}
+    ran = subprocess.run(command, input=data, capture_output=True, check=False, env=alone)
+    if ran.returncode:
+        said = ran.stderr.decode("utf-8", "replace").strip().rpartition("\n")[2]
+        raise ValueError(said.partition(": ")[2] or said or "a spoiled MATLAB file")
+    return ran.stdout
+
+
+def _open_parquet(path: Path) -> Table:
+    """Open a Parquet file."""
+    need("pyarrow", "parquet", path)
+    import pyarrow
+    from pyarrow import parquet
+
+    check_regular(path, WHAT, LIMITS.table_text)
+    try:
+        file = parquet.ParquetFile(
+            path,
+            buffer_size=_BUFFER,
+            thrift_string_size_limit=LIMITS.parquet_footer,
+            thrift_container_size_limit=LIMITS.parquet_footer,
+        )
+        rows = int(file.metadata.num_rows)
+        columns: list[tuple[str, Any]] = []  # names, and arrays of their own or the file's fields
+        for field in file.schema_arrow:
+            if pyarrow.types.is_nested(field.type):
+                columns += _within(path, field.name, _column(path, file, field.name))
+            else:
+                columns.append((field.name, field))
+    except (OSError, pyarrow.ArrowException) as error:
+        raise InputError(f"{path}: cannot be read as Parquet: {error}") from error
+
+    def load(_: Table, names: Sequence[str]) -> Iterator[Array]:
+        for name in names:
+            values = dict(columns)[name]
+            if not _is_numeric(values.type):
+                raise InputError(
+                    f"{path}: column {name} cannot be read: it holds {values.type}; expected "
+                    "numbers"
+                )
+            if isinstance(values, pyarrow.Field):
+                values = _column(path, file, name)
+            if len(values) != rows:
+                raise InputError(
+                    f"{path}: column {name} has {len(values)} rows; expected the {rows} that the "
+                    "file claims"
+                )
+            yield values.cast(pyarrow.float64()).to_numpy(zero_copy_only=False)
+
+    numeric = tuple(name for name, column in columns if _is_numeric(column.type))
+    return Table(path, tuple(name for name, _ in columns), rows, load, numeric=numeric)
+
+
+def _column(path: Path, file: Any, name: str) -> Any:
+    """Return a whole column, in one piece.
+
+    Raises:
+        InputError: it cannot be read, or is more than ``FileLimits`` allows, by what the file says
+            of it.
+    """
+    import pyarrow
+
+    groups = map(file.metadata.row_group, range(file.metadata.num_row_groups))
+    chunks = [chunk for group in groups for chunk in map(group.column, range(group.num_columns))]
+    chunks = [chunk for chunk in chunks if chunk.path_in_schema.split(".")[0] == name]
+    size = sum(max(chunk.total_uncompressed_size, 0) for chunk in chunks)
+    most = max((chunk.num_values for chunk in chunks), default=0)
+    check_count(path, size, LIMITS.table_text, f"bytes in column {name}")
+    check_count(path, most, LIMITS.table_numbers, f"numbers in column {name}")
+    try:
+        return file.read(columns=[name]).column(0).combine_chunks()
+    except (OSError, pyarrow.ArrowException) as error:
+        raise InputError(
+            f"{path}: column {name} cannot be read: {error}; expected numbers"
+        ) from error
+
+
+def _within(path: Path, name: str, array: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the columns that fields of structs and items of lists of numbers make, by their names.
+
+    Raises:
+        InputError: the lists of a column have several lengths; empty ones may stand between.
+    """
+    import pyarrow
+    from pyarrow import types
+
+    kind = array.type
+    if types.is_struct(kind):
+        for field, inner in zip(kind, array.flatten(), strict=True):
+            yield from _within(path, f"{name}.{field.name}", inner)
+    elif types.is_nested(kind) and not types.is_map(kind) and _is_numeric(kind.value_type):
+        lengths = array.value_lengths().fill_null(0).to_numpy(zero_copy_only=False)
+        sizes = np.unique(lengths[lengths > 0])
+        if len(sizes) > 1:
+            raise InputError(
+                f"{path}: column {name}: lists of {', '.join(map(str, sizes[:5]))} numbers; "
+                "expected one length"
+            )
+        count = int(sizes[0]) if len(sizes) else 0
+        check_count(path, len(array) * count, LIMITS.table_numbers, f"numbers in column {name}")
+        values = np.full((len(array), count), np.nan)
+        if count:
+            flat = array.flatten().cast(pyarrow.float64()).to_numpy(zero_copy_only=False)
+            values[lengths > 0] = flat.reshape(-1, count)
+        for i, column in enumerate(values.T):
+            yield f"{name}[{i}]", pyarrow.array(column)
+    else:
+        yield name, array
+
+
+def _is_numeric(kind: Any) -> bool:
+    from pyarrow import types
+
+    value = kind.value_type if types.is_dictionary(kind) else kind
+    tests = (types.is_integer, types.is_floating, types.is_boolean, types.is_null, types.is_decimal)
+    return any(test(value) for test in tests)

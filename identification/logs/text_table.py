@@ -293,18 +293,17 @@ def _layout(path: Path, head: list[str]) -> tuple[TextLayout, int]:
     Raises:
         InputError: none makes a table of them.
     """
-    best, found, first = 0.0, TextLayout(), 0
-    there = {mark for line in head for mark in set(line)}
-    for separator in _SEPARATORS:
-        if separator not in there and separator != " ":
-            continue
-        for decimal in (".", ",") if separator != "," and "," in there else (".",):
-            layout = TextLayout(separator, decimal)
-            score, start = _score(head, layout)
-            if score > best + 1e-9:
-                best, found, first = score, layout, start
-    if best:
-        return found, first
+    there = {" ", *"".join(head)}
+    layouts = [
+        TextLayout(separator, decimal)
+        for separator in _SEPARATORS
+        for decimal in (".", ",")
+        if separator in there and (decimal == "." or (separator != "," and "," in there))
+    ]
+    scores = [_score(head, layout) for layout in layouts]
+    best = int(np.argmax([round(score, 9) for score, _ in scores]))
+    if scores[best][0]:
+        return layouts[best], scores[best][1]
     if not any(head):
         raise InputError(f"{path}: empty file; expected a header and at least one row of numbers")
     raise InputError(

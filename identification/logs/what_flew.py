@@ -5,21 +5,17 @@ one gate refuses what is none, before four of six motors are taken for a quadrot
 """
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from itertools import takewhile
-from typing import Any
 
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from ...runtime.yaml_file import read_yaml
-from .column_names import words
-from .log_map import MAPS
+from .column_names import WORDS
 from .rotor_orders import Order
-from .table import Array
+from .table import Array, Table, finite_rows
 
 QUADROTOR = "a quadrotor"
 _ROTORS = {QUADROTOR: 4, "a tricopter": 3, "a hexarotor": 6, "an octorotor": 8}
@@ -31,15 +27,6 @@ _APART = np.radians(30.0)  # by which a motor may stand off the rotor that it is
 # of a further rotor's column: share of its variance that the four leave, and its median by theirs
 _LEFT, _SIZES = 0.5, (0.5, 2.0)
 _FEWEST = 30  # rows that decide
-
-
-@cache
-def airframes() -> dict[str, dict[Any, str]]:
-    """Return what numbers and words of autopilots stand for, as ``airframes.yaml`` states."""
-    found: dict[str, dict[Any, str]] = read_yaml(
-        MAPS / "recordings" / "airframes.yaml", "airframes"
-    )
-    return found
 
 
 @dataclass(frozen=True)
@@ -77,10 +64,7 @@ UNSTATED = WhatFlew()
 
 
 def more_rotors(
-    columns: Sequence[str],
-    others: Sequence[str],
-    read: Callable[[Sequence[str]], Mapping[str, Array]],
-    are_speeds: bool = False,
+    columns: Sequence[str], source: Table | Mapping[str, Array], are_speeds: bool = False
 ) -> str:
     """Return in words that a vehicle has more than four rotors; nothing where it has not: columns
     go on with the numbers of four motors', and turn as they do. An output that is not a motor's by
@@ -89,24 +73,25 @@ def more_rotors(
 
     Args:
         columns: the four.
-        others: the columns that are there.
-        read: returns columns (N,) by their names.
+        source: all columns (N,) that are there, by their names.
         are_speeds: the four are measured speeds, which no servo has.
 
     Raises:
         InputError: a table cannot be read.
     """
     turning = [*columns]
+    others = source.numeric or source.header if isinstance(source, Table) else [*source]
     for name in _numbered_on(columns, others):
-        rows = np.column_stack(list(read([*columns, name]).values()))
-        rows = rows[np.isfinite(rows).all(axis=1)]
+        found = source.read([*columns, name]) if isinstance(source, Table) else source
+        rows = np.column_stack([found[column] for column in (*columns, name)])
+        rows = rows[finite_rows(rows)]
         if len(rows) < _FEWEST or np.ptp(rows[:, 4]) == 0.0:
             continue
         size = abs(float(np.median(rows[:, 4]) / max(np.median(np.abs(rows[:, :4])), 1e-12)))
         moves = rows - rows.mean(axis=0)
         left = np.linalg.lstsq(moves[:, :4], moves[:, 4])[1]
         share = float(left[0] / np.sum(moves[:, 4] ** 2)) if len(left) else 0.0
-        is_motor = are_speeds or re.search(words()["motor_words"], name.lower())
+        is_motor = are_speeds or re.search(WORDS["motor_words"], name.lower())
         if (is_motor or share < _LEFT) and _SIZES[0] <= size <= _SIZES[1]:
             turning.append(name)
     if len(turning) == len(columns):

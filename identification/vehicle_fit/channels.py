@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
-from ..logs.source_rates import MOTOR_RATES
+from ..logs.streams import MOTOR_RATES
 from ..motion.signals import log_signals
 from ..motion.smoothing import derivative, low_pass, resampled, runs_of, unbroken
 from .geometry import GRAVITY

@@ -12,7 +12,7 @@ import numpy as np
 from ...dynamics.rotation import matrix_of
 from ...dynamics.vehicle import Vehicle
 from ...identification.logs.log_map import LogMap
-from ...identification.logs.readers.ros_messages import Fields, stamp
+from ...identification.logs.readers.ros_topics import Fields, stamp
 from ..field_map import FieldMap
 from ..filtering import Output
 from ..messages import SECOND, Array, Malformed, Sample

@@ -23,7 +23,7 @@ from tests.support.programs import said
 from windwrench.controllers.trained_policy import FORMAT, load_policy
 from windwrench.dynamics import load_vehicle
 from windwrench.identification import read_log
-from windwrench.identification.logs import parquet_table, text_table
+from windwrench.identification.logs import tables, text_table
 from windwrench.identification.logs.flight_log import REQUIRED
 from windwrench.runtime import regular_files
 from windwrench.runtime.errors import InputError
@@ -249,7 +249,7 @@ def test_a_column_that_would_unpack_to_too_much_is_refused_by_the_footer(tmp_pat
                 pyarrow.table(columns), path, compression=packing, use_dictionary=dictionary
             )
             np.testing.assert_array_equal(read_log(path).t, columns["t"])
-    monkeypatch.setattr(parquet_table, "LIMITS", replace(LIMITS, table_numbers=10_000))
+    monkeypatch.setattr(tables, "LIMITS", replace(LIMITS, table_numbers=10_000))
     with pytest.raises(InputError, match="more than 10000 numbers in column"):
         read_log(path)
 

@@ -7,7 +7,7 @@ from rosbags import rosbag1, rosbag2
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from windwrench.identification.logs.readers.ros_messages import definitions
+from windwrench.identification.logs.readers.ros_topics import definitions
 
 START = 1_700_000_000_000_000_000  # ns
 

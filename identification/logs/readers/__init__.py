@@ -60,14 +60,10 @@ TABLES = {
     "racer": "racer",
 }
 READERS = {
-    name: Reader(name, module.WHAT, module.read, begins=module.BEGINS)
-    for name, module in (
-        ("crazyflie_sd", crazyflie_sd),
-        ("betaflight", betaflight),
-        ("ardupilot_bin", ardupilot_bin),
-        ("px4_ulog", px4_ulog),
-        ("rosbag", rosbag),
+    (name := module.__name__.rpartition(".")[2]): Reader(
+        name, module.WHAT, module.read, begins=module.BEGINS
     )
+    for module in (crazyflie_sd, betaflight, ardupilot_bin, px4_ulog, rosbag)
 }
 READERS["betaflight_csv"] = Reader(
     "betaflight_csv", "a blackbox_decode table", betaflight.read_table, betaflight.SIGNATURE

@@ -1,5 +1,5 @@
 """PX4 logs (``.ulg``), decoded by pyulog: the map ``px4`` says what their topics mean, parameters
-which motor is which rotor (``px4_motors``).
+what flew, which motor is which rotor, which output drives it, and in what range.
 
 **Times.** Those of ``timestamp_sample`` where a topic has them. Angles and velocities that a
 ``vehicle_imu`` gained over a time become rates in the middle of that time.
@@ -9,40 +9,40 @@ which motor is which rotor (``px4_motors``).
 ``motor_curve`` turns them into thrust. One without gets relative thrusts (``commanded_speeds``):
 ``actuator_motors`` itself (PX4 inverts its curve after it), or ``f x^2 + (1 - f) x`` of an output
 x, with f the parameter THR_MDL_FAC.
+
+**Damage.** Some bytes of a ULog may stand for many objects: pyulog writes topics out field by field
+for every subscription, with arrays and topics within topics, and makes an object of every
+parameter, piece of information, text and dropout. Both are counted before they are made.
 """
 
 import io
 import os
-from collections.abc import Iterator, Mapping
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import redirect_stdout
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ....dynamics.vehicle import Vehicle
+from ....runtime.errors import InputError
 from ....runtime.extras import need
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import check_regular, open_regular
 from ..channels import Samples
 from ..flight_log import FlightLog
-from ..log_map import shipped_map
+from ..log_map import shipped_map, stated
 from ..mapped_log import recording_of
+from ..rotor_orders import ORDERS, Order
 from ..streams import Recording
 from ..table import Array, one_line
-from .px4_motors import (
-    Outputs,
-    motor_order,
-    outputs_of,
-    shares_of_outputs,
-    slots_of_escs,
-    what_flew,
-    with_motors,
-    without_ranges,
-)
-from .ulog_counting import counting
+from ..what_flew import PLUS, QUADROTOR, WhatFlew, order_by_places, slots_of_motors
 
 Fields = Mapping[str, Array]  # (N,) of an instance of a topic, by name
+Parameters = Mapping[str, float]
 
 BEGINS = rb"ULog\x01\x12\x35"
 WHAT = "a PX4 log (ULog)"
@@ -53,6 +53,27 @@ _SENSORS = (  # field of an inertial sensor, and that of what it gained over a t
 )
 _MICROSECOND = 1e-6  # s
 _HEADER, _MESSAGE = 16, 3  # bytes, of a file and of a message
+_DEEPEST = 20  # topics within topics
+_MOTOR1 = 101  # PX4's number of the output function "motor 1"
+_BANKS = {"MAIN": "PWM_MAIN_FUNC", "AUX": "PWM_AUX_FUNC", "UAVCAN": "UAVCAN_EC_FUNC"}
+_OUTPUTS = 16  # of a bank
+_ESCS = 8
+_LARGEST_SHARE = 1.5  # an output beyond is no share, but of the protocol's range
+_DSHOT = (0.0, 1999.0)
+_UAVCAN = (0.0, 8191.0)
+_DSHOT_TIMERS = range(-5, -1)  # of PWM_MAIN_TIMn: DShot150 to DShot1200
+_LEAST_PULSE = 700.0  # us: no speed controller is sent a shorter one, disarmed or not
+_ABOVE_PULSES = 1.1  # of the longest pulse, which no pulse reaches
+
+
+@dataclass(frozen=True, eq=False)
+class Outputs:
+    """The outputs of motors 1 to 4, and what of them is 0 and 1."""
+
+    slots: list[int]  # from 0
+    low: Array  # (4,) what is 0
+    high: Array  # (4,) what is 1
+    words: str  # protocol and range
 
 
 def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -> FlightLog:
@@ -86,11 +107,23 @@ def channels(
     topics, stated, is_damaged = read_ulog(path)
     flown = what_flew(stated, topics.pop(_STATUS, []))
     flown.check(path)
-    parameters = stated if has_ranges else without_ranges(stated)
+    parameters = {
+        n: x for n, x in stated.items() if has_ranges or not re.search(r"_(MIN|MAX)\d*$", n)
+    }
     outputs = outputs_of(path, topics.get("actuator_outputs", []), parameters)
     flown = replace(flown, outputs=outputs.words)
     order, order_note = motor_order(path, stated, vehicle)
-    log_map = with_motors(shipped_map("recordings/px4"), order, parameters, outputs)
+    log_map = shipped_map("recordings/px4").with_order(order)
+    motors, sent = log_map.ways("commands")
+    factor = min(max(parameters.get("THR_MDL_FAC", 0.0), 0.0), 1.0)
+    note = (
+        f"commands: actuator_outputs, x = 0 to 1 ({outputs.words}), gives relative thrust "
+        f"f x^2 + (1 - f) x with THR_MDL_FAC f = {factor:g}; motors 1 to 4 at outputs "
+        f"{', '.join(str(slot + 1) for slot in outputs.slots)}"
+    )
+    columns = tuple(f"output[{slot}]" for slot in outputs.slots)
+    sent = replace(sent, columns=columns, thrust_factor=factor, note=note)
+    log_map = log_map.with_ways({"commands": [motors, sent]})
     notes = [*log_map.notes, order_note]
     if is_damaged:
         notes.append("the file is damaged or was cut; what could be read of it was used")
@@ -176,7 +209,10 @@ def unified(topic: str, fields: Fields) -> dict[str, Array]:
     """Return a topic's columns as the map names them; none, where it is not in use."""
     columns = dict(fields)
     if topic == "esc_status":
-        reported = [f"esc[{slot}].esc_rpm" for slot in slots_of_escs(columns)]
+        # the ESCs of motors 1 to 4: by the function that each states, if all do
+        functions = [f"esc[{i}].actuator_function" for i in range(_ESCS)]
+        named = [int(columns[name][-1]) if name in columns else -1 for name in functions]
+        reported = [f"esc[{i}].esc_rpm" for i in slots_of_motors(named, _MOTOR1) or range(4)]
         if not set(reported) <= set(columns):
             return {}
         return {f"esc[{i}].esc_rpm": columns[name] for i, name in enumerate(reported)}
@@ -217,3 +253,202 @@ def _sensor(topic: str, t: Array, fields: Fields, field: str, gained: str) -> Sa
     if field == "accelerometer_m_s2" and np.all(np.abs(late) < 1e6):
         t = t + _MICROSECOND * late
     return Samples(t, found, topic)
+
+
+class TooMuchError(Exception):
+    """Ends the parser: it takes all usual errors for damage and goes on."""
+
+
+def counting(parser: Any) -> Any:
+    """Return pyulog's class ``ULog`` as one that raises TooMuchError where a file has more than
+    ``FileLimits`` allows.
+    """
+    counts: Counter[str] = Counter()
+
+    def count(what: str, most: int, more: int = 1) -> None:
+        counts[what] += more
+        if counts[what] > most:
+            raise TooMuchError(f"more than {most} {what}")
+
+    class AddLogged(parser._MessageAddLogged):  # type: ignore[misc]
+        def _parse_format(self, message_formats: Mapping[str, Any]) -> None:
+            # one that has none takes its place, too
+            more = 1 + _fields(self.message_name, message_formats, {}, 0)
+            count("fields of its topics", LIMITS.ulog_fields, more)
+            super()._parse_format(message_formats)
+
+    def counted(kind: Any) -> Any:
+        class Counted(kind):  # type: ignore[misc]
+            def __init__(self, *arguments: Any, **options: Any) -> None:
+                what = "parameters, pieces of information, texts and dropouts"
+                count(what, LIMITS.ulog_texts)
+                super().__init__(*arguments, **options)
+
+        return Counted
+
+    class Counting(parser):  # type: ignore[misc]
+        _MessageAddLogged = AddLogged
+        _MessageInfo = counted(parser._MessageInfo)
+        MessageLogging = counted(parser.MessageLogging)
+        MessageLoggingTagged = counted(parser.MessageLoggingTagged)
+        MessageDropout = counted(parser.MessageDropout)
+
+        def _check_packet_corruption(self, header: Any) -> bool:
+            is_damaged = bool(super()._check_packet_corruption(header))
+            count("places hold no message", LIMITS.ulog_damages, is_damaged)
+            return is_damaged
+
+    return Counting
+
+
+def _fields(name: str, formats: Mapping[str, Any], known: dict[str, int], depth: int) -> int:
+    """Return how many fields a topic has once its arrays and the topics in it are written out."""
+    if depth > _DEEPEST:
+        raise TooMuchError(f"topic {name[:100]!r} lies more than {_DEEPEST} deep in others")
+    if name not in known:
+        known[name] = sum(
+            max(1, size) * (_fields(kind, formats, known, depth + 1) if kind in formats else 1)
+            for kind, size, _ in formats[name].fields
+        )
+    return known[name]
+
+
+def what_flew(parameters: Parameters, statuses: Sequence[Fields]) -> WhatFlew:
+    """Return what a log states of its vehicle.
+
+    Args:
+        parameters: as the log begins.
+        statuses: of the topic vehicle_status.
+    """
+    known = stated("airframes")
+    count, frame, kind, start = (
+        int(parameters.get(name, 0))
+        for name in ("CA_ROTOR_COUNT", "CA_AIRFRAME", "MAV_TYPE", "SYS_AUTOSTART")
+    )
+    if frame in known["px4_airframe"]:
+        return WhatFlew(known["px4_airframe"][frame], f"parameter CA_AIRFRAME = {frame}")
+    if any(np.any(fields.get("is_vtol", 0)) for fields in statuses):
+        return WhatFlew("a VTOL plane", "vehicle_status.is_vtol")
+    claims = [("mav_type", kind, f"parameter MAV_TYPE = {kind}")]
+    for kind in (int(x) for fields in statuses for x in fields.get("system_type", ())[-1:]):
+        claims.append(("mav_type", kind, f"vehicle_status.system_type = {kind}"))
+    claims.append(("px4_start", start // 1000, f"parameter SYS_AUTOSTART = {start}"))
+    said = ((known[table][key], by) for table, key, by in claims if key in known[table])
+    airframe, by = next(said, (QUADROTOR if count == 4 else "", ""))
+    return WhatFlew(airframe, "parameter CA_ROTOR_COUNT" if count else by, count or None)
+
+
+def motor_order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> tuple[Order, str]:
+    """Return PX4's motor of each of the vehicle's rotors, and the note that says whence: by the
+    positions CA_ROTORn_PX and PY or the airframe's, else as on PX4's quad x.
+
+    Raises:
+        InputError: the motors stand otherwise than the vehicle's rotors, by default one in each
+            quadrant.
+    """
+    start = int(parameters.get("SYS_AUTOSTART", 0))
+    # PX4's body y points right
+    places = [
+        (parameters.get(f"CA_ROTOR{i}_PX", 0.0), -parameters.get(f"CA_ROTOR{i}_PY", 0.0))
+        for i in range(4)
+    ]
+    said, whence = "", "as on PX4's quad x, which the log does not state"
+    if parameters.get("CA_ROTOR_COUNT") and any(x or y for x, y in places):
+        whence, said = "by the positions in CA_ROTORn_PX and PY", "CA_ROTORn_PX and CA_ROTORn_PY"
+    elif start // 1000 == 5:
+        places, whence = list(PLUS), f"as on a quad plus (SYS_AUTOSTART = {start})"
+        said = f"SYS_AUTOSTART = {start}, a quad plus,"
+    order = order_by_places(places, vehicle) if said else ORDERS["px4-x"]
+    if order is None:
+        raise InputError(
+            f"{path}: parameters {said} put the rotors at {places} (x forward, y left); expected "
+            "one in each quadrant, as on a quad x, or a vehicle file with these rotor_positions"
+        )
+    motors = ", ".join(map(str, order))
+    return order, f"motors renumbered {whence}: rotors 1, 2, 3, 4 are motors {motors}"
+
+
+def outputs_of(path: Path, sent: Sequence[Fields], parameters: Parameters) -> Outputs:
+    """Return which outputs the motors are, and what of them is 0 and 1: shares as they are; of
+    DShot and UAVCAN, which the parameters state or no pulse can be, the protocol's range; of pulses
+    each output's own parameter, the bank's, or PX4's default.
+
+    Args:
+        path: the file, for errors.
+        sent: the instances of actuator_outputs.
+        parameters: of the vehicle.
+
+    Raises:
+        InputError: a range of pulses is none, or the outputs fit no protocol.
+    """
+    bank, slots = "MAIN", [0, 1, 2, 3]
+    for name, prefix in reversed(_BANKS.items()):  # of several the first
+        functions = [int(parameters.get(f"{prefix}{i + 1}", 0.0)) for i in range(_OUTPUTS)]
+        if found := slots_of_motors(functions, _MOTOR1):
+            bank, slots = name, found
+    each = (_of_motors(fields, slots) for fields in sent)
+    motors = next((motors for motors in each if motors is not None), np.zeros((0, 4)))
+    most = float(np.nanmax(motors)) if np.isfinite(motors).any() else 0.0
+    turning = motors[motors > 0.5 * most]  # not what stops them
+    usual = float(np.median(turning)) if turning.size else _LEAST_PULSE
+
+    def pulses(end: str, default: float) -> Array:
+        """Return one end (4,) of the outputs' ranges of pulses, us."""
+        names = [(f"PWM_{bank}_{end}{s + 1}", f"PWM_{bank}_{end}", f"PWM_{end}") for s in slots]
+        given = ([parameters.get(name, 0.0) for name in one] for one in names)
+        return np.array([next((x for x in one if x > 0.0), default) for one in given])
+
+    lows, highs = pulses("MIN", 1000.0), pulses("MAX", 2000.0)
+    # a bus for sensors alone leaves the motors to pulses, which stay long when they stand still
+    has_bus = parameters.get("UAVCAN_ENABLE", 0.0) >= 3.0 and bool(np.any(motors < _LEAST_PULSE))
+    timers = [parameters.get(f"PWM_{bank}_TIM{i}", 0.0) for i in range(_OUTPUTS)]
+    is_dshot = parameters.get("DSHOT_CONFIG", 0.0) > 0.0 or any(x in _DSHOT_TIMERS for x in timers)
+    if 0.0 < most <= _LARGEST_SHARE:
+        return Outputs(slots, np.zeros(4), np.ones(4), "shares of 1")
+    if bank == "UAVCAN" or has_bus or most > _ABOVE_PULSES * highs.max():
+        protocol, (low, high), stated = "UAVCAN", _UAVCAN, bank == "UAVCAN" or has_bus
+    elif is_dshot or usual < _LEAST_PULSE:
+        protocol, (low, high), stated = "DShot", _DSHOT, is_dshot
+    else:
+        if not np.all(highs > lows):
+            raise InputError(
+                f"{path}: the PWM_{bank}_MIN and MAX parameters of the motors' outputs are "
+                f"{lows.tolist()} and {highs.tolist()}; expected MIN below MAX"
+            )
+        words = f"pulses, of which one is above {_LARGEST_SHARE:g}: {lows.min():g} to "
+        return Outputs(slots, lows, highs, f"{words}{highs.max():g} us")
+    if most > high:
+        raise InputError(
+            f"{path}: actuator_outputs reaches {most:g}; expected shares up to 1, pulses in us, "
+            f"or numbers of {protocol} up to {high:g}"
+        )
+    why = "as parameters state" if stated else "since no pulses are like that"
+    words = f"{protocol}, {low:g} to {high:g}, {why}"
+    return Outputs(slots, np.full(4, low), np.full(4, high), words)
+
+
+def shares_of_outputs(columns: Fields, outputs: Outputs) -> dict[str, Array]:
+    """Return what was sent to each output (N,) as 0 to 1, of those that are no motors' in the
+    motors' range; nothing, where a motor's never changes.
+    """
+    if _of_motors(columns, outputs.slots) is None:
+        return {}
+    low, high = (np.full(_OUTPUTS, end) for end in (outputs.low.min(), outputs.high.max()))
+    low[outputs.slots], high[outputs.slots] = outputs.low, outputs.high
+    names = [f"output[{i}]" for i in range(_OUTPUTS)]
+    return {
+        name: np.clip((np.nan_to_num(columns[name]) - low[i]) / (high[i] - low[i]), 0.0, 1.0)
+        for i, name in enumerate(names)
+        if name in columns
+    }
+
+
+def _of_motors(columns: Fields, slots: Sequence[int]) -> Array | None:
+    """Return what was sent to the outputs of the motors (N, 4); None where one of them is not there
+    or never changes: that of a servo, or of a bank that is not in use.
+    """
+    names = [f"output[{slot}]" for slot in slots]
+    if not set(names) <= set(columns):
+        return None
+    sent = np.nan_to_num(np.column_stack([columns[name] for name in names]))
+    return sent if np.all(np.ptp(sent, axis=0) > 0.0) else None

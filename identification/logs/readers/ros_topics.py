@@ -1,18 +1,31 @@
 """Which topics of a bag, or of a live source, hold the sections of a log map, by the rules that
-``rosbag`` states.
+``rosbag`` states; and their messages as columns: numbers by the paths of their fields, such as
+``pose.position.x``, ``data[0]`` or ``esc[0].esc_rpm``.
 """
 
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping
+from itertools import islice
+from operator import attrgetter
 from typing import Any
 
+import numpy as np
+
 from ....runtime.errors import InputError, unknown_name
-from ..log_map import LogMap, parse_map
-from .ros_messages import stated
+from ....runtime.file_limits import LIMITS, check_count
+from ..log_map import LogMap, parse_map, stated
+from ..table import Array
+from .px4_ulog import unified
 
 SECTIONS = ("position", "attitude", "rotors", "commands", "battery", "accelerometer", "gyro")
 # sections that stand in the messages of another, where a map does not say in which
 BESIDE = {"attitude": "position", "gyro": "accelerometer"}
 MOTORS = ("rotors", "commands")
+_SECOND = 10**9  # ns
+_MICROSECOND = 1000  # ns
+_LATEST = 2**63  # ns
+_PX4 = "px4_msgs/msg/"
+_SHOWN = 30  # fields that an error lists
 
 
 def map_of(
@@ -67,7 +80,7 @@ def map_of(
     for section in lacks[:1]:
         why = refused.get(section) or f"{section}: {_missing(types, section, where)}"
         raise InputError(f"{source}: {why}")
-    is_ned = types.get(_topic_of(found.get("position")) or "") in stated()["ned"]
+    is_ned = types.get(_topic_of(found.get("position")) or "") in stated("ros")["ned"]
     clock: dict[str, Any] = {"time": {"column": "stamp", "unit": "ns"}}
     clock |= {"world": "ned", "body": "frd"} if is_ned else {}
     log_map = parse_map({**clock, **given, **found}, where)
@@ -93,8 +106,8 @@ def _usual(
     """
     if topic not in types:
         raise unknown_name("topic", topic, types, f"named in {where}")
-    kind, known = types[topic], stated()[section]
-    array = stated()["arrays"].get(kind) if section in MOTORS else None
+    kind, known = types[topic], stated("ros")[section]
+    array = stated("ros")["arrays"].get(kind) if section in MOTORS else None
     if array and "unit" not in said:
         units = "rad/s, rpm, Hz" if section == "rotors" else "normalised, us"
         raise InputError(
@@ -121,9 +134,9 @@ def _chosen(
     """
 
     def named_by(topic: str, words: str) -> bool:
-        return any(word in topic.lower() for word in stated()[words])
+        return any(word in topic.lower() for word in stated("ros")[words])
 
-    fitting = {*stated()[section], *(stated()["arrays"] if "unit" in said else ())}
+    fitting = {*stated("ros")[section], *(stated("ros")["arrays"] if "unit" in said else ())}
     several = sorted(topic for topic, kind in types.items() if kind in fitting)
     if section in ("position", "rotors"):
         flown = [topic for topic in several if not named_by(topic, "setpoint_words")]
@@ -150,8 +163,8 @@ def _missing(types: Mapping[str, str], section: str, where: str) -> str:
     """
     topics = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(types.items())) or "none"
     names = MOTORS if section == "rotors" else (section,)
-    known = dict.fromkeys(kind for name in names for kind in stated()[name])
-    arrays = sorted(topic for topic, kind in types.items() if kind in stated()["arrays"])
+    known = dict.fromkeys(kind for name in names for kind in stated("ros")[name])
+    arrays = sorted(topic for topic, kind in types.items() if kind in stated("ros")["arrays"])
     left_out = sorted(topic for topic, kind in types.items() if kind in known)
     found = "no topic of a type that fits"
     found = f"no topic but set-points by their names ({', '.join(left_out)})" if left_out else found
@@ -163,3 +176,116 @@ def _missing(types: Mapping[str, str], section: str, where: str) -> str:
         )
         wanted += f"commands: {{topic: {arrays[0]}, unit: us}} (or normalised)"
     return f"{found}; expected {wanted}. The topics: {topics}"
+
+
+def definitions() -> list[dict[str, str]]:
+    """Return the definitions of the types that rosbags does not know, in several variants: the
+    newest of each comes first.
+    """
+    known: dict[str, list[str]] = stated("ros")["definitions"]
+    return [
+        {name: texts[min(variant, len(texts) - 1)] for name, texts in known.items()}
+        for variant in range(max(map(len, known.values())))
+    ]
+
+
+def stamp(message: Any) -> int:
+    """Return when a message's sample was taken, in ns of whatever clock its sender has; 0: it does
+    not say.
+    """
+    header = getattr(message, "header", None)
+    if header is not None:
+        return min(int(header.stamp.sec) * _SECOND + int(header.stamp.nanosec), _LATEST - 1)
+    sampled = int(getattr(message, "timestamp_sample", 0) or getattr(message, "timestamp", 0))
+    return _MICROSECOND * sampled if sampled < _LATEST // _MICROSECOND else 0
+
+
+class Fields:
+    """The numbers in a topic's messages that a map asks for; of an array all that it holds.
+
+    Args:
+        where: the topic, for errors.
+        kind: the type of its messages.
+        wanted: columns of the map.
+    """
+
+    def __init__(self, where: str, kind: str, wanted: Collection[str]) -> None:
+        self.where, self._kind, self._wanted = where, kind, wanted
+        self._names: list[str] = []
+        self._getters: list[Callable[[Any], Any]] = []
+
+    def take(self, message: Any) -> list[float]:
+        """Return the numbers (K,) of a message.
+
+        Raises:
+            InputError: it has more than ``FileLimits.log_fields``, or less than the first one.
+        """
+        if not self._names:
+            found = list(islice(_paths(message), LIMITS.log_fields + 1))
+            check_count(self.where, len(found), LIMITS.log_fields, "fields of a message")
+            arrays = set(map(array_of, self._wanted))
+            is_px4 = self._kind.startswith(_PX4)
+            if not is_px4 and not set(self._wanted) <= set(found):
+                raise self._lack(self._wanted, found)
+            self._names = [name for name in found if is_px4 or array_of(name) in arrays]
+            self._getters = [_getter(name) for name in self._names]
+        try:
+            return [float(get(message)) for get in self._getters]
+        except IndexError:
+            names, self._names = self._names, []
+            raise self._lack(names, list(_paths(message))) from None
+
+    def columns(self, rows: Array) -> dict[str, Array]:
+        """Return the columns (N,) of messages' numbers (N, K), by name.
+
+        Raises:
+            InputError: one that is wanted is not among them.
+        """
+        found = dict(zip(self._names, rows.T, strict=True))
+        if self._kind.startswith(_PX4):
+            name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", self._kind.removeprefix(_PX4)).lower()
+            found = unified(name, found)
+        if not set(self._wanted) <= set(found):
+            raise self._lack(self._wanted, list(found))
+        return found
+
+    def _lack(self, wanted: Collection[str], found: Collection[str]) -> InputError:
+        missing = [name for name in wanted if name not in found]
+        return InputError(
+            f"{self.where}: no field {', '.join(missing)} in its {self._kind}; found "
+            f"{', '.join(islice(found, _SHOWN)) or 'no number'}"
+        )
+
+
+def array_of(path: str) -> str:
+    """Return a field's path without the numbers of its elements: what all elements share."""
+    return re.sub(r"\[\d+\]", "[]", path)
+
+
+def _paths(value: Any, path: str = "") -> Iterator[str]:
+    """Yield the paths of the numbers in a message."""
+    if isinstance(value, str | bytes):
+        return
+    if isinstance(value, int | float | np.generic):
+        yield path
+    elif hasattr(value, "__len__"):
+        for i, item in enumerate(value):
+            yield from _paths(item, f"{path}[{i}]")
+    else:  # a message, of rosbags or of rclpy
+        names = getattr(value, "__dataclass_fields__", None) or value.get_fields_and_field_types()
+        for name in names:
+            yield from _paths(getattr(value, name), f"{path}.{name}" if path else name)
+
+
+def _getter(path: str) -> Callable[[Any], Any]:
+    """Return a function that returns a field of a message."""
+    if "[" not in path:
+        return attrgetter(path)
+    steps = [int(x) if x.isdecimal() else x for x in re.findall(r"[^.\[\]]+", path)]
+
+    def get(value: Any) -> Any:
+        for step in steps:
+            value = value[step] if isinstance(step, int) else getattr(value, step)
+        return value
+
+    return get

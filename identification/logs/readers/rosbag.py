@@ -24,17 +24,23 @@ not read.
 
 A sample's time is its header's (of PX4's types its ``timestamp_sample`` or ``timestamp``), where that runs within a second of the
 bag's clock, else the time it was recorded.
-Messages are decoded by rosbags' own definitions and those in ``ros_messages``, never by those in the bag,
-so that nothing in a file decides what code runs; a bag whose definitions differ is refused.
+Messages are decoded by rosbags' own definitions and those in ``maps/recordings/ros.yaml``, never by those in the bag,
+so that nothing in a file decides what code runs; a bag whose definitions differ is refused. A few kilobytes may unpack to any size, so
+what is packed is unpacked up to a limit.
 """  # noqa: E501
 
+import bz2
 import os
+import re
+import sqlite3
 from array import array
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,15 +49,13 @@ from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.extras import need
 from ....runtime.file_limits import LIMITS, check_count
-from ....runtime.regular_files import open_regular
+from ....runtime.regular_files import check_regular, open_regular
 from ....runtime.yaml_file import read_yaml
 from ..channels import Samples
 from ..flight_log import FlightLog
 from ..mapped_log import recording_of
 from ..table import Array, one_line
-from .ros_messages import Fields, definitions, stamp
-from .ros_topics import map_of
-from .unpacking import check_bag_files, limited_unpacking
+from .ros_topics import Fields, definitions, map_of, stamp
 
 WHAT = "a ROS bag (ROS 1, SQLite or MCAP)"
 SUFFIXES = (".bag", ".db3", ".mcap")
@@ -62,6 +66,12 @@ _Messages = Callable[[str], Iterator[tuple[int, Any]]]  # topic to (recorded at 
 
 _SAME_CLOCK = 1_000_000_000  # ns between a header's time and the recording's
 _NANOSECOND = 1e-9  # s
+LARGEST = LIMITS.bag_chunk
+_METADATA = 1_000_000  # bytes
+_TABLES = 100  # a bag has four or five
+_COMPUTED = re.compile(r"\bAS\s*\(|\bVIRTUAL\b", re.IGNORECASE)
+_LISTED = re.compile(r"^\s*-\s*['\"]?(.+\.(?:db3|mcap))['\"]?\s*$", re.MULTILINE)
+_WHOLE = re.compile(r"compression_mode:\s*['\"]?(file|message)", re.IGNORECASE)
 
 
 def read(
@@ -85,9 +95,7 @@ def read(
             wanted = dict.fromkeys(name for part in held.values() for name in part.named)
             fields = Fields(f"{path}: topic {topic}", types[topic], wanted)
             try:
-                times, columns, doubt = _decoded_topic(
-                    f"{path}: topic {topic}", fields, messages(topic)
-                )
+                times, columns, doubt = _decoded_topic(fields, messages(topic))
             except InputError as error:
                 if held.keys() & {*given, "position", "rotors"}:
                     raise
@@ -202,7 +210,7 @@ def _decoded(raw: Any, kind: str, stores: list[Any], ros1: bool) -> Any:
 
 
 def _decoded_topic(
-    where: str, fields: Fields, messages: Iterator[tuple[int, Any]]
+    fields: Fields, messages: Iterator[tuple[int, Any]]
 ) -> tuple[NDArray[np.int64], dict[str, Array], str]:
     """Return times (N,) in ns and columns (N,) of a topic by name, and what is wrong with its time
     stamps.
@@ -212,12 +220,12 @@ def _decoded_topic(
     """
     recorded, stamped, values = array("q"), array("q"), array("d")
     for index, (received, message) in enumerate(messages):
-        check_count(where, index + 1, LIMITS.table_rows, "messages")
+        check_count(fields.where, index + 1, LIMITS.table_rows, "messages")
         recorded.append(received)
         stamped.append(stamp(message))
         values.extend(fields.take(message))
     if not recorded:
-        raise InputError(f"{where} has no messages; expected at least two")
+        raise InputError(f"{fields.where} has no messages; expected at least two")
     columns = fields.columns(np.array(values).reshape(len(recorded), -1))
     received_at, sampled_at = np.array(recorded), np.array(stamped)
     if not np.any(sampled_at):
@@ -225,3 +233,102 @@ def _decoded_topic(
     if np.max(np.abs(sampled_at - received_at)) > _SAME_CLOCK:
         return received_at, columns, "its time stamps are of another clock than the bag's"
     return sampled_at, columns, ""
+
+
+def _at_most(make: Callable[[], Any], spent: list[int]) -> Callable[..., bytes]:
+    """Return the decompression of ``make()``'s kind, which refuses what unpacks to more than
+    ``LARGEST`` bytes, or to more than a bag may with all its chunks, of which ``spent`` keeps the
+    count: an index may name the same chunk over and over.
+    """
+
+    def unpack(data: bytes, *_: object) -> bytes:
+        machine = make()
+        out: bytes = machine.decompress(data, max_length=LARGEST)
+        if not machine.eof:
+            raise ValueError(f"a chunk unpacks to more than {LARGEST} bytes, or ends too soon")
+        spent.append(spent.pop() + len(out))
+        if spent[0] > LIMITS.bag_unpacked:
+            raise ValueError(
+                f"its chunks unpack to more than {LIMITS.bag_unpacked} bytes; copy the topics of "
+                f"pose and rotors to a bag of their own"
+            )
+        return out
+
+    return unpack
+
+
+@contextmanager
+def limited_unpacking() -> Iterator[None]:
+    """Have rosbags unpack no chunk to more than ``LARGEST`` bytes, and no more of them and of their
+    index than ``FileLimits`` allows, while the block lasts.
+    """
+    import lz4.frame
+    from rosbags.rosbag1 import reader
+    from rosbags.rosbag2 import storage_mcap
+
+    spent = [0]
+    entries = count()
+
+    class Entry(reader.IndexData):  # type: ignore[misc]
+        """An entry of the index, counted."""
+
+        __slots__ = ()
+
+        def __new__(cls, *values: int) -> Any:
+            if next(entries) >= LIMITS.bag_index:
+                raise ValueError(f"its index has more than {LIMITS.bag_index} entries")
+            return super().__new__(cls, *values)
+
+    lz4_at_most = _at_most(lz4.frame.LZ4FrameDecompressor, spent)
+    with (
+        patch.object(reader, "IndexData", Entry),
+        patch.dict(
+            reader.decompressors, {"bz2": _at_most(bz2.BZ2Decompressor, spent), "lz4": lz4_at_most}
+        ),
+        patch.dict(
+            storage_mcap.DECOMPRESSORS,
+            {"zstd": _at_most(storage_mcap.zstd.ZstdDecompressor, spent), "lz4": lz4_at_most},
+        ),
+    ):
+        yield
+
+
+def check_bag_files(path: Path) -> None:
+    """Check the files of a ROS 2 bag, a file or a folder, before a library opens them by name.
+
+    Raises:
+        InputError: one is no regular file, or a database that computes what it holds; or the files
+            or messages are packed one by one, so that what they unpack to cannot be limited.
+    """
+    is_folder = os.path.isdir(path)
+    folder = path if is_folder else path.parent
+    metadata = folder / "metadata.yaml"
+    files = [file for file in folder.iterdir() if not file.is_dir()] if is_folder else [path]
+    text = ""
+    if metadata.exists():
+        check_regular(metadata, "the metadata of a ROS 2 bag", _METADATA)
+        text = metadata.read_bytes().decode("utf-8", "replace")
+    if is_folder:
+        files += [path / name for name in _LISTED.findall(text) if (path / name).exists()]
+    for file in files:
+        check_regular(file, "a file of a ROS 2 bag")
+        if file.suffix.lower() != ".db3":
+            continue
+        # a view or a computed column of a few bytes of SQL may give any number of rows of any size
+        found = []
+        with suppress(sqlite3.Error):  # the reader says what is wrong with it
+            uri = f"{file.resolve().as_uri()}?mode=ro&immutable=1"
+            with closing(sqlite3.connect(uri, uri=True)) as database:
+                query = "SELECT name, type, sql FROM sqlite_master WHERE type IN ('table', 'view')"
+                found = database.execute(query).fetchmany(_TABLES)
+        for name, kind, sql in found:
+            if kind == "view" or _COMPUTED.search(sql or "") or len(found) == _TABLES:
+                raise InputError(
+                    f"{file}: its {kind} {name!r} is computed; expected a ROS 2 bag, whose tables "
+                    "hold what was recorded"
+                )
+    if packed := _WHOLE.search(text):
+        raise InputError(
+            f"{metadata}: compression_mode {packed[1].lower()}: expected a bag that is not "
+            "packed, or by chunks (MCAP); `ros2 bag convert` makes one"
+        )

@@ -74,7 +74,7 @@ def test_arrays_of_other_lengths_are_left_out_with_a_note(tmp_path):
     ],
 )
 def test_a_matlab_file_that_cannot_be_read_says_what_to_do(tmp_path, monkeypatch, data, expected):
-    monkeypatch.setattr("windwrench.identification.logs.array_table.find_spec", lambda _: None)
+    monkeypatch.setattr("windwrench.identification.logs.tables.find_spec", lambda _: None)
     (tmp_path / "a.mat").write_bytes(data)
     with pytest.raises(InputError, match=expected):
         open_table(tmp_path / "a.mat")

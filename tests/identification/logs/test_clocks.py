@@ -5,8 +5,7 @@ import pytest
 
 from tests.support.dataflash_writer import dataflash, imu, parm, rcou
 from windwrench.dynamics import InputError
-from windwrench.identification.logs.channels import Samples
-from windwrench.identification.logs.clocks import CLOCK, in_order, on_one_clock
+from windwrench.identification.logs.channels import CLOCK, Samples, in_order, on_one_clock
 from windwrench.identification.logs.reading import read_log
 
 T = 0.02 * np.arange(600)

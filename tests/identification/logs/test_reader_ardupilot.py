@@ -20,7 +20,7 @@ from tests.support.dataflash_writer import (
     xkq,
 )
 from windwrench.dynamics import InputError, load_vehicle
-from windwrench.identification.logs.readers.dataflash import read_dataflash
+from windwrench.identification.logs.readers.ardupilot_bin import read_dataflash
 from windwrench.identification.logs.reading import read_log
 
 VEHICLE = load_vehicle("ardrone2")

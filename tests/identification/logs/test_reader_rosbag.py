@@ -21,7 +21,7 @@ from tests.support.autopilot_flight import (
     ned,
 )
 from windwrench.dynamics import InputError, load_vehicle
-from windwrench.identification.logs.readers import rosbag, unpacking
+from windwrench.identification.logs.readers import rosbag
 from windwrench.identification.logs.reading import read_log
 from windwrench.runtime.file_limits import LIMITS
 
@@ -31,7 +31,7 @@ from rosbags import rosbag1, rosbag2
 from rosbags.rosbag1 import reader
 
 from tests.support.bag_writer import START, stamp, write_bag
-from windwrench.identification.logs.readers.ros_messages import definitions
+from windwrench.identification.logs.readers.ros_topics import definitions
 
 VEHICLE = load_vehicle("ardrone2")
 T = 0.01 * np.arange(50)
@@ -372,7 +372,7 @@ def test_packed_chunks_are_unpacked_up_to_a_limit(way, write, monkeypatch):
     path = write(FLIGHT, kind, packed=packed)
     assert_flight(read_log(path, "rosbag", VEHICLE))
     before = dict(reader.decompressors)
-    monkeypatch.setattr(unpacking, "LARGEST", 1000)
+    monkeypatch.setattr(rosbag, "LARGEST", 1000)
     with pytest.raises(InputError, match=r"flight.*a chunk unpacks to more than 1000 bytes"):
         read_log(path, "rosbag", VEHICLE)
     assert reader.decompressors == before  # rosbags is left as it was
@@ -391,8 +391,7 @@ CHUNKS = {"bag_unpacked": 20_000}, "its chunks unpack to more than 20000 bytes"
 )
 def test_what_a_bag_holds_is_counted(kind, packed, limit, expected, write, monkeypatch):
     path = write(FLIGHT, kind, packed=packed)
-    for module in (unpacking, rosbag):
-        monkeypatch.setattr(module, "LIMITS", replace(LIMITS, **limit))
+    monkeypatch.setattr(rosbag, "LIMITS", replace(LIMITS, **limit))
     with pytest.raises(InputError, match=expected):
         read_log(path, "rosbag", VEHICLE)
 

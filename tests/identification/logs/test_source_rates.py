@@ -9,7 +9,7 @@ from tests.support.flown import VEHICLE, recorded
 from windwrench.identification import diagnose, read_log
 from windwrench.identification.logs.flight_log import write_log
 from windwrench.identification.logs.screening import screen_log
-from windwrench.identification.logs.source_rates import between_samples, source_rate
+from windwrench.identification.logs.streams import between_samples, source_rate
 from windwrench.identification.wrench_series import estimate_log
 from windwrench.runtime.errors import InputError
 
