@@ -127,9 +127,4 @@ def jacobian(model: Model, theta: Array, names: tuple[str, ...]) -> tuple[Array,
         return coefficients(model.values(x), names, model.mass, model.powers)
 
     here = at(theta)
-    slopes = np.empty((len(theta), *here.shape))
-    for i in range(len(theta)):
-        step = np.zeros(len(theta))
-        step[i] = 1e-6
-        slopes[i] = (at(theta + step) - here) / 1e-6
-    return here, slopes
+    return here, np.array([(at(theta + e) - here) / 1e-6 for e in 1e-6 * np.eye(len(theta))])

@@ -41,7 +41,7 @@ def identified_data(found: Identified) -> dict[str, Any]:
         "estimates": [
             {"name": e.name, "value": e.value, "interval_95": [e.low, e.high]}
             | {"unit": e.unit, "status": e.status, "how": e.how}
-            for e in found.estimates
+            for e in found.estimates.values()
         ],
         "notes": found.notes,
         "advice": found.advice,
@@ -63,7 +63,7 @@ def identified_data(found: Identified) -> dict[str, Any]:
 def headline(found: Identified) -> str:
     """Return one sentence on how much of the vehicle the logs tell."""
     essential = ["Jxx", "Jyy", "Jzz", "p/k"]
-    open_ones = [n for n in essential if found[n].status in (ASSUMED, NOTHING)]
+    open_ones = [n for n in essential if found.estimates[n].status in (ASSUMED, NOTHING)]
     told = "thrust" if found.fit.drive.commands else "k"
     if not open_ones:
         return f"{told}, inertia and reaction torque are identified"
@@ -77,7 +77,7 @@ def write_identified(found: Identified, path: Path) -> list[Path]:
     Raises:
         InputError: a file cannot be written.
     """
-    known = found.by_name
+    known = found.estimates
     std = {
         e.name: {
             c: (estimate.high - estimate.low) / 3.92

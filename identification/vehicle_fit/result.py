@@ -46,7 +46,7 @@ class Identified:
     """A vehicle from its logs."""
 
     vehicle: Vehicle
-    estimates: tuple[Estimate, ...]
+    estimates: Mapping[str, Estimate]  # by their names
     sources: Sources
     pieces: tuple[MotionPiece, ...]
     fit: VehicleFit
@@ -55,12 +55,3 @@ class Identified:
     # of what was not fitted to: held_out_blocks, flights_left_out (each in turn, of several), and
     # prediction, of further flights
     predicted: Mapping[str, PredictionErrors]
-
-    def __getitem__(self, name: str) -> Estimate:
-        """Return an estimate by its name."""
-        return self.by_name[name]
-
-    @property
-    def by_name(self) -> Mapping[str, Estimate]:
-        """All estimates by their names."""
-        return {estimate.name: estimate for estimate in self.estimates}
