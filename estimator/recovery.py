@@ -171,10 +171,9 @@ def load_recovery(record: np.void, vehicle: Vehicle, gate: float | None, given: 
         torque,
         given.force_std * weight,
     )
-    record["lost"] = np.repeat(np.square(deviations), 3)
-    record["lost"] *= _LOST
-    record["lost"][:3] = (given.attitude_std / 4.0) ** 2  # (16)
     record["prior"] = np.repeat(np.square(deviations), 3)
+    record["lost"] = _LOST * record["prior"]
+    record["lost"][:3] = (given.attitude_std / 4.0) ** 2  # (16)
     # accelerations of a push of two weights, and of the same about the arm
     push = 2.0 * weight
     record["push"] = push * vehicle.arm_l / inertia, push / vehicle.mass
