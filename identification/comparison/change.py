@@ -26,14 +26,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import log_softmax, logsumexp, softmax
 
+from ...runtime.arrays import Array
 from ...runtime.errors import InputError
 from .sessions import difference
 from .trim import Trim, features_of
-
-Array = NDArray[np.float64]
 
 NOWHERE = "nowhere"
 SOMETHING_ELSE = "something else"

@@ -17,15 +17,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import log_softmax, logsumexp, softmax
 from scipy.stats import norm
 
+from ...runtime.arrays import Array, Index
 from .fault_balance import BalanceChannel, Begin, FaultBalance
 from .fault_channels import STEP, Channels, Samples, sample
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 NOTHING, ALL, OTHER = "nothing", "all rotors", "another force or torque"
 

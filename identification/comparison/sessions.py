@@ -15,12 +15,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import log_softmax
 
+from ...runtime.arrays import Array, Index
 from .trim import Trim
-
-Array = NDArray[np.float64]
 
 # How unchanged flights differ, in the four numbers of a trim, measured on 89 flights of one
 # Crazyflie, 7 of them unchanged (CrazyPAD, vehicle E8; Masalimov and others, Data 2024, 9, 79).
@@ -71,7 +69,7 @@ def difference(after: Sequence[Trim], before: Sequence[Trim]) -> Difference:
     return Difference(mean[keep], variance[keep], log[keep])
 
 
-def _cuts(trims: Sequence[Trim], later: Array, x: Array) -> list[tuple[NDArray[np.intp], float]]:
+def _cuts(trims: Sequence[Trim], later: Array, x: Array) -> list[tuple[Index, float]]:
     """Return each way to cut the flights into sessions: the number of each flight's session, and
     the logarithm of its prior.
     """
@@ -89,12 +87,12 @@ def _cuts(trims: Sequence[Trim], later: Array, x: Array) -> list[tuple[NDArray[n
         ends = told & known
         ends[places] = chosen
         log = float(np.log(np.where(ends, chance, 1.0 - chance)[places]).sum())
-        out.append((np.concatenate([[0], np.cumsum(ends)]).astype(np.intp), log))
+        out.append((np.concatenate([[0], np.cumsum(ends)]).astype(np.int64), log))
     return out
 
 
 def _of_cut(
-    x: Array, later: Array, noise: Array, cut: NDArray[np.intp], log: float
+    x: Array, later: Array, noise: Array, cut: Index, log: float
 ) -> tuple[Array, Array, Array]:
     """Return mean and variance (k, 4) of the difference between flights (n, 4) that are ``later``
     (n,) and those that are not, and the logarithm (k,) of how likely they are, at each pair of

@@ -19,11 +19,10 @@ from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import false_discovery_control, mannwhitneyu, t
 
-Array = NDArray[np.float64]
+from ...runtime.arrays import Array
 
 FALSE_DISCOVERIES = 0.05  # expected share of false ones among the drifts that are told
 # flights that a trend needs: with 4, its interval held the truth 91 times of 100 where flights

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import EffectSetting, Mocap, MotorCurve, Uncertainty, Vehicle
@@ -18,8 +17,6 @@ from .motors import MotorResponse
 from .parameters import FURTHER
 from .result import ASSUMED, IDENTIFIED, NOTHING, Estimate
 from .solve import VehicleFit
-
-Array = NDArray[np.float64]
 
 
 def vehicle_of(

@@ -10,18 +10,16 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import welch
 from scipy.spatial.transform import Rotation
 
+from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from ..logs.source_rates import MOTOR_RATES
 from ..motion.signals import log_signals
 from ..motion.smoothing import derivative, low_pass, resampled, runs_of, unbroken
 from .geometry import GRAVITY
-
-Array = NDArray[np.float64]
 
 _SHORTEST_PIECE = 3.0  # s; shorter ones have no frequency low enough to tell a bias
 _GAP = 0.1  # s without a sample, at which a piece ends
@@ -254,7 +252,7 @@ def _velocity(log: FlightLog, t: Array) -> Array | None:
     return None if np.isnan(out).any() else out
 
 
-def _flying(piece: MotionPiece) -> NDArray[np.bool_]:
+def _flying(piece: MotionPiece) -> Mask:
     """Return where the rotors carry the vehicle, without take-off and landing."""
     drive = piece.rotor_speeds if piece.rotor_speeds is not None else piece.command
     assert drive is not None
@@ -263,7 +261,7 @@ def _flying(piece: MotionPiece) -> NDArray[np.bool_]:
     return np.asarray(load > _FLYING_SHARE * usual)
 
 
-def _cut(piece: MotionPiece, keep: NDArray[np.bool_]) -> list[MotionPiece]:
+def _cut(piece: MotionPiece, keep: Mask) -> list[MotionPiece]:
     """Return the runs of samples that are kept, if they are long enough."""
     if keep.all():
         return [piece]

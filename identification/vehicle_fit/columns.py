@@ -11,13 +11,11 @@ gyroscopic one, from which ``Jz`` is told.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...runtime.arrays import Array
 from ..motion.smoothing import derivative, lagged, low_pass
 from .channels import MotionPiece
 from .spectra import BAND, Complex, Segment, segments_of
-
-Array = NDArray[np.float64]
 
 _STEP = {"lag": 1e-3, "gamma": 0.05}  # of finite differences
 # Hz: slower moments that nothing measures are answered by the flight loop with rotor torque, so

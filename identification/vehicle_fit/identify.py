@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.effects import Role
 from ...dynamics.vehicle import Vehicle
@@ -32,7 +31,6 @@ from .result import IDENTIFIED, NOTHING, Estimate, Identified, told
 from .solve import Interval, VehicleFit, score_tests, solve
 from .spectra import BAND
 
-Array = NDArray[np.float64]
 Report = Callable[[float, str], None]
 
 # fall of twice the negative log-likelihood for each further parameter, in units of ln of the

@@ -12,11 +12,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...runtime.arrays import Array
 from .geometry import GRAVITY
-
-Array = NDArray[np.float64]
 
 _AXES = "xyz"
 NONLINEAR = ("lag", "delay", "gamma")  # s, s, 1

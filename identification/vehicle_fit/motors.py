@@ -5,14 +5,12 @@ behind a first-order lag.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.stats import t as student
 
+from ...runtime.arrays import Array
 from ..motion.smoothing import lagged
 from .channels import MotionPiece
-
-Array = NDArray[np.float64]
 
 _LAGS = (1e-3, 0.5)  # s, the shortest and the longest
 _SEGMENT = 5.0  # s: errors further apart are taken as independent

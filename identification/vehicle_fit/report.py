@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.vehicle_file import save_vehicle
+from ...runtime.arrays import Array
 from ...runtime.drawing import ESTIMATE, TRUTH, new_figure, styled
 from ...runtime.page_files import write_png, write_text
 from ...runtime.plain_values import plain
@@ -23,7 +23,6 @@ from .result import ASSUMED, NOTHING, Identified
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 _SHOWN_HZ = 8.0  # of the picture: what is faster is the pose's noise
 _LEAST_HZ = 0.4  # of the shares: what is slower holds the mean, such as the weight

@@ -4,15 +4,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ...dynamics.vehicle import Vehicle
 from ..prediction import PredictionErrors
 from .channels import MotionPiece, Sources
 from .solve import VehicleFit
-
-Array = NDArray[np.float64]
 
 IDENTIFIED, ASSUMED, GIVEN, NOTHING = "identified", "assumed", "given", "not identifiable"
 

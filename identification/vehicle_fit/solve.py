@@ -12,16 +12,15 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
 from .channels import MotionPiece
 from .columns import BalanceSpectra, Drive, balance
 from .model import Model, jacobian
 from .spectra import LOSS, TAPERS, residual_spectra
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 Function = Callable[[Values], float]
 Interval = tuple[float, float, float]  # value, low and high
@@ -127,7 +126,7 @@ def solve(pieces: list[MotionPiece], drive: Drive, model: Model, start: Array) -
     return VehicleFit(model, theta, information, scores, loss, made, spectra)
 
 
-def refitted(fit: VehicleFit, kept: Sequence[NDArray[np.bool_]]) -> list[VehicleFit]:
+def refitted(fit: VehicleFit, kept: Sequence[Mask]) -> list[VehicleFit]:
     """Return a fit's coefficients by those of its segments (s,) alone that are ``kept``, of which
     the noise has the spectrum that it has.
 

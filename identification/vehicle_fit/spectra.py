@@ -12,10 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from ...runtime.arrays import Array, Complex, Index
 
 _SEGMENT = 5.0  # s: of one transform; its inverse is the frequency's step
 TAPERS = 3  # sine tapers (Riedel and Sidorenko, 1995): a low leak, and little lost
@@ -38,10 +36,10 @@ class Segment:
     columns: Complex  # (K, m, c): per root Hz
 
 
-def edges_of(n: int, period: float) -> NDArray[np.intp]:
+def edges_of(n: int, period: float) -> Index:
     """Return the ends (count + 1,) of the segments, of about equal length, of a piece."""
     count = max(1, round(n * period / _SEGMENT))
-    return np.linspace(0, n, count + 1).astype(np.intp)
+    return np.linspace(0, n, count + 1).astype(np.int64)
 
 
 def segments_of(columns: Array, period: float, log: int, band: float) -> list[Segment]:
