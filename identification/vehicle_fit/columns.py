@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...runtime.arrays import Array
+from ...runtime.arrays import Array, Complex
 from ..motion.smoothing import derivative, lagged, low_pass
 from .channels import MotionPiece
-from .spectra import BAND, Complex, Segment, segments_of
+from .spectra import BAND, Segment, segments_of
 
 _STEP = {"lag": 1e-3, "gamma": 0.05}  # of finite differences
 # Hz: slower moments that nothing measures are answered by the flight loop with rotor torque, so

@@ -194,7 +194,9 @@ def _first_fit(
             fits.append(solve(pieces, here, model, start))
         fit = min(fits, key=lambda f: f.loss)
         cost = fit.loss + _PENALTY * math.log(_frequencies(fit)) * len(exponents)
-        if _rises(fit) and (best is None or cost < best[0]):
+        thrust = thrust_of(fit.values, exponents, np.linspace(0.05, 1.0, 20))
+        rises = np.all(np.diff(thrust) > 0.0)  # with the command, from nothing to full
+        if rises and (best is None or cost < best[0]):
             best = cost, fit, turned
     if best is None:
         raise InputError(
@@ -229,12 +231,6 @@ def _hover_thrust(fit: VehicleFit) -> tuple[float, float]:
     u = (weight / (4.0 * scale[f"a{len(exponents) - 1}"])) ** (1.0 / exponents[-1])
     value, low, _ = fit.interval(lambda v: 4.0 * thrust_of(v, exponents, u) / weight, False)
     return value, (value - low) / (fit.width * max(abs(value), 1e-9))
-
-
-def _rises(fit: VehicleFit) -> bool:
-    """Does thrust grow with the command, from nothing to full?"""
-    u = np.linspace(0.05, 1.0, 20)
-    return bool(np.all(np.diff([thrust_of(fit.values, fit.drive.exponents, x) for x in u]) > 0.0))
 
 
 def _frequencies(fit: VehicleFit) -> float:

@@ -239,13 +239,12 @@ def _newton(
 
 def _bounded(theta: Array, model: Model, drive: Drive) -> Array:
     """Return parameters of which the nonlinear ones stay near the drive's, and in their range."""
-    low, high = np.full((2, len(theta)), [[-np.inf], [np.inf]])
-    for i, name in enumerate(model.free):
-        if name in _RANGES:
-            least, most = _RANGES[name]
-            low[i] = max(least, getattr(drive, name) - _MOST_CHANGE)
-            high[i] = min(most, getattr(drive, name) + _MOST_CHANGE)
-    return np.clip(theta, low, high)
+    bounded = theta.copy()
+    for name in model.nonlinear:
+        i, here = model.free.index(name), getattr(drive, name)
+        near = np.clip(theta[i], here - _MOST_CHANGE, here + _MOST_CHANGE)
+        bounded[i] = np.clip(near, *_RANGES[name])
+    return bounded
 
 
 def _powers(
