@@ -135,7 +135,12 @@ def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
     at, place = t[log.valid], log.position[log.valid]
     if len(at) < 3:
         raise InputError(f"{name}: fewer than three poses; expected a flight")
-    speeds = log.rotor_speeds if log.has_rotor_speeds else _scaled_speeds(thrust, vehicle)
+    speeds = log.rotor_speeds
+    if not log.has_rotor_speeds:  # then scaled: while the rotors are high, they carry the weight
+        total = thrust.sum(axis=1)
+        carried = total[flying(total)]
+        scale = vehicle.weight / float(np.median(carried)) if len(carried) else 0.0
+        speeds = np.sqrt(np.maximum(scale * thrust, 0.0) / vehicle.k)
     phases = flight_phases(t, np.interp(t, at, place[:, 2]), speeds, vehicle)
     flown = [(t >= phase.start) & (t <= phase.end) for phase in phases if phase.name == FLIGHT]
     speed = _smooth(np.linalg.norm(np.gradient(place, at, axis=0), axis=1), at)
@@ -159,15 +164,6 @@ def carrying(t: Array, total: Array) -> Mask:
     if steady.any():
         steady &= np.abs(smooth / np.median(total[steady]) - 1.0) < NEAR
     return steady
-
-
-def _scaled_speeds(thrust: Array, vehicle: Vehicle) -> Array:
-    """Return speeds (N, 4) in rad/s whose median thrust while the rotors are high is the weight."""
-    total = thrust.sum(axis=1)
-    carried = total[flying(total)]
-    scale = vehicle.weight / float(np.median(carried)) if len(carried) else 0.0
-    speeds: Array = np.sqrt(np.maximum(scale * thrust, 0.0) / vehicle.k)
-    return speeds
 
 
 def _smooth(values: Array, t: Array) -> Array:
