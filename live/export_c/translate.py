@@ -13,7 +13,7 @@ import inspect
 import math
 import re
 import textwrap
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
@@ -293,7 +293,12 @@ class Function:
                     return
                 found = tuple(self.evaluated(one) for one in values)
             case ast.Tuple(elts=targets), _:
-                found = tuple(_elements(self.evaluated(value), len(targets)))
+                several = self.evaluated(value)
+                if isinstance(several, Array):
+                    several = tuple(several.at(constant(i)) for i in range(len(targets)))
+                if not isinstance(several, tuple):
+                    raise UntranslatableError("takes one number for several")
+                found = several
                 if self.suffix and all(isinstance(one, ast.Name) for one in targets):
                     for one, of in zip(targets, map(self.kept, found), strict=True):
                         name = cast(ast.Name, one).id
@@ -592,15 +597,3 @@ def _bound(value: Value) -> Value | None:
         case Array(shape=(rows, columns)):
             return Array("", (rows, columns), root="matrix")
     return None
-
-
-def _elements(value: Value, count: int) -> Iterator[Value]:
-    """Return the numbers of what stands on the right of several targets."""
-    for i in range(count):
-        match value:
-            case tuple():
-                yield value[i]
-            case Array():
-                yield value.at(constant(i))
-            case _:
-                raise UntranslatableError("takes one number for several")
