@@ -5,7 +5,6 @@ where the flight does not tell.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -22,8 +21,8 @@ from .solve import Function, Interval, Values, VehicleFit
 UNKNOWN: Interval = (math.nan, math.nan, math.nan)
 
 
-def thrust_of(values: Values, exponents: Sequence[int], u: Any) -> Any:
-    """Return one rotor's thrust (N) at a speed in rad/s or a command, or at each of several."""
+def thrust_of(values: Values, exponents: Sequence[int], u: float) -> float:
+    """Return one rotor's thrust (N) at a speed in rad/s or a command."""
     return sum(values[f"a{j}"] * u**e for j, e in enumerate(exponents))
 
 

@@ -194,7 +194,7 @@ def _first_fit(
             fits.append(solve(pieces, here, model, start))
         fit = min(fits, key=lambda f: f.loss)
         cost = fit.loss + _PENALTY * math.log(_frequencies(fit)) * len(exponents)
-        thrust = thrust_of(fit.values, exponents, np.linspace(0.05, 1.0, 20))
+        thrust = [thrust_of(fit.values, exponents, u) for u in np.linspace(0.05, 1.0, 20)]
         rises = np.all(np.diff(thrust) > 0.0)  # with the command, from nothing to full
         if rises and (best is None or cost < best[0]):
             best = cost, fit, turned
