@@ -327,8 +327,9 @@ class _Flight:
     def pieces(self, rows: slice) -> list[Piece]:
         """Return the pieces of some rows."""
         columns: list[Any] = [None if c is None else c[rows] for c in self.columns]
-        use = self.use
-        return pieces_of(self.vehicle, *columns, longest_gap=use.longest_gap, startup=use.startup)
+        t, speeds, x, q, volts = columns
+        gap, startup = self.use.longest_gap, self.use.startup
+        return pieces_of(self.vehicle, t, speeds, x, q, volts, gap, startup)
 
     def evaluate(self, tuning: UKFTuning, pieces: Sequence[Piece]) -> Innovations:
         """Return what a pass of the filter with this tuning finds."""

@@ -232,10 +232,8 @@ def start_over_if_broken(f: Record) -> None:
         total += row
     broken = opposite(math.isfinite(total))
     if any_of(broken):
-        for i in range(7):
-            x[i] = choose(broken, f.poses.seen[i], x[i])
-        for i in range(7, 19):
-            x[i] = choose(broken, 0.0, x[i])
+        for i in range(19):
+            x[i] = choose(broken, f.poses.seen[i] if i < 7 else 0.0, x[i])
         _forget(f, broken, broken, broken)
         f.restarts = choose(broken, f.restarts + 1.0, f.restarts)
         f.status = choose(broken, RESTARTED, f.status)
