@@ -90,10 +90,10 @@ def identify(
                 e.unit,
                 e.status,
             )
-            for e in found.estimates
+            for e in found.estimates.values()
         ],
     )
-    for e in found.estimates:
+    for e in found.estimates.values():
         if e.status in ("assumed", "not identifiable"):
             console.print(f"{e.name}: {e.status}: {e.how}")
     for line in found.advice:

@@ -129,10 +129,7 @@ def split(f: Record, cross: Array, joint: Array) -> None:
     imu.bias_covariance[:] = joint[:BIASES, :BIASES]
     # what the filter has forgotten is correlated with nothing
     for i in range(N):
-        alone = True
-        for j in range(N):
-            alone = alone and (i == j or P[i, j] == 0.0)
-        if alone:
+        if np.count_nonzero(P[i]) <= 1:
             cross[i] = 0.0
     root = root_of(P)
     whitened = divide(root, cross)
@@ -158,12 +155,11 @@ def carry_companions(f: Record, dt: float, cross: Array) -> None:
     joint[:BIASES, :BIASES] = imu.bias_covariance
     for i in range(BIASES):
         joint[i, i] += dt / f.period * imu.walk[i]
+        imu.sensitivity[i, i] = 1.0
     imu.mean[BIASES:] = 0.0
     # the accelerations of the noise, in body axes: velocity is rows 9-11
     turned = f.centre_rotation.T @ np.ascontiguousarray(f.B[:, 9:12].T)
     imu.sensitivity[3:, BIASES:] = turned / dt
-    for i in range(BIASES):
-        imu.sensitivity[i, i] = 1.0
     # one standard deviation of each input, as ``add_noise`` leaves them
     all_cross = np.empty((N, COMPANIONS))
     all_cross[:, :BIASES], all_cross[:, BIASES:] = cross, f.B.T

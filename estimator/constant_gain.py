@@ -61,8 +61,15 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
         propagate(f, x, dt, centre)
         follow_loads(f, f.rotation, dt)
         f.time += dt
-    if f.steady == 0:
-        _step_with_covariance(f, sample, usable, dt)
+    if f.steady == 0:  # go on from the predicted state with the covariance
+        x[:NIS], x[NIS] = centre[:NIS], math.nan
+        if dt > 0.0:
+            f.near += dt
+            carry_at_hover(f, dt)
+            after_prediction(f, dt)
+        if usable > 0:
+            _correct_with_covariance(f, sample, usable)
+            _look_for_steady_state(f)
         return usable
     grow_older(f, dt)
     f.status = COASTING
@@ -92,7 +99,12 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
             nis += y[i] * f.information[i, j] * y[j]
     late = f.poses.position_age > _LONGEST_GAP or f.poses.attitude_age > _LONGEST_GAP
     if late or not nis <= f.alarm[usable // 3]:
-        _leave_steady_state(f)
+        # a covariance takes over at the predicted state: after a gap, whose widening is made up
+        # for, or at a measurement that is not to be believed as it is
+        f.steady, f.near = 0, 0.0
+        x[:NIS], x[NIS] = centre[:NIS], math.nan
+        catch_up(f)
+        after_prediction(f, 0.0)
         _correct_with_covariance(f, sample, usable)
         return usable
     x[NIS] = nis if usable == 3 else math.nan
@@ -103,32 +115,6 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
         f.status = TRACKING
         remember(f, sample[4:11], usable & 1 != 0, usable & 2 != 0)
     return usable
-
-
-@compiled
-def _leave_steady_state(f: Record) -> None:
-    """Let a covariance take over at the predicted state, ``f.centre``: after a gap, whose widening
-    is made up for here, or at a measurement that is not to be believed as it is.
-    """
-    x = f.x
-    f.steady, f.near = 0, 0.0
-    x[:NIS], x[NIS] = f.centre[:NIS], math.nan
-    catch_up(f)
-    after_prediction(f, 0.0)
-
-
-@compiled
-def _step_with_covariance(f: Record, sample: Array, usable: int, dt: float) -> None:
-    """Go on from the predicted state, ``f.centre``, with the covariance."""
-    x = f.x
-    x[:NIS], x[NIS] = f.centre[:NIS], math.nan
-    if dt > 0.0:
-        f.near += dt
-        carry_at_hover(f, dt)
-        after_prediction(f, dt)
-    if usable > 0:
-        _correct_with_covariance(f, sample, usable)
-        _look_for_steady_state(f)
 
 
 @compiled

@@ -296,19 +296,12 @@ def add_squares(
 
 
 @compiled_for_vectors
-def add_pairs(f: Record) -> None:
-    """Add ``H' H + E' E`` of the first six pairs of sigma points to P; only the first 12 rows of
-    the model are nonlinear.
+def add_pairs(f: Record, first: int) -> None:
+    """Add ``H' H + E' E`` of six pairs of sigma points, from ``first`` on, to P; only the first 12
+    rows of the model are nonlinear.
     """
-    add_squares(f.P, f.H, 0, 1.0, N)
-    add_squares(f.P, f.E, 0, 1.0, 12)
-
-
-@compiled_for_vectors
-def add_more_pairs(f: Record) -> None:
-    """Do the same with the next six."""
-    add_squares(f.P, f.H, 6, 1.0, N)
-    add_squares(f.P, f.E, 6, 1.0, 12)
+    add_squares(f.P, f.H, first, 1.0, N)
+    add_squares(f.P, f.E, first, 1.0, 12)
 
 
 @compiled_for_vectors

@@ -27,13 +27,10 @@ _NO_HEADING = 1e-6  # of a quaternion squared: thrust points down, and there is 
 def carry_at_hover(f: Record, dt: float) -> None:
     """Carry the covariance ``dt`` s ahead by the model at hover."""
     P, A, G, J = f.P, f.S, f.H, f.hover
-    A[:] = 0.0
+    A[0:3], A[3:6], A[9:12] = 0.0, dt * J[:3], dt * J[3:]
+    A[6:9] = 0.5 * dt * A[9:12]
     for i in range(3):
         A[i, 3 + i] = 0.25 * dt  # an MRP is a quarter of an angle
-        for j in range(N):
-            A[3 + i, j] = dt * J[i, j]
-            A[9 + i, j] = dt * J[3 + i, j]
-            A[6 + i, j] = 0.5 * dt * A[9 + i, j]
         A[6 + i, 9 + i] += dt
     carry_by_jacobian(P, A, G)
     f.centre_rotation[:] = np.eye(3)
@@ -47,12 +44,7 @@ def catch_up(f: Record) -> None:
     since = max(f.poses.position_age, f.poses.attitude_age)
     if since <= 0.0:
         return
-    steps = since / f.period
-    count = 1
-    if steps >= 1.5:
-        count = CATCH_UP
-        if steps < CATCH_UP:
-            count = int(steps + 0.5)
+    count = max(1, int(min(since / f.period, 1.0 * CATCH_UP) + 0.5))
     for _ in range(count):
         carry_at_hover(f, since / count)
 

@@ -66,9 +66,8 @@ def take_in_imu(record: Record, z: Array, gyro: bool, accelerometer: bool) -> No
     cross = root @ pairs
     companions = T.T @ cross + imu.rest @ C.T
     covariance += C @ imu.rest @ C.T
+    covariance += np.diag(f.imu_noise)
     innovation -= C @ imu.mean
-    for i in range(6):
-        covariance[i, i] += f.imu_noise[i]
     x[NIS] = _nis(covariance, innovation, first, last)
     first, last = _believed(f, covariance, innovation, first, last)
     if first < last:
@@ -188,11 +187,8 @@ def _correct(
     covariances -= W.T @ V
     P -= W.T @ W
     symmetrise(P)
-    for i in range(NIS):
-        f.centre[i] = x[i]
+    f.centre[:NIS] = x[:NIS]
     fold(f, f.centre, (W.T @ y)[:, 0])
-    move = (V.T @ y)[:, 0]
-    for i in range(COMPANIONS):
-        imu.mean[i] += move[i]
+    imu.mean[:] += (V.T @ y)[:, 0]
     bound_biases(f)
     split(f, covariances, joint)

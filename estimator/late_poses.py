@@ -219,7 +219,8 @@ class TimedFilter:
         """Do again what a new event changes, from the last snapshot before it on."""
         events = self._events
         first = next(i for i in range(new, -1, -1) if events[i].before is not None)
-        self._restore(events[first].before)
+        for part, old in zip(self.ukf.memory, events[first].before or (), strict=True):
+            part[:] = old
         now = events[first - 1].t if first else self._start
         self._snapped = now
         for i in range(first, len(events)):
@@ -246,11 +247,6 @@ class TimedFilter:
 
     def _snapshot(self) -> Snapshot:
         return [part.copy() for part in self.ukf.memory]
-
-    def _restore(self, kept: Snapshot | None) -> None:
-        assert kept is not None
-        for part, old in zip(self.ukf.memory, kept, strict=True):
-            part[:] = old
 
     def _now(self, method: str) -> float:
         now = self.time

@@ -21,13 +21,11 @@ have nothing to do with each other, the variance of the output is ``sum_j var(e_
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..dynamics.vehicle import Uncertainty, Vehicle
 from ..runtime.compiled import Record, compiled_for_vectors
 from ..runtime.vector_lanes import choose
-
-Array = NDArray[np.float64]
+from .estimate import Array
 
 # Loads, one a row: thrust along body x and y, which times its arm turns the body, and along z (N);
 # what moves the mass (N); torques of the rotors about body x and y, about z, and all torques (Nm).

@@ -78,10 +78,8 @@ def link_back(P: Array, C: Array, after: Array, G: Array, K: Array) -> None:
     """
     L = root_of(after)
     W = divide(L, C.T)
-    K[:] = P - W.T @ W
-    for i in range(N):
-        for j in range(i):
-            K[i, j] = K[j, i] = 0.5 * (K[i, j] + K[j, i])
+    left = P - W.T @ W
+    K[:] = 0.5 * (left + left.T)
     G[:] = W
     divide_transposed(L, G)
     if not (math.isfinite(np.trace(L)) and _hold_positive(K, P)):
@@ -155,7 +153,5 @@ def step_back(x: Array, P: Array, link: Record, earlier: Array) -> None:
     displace(earlier, difference @ G, 1.0, np.empty(3), np.empty(4), x)
     normalise(x[3:7])
     x[NIS] = earlier[NIS]
-    P[:] = link.K + G.T @ (P @ G)
-    for i in range(N):
-        for j in range(i):
-            P[i, j] = P[j, i] = 0.5 * (P[i, j] + P[j, i])
+    smoothed = link.K + G.T @ (P @ G)
+    P[:] = 0.5 * (smoothed + smoothed.T)

@@ -171,10 +171,9 @@ def load_recovery(record: np.void, vehicle: Vehicle, gate: float | None, given: 
         torque,
         given.force_std * weight,
     )
-    record["lost"] = np.repeat(np.square(deviations), 3)
-    record["lost"] *= _LOST
-    record["lost"][:3] = (given.attitude_std / 4.0) ** 2  # (16)
     record["prior"] = np.repeat(np.square(deviations), 3)
+    record["lost"] = _LOST * record["prior"]
+    record["lost"][:3] = (given.attitude_std / 4.0) ** 2  # (16)
     # accelerations of a push of two weights, and of the same about the arm
     push = 2.0 * weight
     record["push"] = push * vehicle.arm_l / inertia, push / vehicle.mass
@@ -233,10 +232,8 @@ def start_over_if_broken(f: Record) -> None:
         total += row
     broken = opposite(math.isfinite(total))
     if any_of(broken):
-        for i in range(7):
-            x[i] = choose(broken, f.poses.seen[i], x[i])
-        for i in range(7, 19):
-            x[i] = choose(broken, 0.0, x[i])
+        for i in range(19):
+            x[i] = choose(broken, f.poses.seen[i] if i < 7 else 0.0, x[i])
         _forget(f, broken, broken, broken)
         f.restarts = choose(broken, f.restarts + 1.0, f.restarts)
         f.status = choose(broken, RESTARTED, f.status)
@@ -533,10 +530,8 @@ def _remember_refused(f: Record, pose: Array, at_position: bool, at_attitude: bo
     agreed_for = m.agreed_for + min(m.doubted_position_age, m.doubted_attitude_age)
     agreed_for = choose(m.agreeing > 1.5, agreed_for, 0.0)
     m.agreed_for = choose(at_position | at_attitude, agreed_for, m.agreed_for)
-    for i in range(3):
-        m.doubted[i] = choose(at_position, pose[i], m.doubted[i])
-    for i in range(4):
-        m.doubted[3 + i] = choose(at_attitude, pose[3 + i], m.doubted[3 + i])
+    for i in range(7):
+        m.doubted[i] = choose(at_position if i < 3 else at_attitude, pose[i], m.doubted[i])
     m.doubted_position_age = choose(at_position, 0.0, m.doubted_position_age)
     m.doubted_attitude_age = choose(at_attitude, 0.0, m.doubted_attitude_age)
 
@@ -597,10 +592,8 @@ def remember(f: Record, pose: Array, with_position: bool, with_attitude: bool) -
     jumped in them was not measured now: an attitude alone says nothing of a position.
     """
     m, done = f.poses, with_position | with_attitude
-    for i in range(3):
-        m.seen[i] = choose(with_position, pose[i], m.seen[i])
-    for i in range(4):
-        m.seen[3 + i] = choose(with_attitude, pose[3 + i], m.seen[3 + i])
+    for i in range(7):
+        m.seen[i] = choose(with_position if i < 3 else with_attitude, pose[i], m.seen[i])
     m.position_age = choose(with_position, 0.0, m.position_age)
     m.attitude_age = choose(with_attitude, 0.0, m.attitude_age)
     if f.gated > 0:

@@ -23,25 +23,14 @@ def rise_times(vehicle: Vehicle, tuning: UKFTuning, period: float) -> tuple[Arra
         tuning: deviations per step.
         period: s.
     """
-    force, torque = np.empty(3), np.empty(3)
-    thrust, motor, force_walk, torque_walk, position, attitude = (
-        np.broadcast_to(np.asarray(value, dtype=np.float64), 3)
-        for value in (
-            tuning.thrust_noise,
-            tuning.motor_torque_noise,
-            tuning.force_walk,
-            tuning.torque_walk,
-            tuning.position_noise,
-            tuning.attitude_noise,
-        )
+    of, mass, inertia = tuning, np.full(3, vehicle.mass), np.diagonal(vehicle.inertia)
+    return (
+        _rise(period, mass, of.thrust_noise, of.force_walk, of.position_noise),
+        _rise(period, inertia, of.motor_torque_noise, of.torque_walk, of.attitude_noise),
     )
-    for i in range(3):
-        force[i] = _rise(period, vehicle.mass, thrust[i], force_walk[i], position[i])
-        inertia = float(vehicle.inertia[i, i])
-        torque[i] = _rise(period, inertia, motor[i], torque_walk[i], attitude[i])
-    return force, torque
 
 
+@np.vectorize(otypes=[float])
 def _rise(dt: float, inertia: float, white: float, walk: float, noise: float) -> float:
     """Return the rise time (s) of the wrench w in ``inertia * x'' = w``, x being measured."""
     # in units of the noise, time in periods: w is then the change of x in a step squared

@@ -144,8 +144,7 @@ def undo_sensing(f: Record, z: Array, parts: int, dt: float) -> Array:
         sample[i] = z[i]
     if f.sensing_count > 0:
         if parts & 2 == 0:
-            for i in range(4):
-                sample[7 + i] = f.x[3 + i]
+            sample[7:11] = f.x[3:7]
         rewrite_sample(f, dt, parts + 4 if dt > 0.0 else parts, -1.0)
     return sample
 
@@ -155,8 +154,6 @@ def undo_first_pose(record: Record) -> None:
     """Bring the pose of a new estimate to what it was before the declared sensing effects."""
     f = record[0]
     if f.sensing_count > 0:
-        for i in range(7):
-            f.sample[4 + i] = f.x[i]
+        f.sample[4:11] = f.x[0:7]
         rewrite_sample(f, 0.0, 3, -1.0)
-        for i in range(7):
-            f.x[i] = f.sample[4 + i]
+        f.x[0:7] = f.sample[4:11]

@@ -125,7 +125,18 @@ class RecordingUKF(WrenchUKF):
         std = np.empty((self.events, N))
         begins = sorted(self._starts)
         for begin, end in zip(begins, [*begins[1:], self.events], strict=True):
-            self._smooth_segment(events, begin, end, numbers, std)
+            record, blocks = self._starts[begin].copy(), []
+            for first in range(begin + 1, end, _BLOCK):
+                here = slice(first, min(first + _BLOCK, end))
+                blocks.append((here, record.copy()))
+                calls, loads = events[here], np.empty((here.stop - first, *LOAD))
+                make_calls(record, calls, np.arange(len(calls)), numbers[here], std[here], loads)
+            links = np.zeros(1 + min(_BLOCK, end - begin), dtype=LINK)
+            for here, memory in reversed(blocks):
+                links["x"][0], links["load"][0] = memory["x"][0], memory["load"][0]
+                _forward_with_links(memory, events[here], links, numbers[here])
+                _backward(links, record, numbers[here], std[here])
+            _write(record["x"][0], record["P"][0], record["model"][0], numbers, std, begin)
         finite = np.isfinite(numbers[:, :NIS]).all(axis=1) & np.isfinite(std).all(axis=1)
         if not finite.all():
             raise InputError(
@@ -134,20 +145,3 @@ class RecordingUKF(WrenchUKF):
             )
         wanted = slice(None) if at is None else np.asarray(at, dtype=np.int64)
         return WrenchEstimate(numbers[wanted], std[wanted])
-
-    def _smooth_segment(
-        self, events: np.ndarray, begin: int, end: int, numbers: Array, std: Array
-    ) -> None:
-        """Smooth the events from a start to before the next one into the arrays of all."""
-        record, blocks = self._starts[begin].copy(), []
-        for first in range(begin + 1, end, _BLOCK):
-            here = slice(first, min(first + _BLOCK, end))
-            blocks.append((here, record.copy()))
-            calls, loads = events[here], np.empty((here.stop - first, *LOAD))
-            make_calls(record, calls, np.arange(len(calls)), numbers[here], std[here], loads)
-        links = np.zeros(1 + min(_BLOCK, end - begin), dtype=LINK)
-        for here, memory in reversed(blocks):
-            links["x"][0], links["load"][0] = memory["x"][0], memory["load"][0]
-            _forward_with_links(memory, events[here], links, numbers[here])
-            _backward(links, record, numbers[here], std[here])
-        _write(record["x"][0], record["P"][0], record["model"][0], numbers, std, begin)

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..dynamics.vehicle import Vehicle
 from ..runtime.arguments import check_positive
-
-Array = NDArray[np.float64]
 
 # The vehicle and period for which the default tuning is stated: AR.Drone 2.0 at 200 Hz
 PERIOD = 0.005

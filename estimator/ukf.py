@@ -46,7 +46,6 @@ from .bias_states import (
     reset_imu,
 )
 from .covariance import (
-    add_more_pairs,
     add_noise,
     add_pairs,
     carry_linear_part,
@@ -100,24 +99,18 @@ _VARIANCES = slice(WITHOUT_COVARIANCE, None, N + 1)  # of an estimate's numbers
 def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
     """Carry the filter ``dt`` s ahead at rotor speeds (4,) rad/s: (18)-(27)."""
     drive(f, rotor_speeds, dt, voltage)
-    carry_on(f, dt)
-    f.time += dt
-
-
-@compiled
-def carry_on(f: Record, dt: float) -> None:
-    """Carry a filter ahead, with its effects, its rotors' wrench being known."""
     if f.wrench_count == 0:
         quaternion_to_matrix(f.x[3:7], f.rotation)
         carry(f, dt)
-        return
-    root_of_twelve(f)
-    propagate(f, f.x, dt, f.centre)
-    _carry_linear(f, dt)
-    _pairs_in_turn(f, dt, 2 * PAIRS, propagate)
-    add_pairs(f)
-    add_more_pairs(f)
-    _gather(f, dt)
+    else:
+        root_of_twelve(f)
+        propagate(f, f.x, dt, f.centre)
+        _carry_linear(f, dt)
+        _pairs_in_turn(f, dt, 2 * PAIRS, propagate)
+        add_pairs(f, 0)
+        add_pairs(f, PAIRS)
+        _gather(f, dt)
+    f.time += dt
 
 
 @compiled
@@ -129,7 +122,7 @@ def carry(f: Record, dt: float) -> None:
     move(f, f.x, dt, f.centre)
     _carry_linear(f, dt)
     _pairs(f, dt)
-    add_pairs(f)
+    add_pairs(f, 0)
     _gather(f, dt)
 
 

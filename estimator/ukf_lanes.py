@@ -149,13 +149,13 @@ class Blocks:
 
     def step(self, z: Array, _parts: int, _dt: float, _voltage: Array, out: Array) -> None:
         """Step all: samples (n, 11), NaN where nothing was measured; estimates (n, 28), written."""
-        x, status, restarts, model = (self._blocks[name] for name in NUMBERS)
+        kept: Any = tuple(self._blocks[name] for name in NUMBERS)
         _step_blocks(
             step_address(),
             self._work.ctypes.data,
             self._work["z"][0],
             self._blocks.ctypes.data,
-            (x, status, restarts, model),
+            kept,
             z,
             out,
         )

@@ -94,8 +94,12 @@ class Clocks:
 
     def time(self, sample: Sample) -> float | None:
         """Return when a message was measured, s of the stream's time; None where it is left out."""
-        if sample.stamp is None:
-            return self._untimed(sample.arrival)
+        if sample.stamp is None:  # as if its delay were the least
+            if not self._clocks:
+                return None
+            reference, arrival = self._clocks[0], sample.arrival
+            stamp = arrival - reference.offset.value if self._paced else reference.newest
+            return 1e-9 * (stamp + reference.shift)
         if sample.kind not in self._kinds:
             found = self._clock_of(sample.stamp, sample.arrival)
             self._kinds[sample.kind] = found, deque(maxlen=_REMEMBERED)
@@ -110,21 +114,9 @@ class Clocks:
             clock.offset.add(sample.arrival, sample.arrival - sample.stamp)
         if sample.stamp > clock.newest:
             clock.newest, clock.newest_arrival = sample.stamp, sample.arrival
-        return 1e-9 * self._stream_time(clock, sample.stamp)
-
-    def _stream_time(self, clock: _Clock, stamp: int) -> int:
         reference = self._clocks[0]
-        if clock is reference:
-            return stamp + clock.shift
-        return stamp + clock.offset.value - reference.offset.value + reference.shift
-
-    def _untimed(self, arrival: int) -> float | None:
-        """Return the time of a message that does not state one: as if its delay were the least."""
-        if not self._clocks:
-            return None
-        reference = self._clocks[0]
-        stamp = arrival - reference.offset.value if self._paced else reference.newest
-        return 1e-9 * (stamp + reference.shift)
+        ahead = 0 if clock is reference else clock.offset.value - reference.offset.value
+        return 1e-9 * (sample.stamp + ahead + reference.shift)
 
     def _clock_of(self, stamp: int, arrival: int) -> _Clock:
         """Return the clock that a new kind of message is stamped by."""

@@ -18,13 +18,6 @@ def as_fields(output: Output) -> dict[str, Any]:
     return dict(zip(COLUMNS, [*values, output.estimate.status], strict=True))
 
 
-def as_line(output: Output) -> str:
-    """Return an estimate as a line of ``wrench.csv``."""
-    t, *values = _values(output)
-    numbers = (f"{x:.9g}" for x in [*values, output.estimate.status_code])
-    return ",".join([repr(t), *numbers]) + "\n"
-
-
 class Lines(Sink[Output]):
     """Estimates as lines of text in a file."""
 
@@ -37,7 +30,9 @@ class Lines(Sink[Output]):
     def add(self, output: Output) -> None:
         """Write an estimate."""
         self.held += 1
-        self._file.write(as_line(output))
+        t, *values = _values(output)
+        numbers = (f"{x:.9g}" for x in [*values, output.estimate.status_code])
+        self._file.write(",".join([repr(t), *numbers]) + "\n")
 
     def idle(self) -> None:
         """Have what was written read."""

@@ -80,19 +80,16 @@ class Joiner:
                 self._first_command = t
             wait = 0.0 if sample.whole else _MEASURED
             if t - self._first_command >= wait:
-                self._keep(t, self._commanded(sample.command))
+                if self._vehicle.motor_curve is None:
+                    raise InputError(
+                        f"vehicle {self._vehicle.name}: the stream has motor commands and no "
+                        "measured rotor speeds, and the vehicle states no motor_curve; expected "
+                        "one in its file, to turn commands into thrust"
+                    )
+                voltage = None if self._voltage is None else np.array([self._voltage])
+                speeds = self._vehicle.commanded_speeds(sample.command[None, :], voltage)[0]
+                self._keep(t, speeds)
         return not self._measured
-
-    def _commanded(self, command: Array) -> Array:
-        if self._vehicle.motor_curve is None:
-            raise InputError(
-                f"vehicle {self._vehicle.name}: the stream has motor commands and no measured "
-                "rotor speeds, and the vehicle states no motor_curve; expected one in its file, "
-                "to turn commands into thrust"
-            )
-        voltage = None if self._voltage is None else np.array([self._voltage])
-        speeds: Array = self._vehicle.commanded_speeds(command[None, :], voltage)[0]
-        return speeds
 
     def _keep(self, t: float, speeds: Array) -> None:
         kept = self._speeds

@@ -26,14 +26,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import log_softmax, logsumexp, softmax
 
+from ...runtime.arrays import Array
 from ...runtime.errors import InputError
 from .sessions import difference
 from .trim import Trim, features_of
-
-Array = NDArray[np.float64]
 
 NOWHERE = "nowhere"
 SOMETHING_ELSE = "something else"
@@ -54,28 +52,20 @@ _KINDS = {
 
 _AMOUNTS = 80  # of a change, over which its evidence is summed
 
-
-@dataclass(frozen=True)
-class ChangeSettings:
-    """What is assumed of changes."""
-
-    # share of the weight, or of one rotor's thrust, by which something that changed has changed:
-    # the scale of a half-normal prior
-    amount: float = 0.15
-    # standard deviation of the power by which the request for one thrust falls with the battery's
-    # voltage: 0 where the firmware makes up for the battery, up to 2 where rotor speed follows it
-    voltage_power: float = 0.5
-    # how far a real rotor's request leaves what a linear one would need, as a share of the change.
-    # A bent curve changes by how much one rotor's request rises, and this moves all four numbers
-    # alike; drag and thrust of a cut propeller do not shrink alike, which shows in the diagonals.
-    # Cuts of 2 to 4 mm moved the diagonals 0.9, and the total 1.0 times as much as the sides
-    bend: tuple[float, float, float, float] = (0.1, 0.1, 0.25, 0.25)
-    # probability of nothing, before the flights are looked at: who compares has a reason
-    unchanged: float = 0.4
-    sure: float = 0.95  # probability from which a place is named without a doubt
-
-
-CHANGES = ChangeSettings()
+# share of the weight, or of one rotor's thrust, by which something that changed has changed:
+# the scale of a half-normal prior
+_USUAL_AMOUNT = 0.15
+# standard deviation of the power by which the request for one thrust falls with the battery's
+# voltage: 0 where the firmware makes up for the battery, up to 2 where rotor speed follows it
+_VOLTAGE_POWER = 0.5
+# how far a real rotor's request leaves what a linear one would need, as a share of the change.
+# A bent curve changes by how much one rotor's request rises, and this moves all four numbers
+# alike; drag and thrust of a cut propeller do not shrink alike, which shows in the diagonals.
+# Cuts of 2 to 4 mm moved the diagonals 0.9, and the total 1.0 times as much as the sides
+_BEND = (0.1, 0.1, 0.25, 0.25)
+# probability of nothing, before the flights are looked at: who compares has a reason
+_UNCHANGED = 0.4
+SURE = 0.95  # probability from which a place is named without a doubt
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +92,7 @@ class Change:
     @property
     def sure(self) -> bool:
         """Whether the likeliest place is sure."""
-        return self.places[self.place] >= CHANGES.sure
+        return self.places[self.place] >= SURE
 
 
 def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
@@ -115,12 +105,11 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     Raises:
         InputError: a set is empty.
     """
-    use = CHANGES
     if not (len(after) and len(before)):
         raise InputError("compare: expected at least one flight in each of the two sets")
     found = difference(after, before)
     moved, unchanged = found.mean[:, None], found.variance
-    unchanged[:, 3] += (use.voltage_power * _voltage_ratio(after, before)) ** 2
+    unchanged[:, 3] += (_VOLTAGE_POWER * _voltage_ratio(after, before)) ** 2
     shares = np.mean([trim.thrust / trim.total for trim in before], axis=0)
 
     def logs_of(means: Array, spread: Array) -> Array:
@@ -131,24 +120,24 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
         off = np.square(moved - means) / variance + np.log(2.0 * np.pi * variance)
         return np.asarray(logsumexp(found.log[:, None] - 0.5 * off.sum(axis=2), axis=0))
 
-    amounts = np.linspace(0.02, 4.0, _AMOUNTS) * use.amount
-    prior = log_softmax(-0.5 * np.square(amounts / use.amount))
+    amounts = np.linspace(0.02, 4.0, _AMOUNTS) * _USUAL_AMOUNT
+    prior = log_softmax(-0.5 * np.square(amounts / _USUAL_AMOUNT))
     nothing = float(logs_of(np.zeros((1, 4)), np.zeros((1, 4)))[0])
     # by place and kind: the logarithm of how likely it is; mean and deviation of the amount
-    logs = {(NOWHERE, ""): nothing + math.log(use.unchanged)}
+    logs = {(NOWHERE, ""): nothing + math.log(_UNCHANGED)}
     sizes = {(NOWHERE, ""): (0.0, 0.0)}
     for place, kind in ((place, kind) for place, kinds in _KINDS.items() for kind in kinds):
         if place == SOMETHING_ELSE:
             means, spread = np.zeros((_AMOUNTS, 4)), np.repeat(amounts[:, None], 4, axis=1)
         else:
             means = np.array([_moved(place, kind, amount, shares) for amount in amounts])
-            spread = np.linalg.norm(means, axis=1)[:, None] * np.array(use.bend)
+            spread = np.linalg.norm(means, axis=1)[:, None] * np.array(_BEND)
         every = logs_of(means, spread) + prior
         weights = softmax(every)
         middle = float(amounts @ weights)
         sizes[place, kind] = middle, math.sqrt(float(np.square(amounts - middle) @ weights))
         # each place is as likely as the other beforehand
-        each = (1.0 - use.unchanged) / (len(_KINDS) * len(_KINDS[place]))
+        each = (1.0 - _UNCHANGED) / (len(_KINDS) * len(_KINDS[place]))
         logs[place, kind] = float(logsumexp(every)) + math.log(each)
     chances = dict(zip(logs, softmax(list(logs.values())).tolist(), strict=True))
     places = {place: sum(p for (at, _), p in chances.items() if at == place) for place, _ in logs}
@@ -173,13 +162,11 @@ def _voltage_ratio(after: Sequence[Trim], before: Sequence[Trim]) -> float:
     It says how much less the total may be trusted, and is not taken off the total: a heavier
     vehicle draws more and pulls its battery down, so that would hide what is looked for.
     """
-    means = []
-    for group in (after, before):
-        levels = [math.log(trim.voltage) for trim in group if trim.voltage is not None]
-        if len(levels) < len(group):
-            return 0.0
-        means.append(float(np.mean(levels)))
-    return means[0] - means[1]
+    levels = [
+        np.mean([math.nan if trim.voltage is None else math.log(trim.voltage) for trim in group])
+        for group in (after, before)
+    ]
+    return float(np.nan_to_num(levels[0] - levels[1]))
 
 
 def _moved(place: str, kind: str, amount: float, shares: Array) -> Array:

@@ -14,14 +14,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import toeplitz
 from scipy.ndimage import maximum_filter1d
 
+from ...runtime.arrays import Array, Index
 from .fault_channels import STEP, Samples
 from .fault_noise import Noise, fit_noise
-
-Array = NDArray[np.float64]
 
 # signs of the rotors' moments about x, y, z; the last row is the force along z
 _SIGNS = np.array([[1, 1, -1, -1], [-1, 1, 1, -1], [1, -1, 1, -1], [1, 1, 1, 1]], dtype=np.float64)
@@ -135,7 +133,7 @@ class BalanceChannel:
         slope = np.array([b / a**2, -1.0 / a])
         return -b / a, math.sqrt(max(float(slope @ covariance[:2, :2] @ slope), 1e-12))
 
-    def steps(self, rows: NDArray[np.int64], ramp: Array) -> Array:
+    def steps(self, rows: Index, ramp: Array) -> Array:
         """Return the log-likelihoods (K,) of a step that begins at each of ``rows`` by a ramp, of
         whatever size explains it best, at the price of a normal prior as wide as that size, or of
         one that is worth a single sample where that is wider.
@@ -148,7 +146,7 @@ class BalanceChannel:
         found: Array = self.noise.log_likelihood(self.yy - self.gain * self.my - gain) - price
         return found
 
-    def _beginning(self, rows: NDArray[np.int64], ramp: Array) -> Array:
+    def _beginning(self, rows: Index, ramp: Array) -> Array:
         """Return products (3, K) of a share of 1 that begins at each of ``rows`` (K,) by a ramp:
         with y, with the moment, with itself; after projection.
         """

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from ...dynamics.vehicle import Vehicle
+from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from ..logs.flight_phases import carrying, usual_thrust
@@ -23,9 +23,6 @@ from ..logs.readers import px4_ulog, reader_by_content
 from ..logs.reading import read_log
 from ..logs.streams import Stream, readable
 from ..motion.smoothing import lagged, resampled, runs_of
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _PX4 = "px4_ulog"  # the reader
 _CHANNELS = ("gyro", "accelerometer", "commands")  # of a PX4 log that are needed

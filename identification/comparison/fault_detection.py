@@ -17,50 +17,37 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import log_softmax, logsumexp, softmax
 from scipy.stats import norm
 
+from ...runtime.arrays import Array, Index
 from .fault_balance import BalanceChannel, Begin, FaultBalance
 from .fault_channels import STEP, Channels, Samples, sample
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-
 NOTHING, ALL, OTHER = "nothing", "all rotors", "another force or torque"
 
-
-@dataclass(frozen=True)
-class FaultSettings:
-    """What is tried, and when a fault is named."""
-
-    losses: tuple[float, float] = (0.05, 1.0)  # share of a rotor's thrust
-    all_lose: float = 0.5  # the most that is tried of all rotors together
-    lags: tuple[float, ...] = (0.0, 0.015, 0.03, 0.05, 0.08, 0.12)  # s
-    # curves of thrust against command: the square's share, and the dead zone in parts of the
-    # median command
-    curves: tuple[tuple[float, float], ...] = (
-        *((0.0, 0.0), (0.2, 0.0), (0.5, 0.0), (1.0, 0.0), (0.0, 0.3), (1.0, 0.3)),
-    )
-    # before the log is looked at: nothing, one of the rotors, all rotors, another force or torque
-    prior: tuple[float, float, float, float] = (0.5, 0.3, 0.05, 0.15)
-    # what the model gets wrong of a loss, as a share of it: curve, lag and inflow of rotors that
-    # suddenly work elsewhere
-    error: float = 0.25
-    before: int = 25  # intervals of flight before a fault, at least: what is usual
-    after: int = 4  # intervals after a fault, at least, that show it
-    places: int = 2000  # where a fault may begin, at most
-    steps: int = 39  # of ``losses`` that are tried
-    parts: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75)  # of an interval, where a fault may begin
-    # standard deviation of a jump that no rotor makes, about x, y, z and along z, in parts of what
-    # one rotor's usual thrust does there: a load of a third of the weight that falls
-    other: tuple[float, float, float, float] = (0.5, 0.5, 0.5, 1.3)
-    rounds: int = 2  # of fitting the noise and looking again
-    sure: float = 0.95  # probability from which a fault is named without a doubt
-
-
-FAULTS = FaultSettings()
-_BEGINS = [Begin(part, lagged) for lagged in (False, True) for part in FAULTS.parts]
+_LOSSES = (0.05, 1.0)  # share of a rotor's thrust
+_ALL_LOSE = 0.5  # the most that is tried of all rotors together
+_LAGS = (0.0, 0.015, 0.03, 0.05, 0.08, 0.12)  # s
+# curves of thrust against command: the square's share, and the dead zone in parts of the
+# median command
+_CURVES = ((0.0, 0.0), (0.2, 0.0), (0.5, 0.0), (1.0, 0.0), (0.0, 0.3), (1.0, 0.3))
+# before the log is looked at: nothing, one of the rotors, all rotors, another force or torque
+_PRIOR = (0.5, 0.3, 0.05, 0.15)
+# what the model gets wrong of a loss, as a share of it: curve, lag and inflow of rotors that
+# suddenly work elsewhere
+_ERROR = 0.25
+_BEFORE = 25  # intervals of flight before a fault, at least: what is usual
+_AFTER = 4  # intervals after a fault, at least, that show it
+_PLACES = 2000  # where a fault may begin, at most
+_STEPS = 39  # of ``_LOSSES`` that are tried
+_PARTS = (0.0, 0.25, 0.5, 0.75)  # of an interval, where a fault may begin
+# standard deviation of a jump that no rotor makes, about x, y, z and along z, in parts of what
+# one rotor's usual thrust does there: a load of a third of the weight that falls
+_OTHER = (0.5, 0.5, 0.5, 1.3)
+_ROUNDS = 2  # of fitting the noise and looking again
+_SURE = 0.95  # probability from which a fault is named without a doubt
+_BEGINS = [Begin(part, lagged) for lagged in (False, True) for part in _PARTS]
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +75,7 @@ class RotorFault:
     @property
     def sure(self) -> bool:
         """Whether the likeliest is sure."""
-        return self.probabilities[self.likeliest] >= FAULTS.sure
+        return self.probabilities[self.likeliest] >= _SURE
 
 
 def find_fault(channels: Channels) -> RotorFault:
@@ -97,16 +84,16 @@ def find_fault(channels: Channels) -> RotorFault:
     Raises:
         InputError: too little flight.
     """
-    use, samples = FAULTS, sample(channels)
+    samples = sample(channels)
     tried = _search(samples, channels.thrust_known)
     best = max(tried, key=lambda one: one.log)
     evidence, starts, start_weights = _onsets(samples, best)
     each, shares, weights = _patterns(best)
-    prior = np.array([*[use.prior[1] / 4] * 4, use.prior[2], use.prior[3]])
+    prior = np.array([*[_PRIOR[1] / 4] * 4, _PRIOR[2], _PRIOR[3]])
     logs = np.log(prior) + each
     # the prior of an event of some kind is in ``prior``; how likely it is that there was one, with
     # sizes left free, is the search's
-    whole = math.log(use.prior[0]) + max(one.nothing for one in tried)
+    whole = math.log(_PRIOR[0]) + max(one.nothing for one in tried)
     happened = evidence + math.log(float(prior.sum()))
     chances = softmax(np.append(whole, happened + log_softmax(logs)))
     rotor = int(np.argmax(logs[:4]))
@@ -143,10 +130,10 @@ def _search(samples: Samples, thrust_known: bool) -> list[_Tried]:
                 tried[key] = _fitted(FaultBalance(samples, samples.thrust(*key), key[0]), rows)
         return max(tried, key=lambda key: tried[key].log)
 
-    curves = FAULTS.curves[:1] if thrust_known else FAULTS.curves
-    middle = FAULTS.lags[len(FAULTS.lags) // 2]
+    curves = _CURVES[:1] if thrust_known else _CURVES
+    middle = _LAGS[len(_LAGS) // 2]
     _, *curve = best_of((middle, *curve) for curve in curves)
-    lag, *_ = best_of((lag, curve[0], curve[1]) for lag in FAULTS.lags)
+    lag, *_ = best_of((lag, curve[0], curve[1]) for lag in _LAGS)
     best_of((lag, *curve) for curve in curves)
     return list(tried.values())
 
@@ -155,7 +142,7 @@ def _fitted(balance: FaultBalance, rows: Index) -> _Tried:
     """Return a lag and curve with its noise, which is fitted beside the likeliest jump."""
     channels = balance.channels()
     nothing = sum(channel.nothing() for channel in channels)
-    for _ in range(FAULTS.rounds):
+    for _ in range(_ROUNDS):
         _, row, begin = _jump(balance, channels, rows)
         channels = balance.channels(balance.share(row, begin))
     nothing = max(nothing, sum(channel.nothing() for channel in channels))
@@ -188,7 +175,7 @@ def _onsets(samples: Samples, best: _Tried) -> tuple[float, Array, Array]:
     is (T,).
     """
     every = _rows(len(samples.t))
-    rows = np.arange(max(best.row - 5, FAULTS.before), min(best.row + 6, every[-1] + 1))
+    rows = np.arange(max(best.row - 5, _BEFORE), min(best.row + 6, every[-1] + 1))
     logs, fine = (_steps(best.balance, best.channels, some, _BEGINS) for some in (every, rows))
     parts = np.array([begin.part for begin in _BEGINS])
     starts = samples.t[rows] + STEP * (parts[:, None] - 0.5)
@@ -202,9 +189,8 @@ def _patterns(best: _Tried) -> tuple[Array, Array, Array]:
     from what the channels say; shares (E,) that may be lost, and how likely each is by each rotor
     (4, E).
     """
-    use = FAULTS
-    shares = np.linspace(*use.losses, use.steps)
-    lost = shares[shares <= use.all_lose, None]
+    shares = np.linspace(*_LOSSES, _STEPS)
+    lost = shares[shares <= _ALL_LOSE, None]
     share = best.balance.share(best.row, best.begin)
 
     def seen(columns: Array) -> Array:
@@ -216,12 +202,12 @@ def _patterns(best: _Tried) -> tuple[Array, Array, Array]:
     tried: list[tuple[Array, Array, Array, Array]] = []
     for rotor in range(4):
         loss = seen(best.balance.lost(rotor, share))
-        tried.append((*loss, shares[:, None] * np.ones(4), use.error * shares[:, None]))
+        tried.append((*loss, shares[:, None] * np.ones(4), _ERROR * shares[:, None]))
     # a jump of each channel, in parts of what one rotor's usual thrust does there
     jumps = seen(np.repeat(share[:, None], 4, axis=1))
-    means, spread = lost * [0.0, 0.0, 0.0, 4.0], use.error * lost * [2.0, 2.0, 2.0, 4.0]
+    means, spread = lost * [0.0, 0.0, 0.0, 4.0], _ERROR * lost * [2.0, 2.0, 2.0, 4.0]
     tried.append((*jumps, means, spread))
-    tried.append((*jumps, np.zeros((1, 4)), np.array([use.other])))
+    tried.append((*jumps, np.zeros((1, 4)), np.array([_OTHER])))
     # only what speaks under every hypothesis, so that all explain the same numbers
     says = np.isfinite([std for _, std, *_ in tried]).all(axis=0)
     logs = [
@@ -236,11 +222,11 @@ def _rows(count: int) -> Index:
     """Return where a fault may begin: everywhere, or in a long flight evenly spread and everywhere
     near the end, where little is left to see it by.
     """
-    rows, most = np.arange(FAULTS.before, count - FAULTS.after), FAULTS.places
-    if len(rows) > most:
-        early = rows[: -most // 4]
-        step = math.ceil(len(early) / (0.75 * most))
-        rows = np.concatenate([early[::step], rows[-most // 4 :]])
+    rows = np.arange(_BEFORE, count - _AFTER)
+    if len(rows) > _PLACES:
+        early = rows[: -_PLACES // 4]
+        step = math.ceil(len(early) / (0.75 * _PLACES))
+        rows = np.concatenate([early[::step], rows[-_PLACES // 4 :]])
     return rows
 
 

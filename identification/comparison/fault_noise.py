@@ -10,10 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
+from scipy.signal import lfilter
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from ...runtime.arrays import Array, Mask
 
 ORDER = 10
 SHARES = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)  # of activity against the quiet level, tried in turn
@@ -34,11 +33,7 @@ class Noise:
 
     def filtered(self, values: Array) -> Array:
         """Return the filter's output (N, ...); rows that are not ``whole`` mean nothing."""
-        weighted = (values.T / self.scale).T
-        out = np.zeros_like(weighted)
-        for k, weight in enumerate(self.filter):
-            out[k:] += weight * weighted[: len(weighted) - k]
-        return out
+        return np.asarray(lfilter(self.filter, 1.0, (values.T / self.scale).T, axis=0))
 
     def log_likelihood(self, rest: Array) -> Array:
         """Return the log-likelihood of innovations whose squares sum to ``rest``, with their

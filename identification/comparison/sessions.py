@@ -15,41 +15,29 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import log_softmax
 
+from ...runtime.arrays import Array, Index
 from .trim import Trim
 
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class ScatterSettings:
-    """How unchanged flights differ, in the four numbers of a trim.
-
-    Measured on 89 flights of one Crazyflie, 7 of them unchanged (CrazyPAD, vehicle E8; Masalimov
-    and others, Data 2024, 9, 79).
-    """
-
-    # standard deviations between sessions, of the differences of sides and of the diagonals, in
-    # parts of the total, and of the total's logarithm; a centre of mass that moves by 1 % of the
-    # arm is 0.01 of a side
-    session: tuple[float, float, float, float] = (0.015, 0.01, 0.01, 0.02)
-    # between flights of a session
-    flight: tuple[float, float, float, float] = (0.0035, 0.0035, 0.005, 0.006)
-    # standard deviation of the logarithm by which one vehicle scatters more or less, at a level
-    spread: float = 0.5
-    scales: int = 7  # of either level, within two standard deviations, over which is summed
-    # probability that a session ends between two flights; and where the voltage rises there, by at
-    # least this share
-    ends: float = 0.3
-    ends_at_rise: float = 0.9
-    rise: float = 0.01
-    most_ends: int = 8  # places where a session may end, those where flights differ most
-    least_log: float = -12.0  # below the likeliest way; what is less likely does not count
-
-
-SCATTER = ScatterSettings()
+# How unchanged flights differ, in the four numbers of a trim, measured on 89 flights of one
+# Crazyflie, 7 of them unchanged (CrazyPAD, vehicle E8; Masalimov and others, Data 2024, 9, 79).
+# Standard deviations between sessions, of the differences of sides and of the diagonals, in parts
+# of the total, and of the total's logarithm; a centre of mass that moves by 1 % of the arm is 0.01
+# of a side
+SESSION_STD = (0.015, 0.01, 0.01, 0.02)
+# between flights of a session
+FLIGHT_STD = (0.0035, 0.0035, 0.005, 0.006)
+# standard deviation of the logarithm by which one vehicle scatters more or less, at a level
+_SPREAD = 0.5
+_SCALES = 7  # of either level, within two standard deviations, over which is summed
+# probability that a session ends between two flights; and where the voltage rises there, by at
+# least this share
+_ENDS = 0.3
+_ENDS_AT_RISE = 0.9
+_RISE = 0.01
+_MOST_ENDS = 8  # places where a session may end, those where flights differ most
+_LEAST_LOG = -12.0  # below the likeliest way; what is less likely does not count
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,55 +65,44 @@ def difference(after: Sequence[Trim], before: Sequence[Trim]) -> Difference:
     parts = (_of_cut(x, later, noise, cut, log) for cut, log in _cuts(trims, later, x))
     mean, variance, log = map(np.concatenate, zip(*parts, strict=True))
     log = log_softmax(log)
-    keep = log > log.max() + SCATTER.least_log
+    keep = log > log.max() + _LEAST_LOG
     return Difference(mean[keep], variance[keep], log[keep])
 
 
-def _scales() -> tuple[Array, Array, Array]:
-    """Return the variances (k, 4) between sessions and between flights at each pair of scales, and
-    the logarithms (k,) of its prior.
-    """
-    use = SCATTER
-    grid = np.linspace(-2.0, 2.0, use.scales)
-    first, second = (x.ravel() for x in np.meshgrid(grid, grid, indexing="ij"))
-    return (
-        np.exp(2.0 * use.spread * first)[:, None] * np.square(use.session),
-        np.exp(2.0 * use.spread * second)[:, None] * np.square(use.flight),
-        -0.5 * (first**2 + second**2),
-    )
-
-
-def _cuts(trims: Sequence[Trim], later: Array, x: Array) -> list[tuple[NDArray[np.intp], float]]:
+def _cuts(trims: Sequence[Trim], later: Array, x: Array) -> list[tuple[Index, float]]:
     """Return each way to cut the flights into sessions: the number of each flight's session, and
     the logarithm of its prior.
     """
-    use = SCATTER
-    apart = np.abs(np.diff(x, axis=0) / use.session).sum(axis=1)
+    apart = np.abs(np.diff(x, axis=0) / SESSION_STD).sum(axis=1)
     volts = np.array([np.nan if trim.voltage is None else trim.voltage for trim in trims])
-    rises = np.diff(volts) > use.rise * volts[:-1]  # False where one is not known
-    chance = np.where(rises, use.ends_at_rise, use.ends)
+    rises = np.diff(volts) > _RISE * volts[:-1]  # False where one is not known
+    chance = np.where(rises, _ENDS_AT_RISE, _ENDS)
     names = np.array([trim.session for trim in trims])
     told = (names[1:] != "") | (names[:-1] != "") | (np.diff(later) != 0.0)
     known = np.where(names[1:] != "", names[1:] != names[:-1], True)
     places = np.argsort(np.where(told, np.inf, -apart), kind="stable")
-    places = places[: min(int((~told).sum()), use.most_ends)]
+    places = places[: min(int((~told).sum()), _MOST_ENDS)]
     out = []
     for chosen in itertools.product((False, True), repeat=len(places)):
         ends = told & known
         ends[places] = chosen
         log = float(np.log(np.where(ends, chance, 1.0 - chance)[places]).sum())
-        out.append((np.concatenate([[0], np.cumsum(ends)]).astype(np.intp), log))
+        out.append((np.concatenate([[0], np.cumsum(ends)]).astype(np.int64), log))
     return out
 
 
 def _of_cut(
-    x: Array, later: Array, noise: Array, cut: NDArray[np.intp], log: float
+    x: Array, later: Array, noise: Array, cut: Index, log: float
 ) -> tuple[Array, Array, Array]:
     """Return mean and variance (k, 4) of the difference between flights (n, 4) that are ``later``
     (n,) and those that are not, and the logarithm (k,) of how likely they are, at each pair of
     scales of the scatter; the vehicle's mean is integrated out.
     """
-    session, flight, prior = _scales()
+    scale = np.linspace(-2.0, 2.0, _SCALES)
+    wider = np.exp(2.0 * _SPREAD * scale)[:, None]
+    session = np.repeat(wider * np.square(SESSION_STD), _SCALES, axis=0)  # (k, 4) variances
+    flight = np.tile(wider * np.square(FLIGHT_STD), (_SCALES, 1))
+    prior = -0.5 * np.add.outer(scale**2, scale**2).ravel()
     weight = 1.0 / (flight[:, None] + noise)  # (k, n, 4)
     of = np.eye(int(cut[-1]) + 1)[cut]  # (n, sessions)
     # of the vehicle's mean, the difference, and the flights: products under the inverse covariance

@@ -15,16 +15,14 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from ...dynamics.vehicle import Vehicle
+from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from ..logs.flight_phases import FLIGHT, flight_phases, flying
 from ..motion.smoothing import runs_of
-
-Array = NDArray[np.float64]
 
 LEAST_SECONDS = 3.0  # of steady flight: a mean over less follows single manoeuvres
 CALM = 1.5  # m/s: faster, the airflow decides how the rotors share the work
@@ -70,9 +68,7 @@ def features_of(thrust: Array) -> Array:
     return np.append(_MIX @ thrust / total, math.log(total))
 
 
-def trim_of(
-    name: str, t: Array, thrust: Array, steady: NDArray[np.bool_], voltage: Array | None = None
-) -> Trim:
+def trim_of(name: str, t: Array, thrust: Array, steady: Mask, voltage: Array | None = None) -> Trim:
     """Return the trim of a flight.
 
     Args:
@@ -106,7 +102,7 @@ def trim_of(
     return Trim(name, mean, seconds, _noise(t, thrust, steady, step), level)
 
 
-def _noise(t: Array, thrust: Array, steady: NDArray[np.bool_], step: Array) -> Array:
+def _noise(t: Array, thrust: Array, steady: Mask, step: Array) -> Array:
     """Return the variance (4,) of the four numbers of a flight, from the means of batches."""
     batch = np.floor(np.cumsum(np.where(steady, step, 0.0)) / BATCH).astype(np.int64)
     batches = (steady & (batch == number) for number in range(int(batch[-1]) + 1))
@@ -139,7 +135,12 @@ def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
     at, place = t[log.valid], log.position[log.valid]
     if len(at) < 3:
         raise InputError(f"{name}: fewer than three poses; expected a flight")
-    speeds = log.rotor_speeds if log.has_rotor_speeds else _scaled_speeds(thrust, vehicle)
+    speeds = log.rotor_speeds
+    if not log.has_rotor_speeds:  # then scaled: while the rotors are high, they carry the weight
+        total = thrust.sum(axis=1)
+        carried = total[flying(total)]
+        scale = vehicle.weight / float(np.median(carried)) if len(carried) else 0.0
+        speeds = np.sqrt(np.maximum(scale * thrust, 0.0) / vehicle.k)
     phases = flight_phases(t, np.interp(t, at, place[:, 2]), speeds, vehicle)
     flown = [(t >= phase.start) & (t <= phase.end) for phase in phases if phase.name == FLIGHT]
     speed = _smooth(np.linalg.norm(np.gradient(place, at, axis=0), axis=1), at)
@@ -147,7 +148,7 @@ def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
     return trim_of(name, t, thrust, steady, log.voltage)
 
 
-def carrying(t: Array, total: Array) -> NDArray[np.bool_]:
+def carrying(t: Array, total: Array) -> Mask:
     """Return in which rows (N,) the rotors carry the vehicle steadily, from their thrust alone.
 
     Args:
@@ -163,15 +164,6 @@ def carrying(t: Array, total: Array) -> NDArray[np.bool_]:
     if steady.any():
         steady &= np.abs(smooth / np.median(total[steady]) - 1.0) < NEAR
     return steady
-
-
-def _scaled_speeds(thrust: Array, vehicle: Vehicle) -> Array:
-    """Return speeds (N, 4) in rad/s whose median thrust while the rotors are high is the weight."""
-    total = thrust.sum(axis=1)
-    carried = total[flying(total)]
-    scale = vehicle.weight / float(np.median(carried)) if len(carried) else 0.0
-    speeds: Array = np.sqrt(np.maximum(scale * thrust, 0.0) / vehicle.k)
-    return speeds
 
 
 def _smooth(values: Array, t: Array) -> Array:

@@ -21,7 +21,7 @@ from ...runtime.drawing import (
 from ...runtime.page_files import write_json, write_png
 from ...runtime.plain_values import plain
 from ..motion.smoothing import resampled
-from .change import CHANGES, NOWHERE, SOMETHING_ELSE, Change
+from .change import NOWHERE, SOMETHING_ELSE, SURE, Change
 from .fault_detection import ALL, NOTHING, OTHER, RotorFault
 from .trim import Trim
 
@@ -138,9 +138,9 @@ def _draw_change(change: Change) -> Any:
     chances = [change.places[name] for name in names]
     right.barh(names, chances, color=[AFTER if n == change.place else GREY for n in names])
     right.set_xlim(0.0, 1.0)
-    right.axvline(CHANGES.sure, color=BLACK, lw=1, ls="--")
+    right.axvline(SURE, color=BLACK, lw=1, ls="--")
     right.set_xlabel("probability that something changed there")
-    right.set_title(f"sure from {CHANGES.sure:g} (dashed)")
+    right.set_title(f"sure from {SURE:g} (dashed)")
     return figure
 
 

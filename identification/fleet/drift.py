@@ -19,25 +19,16 @@ from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import false_discovery_control, mannwhitneyu, t
 
-Array = NDArray[np.float64]
+from ...runtime.arrays import Array
 
-
-@dataclass(frozen=True)
-class DriftSettings:
-    """What counts as a drift."""
-
-    false_discoveries: float = 0.05  # expected share of false ones among the drifts that are told
-    # flights that a trend needs: with 4, its interval held the truth 91 times of 100 where flights
-    # differ as much as their deviations, with 5 or more 93 to 96
-    least_flights: int = 5
-    least_each: int = 3  # flights with and without an effect, to say that it came or went
-
-
-DRIFT = DriftSettings()
+FALSE_DISCOVERIES = 0.05  # expected share of false ones among the drifts that are told
+# flights that a trend needs: with 4, its interval held the truth 91 times of 100 where flights
+# differ as much as their deviations, with 5 or more 93 to 96
+LEAST_FLIGHTS = 5
+LEAST_EACH = 3  # flights with and without an effect, to say that it came or went
 
 
 class Coefficient(NamedTuple):
@@ -59,7 +50,7 @@ class _Tested:
     @property
     def told(self) -> bool:
         """Whether chance does not explain the change, as the fleet's tests together say."""
-        return self.adjusted_p is not None and self.adjusted_p < DRIFT.false_discoveries
+        return self.adjusted_p is not None and self.adjusted_p < FALSE_DISCOVERIES
 
 
 @dataclass
@@ -173,7 +164,7 @@ def trend_of(
     one session, of which ``sessions`` has the name by the flight's number, count as one.
     """
     x, y, s, sure = points.T
-    few_sure = bool(sure.sum() < DRIFT.least_flights)
+    few_sure = bool(sure.sum() < LEAST_FLIGHTS)
     good = np.isfinite(y) & np.isfinite(s) & (s > 0.0) & (few_sure | (sure > 0.0))
     x, y, s = x[good], y[good], s[good]
     if sessions:
@@ -186,7 +177,7 @@ def trend_of(
         half = float(t.ppf(0.975, len(y) - 1)) * error
     trend = Trend(of, points, among, mean, (mean - half, mean + half), between)
     trend.tentative = not sure.all()
-    if len(y) >= DRIFT.least_flights:
+    if len(y) >= LEAST_FLIGHTS:
         middle = float(np.mean(x))
         design = np.column_stack([np.ones(len(y)), x - middle])
         (level, slope), (_, error), _ = meta_regression(design, y, s, False)
@@ -206,7 +197,7 @@ def appearance_of(
     there are too few of either.
     """
     without = set(diagnosed) - set(named)
-    if min(len(named), len(without)) < DRIFT.least_each:
+    if min(len(named), len(without)) < LEAST_EACH:
         return None
     test = mannwhitneyu(named, sorted(without))
     later = bool(test.statistic > 0.5 * len(named) * len(without))

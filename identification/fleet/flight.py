@@ -9,13 +9,11 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-from ...dynamics.vehicle import Vehicle
 from ...dynamics.vehicle_file import dump_vehicle, load_vehicle, named_vehicle
 from ...runtime.code_digest import code_digest
 from ...runtime.errors import InputError
 from ...runtime.plain_values import as_text
 from ..diagnosis import diagnose
-from ..logs.flight_log import FlightLog
 from ..logs.log_map import load_map
 from ..logs.reading import read_log
 from ..report.files import report_data
@@ -76,13 +74,16 @@ def refusal(kind: str, reason: str) -> dict[str, Any]:
     return {"status": "refused", "kind": kind, "reason": " ".join(as_text(reason).split())}
 
 
-def diagnose_one(log: FleetLog, without: tuple[str, ...] = ()) -> dict[str, Any]:
+def diagnose_one(log: FleetLog, without: tuple[str, ...]) -> dict[str, Any]:
     """Return the outcome of a log: what was found, or why it was refused. Raises nothing."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # a log's notes say what matters
-            flight, vehicle = _read(log)
-            data = report_data(diagnose([flight], vehicle, without=without))
+            model = None if log.vehicle is None else load_vehicle(log.vehicle)
+            flight = read_log(log.path, log.reader, model, log.map, log.piece)
+            how = ", a manifest or a vehicle.yaml beside the log"
+            flown = model or named_vehicle(flight.vehicle, log.path, how)
+            data = report_data(diagnose([flight], flown, without=without))
     except InputError as error:
         return refusal("input", str(error))
     except MemoryError:
@@ -92,17 +93,3 @@ def diagnose_one(log: FleetLog, without: tuple[str, ...] = ()) -> dict[str, Any]
         where = f"{os.path.basename(place.filename)}, line {place.lineno}"
         return refusal("error", f"{log.path}: {type(error).__name__} ({where}): {error}")
     return {"status": "diagnosed", **{name: data[name] for name in _KEPT}}
-
-
-def _read(log: FleetLog) -> tuple[FlightLog, Vehicle]:
-    """Return the flight of a log and its vehicle.
-
-    Raises:
-        InputError: it cannot be read, or its vehicle is not known.
-    """
-    model = None if log.vehicle is None else load_vehicle(log.vehicle)
-    flight = read_log(log.path, log.reader, model, log.map, log.piece)
-    if model is not None:
-        return flight, model
-    how = ", a manifest or a vehicle.yaml beside the log"
-    return flight, named_vehicle(flight.vehicle, log.path, how)

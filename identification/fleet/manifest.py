@@ -183,7 +183,10 @@ def find_logs(
             fits = next((entry for entry in said.logs if fnmatchcase(name, entry.log)), None)
             if fits is not None:
                 unused.pop(fits.log, None)
-                log = _with_entry(log, fits)
+                facts = {k: x for k, x in vars(fits).items() if k != "log" and x not in (None, "")}
+                if {"reader", "map"} & facts.keys():  # it takes the place of the other
+                    log = replace(log, reader=None, map=None)
+                log = replace(log, **facts)
             logs.setdefault(os.path.realpath(path), log)
     if not logs:
         raise InputError(
@@ -234,11 +237,3 @@ def _vehicle_beside(path: Path, root: Path) -> str | None:
     above = takewhile(lambda folder: folder != root.parent, path.parents)
     files = (folder / VEHICLE_FILE for folder in above)
     return next((str(file) for file in files if file.is_file()), None)
-
-
-def _with_entry(log: FleetLog, entry: ManifestEntry) -> FleetLog:
-    """Return a log of which an entry says more: its reader or map takes the place of the other."""
-    said = {k: x for k, x in vars(entry).items() if k != "log" and x not in (None, "")}
-    if {"reader", "map"} & said.keys():
-        log = replace(log, reader=None, map=None)
-    return replace(log, **said)

@@ -13,7 +13,7 @@ from ...runtime.page_files import page_template
 from ...runtime.plain_values import as_text
 from ..report.page import TONES, page_file
 from ..report.words import MISSING, coefficient_meaning, in_words, with_std
-from .drift import DRIFT, Appearance, Fleet, Trend
+from .drift import FALSE_DISCOVERIES, LEAST_FLIGHTS, Appearance, Fleet, Trend
 
 _KINDS = {
     "input": "the log or its vehicle cannot be used",
@@ -43,7 +43,8 @@ def fleet_page(fleet: Fleet, rows: Sequence[Mapping[str, Any]], command: str) ->
         picture=small_picture,
         in_words=in_words,
         coefficients=_coefficients,
-        settings=DRIFT,
+        least_flights=LEAST_FLIGHTS,
+        false_discoveries=FALSE_DISCOVERIES,
         command=as_text(command),
         shared_style=page_file("page.css"),
         version=__version__,

@@ -1,16 +1,12 @@
 """The picture of a fleet: coefficients from flight to flight, those that drift first."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...runtime.drawing import AFTER, BEFORE, GREY, new_figure, styled
 from ...runtime.page_files import write_figure
-from .drift import Fleet, Trend
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from .drift import Fleet
 
 _MOST_PANELS = 12
 _ACROSS = 3
@@ -23,6 +19,8 @@ def draw_fleet(fleet: Fleet, folder: Path) -> Path:
     Raises:
         InputError: it cannot be written.
     """
+    from matplotlib.ticker import MaxNLocator
+
     shown = sorted(
         fleet.trends,
         key=lambda one: (not one.told, one.adjusted_p or 1.0, -len(one.points)),
@@ -31,7 +29,20 @@ def draw_fleet(fleet: Fleet, folder: Path) -> Path:
     figure = new_figure(0.5 + 1.9 * down)
     panels = figure.subplots(down, _ACROSS, squeeze=False).ravel()
     for panel, one in zip(panels, shown, strict=False):
-        _draw(panel, one)
+        of, colour = one.of, BEFORE if one.told else AFTER
+        x, y, s = one.points[:, :3].T
+        sure = one.points[:, 3] > 0.0
+        panel.errorbar(x, y, 1.96 * np.nan_to_num(s), fmt="none", ecolor=GREY, elinewidth=0.7)
+        panel.plot(x[sure], y[sure], "o", color=colour, ms=3.5)
+        panel.plot(x[~sure], y[~sure], "o", mfc="white", mec=colour, ms=3.5)
+        if one.ends is not None:
+            panel.plot([x[0], x[-1]], one.ends, color=colour, lw=1.2)
+        unit = "" if of.unit == "1" else f" ({of.unit})"
+        # names of users may hold what mathematical text would choke on
+        panel.set_title(f"{of.id[:24]}: {of.effect}\n{of.coefficient}{unit}", parse_math=False)
+        panel.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4), useMathText=False)
+        panel.xaxis.set_major_locator(MaxNLocator(integer=True))
+        panel.set_xlabel("flight")
     for panel in panels[len(shown) :]:
         panel.set_axis_off()
     if not shown:
@@ -42,22 +53,3 @@ def draw_fleet(fleet: Fleet, folder: Path) -> Path:
         + (f"; {left} more in fleet.html" if left else "")
     )
     return write_figure(figure, folder, "fleet")
-
-
-def _draw(panel: "Axes", one: Trend) -> None:
-    from matplotlib.ticker import MaxNLocator
-
-    of, colour = one.of, BEFORE if one.told else AFTER
-    x, y, s = one.points[:, :3].T
-    sure = one.points[:, 3] > 0.0
-    panel.errorbar(x, y, 1.96 * np.nan_to_num(s), fmt="none", ecolor=GREY, elinewidth=0.7)
-    panel.plot(x[sure], y[sure], "o", color=colour, ms=3.5)
-    panel.plot(x[~sure], y[~sure], "o", mfc="white", mec=colour, ms=3.5)
-    if one.ends is not None:
-        panel.plot([x[0], x[-1]], one.ends, color=colour, lw=1.2)
-    unit = "" if of.unit == "1" else f" ({of.unit})"
-    # names of users may hold what mathematical text would choke on
-    panel.set_title(f"{of.id[:24]}: {of.effect}\n{of.coefficient}{unit}", parse_math=False)
-    panel.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4), useMathText=False)
-    panel.xaxis.set_major_locator(MaxNLocator(integer=True))
-    panel.set_xlabel("flight")

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import EffectSetting, Mocap, MotorCurve, Uncertainty, Vehicle
@@ -18,8 +17,6 @@ from .motors import MotorResponse
 from .parameters import FURTHER
 from .result import ASSUMED, IDENTIFIED, NOTHING, Estimate
 from .solve import VehicleFit
-
-Array = NDArray[np.float64]
 
 
 def vehicle_of(
@@ -39,7 +36,13 @@ def vehicle_of(
     effects = list(_effects(estimates))
     curve = None
     if fit.drive.commands:
-        curve = _curve(fit, estimates["voltage_exponent"])
+        thrust = np.zeros(max(fit.drive.exponents) + 1)
+        thrust[list(fit.drive.exponents)] = [
+            fit.values[f"a{j}"] for j in range(len(fit.drive.exponents))
+        ]
+        exponent = estimates["voltage_exponent"]
+        known = exponent.value if exponent.status == IDENTIFIED else 0.0
+        curve = MotorCurve(tuple(thrust.tolist()), known)
         k = fit.model.weight / (4.0 * USUAL.hover_speed**2)
     else:
         k = estimates["k"].value
@@ -126,14 +129,6 @@ def _effects(estimates: Mapping[str, Estimate]) -> Sequence[EffectSetting]:
     if any(get(e.name).role == Role.ROTOR_DRAG for e in out):
         out = [e for e in out if get(e.name).role != Role.RATE_DAMPING]
     return out
-
-
-def _curve(fit: VehicleFit, exponent: Estimate) -> MotorCurve:
-    values = fit.values
-    thrust = [0.0] * (max(fit.drive.exponents) + 1)
-    for j, e in enumerate(fit.drive.exponents):
-        thrust[e] = values[f"a{j}"]
-    return MotorCurve(tuple(thrust), exponent.value if exponent.status == IDENTIFIED else 0.0)
 
 
 def advice_of(estimates: Mapping[str, Estimate]) -> list[str]:

@@ -10,10 +10,10 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import welch
 from scipy.spatial.transform import Rotation
 
+from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from ..logs.streams import MOTOR_RATES
@@ -21,27 +21,17 @@ from ..motion.signals import log_signals
 from ..motion.smoothing import derivative, low_pass, resampled, runs_of, unbroken
 from .geometry import GRAVITY
 
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class PieceSettings:
-    """How signals are made of a log."""
-
-    shortest_piece: float = 3.0  # s; shorter ones have no frequency low enough to tell a bias
-    gap: float = 0.1  # s without a sample, at which a piece ends
-    # Hz: of angular velocity and velocity where they multiply something: what a quadrotor's motion
-    # has, without the noise that would enter a product squared
-    product_hz: float = 8.0
-    # Hz: faster logs are thinned out, behind a low-pass at 0.4 of it: rotors follow no faster
-    fastest_hz: float = 200.0
-    # share of the hover thrust's command below which a vehicle stands on the ground
-    flying_share: float = 0.3
-    # share of different values among all, below which rotor speeds are rounded
-    few_values: float = 0.2
-
-
-CHANNELS = PieceSettings()
+_SHORTEST_PIECE = 3.0  # s; shorter ones have no frequency low enough to tell a bias
+_GAP = 0.1  # s without a sample, at which a piece ends
+# Hz: of angular velocity and velocity where they multiply something: what a quadrotor's motion
+# has, without the noise that would enter a product squared
+_PRODUCT_HZ = 8.0
+# Hz: faster logs are thinned out, behind a low-pass at 0.4 of it: rotors follow no faster
+_FASTEST_HZ = 200.0
+# share of the hover thrust's command below which a vehicle stands on the ground
+_FLYING_SHARE = 0.3
+# share of different values among all, below which rotor speeds are rounded
+_FEW_VALUES = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +124,7 @@ def rounding_step(logs: Sequence[FlightLog]) -> float:
     """
     values = np.concatenate([log.rotor_speeds.ravel() for log in logs])
     kept = np.unique(np.round(values, 6))
-    if len(kept) < 3 or len(kept) > CHANNELS.few_values * len(values):
+    if len(kept) < 3 or len(kept) > _FEW_VALUES * len(values):
         return 0.0
     return float(np.median(np.diff(kept)))
 
@@ -175,7 +165,7 @@ def pieces_of(
                 pieces += _cut(part, _flying(part))
     if not pieces:
         raise InputError(
-            f"{logs[0].name}: no piece of {CHANNELS.shortest_piece:g} s in flight is unbroken "
+            f"{logs[0].name}: no piece of {_SHORTEST_PIECE:g} s in flight is unbroken "
             "there; expected a longer flight, or another --from and --to"
         )
     return pieces, sources
@@ -206,8 +196,8 @@ def _inertial(log: FlightLog, sources: Sources) -> Iterator[_Motion]:
     assert log.gyro is not None
     read = np.flatnonzero(np.isfinite(log.gyro[:, 0]))
     period = float(np.median(np.diff(log.t[read])))
-    gap = max(CHANNELS.gap, 3.5 * period)
-    for rows in unbroken(log.t, read, gap, 15, CHANNELS.shortest_piece):
+    gap = max(_GAP, 3.5 * period)
+    for rows in unbroken(log.t, read, gap, 15, _SHORTEST_PIECE):
         t = np.arange(log.t[rows[0]], log.t[rows[-1]], period)
         rate = _sensor(log, log.gyro, t)
         force = None if log.accelerometer is None else _sensor(log, log.accelerometer, t)
@@ -226,18 +216,18 @@ def _piece(log: FlightLog, number: int, motion: _Motion, sources: Sources) -> Mo
         None if log.command is None else resampled(t, log.t, log.command),
         None if log.voltage is None else np.interp(t, log.t, log.voltage),
     )
-    if period < 0.8 / CHANNELS.fastest_hz:
-        period = 1.0 / CHANNELS.fastest_hz
+    if period < 0.8 / _FASTEST_HZ:
+        period = 1.0 / _FASTEST_HZ
         thin = np.arange(t[0], t[-1], period)
 
         def thinned(x: Array) -> Array:
-            slow = low_pass(x, 0.4 * CHANNELS.fastest_hz, piece.period)
+            slow = low_pass(x, 0.4 * _FASTEST_HZ, piece.period)
             return resampled(thin, t, slow) if x.ndim > 1 else np.interp(thin, t, slow)
 
         piece = replace(piece.mapped(thinned), t=thin, period=period)
 
     def smooth(x: Array) -> Array:
-        return low_pass(x, CHANNELS.product_hz, period)
+        return low_pass(x, _PRODUCT_HZ, period)
 
     moving = None if piece.velocity is None else smooth(piece.velocity)
     return replace(piece, angular_velocity=smooth(piece.angular_velocity), velocity=moving)
@@ -262,21 +252,21 @@ def _velocity(log: FlightLog, t: Array) -> Array | None:
     return None if np.isnan(out).any() else out
 
 
-def _flying(piece: MotionPiece) -> NDArray[np.bool_]:
+def _flying(piece: MotionPiece) -> Mask:
     """Return where the rotors carry the vehicle, without take-off and landing."""
     drive = piece.rotor_speeds if piece.rotor_speeds is not None else piece.command
     assert drive is not None
     load = low_pass(np.mean(np.square(drive), axis=1), 1.0, piece.period)
     usual = float(np.median(load[load > 0.1 * np.quantile(load, 0.95)]))
-    return np.asarray(load > CHANNELS.flying_share * usual)
+    return np.asarray(load > _FLYING_SHARE * usual)
 
 
-def _cut(piece: MotionPiece, keep: NDArray[np.bool_]) -> list[MotionPiece]:
+def _cut(piece: MotionPiece, keep: Mask) -> list[MotionPiece]:
     """Return the runs of samples that are kept, if they are long enough."""
     if keep.all():
         return [piece]
     return [
         piece.mapped(lambda x, a=a, b=b: x[a:b])  # type: ignore[misc]
         for a, b in runs_of(keep)
-        if (b - a) * piece.period >= CHANNELS.shortest_piece
+        if (b - a) * piece.period >= _SHORTEST_PIECE
     ]

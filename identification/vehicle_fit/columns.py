@@ -11,13 +11,11 @@ gyroscopic one, from which ``Jz`` is told.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...runtime.arrays import Array, Complex
 from ..motion.smoothing import derivative, lagged, low_pass
 from .channels import MotionPiece
-from .spectra import SPECTRUM, Complex, Segment, segments_of
-
-Array = NDArray[np.float64]
+from .spectra import BAND, Segment, segments_of
 
 _STEP = {"lag": 1e-3, "gamma": 0.05}  # of finite differences
 # Hz: slower moments that nothing measures are answered by the flight loop with rotor torque, so
@@ -39,7 +37,7 @@ class Drive:
     lag: float = 0.0  # s
     delay: float = 0.0  # s, by which the motion comes behind the rotors
     gamma: float = 0.0  # exponent of the voltage
-    band: float = SPECTRUM.band  # Hz, up to which force and turning are compared
+    band: float = BAND  # Hz, up to which force and turning are compared
     # rad/s, standard deviation of one measured speed; of those behind a lag nothing is known
     speed_noise: float = 0.0
 
@@ -89,25 +87,14 @@ def balance(pieces: list[MotionPiece], drive: Drive, nonlinear: tuple[str, ...])
     )
 
 
-def basis(piece: MotionPiece, drive: Drive) -> Array:
-    """Return the basis functions (n, 4, m) of each rotor's thrust, behind the lag."""
-    u = turning(piece, drive)
-    out = np.stack([u**e for e in drive.exponents], axis=2)
-    if drive.commands and drive.voltage_ref > 0.0 and piece.voltage is not None:
-        out = out * np.power(piece.voltage / drive.voltage_ref, drive.gamma)[:, None, None]
-    return out
-
-
-def turning(piece: MotionPiece, drive: Drive) -> Array:
-    """Return each rotor's speed (n, 4), behind the lag: as measured, or its command."""
-    source = piece.command if drive.commands else piece.rotor_speeds
-    assert source is not None
-    return lagged(source, drive.lag, piece.period)
-
-
 def rotor_columns(piece: MotionPiece, drive: Drive) -> dict[str, Array]:
     """Return the columns (n,) that depend on the rotors."""
-    phi, speed = basis(piece, drive), turning(piece, drive)
+    source = piece.command if drive.commands else piece.rotor_speeds
+    assert source is not None
+    speed = lagged(source, drive.lag, piece.period)  # (n, 4), or the command
+    phi = np.stack([speed**e for e in drive.exponents], axis=2)  # of each rotor's thrust
+    if drive.commands and drive.voltage_ref > 0.0 and piece.voltage is not None:
+        phi *= np.power(piece.voltage / drive.voltage_ref, drive.gamma)[:, None, None]
     x, y = drive.positions[:, 0], drive.positions[:, 1]
     out: dict[str, Array] = {}
     for j in range(phi.shape[2]):
@@ -117,7 +104,7 @@ def rotor_columns(piece: MotionPiece, drive: Drive) -> dict[str, Array]:
         out[f"Z{j}"] = -phi[:, :, j] @ drive.spin
     momentum = speed @ drive.spin
     w = piece.angular_velocity
-    smooth = low_pass(momentum[:, None], 2.0 * SPECTRUM.band, piece.period)
+    smooth = low_pass(momentum[:, None], 2.0 * BAND, piece.period)
     out["spin up"] = -derivative(smooth, piece.period)[:, 0]
     out["spin x"], out["spin y"] = -w[:, 1] * momentum, w[:, 0] * momentum
     if piece.velocity is not None:

@@ -65,7 +65,7 @@ def _autopilot(
         for p, value, limit in zip(parameters, values, limits, strict=True)
         if value is not None and value > limit
     ]
-    full = found.by_name.get("thrust(1)")
+    full = found.estimates.get("thrust(1)")
     if values[3] is not None and full is not None and full.status != IDENTIFIED:
         doubts.append(
             f"# {parameters[3]} and {parameters[4]}: the full thrust was not flown; {full.how}"
@@ -81,7 +81,7 @@ def _autopilot(
 def _simulator(found: Identified, name: str) -> str:
     """Return a simulator's parameters."""
     v = found.vehicle
-    lag, drag = found[effect_of(Role.LAG)], linear_drag(v)
+    lag, drag = found.estimates[effect_of(Role.LAG)], linear_drag(v)
     rows = [
         np.sign(v.positions[_CRAZYFLIE, 1]),
         -np.sign(v.positions[_CRAZYFLIE, 0]),
@@ -93,7 +93,7 @@ def _simulator(found: Identified, name: str) -> str:
             "# these logs hold commands, no rotor speeds: k and p are scaled so that rotors hover "
             f"at {v.hover_rate:.0f} rad/s; thrust and torque are right, speeds are not\n"
         )
-    assumed = [e.name for e in found.estimates if e.status == ASSUMED]
+    assumed = [e.name for e in found.estimates.values() if e.status == ASSUMED]
     notes += f"# assumed, not identified: {', '.join(assumed)}\n" if assumed else ""
     text = page_template(__package__, f"templates/{name}.j2", html=False)
     return text.render(

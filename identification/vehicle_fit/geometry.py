@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...runtime.arrays import Array
 from ...runtime.errors import InputError
-
-Array = NDArray[np.float64]
 
 QUADRANT = np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
 SPIN = np.array([-1.0, 1.0, -1.0, 1.0])  # about body +z, in the same order

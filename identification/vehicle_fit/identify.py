@@ -9,10 +9,9 @@ What a flight does not show is fixed by an assumption that is named, or left out
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.effects import Role
 from ...dynamics.vehicle import Vehicle
@@ -30,29 +29,20 @@ from .motors import motor_response
 from .parameters import FORCE_BIAS, FURTHER, first_model
 from .result import IDENTIFIED, NOTHING, Estimate, Identified, told
 from .solve import Interval, VehicleFit, score_tests, solve
-from .spectra import SPECTRUM
+from .spectra import BAND
 
-Array = NDArray[np.float64]
 Report = Callable[[float, str], None]
 
-
-@dataclass(frozen=True)
-class IdentifySettings:
-    """What is asked of a fit before it is believed."""
-
-    # fall of twice the negative log-likelihood for each further parameter, in units of ln of the
-    # count of frequencies: Schwarz's criterion, doubled since the noise's spectrum is fitted too
-    penalty: float = 2.0
-    # Hz: narrower bands, in turn, where the whole band contradicts itself
-    bands: tuple[float, ...] = (4.0, 1.5)
-    apart: float = 3.0  # standard deviations of thrust between two bands, or of a bias' prior
-    close: float = 0.01  # share of thrust by which two bands may differ whatever the intervals say
-    least_voltage_range: float = 0.03  # share: below it the voltage's exponent is not asked for
-    least_lag: float = 4.0  # standard deviations of a lag behind rotor speeds that were logged
-    lags: tuple[float, ...] = (0.03, 0.08)  # s, where the search for it starts
-
-
-IDENTIFY = IdentifySettings()
+# fall of twice the negative log-likelihood for each further parameter, in units of ln of the
+# count of frequencies: Schwarz's criterion, doubled since the noise's spectrum is fitted too
+_PENALTY = 2.0
+# Hz: narrower bands, in turn, where the whole band contradicts itself
+_BANDS = (4.0, 1.5)
+_APART = 3.0  # standard deviations of thrust between two bands, or of a bias' prior
+_CLOSE = 0.01  # share of thrust by which two bands may differ whatever the intervals say
+_LEAST_VOLTAGE_RANGE = 0.03  # share: below it the voltage's exponent is not asked for
+_LEAST_LAG = 4.0  # standard deviations of a lag behind rotor speeds that were logged
+_LAGS = (0.03, 0.08)  # s, where the search for it starts
 
 
 def identify(
@@ -94,7 +84,7 @@ def identify(
     fit, turned = _first_fit(pieces, sources, drive, mass)
     report(0.4, "asking whether slow and quick motion agree")
     fit, doubt = _agreeing(pieces, fit), ""
-    if fit.drive.band < SPECTRUM.band:
+    if fit.drive.band < BAND:
         doubt = "quick motion contradicts slow motion in these logs"
         notes.append(
             f"warning: above {fit.drive.band:g} Hz these logs contradict what they say below, as "
@@ -143,7 +133,7 @@ def identify(
         named[lag] = Estimate(lag, *motors.known, "s", IDENTIFIED, how)
     return Identified(
         vehicle,
-        tuple(named.values()),
+        named,
         sources,
         tuple(pieces),
         fit,
@@ -170,7 +160,7 @@ def _voltage(pieces: Sequence[MotionPiece]) -> float:
     together = np.concatenate(voltages)
     middle = float(np.median(together))
     wide = float(np.ptp(np.quantile(together, [0.05, 0.95])))
-    return middle if middle > 0.0 and wide > IDENTIFY.least_voltage_range * middle else 0.0
+    return middle if middle > 0.0 and wide > _LEAST_VOLTAGE_RANGE * middle else 0.0
 
 
 def _first_fit(
@@ -183,14 +173,14 @@ def _first_fit(
         # do the logged speeds lead the motion as commands do?
         late = balance(pieces, replace(plain.drive, speed_noise=0.0), ("delay", "lag"))
         _, (lag,), (size,) = score_tests(plain, {"lag": ("lag",)}, late)["lag"]
-        if lag < IDENTIFY.least_lag * size:
+        if lag < _LEAST_LAG * size:
             return plain, turned
         model, start = model.with_more(plain.theta, "lag")
-        start[-1] = IDENTIFY.lags[0]
+        start[-1] = _LAGS[0]
         other = solve(pieces, drive, model, start)
-        enough = IDENTIFY.penalty * math.log(_frequencies(plain))
+        enough = _PENALTY * math.log(_frequencies(plain))
         lag, low, _ = other.interval("lag", logarithm=False)
-        sure = lag > IDENTIFY.least_lag * (lag - low) / other.width
+        sure = lag > _LEAST_LAG * (lag - low) / other.width
         return (other if sure and plain.loss - other.loss > enough else plain), turned
     nonlinear = ("lag", "delay", *(("gamma",) if drive.voltage_ref > 0.0 else ()))
     best: tuple[float, VehicleFit, bool] | None = None
@@ -199,12 +189,14 @@ def _first_fit(
         here = replace(drive, exponents=exponents)
         model, start, here, turned = first_model(pieces, sources, here, mass, nonlinear)
         fits = []
-        for lag in IDENTIFY.lags if best is None else (best[1].drive.lag,):
+        for lag in _LAGS if best is None else (best[1].drive.lag,):
             start[model.free.index("lag")] = lag
             fits.append(solve(pieces, here, model, start))
         fit = min(fits, key=lambda f: f.loss)
-        cost = fit.loss + IDENTIFY.penalty * math.log(_frequencies(fit)) * len(exponents)
-        if _rises(fit) and (best is None or cost < best[0]):
+        cost = fit.loss + _PENALTY * math.log(_frequencies(fit)) * len(exponents)
+        thrust = [thrust_of(fit.values, exponents, u) for u in np.linspace(0.05, 1.0, 20)]
+        rises = np.all(np.diff(thrust) > 0.0)  # with the command, from nothing to full
+        if rises and (best is None or cost < best[0]):
             best = cost, fit, turned
     if best is None:
         raise InputError(
@@ -217,13 +209,13 @@ def _agreeing(pieces: list[MotionPiece], fit: VehicleFit) -> VehicleFit:
     """Return the fit up to the widest frequency at which thrust is what slower motion alone says
     (Hausman's test), and no sensor's bias is beyond belief.
     """
-    for band in IDENTIFY.bands:
+    for band in _BANDS:
         slow = solve(pieces, replace(fit.drive, band=band), fit.model, fit.theta)
         wide, narrow = _hover_thrust(fit), _hover_thrust(slow)
         apart = abs(math.log(narrow[0] / wide[0])) if min(narrow[0], wide[0]) > 0.0 else math.inf
         bias = abs(fit.values.get("force bias z", 0.0))
-        sure = apart > IDENTIFY.apart * math.hypot(narrow[1], IDENTIFY.close)
-        if not sure and bias < IDENTIFY.apart * FORCE_BIAS:
+        sure = apart > _APART * math.hypot(narrow[1], _CLOSE)
+        if not sure and bias < _APART * FORCE_BIAS:
             return fit
         fit = slow
     return fit
@@ -239,12 +231,6 @@ def _hover_thrust(fit: VehicleFit) -> tuple[float, float]:
     u = (weight / (4.0 * scale[f"a{len(exponents) - 1}"])) ** (1.0 / exponents[-1])
     value, low, _ = fit.interval(lambda v: 4.0 * thrust_of(v, exponents, u) / weight, False)
     return value, (value - low) / (fit.width * max(abs(value), 1e-9))
-
-
-def _rises(fit: VehicleFit) -> bool:
-    """Does thrust grow with the command, from nothing to full?"""
-    u = np.linspace(0.05, 1.0, 20)
-    return bool(np.all(np.diff([thrust_of(fit.values, fit.drive.exponents, x) for x in u]) > 0.0))
 
 
 def _frequencies(fit: VehicleFit) -> float:
@@ -297,4 +283,4 @@ def _with_optional(
 
 def _least_fall(fit: VehicleFit, name: str) -> float:
     """Return by how much twice the negative log-likelihood must fall with a further effect."""
-    return IDENTIFY.penalty * len(FURTHER[name].parameters) * math.log(_frequencies(fit))
+    return _PENALTY * len(FURTHER[name].parameters) * math.log(_frequencies(fit))

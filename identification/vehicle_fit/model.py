@@ -12,11 +12,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...runtime.arrays import Array
 from .geometry import GRAVITY
-
-Array = NDArray[np.float64]
 
 _AXES = "xyz"
 NONLINEAR = ("lag", "delay", "gamma")  # s, s, 1
@@ -78,35 +76,28 @@ def coefficients(p: Mapping[str, float], names: tuple[str, ...], mass: float, po
             column = place[f"w{axis}w{other}"]
             out[:3, column] = products @ lever - np.trace(products) * lever
             moment[:, column] = -np.einsum("ijk,kj", _CROSS, inertia @ products)
+    tilt = np.array([get("tilt x", 0.0), get("tilt y", 0.0), 1.0])
     for j in range(powers):
-        a = get(f"a{j}", 0.0)
-        thrust = place[f"T{j}"]
-        out[0, thrust] += get("tilt x", 0.0) * a / mass
-        out[1, thrust] += get("tilt y", 0.0) * a / mass
-        out[2, thrust] += a / mass
-        moment[0, place[f"X{j}"]] += a
-        moment[0, thrust] -= a * get("cy", 0.0)
-        moment[1, place[f"Y{j}"]] += a
-        moment[1, thrust] += a * get("cx", 0.0)
-        moment[2, place[f"Z{j}"]] += a * get("reach", 0.0)
+        a, thrust = get(f"a{j}", 0.0), place[f"T{j}"]
+        out[:3, thrust] += tilt * a / mass
+        moment[:2, thrust] += a * np.array([-get("cy", 0.0), get("cx", 0.0)])
+        for i, lever_arm in enumerate((1.0, 1.0, get("reach", 0.0))):
+            moment[i, place[f"{'XYZ'[i]}{j}"]] += a * lever_arm
     for i, axis in enumerate(_AXES):
         out[i, place["1"]] += get(f"force bias {axis}", 0.0)
         moment[i, place[f"w{axis}"]] -= get(f"damping {axis}", 0.0)
         for kind in ("rotor drag", "linear drag", "quadratic drag"):
             if (value := get(f"{kind} {axis}")) is not None:
                 out[i, place[f"{kind} {axis}"]] += value / mass
-    if "rotor drag x" in p:
-        moment[2, place["moment of rotor drag x"]] += p["rotor drag x"]
-        moment[2, place["moment of rotor drag y"]] += p["rotor drag y"]
+    for axis in "xy" if "rotor drag x" in p else "":
+        moment[2, place[f"moment of rotor drag {axis}"]] += p[f"rotor drag {axis}"]
     for kind in ("rotor drag z", "lift"):
         for i, axis in enumerate("xy" if kind in p else ""):
             moment[i, place[f"moment {axis} of {kind}"]] += p[kind]
     if "lift" in p:
         out[2, place["lift"]] += p["lift"] / mass
-    spin = get("Jr", 0.0)
-    moment[2, place["spin up"]] += spin
-    moment[0, place["spin x"]] += spin
-    moment[1, place["spin y"]] += spin
+    for i, direction in enumerate(("x", "y", "up")):
+        moment[i, place[f"spin {direction}"]] += get("Jr", 0.0)
     if "flapping" in p:  # the columns of rotor drag are minus the sum of speeds times velocity
         moment[0, place["rotor drag y"]] += p["flapping"]
         moment[1, place["rotor drag x"]] -= p["flapping"]
@@ -127,9 +118,4 @@ def jacobian(model: Model, theta: Array, names: tuple[str, ...]) -> tuple[Array,
         return coefficients(model.values(x), names, model.mass, model.powers)
 
     here = at(theta)
-    slopes = np.empty((len(theta), *here.shape))
-    for i in range(len(theta)):
-        step = np.zeros(len(theta))
-        step[i] = 1e-6
-        slopes[i] = (at(theta + step) - here) / 1e-6
-    return here, slopes
+    return here, np.array([(at(theta + e) - here) / 1e-6 for e in 1e-6 * np.eye(len(theta))])

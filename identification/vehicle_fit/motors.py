@@ -5,26 +5,16 @@ behind a first-order lag.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.stats import t as student
 
+from ...runtime.arrays import Array
 from ..motion.smoothing import lagged
 from .channels import MotionPiece
 
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class MotorSettings:
-    """How the response is fitted."""
-
-    lags: tuple[float, float] = (1e-3, 0.5)  # s, the shortest and the longest
-    segment: float = 5.0  # s: errors further apart are taken as independent
-    powers: int = 3  # speed against u^0, u^1, u^2
-
-
-MOTORS = MotorSettings()
+_LAGS = (1e-3, 0.5)  # s, the shortest and the longest
+_SEGMENT = 5.0  # s: errors further apart are taken as independent
+_POWERS = 3  # speed against u^0, u^1, u^2
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +39,7 @@ def motor_response(pieces: list[MotionPiece]) -> MotorResponse | None:
 
     def columns(lag: float) -> Array:
         u = [lagged(p.command, lag, p.period).ravel() for p in pieces if p.command is not None]
-        return np.asarray(np.vander(np.concatenate(u), MOTORS.powers, increasing=True))
+        return np.asarray(np.vander(np.concatenate(u), _POWERS, increasing=True))
 
     target = speeds.ravel()
 
@@ -61,7 +51,7 @@ def motor_response(pieces: list[MotionPiece]) -> MotorResponse | None:
     def misfit(log_lag: float) -> float:
         return float(np.sum(np.square(fitted(float(np.exp(log_lag)))[1])))
 
-    bounds = tuple(np.log(MOTORS.lags))
+    bounds = tuple(np.log(_LAGS))
     found = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-3})
     lag = float(np.exp(found.x))
     best, residual = fitted(lag)
@@ -70,7 +60,7 @@ def motor_response(pieces: list[MotionPiece]) -> MotorResponse | None:
     moves = np.column_stack([columns(lag), slope])
     inverse = np.linalg.inv(moves.T @ moves)
     seconds = pieces[0].period * np.arange(len(speeds)).repeat(speeds.shape[1])
-    block = (seconds / MOTORS.segment).astype(int)
+    block = (seconds / _SEGMENT).astype(int)
     count = int(block.max()) + 1
     # errors go on within a segment: a sandwich over segments
     scores = np.array([moves[block == b].T @ residual[block == b] for b in range(count)])

@@ -6,17 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from ...dynamics.effects import Role
+from ...runtime.arrays import Array
 from ...runtime.errors import InputError
 from .channels import MotionPiece, Sources
 from .columns import Drive, rotor_columns
 from .geometry import GRAVITY, USUAL
 from .model import Model
-
-Array = NDArray[np.float64]
 
 # of an accelerometer that is not calibrated beside its factory's, m/s2 and rad: 20 mg, as data
 # sheets of such sensors state

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.vehicle_file import save_vehicle
+from ...runtime.arrays import Array
 from ...runtime.drawing import ESTIMATE, TRUTH, new_figure, styled
 from ...runtime.page_files import write_png, write_text
 from ...runtime.plain_values import plain
@@ -23,7 +23,6 @@ from .result import ASSUMED, NOTHING, Identified
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 _SHOWN_HZ = 8.0  # of the picture: what is faster is the pose's noise
 _LEAST_HZ = 0.4  # of the shares: what is slower holds the mean, such as the weight
@@ -41,7 +40,7 @@ def identified_data(found: Identified) -> dict[str, Any]:
         "estimates": [
             {"name": e.name, "value": e.value, "interval_95": [e.low, e.high]}
             | {"unit": e.unit, "status": e.status, "how": e.how}
-            for e in found.estimates
+            for e in found.estimates.values()
         ],
         "notes": found.notes,
         "advice": found.advice,
@@ -63,7 +62,7 @@ def identified_data(found: Identified) -> dict[str, Any]:
 def headline(found: Identified) -> str:
     """Return one sentence on how much of the vehicle the logs tell."""
     essential = ["Jxx", "Jyy", "Jzz", "p/k"]
-    open_ones = [n for n in essential if found[n].status in (ASSUMED, NOTHING)]
+    open_ones = [n for n in essential if found.estimates[n].status in (ASSUMED, NOTHING)]
     told = "thrust" if found.fit.drive.commands else "k"
     if not open_ones:
         return f"{told}, inertia and reaction torque are identified"
@@ -77,7 +76,7 @@ def write_identified(found: Identified, path: Path) -> list[Path]:
     Raises:
         InputError: a file cannot be written.
     """
-    known = found.by_name
+    known = found.estimates
     std = {
         e.name: {
             c: (estimate.high - estimate.low) / 3.92

@@ -4,15 +4,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ...dynamics.vehicle import Vehicle
 from ..prediction import PredictionErrors
 from .channels import MotionPiece, Sources
 from .solve import VehicleFit
-
-Array = NDArray[np.float64]
 
 IDENTIFIED, ASSUMED, GIVEN, NOTHING = "identified", "assumed", "given", "not identifiable"
 
@@ -46,7 +41,7 @@ class Identified:
     """A vehicle from its logs."""
 
     vehicle: Vehicle
-    estimates: tuple[Estimate, ...]
+    estimates: Mapping[str, Estimate]  # by their names
     sources: Sources
     pieces: tuple[MotionPiece, ...]
     fit: VehicleFit
@@ -55,12 +50,3 @@ class Identified:
     # of what was not fitted to: held_out_blocks, flights_left_out (each in turn, of several), and
     # prediction, of further flights
     predicted: Mapping[str, PredictionErrors]
-
-    def __getitem__(self, name: str) -> Estimate:
-        """Return an estimate by its name."""
-        return self.by_name[name]
-
-    @property
-    def by_name(self) -> Mapping[str, Estimate]:
-        """All estimates by their names."""
-        return {estimate.name: estimate for estimate in self.estimates}

@@ -12,37 +12,26 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
 from .channels import MotionPiece
 from .columns import BalanceSpectra, Drive, balance
-from .model import NONLINEAR, Model, jacobian
-from .spectra import SPECTRUM, residual_spectra
+from .model import Model, jacobian
+from .spectra import LOSS, TAPERS, residual_spectra
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 Function = Callable[[Values], float]
 Interval = tuple[float, float, float]  # value, low and high
 
-
-@dataclass(frozen=True)
-class SolveSettings:
-    """When a fit is done."""
-
-    rounds: int = 12  # of a new spectrum and a new linearisation
-    steps: int = 2  # of Gauss-Newton in each
-    close: float = 0.02  # of a standard deviation: a change that ends it
-    lag: tuple[float, float] = (0.0, 0.5)  # s
-    delay: tuple[float, float] = (-0.1, 0.1)  # s
-    gamma: tuple[float, float] = (-4.0, 4.0)
-    most_change: float = 0.05  # of one of these in a round
-    # of one frequency: where the parameters explain nearly all of it, its noise is not seen
-    most_leverage: float = 0.8
-
-
-SOLVE = SolveSettings()
+_ROUNDS = 12  # of a new spectrum and a new linearisation
+_STEPS = 2  # of Gauss-Newton in each
+_CLOSE = 0.02  # of a standard deviation: a change that ends it
+_RANGES = {"lag": (0.0, 0.5), "delay": (-0.1, 0.1), "gamma": (-4.0, 4.0)}  # s, s, 1
+_MOST_CHANGE = 0.05  # of one of these in a round
+# of one frequency: where the parameters explain nearly all of it, its noise is not seen
+_MOST_LEVERAGE = 0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,12 +56,12 @@ class VehicleFit:
         """Covariance (p, p), the larger of what the noise's spectrum says and what the segments'
         own scatter says (White's sandwich), parameter by parameter.
         """
-        inverse = np.asarray(SPECTRUM.loss * np.linalg.inv(self.information), dtype=np.float64)
+        inverse = np.asarray(LOSS * np.linalg.inv(self.information), dtype=np.float64)
         count = len(self.scores)
         if count < 4:
             return inverse
         meat = self.scores.T @ self.scores * (count / (count - 1.0))
-        sandwich = inverse @ meat @ inverse / SPECTRUM.loss**2
+        sandwich = inverse @ meat @ inverse / LOSS**2
         # few segments scatter: their evidence counts by how many there are
         share = count / (count + 30.0)
         ratio = np.diag(sandwich) / np.diag(inverse)
@@ -117,11 +106,11 @@ def solve(pieces: list[MotionPiece], drive: Drive, model: Model, start: Array) -
     made = linear()
     powers = [np.mean(np.abs(s.columns[:, :, :6]) ** 2, axis=0) for s in made.segments]
     spectra = residual_spectra(made.segments, powers)
-    for number in range(SOLVE.rounds):
+    for number in range(_ROUNDS):
         total = np.sum(_grams(made, spectra), axis=0)
-        theta, information, moved = _moved(made, total, model, theta, SOLVE.steps)
+        theta, information, moved = _moved(made, total, model, theta, _STEPS)
         made = linear() if model.nonlinear else made
-        if number >= 2 and moved < SOLVE.close:
+        if number >= 2 and moved < _CLOSE:
             break
         powers = _powers(made, spectra, model, theta, information)
         spectra = residual_spectra(made.segments, powers)
@@ -133,11 +122,11 @@ def solve(pieces: list[MotionPiece], drive: Drive, model: Model, start: Array) -
         np.sum(s.weight[:, None] * np.log(np.where(np.isinf(p), 1.0, p)))
         for s, p in zip(made.segments, spectra, strict=True)
     )
-    loss = float(SPECTRUM.tapers * sum(logs))
+    loss = float(TAPERS * sum(logs))
     return VehicleFit(model, theta, information, scores, loss, made, spectra)
 
 
-def refitted(fit: VehicleFit, kept: Sequence[NDArray[np.bool_]]) -> list[VehicleFit]:
+def refitted(fit: VehicleFit, kept: Sequence[Mask]) -> list[VehicleFit]:
     """Return a fit's coefficients by those of its segments (s,) alone that are ``kept``, of which
     the noise has the spectrum that it has.
 
@@ -149,7 +138,7 @@ def refitted(fit: VehicleFit, kept: Sequence[NDArray[np.bool_]]) -> list[Vehicle
         if not keep.any():
             raise InputError("the flight is too short; expected more than 5 s without a break")
         total = grams[keep].sum(axis=0)
-        theta, information, _ = _moved(fit.balance, total, fit.model, fit.theta, SOLVE.rounds)
+        theta, information, _ = _moved(fit.balance, total, fit.model, fit.theta, _ROUNDS)
         again = replace(fit, theta=theta, information=information, scores=fit.scores[keep])
         out.append(again)
     return out
@@ -171,7 +160,7 @@ def score_tests(
     def reached(rows: list[int]) -> tuple[float, Array, Array]:
         inverse = np.linalg.inv(information[np.ix_(rows, rows)])
         moved = inverse @ gradient[rows]
-        return float(gradient[rows] @ moved), moved, np.sqrt(SPECTRUM.loss * np.diag(inverse))
+        return float(gradient[rows] @ moved), moved, np.sqrt(LOSS * np.diag(inverse))
 
     for name, group in groups.items():
         further = [model.free.index(p) for p in group]
@@ -213,7 +202,7 @@ def _grams(made: BalanceSpectra, spectra: Sequence[Array]) -> list[Array]:
             scaled = (both * np.sqrt(weight)[None, :, None]).reshape(-1, both.shape[2])
             parts = np.concatenate([scaled.real, scaled.imag])
             gram[axis] = parts.T @ parts
-            added = noise * float(np.sum(weight * gain)) * SPECTRUM.tapers
+            added = noise * float(np.sum(weight * gain)) * TAPERS
             gram[axis, 1 : 1 + c, 1 : 1 + c] -= added
         grams.append(gram)
     return grams
@@ -250,13 +239,12 @@ def _newton(
 
 def _bounded(theta: Array, model: Model, drive: Drive) -> Array:
     """Return parameters of which the nonlinear ones stay near the drive's, and in their range."""
-    low, high = np.full((2, len(theta)), [[-np.inf], [np.inf]])
-    for i, name in enumerate(model.free):
-        if name in NONLINEAR:
-            least, most = getattr(SOLVE, name)
-            low[i] = max(least, getattr(drive, name) - SOLVE.most_change)
-            high[i] = min(most, getattr(drive, name) + SOLVE.most_change)
-    return np.clip(theta, low, high)
+    bounded = theta.copy()
+    for name in model.nonlinear:
+        i, here = model.free.index(name), getattr(drive, name)
+        near = np.clip(theta[i], here - _MOST_CHANGE, here + _MOST_CHANGE)
+        bounded[i] = np.clip(near, *_RANGES[name])
+    return bounded
 
 
 def _powers(
@@ -279,5 +267,5 @@ def _powers(
         share = np.einsum("ix,ij,jx->x", moves.conj(), inverse, moves, optimize=True).real
         leverage = np.mean(share.reshape(6, *residual.shape[:2]), axis=1).T / spectrum
         power = np.mean(np.abs(residual) ** 2, axis=0)
-        out.append(power / (1.0 - np.minimum(leverage, SOLVE.most_leverage)))
+        out.append(power / (1.0 - np.minimum(leverage, _MOST_LEVERAGE)))
     return out

@@ -12,32 +12,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from ...runtime.arrays import Array, Complex, Index
 
-
-@dataclass(frozen=True)
-class SpectrumSettings:
-    """How signals are transformed."""
-
-    segment: float = 5.0  # s: of one transform; its inverse is the frequency's step
-    tapers: int = 3  # sine tapers (Riedel and Sidorenko, 1995): a low leak, and little lost
-    # Hz: what is faster is vibration, and the loops' answer to noise; rotors follow no faster
-    band: float = 15.0
-    smoothing: float = 0.35  # of the spectrum: width as a share of the frequency,
-    narrowest: float = 0.4  # and at least so many Hz
-
-    @property
-    def loss(self) -> float:
-        """By what the variance of an estimate is larger than the information's inverse: the mean
-        of the tapers' squares, whose own mean is 1, weighs a segment's middle more than its ends.
-        """
-        return 1.0 + 0.5 / self.tapers
-
-
-SPECTRUM = SpectrumSettings()
+_SEGMENT = 5.0  # s: of one transform; its inverse is the frequency's step
+TAPERS = 3  # sine tapers (Riedel and Sidorenko, 1995): a low leak, and little lost
+# by what the variance of an estimate is larger than the information's inverse: the mean of the
+# tapers' squares, whose own mean is 1, weighs a segment's middle more than its ends
+LOSS = 1.0 + 0.5 / TAPERS
+# Hz: what is faster is vibration, and the loops' answer to noise; rotors follow no faster
+BAND = 15.0
+_SMOOTHING = 0.35  # of the spectrum: width as a share of the frequency,
+_NARROWEST = 0.4  # and at least so many Hz
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,10 +36,10 @@ class Segment:
     columns: Complex  # (K, m, c): per root Hz
 
 
-def edges_of(n: int, period: float) -> NDArray[np.intp]:
+def edges_of(n: int, period: float) -> Index:
     """Return the ends (count + 1,) of the segments, of about equal length, of a piece."""
-    count = max(1, round(n * period / SPECTRUM.segment))
-    return np.linspace(0, n, count + 1).astype(np.intp)
+    count = max(1, round(n * period / _SEGMENT))
+    return np.linspace(0, n, count + 1).astype(np.int64)
 
 
 def segments_of(columns: Array, period: float, log: int, band: float) -> list[Segment]:
@@ -66,10 +52,10 @@ def segments_of(columns: Array, period: float, log: int, band: float) -> list[Se
         frequency = np.asarray(np.fft.rfftfreq(size, period), dtype=np.float64)
         inside = frequency <= min(band, 0.4 / period)
         frequency = frequency[inside]
-        weight = np.where(frequency == 0.0, 1.0, 2.0) / SPECTRUM.tapers
+        weight = np.where(frequency == 0.0, 1.0, 2.0) / TAPERS
         places = np.arange(1, size + 1) * (np.pi / (size + 1))
         transforms = []
-        for k in range(1, SPECTRUM.tapers + 1):
+        for k in range(1, TAPERS + 1):
             taper = np.sqrt(2.0 * period / (size + 1)) * np.sin(k * places)
             transforms.append(np.fft.rfft(taper[:, None] * columns[a:b], axis=0)[inside])
         out.append(Segment(log, frequency, weight, np.array(transforms)))
@@ -91,7 +77,7 @@ def residual_spectra(segments: Sequence[Segment], powers: Sequence[Array]) -> li
     for s in segments:
         frequency, power = by_log[s.log]
         total = np.concatenate([np.zeros((1, power.shape[1])), np.cumsum(power, axis=0)])
-        half = 0.5 * np.maximum(SPECTRUM.smoothing * s.frequency, SPECTRUM.narrowest)
+        half = 0.5 * np.maximum(_SMOOTHING * s.frequency, _NARROWEST)
         low = np.searchsorted(frequency, s.frequency - half - 1e-9)
         high = np.searchsorted(frequency, s.frequency + half + 1e-9, side="right")
         mean = (total[high] - total[low]) / (high - low)[:, None]

@@ -1,7 +1,7 @@
 """The wrench filter of a vehicle, and a policy, as C that a flight controller compiles."""
 
+from .c_numbers import PRECISIONS
 from .export import ESTIMATORS, Exported, export_c
 from .policies import exportable_policy
-from .precision import PRECISIONS
 
 __all__ = ["ESTIMATORS", "PRECISIONS", "Exported", "export_c", "exportable_policy"]

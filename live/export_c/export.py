@@ -29,17 +29,11 @@ from ...estimator.recovery import NOISE
 from ...estimator.ukf import default_covariance
 from ...runtime.errors import InputError
 from . import hover
-from .c_numbers import literal, shape, table
+from .c_numbers import FUNCTIONS, PRECISIONS, in_precision, literal, shape, table
 from .c_values import UntranslatableError
-from .effect_code import (
-    definitions,
-    exportable_effects,
-    library,
-    translate,
-)
+from .effect_code import definitions, exportable_effects, library, translate
 from .filter_code import constants, fields, filter_code
-from .precision import FUNCTIONS, PRECISIONS, in_precision
-from .tracker import tracker_policy
+from .policies import tracker_policy
 
 _FILTERS: dict[str, tuple[type[WrenchUKF], str]] = {
     "constant-gain": (ConstantGainFilter, "The filter with a constant gain"),

@@ -1,16 +1,29 @@
-"""A policy as C: weights as tables, or a law with its two gains."""
+"""A policy as C: weights as tables, a law with its two gains, or the tracker: what a vehicle's own
+sensing makes of a moving fan, as tables.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from ...controllers.briefing import Briefing, FilterNoise
 from ...controllers.fan_laws import Lead
 from ...controllers.features import QUANTITIES
+from ...controllers.jet_map import FIRST, STEP
+from ...controllers.observation import DECISION_PERIOD, MAX_COMMAND
 from ...controllers.registry import shipped_policies
+from ...controllers.sensor_model import SETTLED, sensor_model
+from ...controllers.tracker import FEW, STOP, TURN, Tracker, nominal
 from ...controllers.trained_policy import TrainedPolicy, cell_of, layers_of, load_policy
+from ...controllers.wrench_lag import ORDER
+from ...dynamics.vehicle import Vehicle
+from ...estimator import UKFTuning
 from ...runtime.errors import InputError
 
 LAWS = ("lead", "tracker")
+PARTICLES = 400  # of the tracker, 40 kB: what a flight controller can spare
 # where the C has the numbers of an observation, in its order
 _COLUMNS = (
     *(f"e->{part}[{i}]" for part in ("force", "torque") for i in range(3)),
@@ -32,7 +45,7 @@ def exportable_policy(name: str) -> Mapping[str, Any]:
             "law": Lead(),
         }
     if name == "tracker":
-        return {"kind": "tracker"}  # the rest is the vehicle's: ``tracker.tracker_policy``
+        return {"kind": "tracker"}  # the rest is the vehicle's: ``tracker_policy``
     trained = shipped_policies()
     if name not in trained and not name.endswith((".npz", ".json")):
         raise InputError(
@@ -69,4 +82,41 @@ def exportable_policy(name: str) -> Mapping[str, Any]:
         "widest": max(features.size, *(len(bias) for _, bias in layers)),
         "activation": str(card["activation"]),
         "squash": bool(card["squash"]),
+    }
+
+
+def briefing_of(vehicle: Vehicle, tuning: UKFTuning, period: float) -> Briefing:
+    """Return what the tracker of a vehicle is told, whose wrench filter has this tuning and period
+    (s): beside that, the fan and the air of the scenario ``base``.
+    """
+    return nominal(Briefing(vehicle=vehicle, noise=FilterNoise.of(tuning, period)))
+
+
+def tracker_policy(vehicle: Vehicle, tuning: UKFTuning, period: float) -> Mapping[str, Any]:
+    """Return what the templates need of the tracker of a vehicle, with the gains of ``Tracker`` and
+    the fan and the air of the scenario ``base``.
+
+    Args:
+        vehicle: that flies.
+        tuning: of its wrench filter.
+        period: of it, s.
+    """
+    law = Tracker()
+    return {
+        "kind": "tracker",
+        "title": "Fan tracking by a particle filter on the fan's place and velocity.",
+        "source": "controllers/tracker.py",
+        "particles": PARTICLES,
+        "order": ORDER,
+        "settled": SETTLED,
+        "model": sensor_model(briefing_of(vehicle, tuning, period)),
+        "law": law,
+        "drift": law.acceleration * np.sqrt(DECISION_PERIOD),
+        "jumps": law.jumps * DECISION_PERIOD,
+        "stop": STOP,
+        "turn": STOP + TURN,
+        "few": FEW,
+        "most": MAX_COMMAND,
+        "first": FIRST,
+        "per_step": 1.0 / STEP,
     }

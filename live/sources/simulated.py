@@ -74,8 +74,12 @@ class Simulated(Source):
         """Fly one tick; return the pose that it samples, the rotor speeds then, and when it was."""
         loop, arrival = self._loop, time.monotonic_ns()
         phase = self._ticks % DECISION_TICKS
-        if phase == 0:
-            self._decide()
+        if phase == 0:  # move the fan, and have the controller answer what the vehicle feels
+            t = TICK * (self._ticks + np.arange(DECISION_TICKS, dtype=np.float64))
+            self._fan_y, x = self._fan_path(t), loop.state
+            observation = np.array([*x[16:19], *x[13:16], x[8], self._command], dtype=np.float32)
+            self._command = float(self._controller(observation, None)[0])
+            loop.setpoint[4] = self._command
         before, external = loop.unrounded.copy(), loop.external.copy()
         loop.run(self._rng.standard_normal((1, NOISE)), self._fan_y[phase : phase + 1])
         if not loop.healthy():
@@ -99,11 +103,3 @@ class Simulated(Source):
         )
         self._ticks += 1
         return sample, arrival
-
-    def _decide(self) -> None:
-        """Move the fan, and have the controller answer what the vehicle feels."""
-        t = TICK * (self._ticks + np.arange(DECISION_TICKS, dtype=np.float64))
-        self._fan_y, x = self._fan_path(t), self._loop.state
-        observation = np.array([*x[16:19], *x[13:16], x[8], self._command], dtype=np.float32)
-        self._command = float(self._controller(observation, None)[0])
-        self._loop.setpoint[4] = self._command

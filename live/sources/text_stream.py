@@ -85,7 +85,11 @@ class TextStream(Source):
         if not text:
             return None
         if not self._header:
-            self._begin(text)
+            mark = next((mark for mark in (",", ";", "\t") if mark in text), " ")
+            self._layout = TextLayout(mark)
+            self._header = self._layout.names(text)
+            self.expected = f"rows of a table with {', '.join(self._header)}"
+            self._map.check(self._header)
             return None
         fields = self._layout.fields(text)
         if len(fields) == len(self._header) + 1 and not fields[-1]:
@@ -105,10 +109,3 @@ class TextStream(Source):
         sample = self._map.sample("row", values, arrival)
         sample.whole = True
         return sample
-
-    def _begin(self, text: str) -> None:
-        """Take the header."""
-        self._layout = TextLayout(next((mark for mark in (",", ";", "\t") if mark in text), " "))
-        self._header = self._layout.names(text)
-        self.expected = f"rows of a table with {', '.join(self._header)}"
-        self._map.check(self._header)

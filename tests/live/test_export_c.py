@@ -34,9 +34,9 @@ from windwrench.dynamics.effects import compile_effects, get, parse_setting
 from windwrench.dynamics.effects.base import ROTORS_SIZE, SAMPLE_SIZE, STATE_SIZE
 from windwrench.estimator import UKFTuning
 from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
+from windwrench.live.export_c.c_numbers import FUNCTIONS
 from windwrench.live.export_c.effect_code import exportable_effects
-from windwrench.live.export_c.precision import FUNCTIONS
-from windwrench.live.export_c.tracker import PARTICLES, briefing_of
+from windwrench.live.export_c.policies import PARTICLES, briefing_of
 
 LARGEST = 0.01  # of a standard deviation
 QUICK = 1_200  # steps of each of five flights

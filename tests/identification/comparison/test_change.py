@@ -11,7 +11,7 @@ from tests.support.data_paths import excerpt
 from tests.support.flown import VEHICLE, recorded
 from windwrench.cli import app
 from windwrench.identification.comparison.change import NOWHERE, SOMETHING_ELSE, compare
-from windwrench.identification.comparison.sessions import SCATTER, difference
+from windwrench.identification.comparison.sessions import FLIGHT_STD, SESSION_STD, difference
 from windwrench.identification.comparison.trim import Trim, trim_of_log
 from windwrench.identification.comparison.words import change_headline, write_change
 
@@ -32,9 +32,9 @@ def drawn(rng, count, moved=(0.0, 0.0, 0.0, 0.0), sessions=1):
     out = []
     for session in range(sessions):
         middle = np.array([0.02, -0.03, 0.05, 0.0]) + moved
-        middle += np.array(SCATTER.session) * rng.standard_normal(4)
+        middle += np.array(SESSION_STD) * rng.standard_normal(4)
         for i in range(count):
-            numbers = middle + np.array(SCATTER.flight) * rng.standard_normal(4)
+            numbers = middle + np.array(FLIGHT_STD) * rng.standard_normal(4)
             thrust = np.linalg.solve(MIX, np.append(numbers[:3], 1.0)) * np.exp(numbers[3])
             out.append(Trim(f"{session}, {i}", thrust, 20.0))
     return out
@@ -90,7 +90,7 @@ def test_a_named_session_is_one_and_what_it_is_off_by_cancels():
             share = np.exp(found.log)
             size = np.sqrt(share @ found.variance)
             scores.append(share @ found.mean / size)
-            assert np.all(size < 2.5 * np.array(SCATTER.flight)) == shared
+            assert np.all(size < 2.5 * np.array(FLIGHT_STD)) == shared
         assert 0.8 < np.sqrt(np.mean(np.square(scores))) < 1.2
 
 

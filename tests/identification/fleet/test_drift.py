@@ -6,7 +6,7 @@ from scipy.stats import linregress, t
 
 from tests.support.diagnoses import fleet_row
 from windwrench.identification.fleet.drift import (
-    DRIFT,
+    LEAST_FLIGHTS,
     Coefficient,
     appearance_of,
     fleet_of,
@@ -79,7 +79,7 @@ def test_intervals_hold_the_truth(between):
 
 
 def test_few_flights_have_no_trend_and_bad_numbers_do_not_count():
-    few = trend([1.0] * (DRIFT.least_flights - 1), [0.1] * (DRIFT.least_flights - 1), 9)
+    few = trend([1.0] * (LEAST_FLIGHTS - 1), [0.1] * (LEAST_FLIGHTS - 1), 9)
     assert (few.per_flight, few.p, few.mean) == (None, None, pytest.approx(1.0))
     one = trend([1.0], [0.1], 9)
     assert one.mean_ci95 == pytest.approx((0.804, 1.196))

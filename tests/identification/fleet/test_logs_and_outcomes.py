@@ -169,7 +169,7 @@ def test_an_error_of_any_kind_is_an_outcome(monkeypatch, error, kind):
         raise error
 
     monkeypatch.setattr("windwrench.identification.fleet.flight.read_log", fails)
-    found = diagnose_one(FleetLog("a.csv", "a.csv"))
+    found = diagnose_one(FleetLog("a.csv", "a.csv"), ())
     assert (found["status"], found["kind"]) == ("refused", kind)
     assert "\n" not in found["reason"]
     assert kind != "error" or "ZeroDivisionError (test_logs_and_outcomes.py" in found["reason"]

@@ -37,7 +37,7 @@ from windwrench.identification.vehicle_fit.identify import identify
 from windwrench.identification.vehicle_fit.parameters import first_model
 from windwrench.identification.vehicle_fit.report import explained
 from windwrench.identification.vehicle_fit.result import IDENTIFIED, Estimate
-from windwrench.identification.vehicle_fit.spectra import SPECTRUM, segments_of
+from windwrench.identification.vehicle_fit.spectra import LOSS, segments_of
 from windwrench.identification.wrench_series import estimate_log
 from windwrench.runtime.errors import InputError
 
@@ -59,7 +59,7 @@ def inertial():
 
 
 def check(found, name, truth, within):
-    estimate = found[name]
+    estimate = found.estimates[name]
     assert estimate.status == "identified", estimate
     assert estimate.value == pytest.approx(truth, rel=within), estimate
     assert estimate.low < estimate.high
@@ -131,8 +131,8 @@ def test_lift_at_the_rotors_is_not_taken_for_a_gyroscopic_torque():
 def test_a_hover_does_not_show_what_it_does_not_excite(crazyflie):
     hover = [recorded("hover", 12.0, vehicle=crazyflie)]
     found = identify(hover, crazyflie.mass, parse_geometry(str(crazyflie.arm_l)))
-    assert found["Jzz"].status == "assumed"
-    assert found["motor_lag"].status == "not identifiable"
+    assert found.estimates["Jzz"].status == "assumed"
+    assert found.estimates["motor_lag"].status == "not identifiable"
     assert any("Yaw at" in line for line in found.advice)
     parse_vehicle(dump_vehicle(found.vehicle))
 
@@ -147,7 +147,7 @@ def test_an_imu_and_commands_are_enough():
     check(found, "Jyy", INERTIA[1, 1], 0.05)
     check(found, "(p/k)/Jzz", REACH / INERTIA[2, 2], 0.05)
     check(found, "motor_lag", 0.05, 0.10)
-    assert found["drag"].status == "not identifiable"
+    assert found.estimates["drag"].status == "not identifiable"
     vehicle = parse_vehicle(dump_vehicle(found.vehicle))
     assert vehicle.motor_curve is not None
     thrust = vehicle.commanded_thrust(np.full((1, 4), hover))
@@ -161,10 +161,10 @@ def test_a_discharge_tells_the_voltage_from_the_thrust_curve(inertial):
     found = identify([used], MASS, parse_geometry(str(ARM)))
     check(found, "voltage_exponent", 1.2, 0.15)
     hover = np.sqrt(MASS * 9.81 / (4 * K)) / FULL
-    empty, full = (e for e in found.estimates if e.name.startswith("hover command at"))
+    empty, full = (e for e in found.estimates.values() if e.name.startswith("hover command at"))
     for volt, known in ((3.535, empty), (4.165, full)):
         assert known.low < hover * (volt / 3.85) ** -0.6 < known.high
-    assert found.vehicle.motor_curve.voltage_exponent == found["voltage_exponent"].value
+    assert found.vehicle.motor_curve.voltage_exponent == found.estimates["voltage_exponent"].value
 
 
 def test_without_a_discharge_voltage_and_curve_are_not_told_apart(inertial):
@@ -172,8 +172,8 @@ def test_without_a_discharge_voltage_and_curve_are_not_told_apart(inertial):
     same = identify(
         [replace(log, voltage=np.full(len(log.t), 3.9))], MASS, parse_geometry(str(ARM))
     )
-    assert same["voltage_exponent"].status == "not identifiable"
-    assert "hardly changes" in same["voltage_exponent"].how
+    assert same.estimates["voltage_exponent"].status == "not identifiable"
+    assert "hardly changes" in same.estimates["voltage_exponent"].how
     assert any("with a full and with an empty battery" in line for line in same.advice)
     assert same.vehicle.motor_curve.voltage_exponent == 0.0
 
@@ -185,7 +185,7 @@ def test_tapers_lose_what_the_intervals_add():
         (s,) = segments_of(noise, 0.01, 0, np.inf)
         x, y = np.moveaxis(s.columns * np.sqrt(s.weight)[:, None], 2, 0)
         off.append(np.vdot(x, y).real / np.linalg.norm(x))
-    assert np.var(off) == pytest.approx(0.01 * SPECTRUM.loss, rel=0.08)  # 1.17: 1 would be off
+    assert np.var(off) == pytest.approx(0.01 * LOSS, rel=0.08)  # 1.17: 1 would be off
 
 
 @pytest.mark.slow
@@ -195,7 +195,7 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say(inertial):
         log = replace(log, rotor_speeds=speeds, command=None)
         found = identify([log], MASS, parse_geometry(str(ARM)))
         for name, truth in (("k", K), ("Jxx", INERTIA[0, 0]), ("Jyy", INERTIA[1, 1])):
-            held.append(found[name].low <= truth <= found[name].high)
+            held.append(found.estimates[name].low <= truth <= found.estimates[name].high)
     assert sum(held) >= 20  # of 24; 95 % intervals miss more than 4 once in 170 times
 
 
@@ -208,9 +208,9 @@ def test_torque_that_loses_to_a_rate_that_stays_tells_no_inertia(crazyflie, comm
     found = identify(logs, crazyflie.mass, parse_geometry(str(crazyflie.arm_l)))
     check(found, "k", crazyflie.k[0], 0.05)
     for name in ("Jxx", "Jyy", "Jzz", "p/k", "p", "com x", "com y", "flapping_moment kflap"):
-        assert found[name].status in ("assumed", "not identifiable")
-        assert "(2 against 1 rad/s after 0.5 s)" in found[name].how
-    assert found["Jxx"].high > 3.0 * found["Jxx"].low
+        assert found.estimates[name].status in ("assumed", "not identifiable")
+        assert "(2 against 1 rad/s after 0.5 s)" in found.estimates[name].how
+    assert found.estimates["Jxx"].high > 3.0 * found.estimates["Jxx"].low
     assert np.all(found.vehicle.com == 0.0)
     assert any("roll movements" in line for line in found.advice)
     with pytest.raises(
@@ -282,22 +282,12 @@ def test_a_part_that_is_too_short_is_refused(inertial, window):
 LAG = Estimate("motor_lag", 0.05, 0.04, 0.06, "s", IDENTIFIED, "")
 
 
-class Found(SimpleNamespace):
-    """As much of a result as exports read."""
-
-    def __getitem__(self, name):
-        return {e.name: e for e in self.estimates}[name]
-
-    @property
-    def by_name(self):
-        return {e.name: e for e in self.estimates}
-
-
 def found(*effects, curve=None, lag=LAG, commands=False):
+    """Return as much of a result as exports read."""
     vehicle = load_vehicle("crazyflie").with_effects(*effects)
     vehicle = vehicle.__class__(**{**vehicle.__dict__, "motor_curve": curve})
-    drive = SimpleNamespace(commands=commands)
-    return Found(vehicle=vehicle, estimates=[lag], fit=SimpleNamespace(drive=drive))
+    fit = SimpleNamespace(drive=SimpleNamespace(commands=commands))
+    return SimpleNamespace(vehicle=vehicle, estimates={lag.name: lag}, fit=fit)
 
 
 def test_px4_and_ardupilot_predict_the_drag_that_the_vehicle_has():

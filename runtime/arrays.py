@@ -1,0 +1,9 @@
+"""Arrays by what they hold; their shapes stand where they are used."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Complex = NDArray[np.complex128]
+Index = NDArray[np.int64]
