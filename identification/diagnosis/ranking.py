@@ -14,6 +14,7 @@ after it, until none does that was not fitted.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ from ..findings import Disturbance, Ranking
 from .climbing import Height, linearised, mode
 from .evidence import set_evidence
 from .likelihood import Likelihood
-from .priors import Base, Setting, Starts
+from .priors import Base, Setting, Starts, prior_size
 from .regression import START_PREFIX, Column, Flights, moves_time, typical_size, without
 from .row_likelihood import RowLikelihood
 from .sets import Posterior, is_possible
@@ -38,6 +39,8 @@ TIME_STARTS = (0.3, 0.6, 1.2)
 # the flights do not tell from it: a likelihood of 20 to 1
 LEAST_RIVAL = 0.05
 ROUNDS = 6  # of fitting the noise beside the best set
+# standard deviations of its prior, by which a coefficient moves in the last of these rounds at most
+CLOSE = 0.1
 MOST_STARTS = 2  # of an effect with nonlinear coefficients, the likeliest, that are fitted by rows
 
 
@@ -69,15 +72,25 @@ def rank(
         report: called with a line of progress.
     """
 
+    def height(x: Setting, near: Likelihood) -> Height:
+        base = Likelihood(flights, x, near, same_noise=True).base(x, {})
+        return linearised(flights, base, x)
+
     def fitted(setting: Setting, near: Likelihood) -> Likelihood:
         report(f"trying {', '.join(setting)}")
-
-        def height(x: Setting) -> Height:
-            base = Likelihood(flights, x, near, same_noise=True).base(x, {})
-            return linearised(flights, base, x)
-
         tried[frozenset(setting)] = setting
-        return Likelihood(flights, mode(setting, height), near)
+        # a slow disturbance does much of what a steady effect does: each is fitted beside the other
+        for _ in range(ROUNDS):
+            near, begun = Likelihood(flights, setting, near), setting
+            setting = mode(begun, partial(height, near=near))
+            moved = (
+                abs(x - begun[e].get(n, 0.0)) / prior_size((e, n), flights)
+                for e, own in setting.items()
+                for n, x in own.items()
+            )
+            if max(moved) < CLOSE:
+                break
+        return Likelihood(flights, setting, near, same_noise=True)
 
     def around(best: Likelihood) -> tuple[Starts, Posterior]:
         starts = starts_of(flights, library, best.setting, {})
