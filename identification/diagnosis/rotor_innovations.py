@@ -109,15 +109,11 @@ def _known_before(track: Track, rotors: Array) -> Array:
     # along the heading and to its left, and about the body's axes
     back = track.heading * [1.0, -1.0]
     seen = np.hstack([level(back, x) for x in np.hsplit(track.innovations, 2)])
-    # a flight loop is no linear one: it knows of gyroscopic torque, and turns what it wants
-    moving = np.column_stack(
-        [track.rotation[before][:, 2, :2], body, track.angular_velocity[before]]
-    )
-    first, second = np.triu_indices(moving.shape[1])
     known += [
-        moving,
-        moving[:, first] * moving[:, second],
+        track.rotation[before][:, 2, :2],
+        body,
         track.position[before],
+        track.angular_velocity[before],
         track.acceleration[before] - track.model[before],
         seen[before],
         # the loop may have read this sample's pose before the rotors were logged
