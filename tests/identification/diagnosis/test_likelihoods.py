@@ -194,7 +194,7 @@ def test_the_noise_of_an_autoregression_is_found():
     begins = np.arange(len(x)) == 0
     begins[5000] = True
     fit = np.arange(len(x)) % 400 < 300
-    found = fitted_noise(x, begins, fit)
+    found = fitted_noise(x, begins, fit, np.zeros(2))
     np.testing.assert_allclose(found.lags[0], lag, atol=0.06)
     np.testing.assert_allclose(found.covariance, root @ root.T, atol=0.06)
     white = found.white(x)[found.known]
