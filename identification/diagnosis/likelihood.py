@@ -570,7 +570,7 @@ def gyration(vehicle: Vehicle, rate: Array) -> Array:
     """Return by how much the angular acceleration (n, 3, 3) grows with the angular velocity."""
     # -u x J v over the inertia J, of all pairs of axes u and v
     twist = -np.cross(np.eye(3)[:, None], vehicle.inertia) @ np.linalg.inv(vehicle.inertia)
-    return np.einsum("nk,kji->nij", rate, twist + twist.swapaxes(0, 1))
+    return np.asarray(np.einsum("nk,kji->nij", rate, twist + twist.swapaxes(0, 1)))
 
 
 def read_poses(log: FlightLog, vehicle: Vehicle, finer: Iterator[Array]) -> list[Poses]:
