@@ -81,7 +81,7 @@ def _of_commands(rows: Rows, here: Array, thrust: Array) -> dict[str, Array]:
         "bend": rows.from_body(DRIFT_STD * (1.5 * w * w - 0.5) * up),
     }
     late = rows.columns({}, [ROTOR_TIME_OFFSET])[ROTOR_TIME_OFFSET]
-    delay = 0.5 * flights.pieces({})[0].signals.period + (DELAY_STD if rows.fixed else 0.0)
+    delay = DELAY_STD if rows.fixed else 0.5 * flights.pieces({})[0].signals.period
     out["delay"] = delay * rows.at_rows(here) * late
     for axis, name in enumerate("xy"):
         if not flights.inertial:
