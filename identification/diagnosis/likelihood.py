@@ -34,7 +34,7 @@ from .log_offsets import (
     ROTOR_TIME_OFFSET,
     with_time_offsets,
 )
-from .noise_search import NOISE, NoiseSearch
+from .noise_search import FIRST_TIME, SETTLING_TIME, NoiseSearch
 from .priors import (
     BETWEEN,
     GAIN,
@@ -60,7 +60,7 @@ from .regression import (
     without,
 )
 from .rotor_innovations import DRIVEN, rotor_innovations, unrounded
-from .steady_filter import PAIRS, PoseNoise, SteadyFilter, steady_filter
+from .steady_filter import OWN, PAIRS, PoseNoise, SteadyFilter, steady_filter
 
 Array = NDArray[np.float64]
 
@@ -69,7 +69,6 @@ STATES = (0, 1, 2)  # of an axis: pose, rate, disturbance
 SIDEWAYS = 0.01
 
 
-OWN = np.equal(np.arange(6)[:, None, None], PAIRS).any(axis=2)  # (6, 3) whether a pair's axis
 FIRST_DISTURBANCE = 0.3  # m/s2 and rad/s2, at which the search for the noise begins
 
 
@@ -200,7 +199,7 @@ class Likelihood:
         return PoseNoise(
             np.repeat([max(floor.position, 1e-6), max(floor.attitude, 1e-6)], 3),
             np.repeat([FIRST_DISTURBANCE, 10.0 * FIRST_DISTURBANCE], 3),
-            np.full(6, NOISE.first_time),
+            np.full(6, FIRST_TIME),
             self._rounding(),
         )
 
@@ -266,7 +265,7 @@ class Likelihood:
     def _counts(self, piece: int) -> NDArray[np.bool_]:
         """Return which samples of a piece the fit may see."""
         out = self._fit[piece].copy()
-        out[: round(NOISE.settling_time / self.period)] = False
+        out[: round(SETTLING_TIME / self.period)] = False
         return out
 
     def gusts(self) -> tuple[Disturbance, ...]:

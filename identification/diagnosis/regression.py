@@ -98,6 +98,17 @@ def is_delay(effect: str) -> bool:
     return get(effect).role == Role.DELAY
 
 
+def delivered(signals: Signals, vehicle: Vehicle) -> Array:
+    """Return the thrust (N) and the torque (Nm, body) of a vehicle's rotors (n, 4), behind its lag
+    and whatever else changes what they deliver.
+    """
+    own = tuple(e for e in vehicle.effects if get(e.name).kind == "rotor input")
+    still = replace(signals, angular_velocity=np.zeros_like(signals.angular_velocity))
+    wrench, _ = acting_wrench(still, replace(vehicle, effects=own))
+    thrust = np.einsum("ni,ni->n", wrench[:, :3], signals.rotation[:, :, 2])
+    return np.column_stack([thrust, wrench[:, 3:]])
+
+
 def moves_time(effect: str) -> bool:
     """Return whether rotors act late by an effect: behind a delay, or behind a lag."""
     return get(effect).role in (Role.DELAY, Role.LAG)
@@ -344,14 +355,8 @@ class Flights:
         """Return what the rotors deliver at the rows (rows, 4), behind a lag and the like that the
         vehicle has: thrust (N) and torque (Nm, body), low-passed.
         """
-        vehicle, out = self.amended(setting), []
-        own = tuple(e for e in vehicle.effects if get(e.name).kind == "rotor input")
-        for p in self.pieces(setting):
-            still = replace(p.signals, angular_velocity=np.zeros_like(p.signals.angular_velocity))
-            wrench, _ = acting_wrench(still, replace(vehicle, effects=own))
-            thrust = np.einsum("ni,ni->n", wrench[:, :3], still.rotation[:, :, 2])
-            out.append(p.smooth(np.column_stack([thrust, wrench[:, 3:]])))
-        return np.concatenate(out)
+        vehicle, pieces = self.amended(setting), self.pieces(setting)
+        return np.concatenate([p.smooth(delivered(p.signals, vehicle)) for p in pieces])
 
     def at_rows(self, name: str, setting: Setting | None = None) -> Array:
         """Return a signal (rows, ...) of ``Signals``, by its name, at the rows."""

@@ -21,7 +21,7 @@ from .priors import (
     in_prior_units,
     prior_size,
 )
-from .regression import Column, Flights, without
+from .regression import Column, Flights, delivered, without
 from .row_noise import ROUNDS, RowNoise, fitted_noise, white_noise
 from .row_nuisances import answered, followers, row_nuisances
 from .rows import Rows
@@ -133,7 +133,7 @@ class RowLikelihood:
         rows, flights, vehicle = self.rows, self.flights, self.flights.vehicle
         pieces, states = flights.pieces({}), []
         for s in (p.signals for p in pieces):
-            rotors = vehicle.rotor_wrench(s.rotor_speeds) / flights.inertias[2:]
+            rotors = delivered(s, vehicle) / flights.inertias[2:]
             # the acceleration is the rotors', which knows no disturbance
             push, rate = rotors[:, :1] * s.rotation[:, :, 2], s.angular_velocity
             states.append(State(s.t, s.position, s.rotation, s.velocity, rate, push, rotors))

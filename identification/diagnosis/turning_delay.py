@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.signal import csd, welch
 
-from ...dynamics.effects import get
+from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import Vehicle
 from ..motion.signals import Signals
 from .regression import moves_time
@@ -76,14 +76,22 @@ def turning_delay(
             rotors that are held at each are late by half as long, and those of a log that has left
             commands out by less.
     """
-    rotors = [e for e in vehicle.effects if moves_time(e.name)]
-    declared = sum(sum(e.coefficients.values()) for e in rotors if get(e.name).kind != "sensing")
+    declared = [
+        (get(e.name).role, x)
+        for e in vehicle.effects
+        if moves_time(e.name) and get(e.name).kind != "sensing"
+        for x in e.coefficients.values()
+    ]
     spectra = [s for piece in pieces for s in _spectra(piece, vehicle)]
     if not spectra:
         return None
 
+    def behind(omega: Array, seconds: float) -> Array:
+        angles = (np.arctan(omega * x) if role == Role.LAG else omega * x for role, x in declared)
+        return np.asarray(omega * seconds + sum(angles))
+
     def deviance(seconds: float) -> float:
-        return sum(s.deviance(np.exp(-1j * s.omega * (declared + seconds))) for s in spectra)
+        return sum(s.deviance(np.exp(-1j * behind(s.omega, seconds))) for s in spectra)
 
     step = 0.005
     at = min(np.arange(0.0, LONGEST_DELAY + step, step).tolist(), key=deviance)
@@ -93,7 +101,10 @@ def turning_delay(
     seconds, least, near = float(best.x), float(best.fun), 0.1 * step
     bend = (deviance(seconds + near) - 2.0 * least + deviance(seconds - near)) / near**2
     std = float(np.sqrt(2.0 / max(bend, 1e-6)))
-    std = math.hypot(std, 0.5 * held / math.sqrt(12.0))
+    # a lag delays each frequency otherwise, and which of them the loop lets show is not known
+    omega = spectra[0].omega
+    spread = float(np.std(behind(omega, 0.0) / omega))
+    std = math.hypot(std, spread, 0.5 * held / math.sqrt(12.0))
     clear = -least > LEAST_LOG_LIKELIHOOD_RATIO and seconds - 0.25 * held > 2.0 * std
     return (seconds, std, -least) if clear else None
 

@@ -11,7 +11,9 @@ from scipy.spatial.transform import Rotation
 from tests.support.flown import VEHICLE
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.diagnosis.diagnosing import diagnose
-from windwrench.identification.diagnosis.row_nuisances import THRUST_STD
+from windwrench.identification.diagnosis.regression import Flights
+from windwrench.identification.diagnosis.row_nuisances import THRUST_STD, row_nuisances
+from windwrench.identification.diagnosis.rows import Rows
 from windwrench.identification.logs.flight_log import FlightLog
 
 SECONDS, PERIOD = 20.0, 0.01
@@ -57,6 +59,15 @@ def hover(load, seed):
         name="hover",
         commanded=True,
     )
+
+
+def test_thrust_at_a_command_is_a_nuisance_by_its_differences_between_flights():
+    """A column that is nearly thrust_scale's own would with it stand for a lag or a drag."""
+    logs = [hover(0.0, seed) for seed in range(2)]
+    one, two = (row_nuisances(Rows(Flights(x, STATED), {})) for x in (logs[:1], logs))
+    assert not one["thrust 0"].any()
+    assert np.abs(two["thrust 0"]).max() > 0.4 * THRUST_STD * STATED.gravity
+    np.testing.assert_allclose(two["thrust 0"], -two["thrust 1"], atol=1e-12)
 
 
 def test_a_hover_shows_a_load_by_the_mean_thrust_alone():

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.support.flown import VEHICLE, recorded
+from tests.support.flown import VEHICLE, recorded, settings
 from tests.support.own_effects import HOSE, joined
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.identification.diagnosis.advice import composites
@@ -128,6 +128,16 @@ def test_the_delay_that_was_flown(vehicle):
     seconds, std, _ = found
     assert seconds == pytest.approx(0.035, abs=0.004)
     assert std < 0.004
+
+
+def test_a_declared_lag_is_no_part_of_the_delay():
+    lag = {"motor_lag": {"tau": 0.04}}
+    model = load_vehicle("ardrone2").with_effects(*settings(lag))
+    assert turning_delay(flown_signals(VEHICLE, **lag), model) is None
+    found = turning_delay(flown_signals(VEHICLE, **lag, latency={"d": 0.03}), model)
+    assert found is not None
+    assert found[0] == pytest.approx(0.03, abs=2.0 * found[1])
+    assert found[1] < 0.006
 
 
 def test_moments_of_another_flight_show_no_delay():
