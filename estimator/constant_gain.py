@@ -29,7 +29,7 @@ from .hover_covariance import (
     turn_world,
 )
 from .model_uncertainty import follow_loads
-from .recovery import after_prediction, grow_older, remember
+from .recovery import after_prediction, grow_older, learn_noise, remember
 from .sample import check_sample, undo_sensing
 from .ukf import WrenchUKF, correct_parts
 from .ukf import step as ukf_step
@@ -54,7 +54,7 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
     if usable < 0:
         return usable
     sample = undo_sensing(f, z, usable, dt)
-    x, centre, y = f.x, f.centre, f.innovation
+    x, centre, y, residual = f.x, f.centre, f.innovation, f.poses.residual
     centre[:NIS] = x[:NIS]
     if dt > 0.0:
         drive(f, sample[0:4], dt, voltage)
@@ -79,6 +79,8 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
     if usable & 1 != 0:
         for i in range(3):
             y[3 + i] = sample[4 + i] - centre[i]
+    for i in range(6):
+        f.increment[i] = y[i] - residual[i]
     # the heading as cosine and sine; straight up or down there is none, and none is needed
     across, along = (
         centre[3] * centre[6] + centre[4] * centre[5],
@@ -97,8 +99,9 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
     for i in range(6):
         for j in range(6):
             nis += y[i] * f.information[i, j] * y[j]
+    noise = 1.0 + max(f.poses.widened[0], f.poses.widened[1])
     late = f.poses.position_age > _LONGEST_GAP or f.poses.attitude_age > _LONGEST_GAP
-    if late or not nis <= f.alarm[usable // 3]:
+    if late or not nis <= noise * f.alarm[usable // 3]:
         # a covariance takes over at the predicted state: after a gap, whose widening is made up
         # for, or at a measurement that is not to be believed as it is
         f.steady, f.near = 0, 0.0
@@ -108,9 +111,17 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
         _correct_with_covariance(f, sample, usable)
         return usable
     x[NIS] = nis if usable == 3 else math.nan
+    if usable > 0:
+        learn_noise(f, usable & 1 != 0, usable & 2 != 0)
+        # with this gain more noise has more of a share in the covariance: at most all of it
+        f.poses.strain = max(f.poses.strain, noise - 1.0)
     turn_vectors(mean[0:3], 1, cosine, sine)  # the rate, next, is in body axes
     turn_vectors(mean[6:N], 4, cosine, sine)
     fold(f, centre, mean)
+    for i in range(6):
+        if usable & (2 if i < 3 else 1) != 0:
+            residual[i] += f.increment[i]
+        residual[i] -= mean[i if i < 3 else 3 + i]
     if usable > 0:
         f.status = TRACKING
         remember(f, sample[4:11], usable & 1 != 0, usable & 2 != 0)
@@ -132,9 +143,9 @@ def _look_for_steady_state(f: Record) -> None:
     """Return to the constant gain once the covariance has been that of a converged filter for a
     while.
     """
-    near = f.status == TRACKING
+    near, noise = f.status == TRACKING, 1.0 + max(f.poses.widened[0], f.poses.widened[1])
     for i in range(N):
-        near &= f.P[i, i] <= _NEAR * f.converged[i, i]
+        near &= f.P[i, i] <= _NEAR * noise * f.converged[i, i]
     if not near:
         f.near = 0.0
     if f.near <= f.settle:

@@ -13,6 +13,7 @@ from ..runtime.compiled import Record, compiled, compiled_for_vectors, compiled_
 from ..runtime.vector_lanes import all_of, choose, first_below, first_column
 from .estimate import Array
 from .filter_record import N
+from .recovery import pose_noise
 
 
 @compiled
@@ -367,7 +368,7 @@ def subtract_squares(f: Record) -> None:
     """Take ``W' W`` off P. Of the rows that were measured that leaves ``R S^-1`` of them, which is
     written as such: the difference would be rounding alone where the noise R is a 1e-16 of them.
     """
-    P, W, L, c, T, noise = f.P, f.W, f.L, f.scales, f.E, f.noise
+    P, W, L, c, T = f.P, f.W, f.L, f.scales, f.E
     add_squares(P, W, 0, -1.0, N, all_of((c[0] > 0.0) & (c[3] > 0.0)))
     for j in range(N):
         t5 = W[5, j] * c[5]
@@ -379,8 +380,8 @@ def subtract_squares(f: Record) -> None:
         T[0, j], T[1, j], T[2, j] = t0 * c[0], t1, t2
         T[3, j], T[4, j], T[5, j] = t3, t4, t5
     for k in range(6):
-        row, measured = k if k < 3 else k + 3, c[k] > 0.0
+        row, measured, noise = k if k < 3 else k + 3, c[k] > 0.0, pose_noise(f, k)
         for j in range(N):
-            kept = choose(measured, noise[k] * T[k, j], P[row, j])
+            kept = choose(measured, noise * T[k, j], P[row, j])
             P[row, j] = kept
             P[j, row] = kept

@@ -31,10 +31,11 @@ class Status(IntEnum):
 
 STATUSES = tuple(status.name.lower() for status in Status)
 TRACKING, COASTING, REJECTED, RESTARTED = map(float, Status)  # in the filter's memory
-# Layout of an estimate's numbers: the state, the status, the restarts, the variances of torque and
-# force that the vehicle's uncertainty makes, then perhaps the covariance
-STATUS, RESTARTS, WITHOUT_COVARIANCE = STATE_SIZE, STATE_SIZE + 1, STATE_SIZE + 8
-MODEL = slice(RESTARTS + 1, WITHOUT_COVARIANCE)
+# Layout of an estimate's numbers: the state, the status, the restarts, the excess of the variances
+# of measured attitudes and positions over the declared ones, the variances of torque and force that
+# the vehicle's uncertainty makes, then perhaps the covariance
+STATUS, RESTARTS, WITHOUT_COVARIANCE = STATE_SIZE, STATE_SIZE + 1, STATE_SIZE + 10
+EXCESS, MODEL = slice(RESTARTS + 1, RESTARTS + 3), slice(RESTARTS + 3, WITHOUT_COVARIANCE)
 ESTIMATE_SIZE = WITHOUT_COVARIANCE + 18 * 18
 
 
@@ -45,8 +46,8 @@ class WrenchEstimate:
     front. Later steps do not change an estimate.
 
     Args:
-        numbers: (28,) state, status, restarts and the model's variances, or (352,), the covariance
-            behind them.
+        numbers: (30,) state, status, restarts, the excess of the measurements' variances and the
+            model's variances, or (354,), the covariance behind them.
         std: (18,) standard deviations of the error state, where there is no covariance.
     """
 
@@ -161,6 +162,21 @@ class WrenchEstimate:
         """
         nis = self.numbers[..., NIS]
         return nis if self.numbers.ndim > 1 else float(nis)
+
+    @property
+    def noise_scales(self) -> Array:
+        """How large the noise of measured attitudes and positions (2,) is, as a multiple of the
+        declared standard deviations: of some 200 poses, 1 at first (``estimator.recovery``).
+        """
+        return np.sqrt(1.0 + self.numbers[..., EXCESS])
+
+    @property
+    def noise_scale(self) -> Any:
+        """Root mean square of the two ``noise_scales``, a number: 2 where poses are twice as noisy
+        as declared.
+        """
+        scale = np.sqrt(1.0 + np.mean(self.numbers[..., EXCESS], axis=-1))
+        return scale if self.numbers.ndim > 1 else float(scale)
 
     @property
     def status_code(self) -> Any:

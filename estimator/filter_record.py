@@ -48,6 +48,9 @@ FILTER = np.dtype(
         ("x", "f8", (STATE_SIZE,)),
         ("status", "f8"),  # what became of the last step's measurement
         ("restarts", "f8"),  # since the reset
+        # by how much the variances of measured attitudes and positions exceed the declared ones, a
+        # share of those, as the poses show: estimator.recovery
+        ("excess", "f8", (2,)),
         ("model", "f8", (6,)),  # variances of torque and force by the vehicle's uncertainty
         ("P", "f8", (N, N)),
         ("load", "f8", LOAD),  # what that uncertainty scales: estimator.model_uncertainty
@@ -88,6 +91,7 @@ FILTER = np.dtype(
         ("error", "f8", (2, N)),
         ("B", "f8", (6, N)),  # scaled noise inputs, one a row
         ("mean", "f8", (N,)),
+        ("increment", "f8", (6,)),  # of the innovation (rho, x) since the last pose was taken in
         ("miss", "f8", (6,)),  # by which a pose misses where it was expected, (rho, x),
         ("slack", "f8", (6,)),  # by how much it may,
         ("disagreement", "f8", (6,)),  # and by how much it misses those refused before it
@@ -121,7 +125,7 @@ FILTER = np.dtype(
         ("imu", IMU),
     ]
 )
-NUMBERS = ("x", "status", "restarts", "model")  # of an estimate without its covariance
+NUMBERS = ("x", "status", "restarts", "excess", "model")  # of an estimate without its covariance
 ESTIMATE = int(FILTER.fields["x"][1])  # type: ignore[index]  # bytes from the record's start to the estimate
 
 

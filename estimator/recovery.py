@@ -69,6 +69,16 @@ _LOST = 0.9  # of a prior's variance: known no better than that
 # of their own one in a hundred goes on from the one before by chance, and two in a row 1e-4
 AGREEING = 3
 
+# How the noise of measured poses is learned. The declared one counts as this many poses,
+PRIOR_OF_NOISE = 10.0
+# and later ones are forgotten over as many: 1 s at 200 Hz
+MEMORY_OF_NOISE = 200.0
+# a pose counts with at most this many times the square expected of it, of three numbers: noise alone
+# exceeds that in one of 140, and a jump of any size counts as little
+LARGEST_SQUARE = 4.0
+# times the deviation of what was learned beyond which the declared noise is refuted
+SURE = 3.0
+
 # Phases, what a filter makes of measured poses, as a record holds them, lanes too
 BELIEVING = 0.0  # the last pose was taken in, or the filter restarted there
 ONE_REFUSED = 1.0  # one alone was refused since
@@ -79,7 +89,11 @@ MEMORY = np.dtype(
     [
         ("phase", "f8"),
         ("strain", "f8"),  # NIS, of 1 expected, of unlikely poses that were taken in; falls
-        ("settling", "f8"),  # s for which a restart still explains what contradicts it
+        ("settling", "f8"),  # s for which a restart may be repeated; a repetition ends it
+        ("judged", "f8"),  # poses that the noise was learned from, up to ``MEMORY_OF_NOISE``
+        ("widened", "f8", (2,)),  # by this share the filter takes more than the declared variance
+        # of attitude and position
+        ("residual", "f8", (6,)),  # (rho, x) of the last measurement after its correction
         ("seen", "f8", (7,)),  # position and quaternion that were believed last
         ("position_age", "f8"),  # s since a position was believed
         ("attitude_age", "f8"),  # s since an attitude was
@@ -182,14 +196,54 @@ def load_recovery(record: np.void, vehicle: Vehicle, gate: float | None, given: 
 
 @compiled
 def grow_older(f: Record, dt: float) -> None:
-    """Count the time since poses were believed and refused."""
+    """Count the time since poses were believed and refused, and widen the measurement's noise by
+    what was learned of it.
+    """
     m = f.poses
+    allowed = 1.0 + SURE / math.sqrt(PRIOR_OF_NOISE + m.judged)
+    for part in range(2):
+        m.widened[part] = max((1.0 + f.excess[part]) / allowed - 1.0, 0.0)
     m.settling -= dt
     m.strain -= min(dt / f.patience, 1.0) * m.strain
     m.position_age += dt
     m.attitude_age += dt
     m.doubted_position_age += dt
     m.doubted_attitude_age += dt
+
+
+@compiled
+def pose_noise(f: Record, i: int) -> float:
+    """Return the variance of number ``i`` of a measured pose, (rho, x), that the filter assumes."""
+    variance: float = f.noise[i] * (1.0 + f.poses.widened[0 if i < 3 else 1])
+    return variance
+
+
+@compiled
+def learn_noise(f: Record, with_position: bool, with_attitude: bool) -> None:
+    """Learn from a measured pose how large the noise of attitudes and positions is.
+
+    What a pose moved since the last measured one, less what the filter expected it to move
+    (``f.increment``), holds the noise of both measurements, 2 R, and the uncertainty of the
+    expected move. A wrench that sets in moves it little in so short a time, and a pose that jumps
+    for good moves it once, where the innovations stay large: they would make noise of every gust.
+    """
+    m, P = f.poses, f.P
+    poses = PRIOR_OF_NOISE + m.judged
+    for part in range(2):
+        measured, wide = with_attitude if part == 0 else with_position, 1.0 + m.widened[part]
+        share, square = 0.0 * wide, 0.0 * wide
+        for j in range(3):
+            i, row = 3 * part + j, 6 * part + j
+            noise, variance = wide * f.noise[i], P[row, row]
+            expected = 2.0 * noise + variance * (variance / (variance + noise))
+            share = share + 2.0 * noise / (3.0 * expected)
+            square = square + f.increment[i] * f.increment[i] / (3.0 * expected)
+        # the excess that this pose shows is wide - 1 + wide (square - 1) / share, and says as much
+        # as the square of the share
+        news = share * (wide - 1.0 - f.excess[part]) + wide * (min(square, LARGEST_SQUARE) - 1.0)
+        f.excess[part] += choose(measured, share * news / poses, 0.0)
+    told = min(m.judged + 1.0, MEMORY_OF_NOISE)
+    m.judged = choose(with_position | with_attitude, told, m.judged)
 
 
 @compiled
@@ -297,6 +351,7 @@ def believable(
     """
     m, alarm = f.poses, f.alarm
     measured = with_position | with_attitude
+    learn_noise(f, with_position, with_attitude)
     f.x[NIS] = choose(measured, nis, math.nan)
     largest = choose(with_position & with_attitude, alarm[1], alarm[0])
     unlikely = measured & opposite(nis <= largest)  # so is what is no number
@@ -399,7 +454,7 @@ def continues(
     rate = math.sqrt(x[10] * x[10] + x[11] * x[11] + x[12] * x[12])
     for i in range(6):
         # the difference of two measurements, at six standard deviations
-        slack = 6.0 * math.sqrt(2.0 * f.noise[i])
+        slack = 6.0 * math.sqrt(2.0 * pose_noise(f, i))
         if i < 3:
             age, measured = attitude_age, with_attitude
             slack = slack + 0.25 * age * (
@@ -465,7 +520,7 @@ def _agrees(f: Record, pose: Array, with_position: bool, with_attitude: bool) ->
     of the three measurements and a push. Leaves that motion, per second, in the memory, and in
     ``f.disagreement`` by how much the pose misses.
     """
-    m, moved, noise, near = f.poses, f.disagreement, f.noise, True
+    m, moved, near = f.poses, f.disagreement, True
     attitude_error(pose[3:7], m.doubted[3:7], moved[0:3])
     for i in range(6):
         if i < 3:
@@ -480,7 +535,7 @@ def _agrees(f: Record, pose: Array, with_position: bool, with_attitude: bool) ->
         variances = choose(has_pace, 1.0 + (1.0 + ratio) * (1.0 + ratio) + ratio * ratio, 2.0)
         fastest = 6.0 * math.sqrt(f.prior[3 + i if i < 3 else 6 + i])
         reach = lever * age * choose(has_pace, 0.5 * (stride + age) * push, fastest)
-        slack = 6.0 * math.sqrt(variances * noise[i]) + reach
+        slack = 6.0 * math.sqrt(variances * pose_noise(f, i)) + reach
         miss = moved[i] - choose(has_pace, age * m.pace[i], 0.0)
         near = near & opposite(measured & (abs(miss) > slack))
         m.pace[i] = choose(measured, moved[i] / max(age, 1e-9), m.pace[i])
@@ -516,7 +571,7 @@ def _is_back(f: Record, pose: Array, with_position: bool, with_attitude: bool) -
         cancelled = cancelled & opposite(measured & (stray > m.blur[i]))
         # NIS if the pose still is where it jumped to, less that if it never was; in either
         # direction, since half a turn has none
-        odds = stray * (stray - 2.0 * abs(off)) / (P[row, row] + f.noise[i])
+        odds = stray * (stray - 2.0 * abs(off)) / (P[row, row] + pose_noise(f, i))
         gained += choose(measured, odds, 0.0)
     sure = (m.phase < REFUSING) | (m.agreeing > AGREEING - 0.5)
     back: bool = (cancelled | (gained > f.alarm[0])) & sure
@@ -562,9 +617,9 @@ def _restart(f: Record, pose: Array, at_position: bool, at_attitude: bool) -> No
     for i in range(4):
         x[3 + i] = choose(at_attitude, pose[3 + i], x[3 + i])
     for i in range(3):
-        variance = min(f.noise[i] + miss[i] * miss[i], prior[i])
+        variance = min(pose_noise(f, i) + miss[i] * miss[i], prior[i])
         P[i, i] = choose(at_attitude, variance, P[i, i])
-        variance = min(f.noise[3 + i] + miss[3 + i] * miss[3 + i], prior[6 + i])
+        variance = min(pose_noise(f, 3 + i) + miss[3 + i] * miss[3 + i], prior[6 + i])
         P[6 + i, 6 + i] = choose(at_position, variance, P[6 + i, 6 + i])
         x[i] = choose(at_position, pose[i], x[i])
         # the twist is still the best guess, unless none of such a vehicle
@@ -582,8 +637,12 @@ def _restart(f: Record, pose: Array, at_position: bool, at_attitude: bool) -> No
         x[1 + i] = choose(mad, 0.0, x[1 + i])
         doubt = prior[i] + x[1 + i] * x[1 + i]
         P[i, i] = choose(restarted & (P[i, i] < doubt), doubt, P[i, i])
+    for i in range(6):
+        f.poses.residual[i] = choose(at_attitude if i < 3 else at_position, 0.0, f.poses.residual[i])
     f.restarts = choose(restarted, f.restarts + 1.0, f.restarts)
-    f.poses.settling = choose(restarted, f.patience, f.poses.settling)
+    # one that repeats another does not allow a third
+    repeated = f.poses.settling > 0.0
+    f.poses.settling = choose(restarted, choose(repeated, 0.0, f.patience), f.poses.settling)
 
 
 @compiled

@@ -16,6 +16,7 @@ from ..runtime.compiled import compiled
 from ..runtime.errors import InputError
 from .estimate import (
     ESTIMATE_SIZE,
+    EXCESS,
     MODEL,
     NIS,
     RESTARTS,
@@ -43,6 +44,7 @@ def _forward_with_links(
         f.z[:] = event.z  # a step brings its quaternion to length 1 in place
         step_with_link(f, f.z, event.parts, event.dt, event.voltage, links[1 + k])
         numbers[k, STATUS], numbers[k, RESTARTS] = f.status, f.restarts
+        numbers[k, EXCESS] = f.excess
 
 
 @compiled

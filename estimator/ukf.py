@@ -57,6 +57,7 @@ from .covariance import (
 from .error_state import displace, error_from, fold, symmetrise
 from .estimate import (
     ESTIMATE_SIZE,
+    EXCESS,
     MODEL,
     NIS,
     POSITION,
@@ -83,7 +84,15 @@ from .filter_record import (
 )
 from .imu import take_in_imu
 from .model_uncertainty import follow_loads
-from .recovery import BELIEVING, NOISE, Recovery, after_prediction, believable, doubted_variance
+from .recovery import (
+    BELIEVING,
+    NOISE,
+    Recovery,
+    after_prediction,
+    believable,
+    doubted_variance,
+    pose_noise,
+)
 from .sample import Sample, check_sample, undo_first_pose, undo_sensing
 from .sigma_points import PAIRS, errors_of_points, halve_pairs, propagate_points, spread_points
 from .tuning import UKFTuning
@@ -217,11 +226,17 @@ def _gather(f: Record, dt: float) -> None:
 def innovate(f: Record, pose: Array, with_position: bool, with_attitude: bool) -> float:
     """Leave the root of the innovation's covariance in ``f.L`` and the whitened innovation of what
     was measured of a pose (7,), (rho, x), in ``f.innovation``; return the NIS.
+
+    Leaves the innovation itself in ``f.poses.residual``, and by how much it changed since the last
+    measurement was taken in, in ``f.increment``.
     """
-    x, P, L, scales, y = f.x, f.P, f.L, f.scales, f.innovation
+    x, P, L, scales, y, residual = f.x, f.P, f.L, f.scales, f.innovation, f.poses.residual
     attitude_error(pose[3:7], x[3:7], y[0:3])
     for i in range(3):
         y[3 + i] = pose[i] - x[i]
+    for i in range(6):
+        f.increment[i] = y[i] - residual[i]
+        residual[i] = choose(with_attitude if i < 3 else with_position, y[i], residual[i])
     # y becomes the whitened innovation; whatever stands there of what was not measured, it becomes
     # zero
     nis = 0.0
@@ -236,11 +251,12 @@ def innovate(f: Record, pose: Array, with_position: bool, with_attitude: bool) -
                 measured & (with_attitude if j < 3 else with_position), total / L[j, j], 0.0
             )
             y[i] -= L[i, j] * y[j]
-        total = P[a, a] + f.noise[i]
+        noise = pose_noise(f, i)
+        total = P[a, a] + noise
         for k in range(i):
             total -= L[i, k] * L[i, k]
         # never below the measurement's own variance, whatever rounding does
-        L[i, i] = math.sqrt(max(total, f.noise[i]))
+        L[i, i] = math.sqrt(max(total, noise))
         scales[i] = choose(measured, 1.0 / L[i, i], 0.0)
         y[i] = choose(measured, y[i] / L[i, i], 0.0)
         nis += y[i] * y[i]
@@ -260,7 +276,7 @@ def take_in(f: Record) -> None:
 @compiled
 def correct(f: Record, pose: Array, with_position: bool, with_attitude: bool) -> None:
     """Take in what was measured of a pose (7,), (rho, x), unless it is not to be believed."""
-    x, scales, y = f.x, f.scales, f.innovation
+    x, scales, y, residual = f.x, f.scales, f.innovation, f.poses.residual
     nis = innovate(f, pose, with_position, with_attitude)
     taken = believable(f, pose, with_position, with_attitude, nis)
     if not all_of(taken):
@@ -269,6 +285,8 @@ def correct(f: Record, pose: Array, with_position: bool, with_attitude: bool) ->
         for i in range(6):
             scales[i], y[i] = choose(taken, scales[i], 0.0), choose(taken, y[i], 0.0)
     take_in(f)
+    for i in range(6):
+        residual[i] -= choose(taken, f.mean[i if i < 3 else 3 + i], 0.0)
     if not all_of(taken):  # a quaternion brought to length 1 once more may change in its last digit
         for i in range(3, 7):
             x[i] = choose(taken, x[i], f.centre[i])
@@ -359,7 +377,7 @@ def make_calls(
     record: Record, calls: np.ndarray, rows: np.ndarray, numbers: Array, std: Array, loads: Array
 ) -> int:
     """Make calls (n,) of an unscented filter, and write into the row of each what it leads to:
-    numbers (N, 28) and standard deviations (N, 18) of an estimate, and what the vehicle's
+    numbers (N, 30) and standard deviations (N, 18) of an estimate, and what the vehicle's
     uncertainty scales (N, 7, 3); return how many there were up to a quaternion that is no rotation.
     """
     f = record[0]
@@ -381,6 +399,7 @@ def make_calls(
             return k
         numbers[row, :STATE_SIZE], numbers[row, MODEL], loads[row] = f.x, f.model, f.load
         numbers[row, STATUS], numbers[row, RESTARTS] = f.status, f.restarts
+        numbers[row, EXCESS] = f.excess
         std[row] = np.diag(f.P)
         if f.poses.phase > BELIEVING or f.poses.strain > _STRAINED:
             _add_doubt(record, std[row])

@@ -19,7 +19,7 @@ from ..dynamics.vehicle import Vehicle
 from ..runtime.arguments import described, real_numbers
 from ..runtime.compiled import compiled_without_gil
 from ..runtime.errors import InputError
-from .estimate import RESTARTS, STATE_SIZE, STATUS, WITHOUT_COVARIANCE, Array, WrenchEstimate
+from .estimate import EXCESS, MODEL, RESTARTS, STATE_SIZE, STATUS, WITHOUT_COVARIANCE, Array, WrenchEstimate
 from .filter_record import NUMBERS, N
 from .recovery import Recovery
 from .sample import convert
@@ -48,8 +48,7 @@ def _step_records(
         for i in range(STATE_SIZE):
             out[n, i] = f.x[i]
         out[n, STATUS], out[n, RESTARTS] = f.status, f.restarts
-        for i in range(6):
-            out[n, STATE_SIZE + 2 + i] = f.model[i]
+        out[n, EXCESS], out[n, MODEL] = f.excess, f.model
 
 
 class _Records:

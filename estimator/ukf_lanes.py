@@ -90,11 +90,11 @@ def _step_blocks(
     work: int,
     work_z: Array,
     blocks: int,
-    kept: tuple[Array, Array, Array, Array],
+    kept: tuple[Array, Array, Array, Array, Array],
     z: Array,
     out: Array,
 ) -> None:
-    estimates, status, restarts, model = kept
+    estimates, status, restarts, excess, model = kept
     count = len(z)
     for b in range(len(estimates)):
         take_up(blocks + b * BLOCK_SIZE, work)
@@ -109,8 +109,10 @@ def _step_blocks(
                 out[WIDTH * b + lane, i] = estimates[b, i, lane]
             out[WIDTH * b + lane, STATE_SIZE] = status[b, lane]
             out[WIDTH * b + lane, STATE_SIZE + 1] = restarts[b, lane]
+            for i in range(2):
+                out[WIDTH * b + lane, STATE_SIZE + 2 + i] = excess[b, i, lane]
             for i in range(6):
-                out[WIDTH * b + lane, STATE_SIZE + 2 + i] = model[b, i, lane]
+                out[WIDTH * b + lane, STATE_SIZE + 4 + i] = model[b, i, lane]
 
 
 def new_work(record: np.ndarray) -> np.ndarray:
