@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import carray, cfunc, types
+from numba import carray, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from .compiled import compiled
+from .compiled import compiled, compiled_callback
 
 Array = NDArray[np.float64]
 STEP = types.int64(types.int64, types.int64, types.float64, types.float64)
@@ -24,7 +24,7 @@ STEP = types.int64(types.int64, types.int64, types.float64, types.float64)
 
 @cache
 def _machine_code(function: Callable[..., Any], signature: Any) -> Any:
-    return cfunc(signature, cache=True)(function)
+    return compiled_callback(signature)(function)
 
 
 def address_of(function: Callable[..., Any], signature: Any = STEP) -> int:

@@ -1,11 +1,13 @@
 """A digest of code: a result of other code is not comparable, and not reused."""
 
 import hashlib
+import os
 from collections.abc import Iterable, Sequence
 from functools import cache
 from pathlib import Path
 
 _ROOT = Path(__file__).resolve().parent.parent
+_SOURCES = (".py", ".yaml", ".xml")
 
 
 @cache
@@ -21,16 +23,15 @@ def code_digest(
 
     All paths are below the package's folder, with ``/``; give tuples.
     """
-    found = {_ROOT / name for name in files}
+    found = {f"{_ROOT}/{name}" for name in files}
+    left_out = tuple(f"{_ROOT}/{folder}/" for folder in without)
     for room in rooms:
-        for path in (_ROOT / room).rglob("*"):
-            name = path.relative_to(_ROOT).as_posix()
-            if path.suffix in (".py", ".yaml", ".xml") and not name.startswith(
-                tuple(f"{folder}/" for folder in without)
-            ):
-                found.add(path)
+        for folder, _, names in os.walk(f"{_ROOT}/{room}"):
+            if not f"{folder}/".startswith(left_out):
+                found |= {f"{folder}/{name}" for name in names if name.endswith(_SOURCES)}
     digest = hashlib.sha256()
     for path in sorted(found):
-        digest.update(path.relative_to(_ROOT).as_posix().encode())
-        digest.update(path.read_bytes())
+        digest.update(path.removeprefix(f"{_ROOT}/").encode())
+        with open(path, "rb") as source:  # pathlib takes three times as long
+            digest.update(source.read())
     return digest.hexdigest()[:16]

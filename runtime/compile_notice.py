@@ -11,7 +11,9 @@ import time
 
 PATIENCE = 2.0  # s of compiling until the line
 _PAUSE = 1.0  # s between two functions, while which the words stay
-LINE = "windwrench: compiling, once for this installation; later starts load it"
+_ONCE, _EACH = "compiling, once for this code", "compiling, at each start"
+LINE = f"windwrench: {_ONCE}; later starts load it"
+NOT_KEPT = f"windwrench: {_EACH}: no folder can be written that keeps it; NUMBA_CACHE_DIR names one"
 
 
 class CompileNotice:
@@ -19,6 +21,7 @@ class CompileNotice:
 
     def __init__(self, patience: float = PATIENCE) -> None:
         self.quiet = False
+        self.is_kept = True  # what is compiled
         self._patience = patience
         self._depth = 0  # a function compiles those that it calls
         self._timer: threading.Timer | None = None
@@ -31,7 +34,7 @@ class CompileNotice:
         """What a progress says in place of its own text while functions are compiled, or ``""``."""
         if not self._depth and time.monotonic() - self._ended > _PAUSE:
             return ""
-        return f"compiling, once for this installation: {self._functions} functions"
+        return f"{_ONCE if self.is_kept else _EACH}: {self._functions} functions"
 
     def begin(self) -> None:
         """Note that a function is compiled from now on."""
@@ -51,7 +54,7 @@ class CompileNotice:
         self._timer = None
         if self._depth and not self._told and not self.quiet:
             self._told = True
-            print(LINE, file=sys.stderr, flush=True)
+            print(LINE if self.is_kept else NOT_KEPT, file=sys.stderr, flush=True)
 
 
 notice = CompileNotice()

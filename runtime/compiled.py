@@ -5,10 +5,11 @@ import warnings
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-from numba import NumbaExperimentalFeatureWarning, njit, typeof
+from numba import NumbaExperimentalFeatureWarning, cfunc, njit, typeof
 from numba.core import event
 
 from .compile_notice import notice
+from .machine_code import code_folder
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -35,32 +36,49 @@ if multiprocessing.parent_process() is None:  # workers leave the telling to who
 Record = Any
 
 
+def _kept(function: F, **options: Any) -> F:
+    with code_folder(function) as is_kept:
+        return cast(F, njit(cache=is_kept, **options)(function))
+
+
 def compiled(function: F) -> F:
     """Compile a function at its first call and keep the machine code on disk; numbers come out the
     same bit for bit.
 
     Strict arithmetic: with reordered sums a cached process could give other bits than a fresh one.
     """
-    return cast(F, njit(cache=True)(function))
+    return _kept(function)
 
 
 def compiled_without_gil(function: F) -> F:
     """Compile like ``compiled``; other threads run Python while a call from Python lasts."""
-    return cast(F, njit(cache=True, nogil=True)(function))
+    return _kept(function, nogil=True)
 
 
 def compiled_for_vectors(function: F) -> F:
     """Compile like ``compiled``, without the checks of each division for zero, which would keep
     loops over many numbers from vector units.
     """
-    return cast(F, njit(cache=True, error_model="numpy")(function))
+    return _kept(function, error_model="numpy")
 
 
 def compiled_inline(function: F) -> F:
     """Compile a part of a ``compiled_for_vectors`` function, anew in each place for the arrays
     there.
     """
-    return cast(F, njit(cache=True, error_model="numpy", inline="always")(function))
+    return _kept(function, error_model="numpy", inline="always")
+
+
+def compiled_callback(signature: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Return a decorator that compiles a C function of a signature, at once; it is called through
+    its ``address``.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        with code_folder(function) as is_kept:
+            return cfunc(signature, cache=is_kept)(function)
+
+    return decorate
 
 
 def specialised(function: Callable[..., Any], *arguments: object) -> Callable[..., Any]:

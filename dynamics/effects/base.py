@@ -32,9 +32,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import cfunc, types
+from numba import types
 from numpy.typing import NDArray
 
+from ...runtime.compiled import compiled_callback
 from ..vehicle import Vehicle
 from .declaration import Family, Implausible, Need, Role, StartingPoints, check_role, check_words
 
@@ -42,7 +43,7 @@ Array = NDArray[np.float64]
 
 _POINTER = types.CPointer(types.float64)
 EFFECT_MODEL = types.void(_POINTER, _POINTER, _POINTER, _POINTER)  # of the C function
-compiled_model: Any = cfunc(EFFECT_MODEL, cache=True)  # the decorator of an effect model
+compiled_model: Any = compiled_callback(EFFECT_MODEL)  # the decorator of an effect model
 
 # vehicle: what a model may know of it
 MASS, GRAVITY, ROTOR_RADIUS, FLOOR, CEILING, VOLTAGE_REF, HOVER_RATE = range(7)
