@@ -34,7 +34,7 @@ from .sample import check_sample, undo_sensing
 from .ukf import WrenchUKF, correct_parts
 from .ukf import step as ukf_step
 
-_MEASURED = [0, 1, 2, 6, 7, 8]  # rows of (rho, x) in the error state
+_MEASURED = (0, 1, 2, 6, 7, 8)  # rows of (rho, x) in the error state
 _LONGEST = 60  # s of hover in which the gain must have converged
 _CONVERGED = 1e-9  # relative change of the covariance in a second
 _HEIGHT = 1.2  # m, of that hover
@@ -80,7 +80,8 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
         for i in range(3):
             y[3 + i] = sample[4 + i] - centre[i]
     for i in range(6):
-        f.increment[i] = y[i] - residual[i]
+        a = _MEASURED[i]
+        f.increment[i], f.unsure[i] = y[i] - residual[i], f.converged[a, a]
     # the heading as cosine and sine; straight up or down there is none, and none is needed
     across, along = (
         centre[3] * centre[6] + centre[4] * centre[5],
@@ -121,7 +122,7 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
     for i in range(6):
         if usable & (2 if i < 3 else 1) != 0:
             residual[i] += f.increment[i]
-        residual[i] -= mean[i if i < 3 else 3 + i]
+        residual[i] -= mean[_MEASURED[i]]
     if usable > 0:
         f.status = TRACKING
         remember(f, sample[4:11], usable & 1 != 0, usable & 2 != 0)
@@ -189,7 +190,7 @@ class ConstantGainFilter(WrenchUKF):
         inverse = 1.0 / f["noise"]
         # with P after the correction: K = P H' / R, and the innovation's inverse covariance is (R -
         # H P H') within / R
-        f["gain"] = P[:, _MEASURED] * inverse
+        f["gain"] = P[:, list(_MEASURED)] * inverse
         left = np.diag(f["noise"]) - P[np.ix_(_MEASURED, _MEASURED)]
         f["information"] = inverse[:, None] * left * inverse
         f["P"] = f["converged"] = P

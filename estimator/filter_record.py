@@ -92,6 +92,7 @@ FILTER = np.dtype(
         ("B", "f8", (6, N)),  # scaled noise inputs, one a row
         ("mean", "f8", (N,)),
         ("increment", "f8", (6,)),  # of the innovation (rho, x) since the last pose was taken in
+        ("unsure", "f8", (6,)),  # variances of the pose (rho, x) that is expected
         ("miss", "f8", (6,)),  # by which a pose misses where it was expected, (rho, x),
         ("slack", "f8", (6,)),  # by how much it may,
         ("disagreement", "f8", (6,)),  # and by how much it misses those refused before it

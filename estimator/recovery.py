@@ -224,17 +224,17 @@ def learn_noise(f: Record, with_position: bool, with_attitude: bool) -> None:
 
     What a pose moved since the last measured one, less what the filter expected it to move
     (``f.increment``), holds the noise of both measurements, 2 R, and the uncertainty of the
-    expected move. A wrench that sets in moves it little in so short a time, and a pose that jumps
+    expected move, as that of the expected pose, ``f.unsure``, shows it. A wrench that sets in moves it little in so short a time, and a pose that jumps
     for good moves it once, where the innovations stay large: they would make noise of every gust.
     """
-    m, P = f.poses, f.P
+    m = f.poses
     poses = PRIOR_OF_NOISE + m.judged
     for part in range(2):
         measured, wide = with_attitude if part == 0 else with_position, 1.0 + m.widened[part]
         share, square = 0.0 * wide, 0.0 * wide
         for j in range(3):
-            i, row = 3 * part + j, 6 * part + j
-            noise, variance = wide * f.noise[i], P[row, row]
+            i = 3 * part + j
+            noise, variance = wide * f.noise[i], f.unsure[i]
             expected = 2.0 * noise + variance * (variance / (variance + noise))
             share = share + 2.0 * noise / (3.0 * expected)
             square = square + f.increment[i] * f.increment[i] / (3.0 * expected)

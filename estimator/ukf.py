@@ -228,7 +228,8 @@ def innovate(f: Record, pose: Array, with_position: bool, with_attitude: bool) -
     was measured of a pose (7,), (rho, x), in ``f.innovation``; return the NIS.
 
     Leaves the innovation itself in ``f.poses.residual``, and by how much it changed since the last
-    measurement was taken in, in ``f.increment``.
+    measurement was taken in, in ``f.increment``; the variances of the expected pose in
+    ``f.unsure``.
     """
     x, P, L, scales, y, residual = f.x, f.P, f.L, f.scales, f.innovation, f.poses.residual
     attitude_error(pose[3:7], x[3:7], y[0:3])
@@ -252,6 +253,7 @@ def innovate(f: Record, pose: Array, with_position: bool, with_attitude: bool) -
             )
             y[i] -= L[i, j] * y[j]
         noise = pose_noise(f, i)
+        f.unsure[i] = P[a, a]
         total = P[a, a] + noise
         for k in range(i):
             total -= L[i, k] * L[i, k]

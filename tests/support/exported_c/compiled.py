@@ -45,7 +45,7 @@ def _estimate_type(imu, number):
     fields = [(n, number * (4 if n == "quaternion" else 3)) for n in names]
     fields += [(f"std_{n}", number * 3) for n in PARTS]
     fields += [("nis", number), ("status", ctypes.c_int), ("restarts", ctypes.c_uint)]
-    fields += [("dead_reckoning", number)]
+    fields += [("noise_scale", number), ("dead_reckoning", number)]
     if imu:
         biases = ("gyro_bias", "accelerometer_bias", "std_gyro_bias", "std_accelerometer_bias")
         fields += [(name, number * 3) for name in biases]
