@@ -29,7 +29,7 @@ from .hover_covariance import (
     turn_world,
 )
 from .model_uncertainty import follow_loads
-from .recovery import after_prediction, grow_older, learn_noise, remember
+from .recovery import after_prediction, grow_older, learn_noise, likeliest_scale, remember
 from .sample import check_sample, undo_sensing
 from .ukf import WrenchUKF, correct_parts
 from .ukf import step as ukf_step
@@ -101,8 +101,9 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
         for j in range(6):
             nis += y[i] * f.information[i, j] * y[j]
     noise = 1.0 + max(f.poses.widened[0], f.poses.widened[1])
+    likeliest = max(likeliest_scale(f, 0), likeliest_scale(f, 3))
     late = f.poses.position_age > _LONGEST_GAP or f.poses.attitude_age > _LONGEST_GAP
-    if late or not nis <= noise * f.alarm[usable // 3]:
+    if late or not nis <= likeliest * f.alarm[usable // 3]:
         # a covariance takes over at the predicted state: after a gap, whose widening is made up
         # for, or at a measurement that is not to be believed as it is
         f.steady, f.near = 0, 0.0

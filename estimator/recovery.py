@@ -1,25 +1,33 @@
-"""What a filter does after a gap, and with a measurement that it cannot believe.
+"""What a filter does after a gap, with poses noisier than declared, and with poses that are wrong.
 
-A Kalman filter's model knows none of four events. Each breaks something else:
+A Kalman filter's model knows none of five events. Each breaks another assumption:
 
+* *Noise* other than declared makes every pose unlikely, or none. The filter learns the variances of
+  measured attitudes and positions from the poses (``learn_noise``), starting at the declared ones.
+  Where poses refute the declared variance the filter takes a wider one. The filter never takes a
+  narrower one: smooth errors of a motion capture change little from pose to pose.
 * A *gap* makes the covariance grow. A part that is known no better than a prior is *lost*: pose and
   twist are held with the prior's covariance, and the next measurement restarts them.
 * An *outlier* is a pose that jumps: far from the filter's expectation and, by more than a vehicle
-  can move, from the pose just before. A gate refuses the pose and its successors, which a filter
-  that has not seen for a while would take for likely. Poses are believed again once the jumps
-  cancel, however wrong the wrench is. Or once the innovation says that there was no jump: a clock's
-  blur also exceeds a vehicle's motion by a little.
+  can move, from the pose just before. The filter refuses the pose and its successors, which a
+  filter that has not seen for a while would take for likely. Poses are accepted again once the
+  jumps cancel, however wrong the wrench is. Or once the innovation says that there was no jump: a
+  clock's blur also exceeds a vehicle's motion by a little.
 * A *push* is harder than the random walk of the wrench expects. The pose is far from the
-  expectation, yet goes on from the pose before. The filter takes the pose in, gate or not.
+  expectation, yet goes on from the pose before. The filter takes the pose in.
 * A *jump for good* is an outlier whose successors all agree with each other. The filter restarts
-  there after ``Recovery.patience``, without a gate at once. Poses that do not even agree with each
-  other restart it after ``Recovery.give_up``, known no better than they disagree.
+  there after ``Recovery.patience``. Poses that do not even agree with each other restart the filter
+  after ``Recovery.give_up``, known no better than they disagree.
+
+A pose is unlikely beyond the gate's probability; without a gate, beyond ``Recovery.jump_at``
+standard deviations.
 
 After a restart attitude and rate may be so little known that a pose which contradicts them would be
 explained by a spin, and then by a torque. So the filter restarts again at poses that come back to
-an attitude that is a guess, and for ``Recovery.patience`` at each unlikely one that goes on. What
-unlikely poses leave in the wrench is not known either: while they are taken in, and as the filter
-forgets them, the stated variances are widened by their NIS.
+an attitude that is a guess, and once within ``Recovery.patience`` at an unlikely one that goes on.
+A restart that repeats another allows no third: with noise twice the declared each restart brought
+the next, 44 a second. The wrench after unlikely poses is not known either: while they are taken in,
+and as the filter forgets them, the stated variances are widened by their NIS.
 
 So a filter is in one of three phases, and each measured pose has one verdict, its ``Status``:
 
@@ -27,7 +35,6 @@ So a filter is in one of three phases, and each measured pose has one verdict, i
     any                 of a part that is lost            RESTARTED   BELIEVING
     BELIEVING           likely                            TRACKING    BELIEVING
     BELIEVING           unlikely, goes on (``continues``) TRACKING    BELIEVING
-    BELIEVING           unlikely, jumped; no gate         RESTARTED   BELIEVING
     BELIEVING           unlikely, jumped                  REJECTED    ONE_REFUSED
     ONE_REFUSED, more   back (``_is_back``)               TRACKING    BELIEVING
     ONE_REFUSED, more   neither                           REJECTED    REFUSING
@@ -70,7 +77,7 @@ _LOST = 0.9  # of a prior's variance: known no better than that
 AGREEING = 3
 
 # How the noise of measured poses is learned. The declared one counts as this many poses,
-PRIOR_OF_NOISE = 10.0
+PRIOR_OF_NOISE = 5.0
 # and later ones are forgotten over as many: 1 s at 200 Hz
 MEMORY_OF_NOISE = 200.0
 # a pose counts with at most this many times the square expected of it, of three numbers: noise alone
@@ -158,7 +165,6 @@ def load_recovery(record: np.void, vehicle: Vehicle, gate: float | None, given: 
     period and kappa.
     """
     weight = vehicle.weight
-    record["gated"] = gate is not None
     # largest NIS that is taken in unseen, of three numbers and of six
     record["alarm"] = given.jump_at**2
     if gate is not None:
@@ -216,6 +222,13 @@ def pose_noise(f: Record, i: int) -> float:
     """Return the variance of number ``i`` of a measured pose, (rho, x), that the filter assumes."""
     variance: float = f.noise[i] * (1.0 + f.poses.widened[0 if i < 3 else 1])
     return variance
+
+
+@compiled
+def likeliest_scale(f: Record, i: int) -> float:
+    """Return the same as poses show it, as a multiple of the declared variance: at least 1."""
+    share: float = max(1.0 + f.excess[0 if i < 3 else 1], 1.0)
+    return share
 
 
 @compiled
@@ -354,6 +367,11 @@ def believable(
     learn_noise(f, with_position, with_attitude)
     f.x[NIS] = choose(measured, nis, math.nan)
     largest = choose(with_position & with_attitude, alarm[1], alarm[0])
+    # the likeliest noise judges, of which the filter takes only what is proved
+    largest = largest * max(
+        choose(with_attitude, likeliest_scale(f, 0) / (1.0 + m.widened[0]), 1.0),
+        choose(with_position, likeliest_scale(f, 3) / (1.0 + m.widened[1]), 1.0),
+    )
     unlikely = measured & opposite(nis <= largest)  # so is what is no number
     late = with_position & (m.position_age > f.patience)
     late = late | (with_attitude & (m.attitude_age > f.patience))
@@ -385,22 +403,17 @@ def _judge(
     explained = continues(
         f, pose, m.seen, m.position_age, m.attitude_age, with_position, with_attitude
     )
-    if f.gated > 0:
-        _compare_refused(f, pose, with_position, with_attitude)
-        back = _is_back(f, pose, with_position, with_attitude)
-        back = back & (explained | opposite(unlikely))
-        explained = choose(believing, explained, back)
+    _compare_refused(f, pose, with_position, with_attitude)
+    back = _is_back(f, pose, with_position, with_attitude)
+    back = back & (explained | opposite(unlikely))
+    explained = choose(believing, explained, back)
     # among refused ones a likely pose too has to come back first
     refused = (unlikely | (measured & opposite(believing))) & opposite(lost | explained)
-    restarted = measured & (lost | (explained & beyond))
-    if f.gated > 0:
-        _remember_refused(f, pose, refused & with_position, refused & with_attitude)
-        lasting = _outlasts(f, with_position, refused)  # writes: asked whatever else holds
-        restarted = restarted | (refused & lasting)
-        refused = refused & opposite(restarted)
-        m.phase = choose(refused, choose(believing, ONE_REFUSED, REFUSING), m.phase)
-    else:
-        restarted = restarted | refused
+    _remember_refused(f, pose, refused & with_position, refused & with_attitude)
+    lasting = _outlasts(f, with_position, refused)  # writes: asked whatever else holds
+    restarted = (measured & (lost | (explained & beyond))) | (refused & lasting)
+    refused = refused & opposite(restarted)
+    m.phase = choose(refused, choose(believing, ONE_REFUSED, REFUSING), m.phase)
     _restart(f, pose, restarted & with_position, restarted & with_attitude)
     verdict = choose(refused, REJECTED, choose(measured, TRACKING, f.status))
     final: float = choose(restarted, RESTARTED, verdict)
@@ -454,7 +467,7 @@ def continues(
     rate = math.sqrt(x[10] * x[10] + x[11] * x[11] + x[12] * x[12])
     for i in range(6):
         # the difference of two measurements, at six standard deviations
-        slack = 6.0 * math.sqrt(2.0 * pose_noise(f, i))
+        slack = 6.0 * math.sqrt(2.0 * f.noise[i] * likeliest_scale(f, i))
         if i < 3:
             age, measured = attitude_age, with_attitude
             slack = slack + 0.25 * age * (
@@ -655,11 +668,10 @@ def remember(f: Record, pose: Array, with_position: bool, with_attitude: bool) -
         m.seen[i] = choose(with_position if i < 3 else with_attitude, pose[i], m.seen[i])
     m.position_age = choose(with_position, 0.0, m.position_age)
     m.attitude_age = choose(with_attitude, 0.0, m.attitude_age)
-    if f.gated > 0:
-        for i in range(6):
-            away = abs(m.jump[i]) > m.blur[i]
-            done = done & ((with_attitude if i < 3 else with_position) | opposite(away))
-        m.phase = choose(done, BELIEVING, m.phase)
+    for i in range(6):
+        away = abs(m.jump[i]) > m.blur[i]
+        done = done & ((with_attitude if i < 3 else with_position) | opposite(away))
+    m.phase = choose(done, BELIEVING, m.phase)
 
 
 @compiled

@@ -423,9 +423,9 @@ class WrenchUKF:
         tuning: noise of model and measurement; default ``UKFTuning.for_vehicle(vehicle, period)``.
         period: time between steps, s.
         gate: refuse poses, or parts of one, whose NIS has a smaller chance than ``1 - gate``
-            (0.999, say) and which do not go on from the pose before; None takes in any. Refused
-            poses that agree with each other for ``recovery.patience`` are believed, and the filter
-            restarts there.
+            (0.999, say) and which do not go on from the pose before. None: refuse those alone that
+            are ``recovery.jump_at`` standard deviations off. Refused poses that agree with each
+            other for ``recovery.patience`` are believed, and the filter restarts there.
         recovery: how gaps, outliers and restarts are dealt with, gate or not; default
             ``Recovery()``.
 

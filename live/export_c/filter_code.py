@@ -21,6 +21,7 @@ from ...estimator.recovery import (
     doubted_variance,
     grow_older,
     learn_noise,
+    likeliest_scale,
     pose_noise,
     remember,
 )
@@ -36,7 +37,7 @@ _CALLED: dict[Any, tuple[Value | None, ...]] = {
     **dict.fromkeys((attitude_error, normalise, propagate, expected_imu), ()),
     **dict.fromkeys((displace, error_from, fold), ()),
     **dict.fromkeys((after_prediction, believable, remember, grow_older, doubted_variance), ()),
-    **dict.fromkeys((learn_noise, pose_noise), ()),
+    **dict.fromkeys((learn_noise, likeliest_scale, pose_noise), ()),
     **dict.fromkeys((innovate, bound_biases, heading, turn_vectors, turn_world), ()),
     bound_variance: (Array("", ("WW_STATES", "WW_STATES"), root="matrix"), None, None),
     model_jacobian: (None, None, Array("", ("12", str(N)), root="matrix"), None),

@@ -64,7 +64,7 @@ def test_nees_of_a_known_error():
     state[3:7] = (turn.inv() * true).as_quat(scalar_first=True)
     covariance = np.eye(18)
     covariance[0, 0] = 0.005**2
-    estimate = WrenchEstimate(np.concatenate([state, np.zeros(8), covariance.ravel()]))
+    estimate = WrenchEstimate(np.concatenate([state, np.zeros(10), covariance.ravel()]))
     truth = np.zeros(20)
     truth[3:7], truth[7], truth[18] = -true.as_quat(scalar_first=True), 1.0, 2.0
     assert np.allclose(state_error(estimate, truth)[:3], [0.005, 0, 0], rtol=1e-4, atol=1e-12)
