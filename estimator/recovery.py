@@ -80,7 +80,7 @@ AGREEING = 3
 PRIOR_OF_NOISE = 5.0
 # and later ones are forgotten over as many: 1 s at 200 Hz
 MEMORY_OF_NOISE = 200.0
-# a pose counts with at most this many times the square expected of it, of three numbers: noise alone
+# a pose counts with at most this many times the square expected of its three numbers: noise alone
 # exceeds that in one of 140, and a jump of any size counts as little
 LARGEST_SQUARE = 4.0
 # times the deviation of what was learned beyond which the declared noise is refuted
@@ -235,10 +235,10 @@ def likeliest_scale(f: Record, i: int) -> float:
 def learn_noise(f: Record, with_position: bool, with_attitude: bool) -> None:
     """Learn from a measured pose how large the noise of attitudes and positions is.
 
-    What a pose moved since the last measured one, less what the filter expected it to move
-    (``f.increment``), holds the noise of both measurements, 2 R, and the uncertainty of the
-    expected move, as that of the expected pose, ``f.unsure``, shows it. A wrench that sets in moves it little in so short a time, and a pose that jumps
-    for good moves it once, where the innovations stay large: they would make noise of every gust.
+    The motion from the last measured pose, less the motion that the filter expected
+    (``f.increment``), holds the noise of both measurements, 2 R. The uncertainty of the expected
+    pose, ``f.unsure``, adds to that. A wrench that sets in adds little in so short a time, and a
+    jump for good adds once. Their innovations stay large, and would make noise of every gust.
     """
     m = f.poses
     poses = PRIOR_OF_NOISE + m.judged
@@ -251,12 +251,12 @@ def learn_noise(f: Record, with_position: bool, with_attitude: bool) -> None:
             expected = 2.0 * noise + variance * (variance / (variance + noise))
             share = share + 2.0 * noise / (3.0 * expected)
             square = square + f.increment[i] * f.increment[i] / (3.0 * expected)
-        # the excess that this pose shows is wide - 1 + wide (square - 1) / share, and says as much
-        # as the square of the share
+        # the excess that this pose shows is wide - 1 + wide (square - 1) / share, and its weight
+        # is the square of the share: an innovation of an unknown pose is no noise
         news = share * (wide - 1.0 - f.excess[part]) + wide * (min(square, LARGEST_SQUARE) - 1.0)
         f.excess[part] += choose(measured, share * news / poses, 0.0)
-    told = min(m.judged + 1.0, MEMORY_OF_NOISE)
-    m.judged = choose(with_position | with_attitude, told, m.judged)
+    judged = min(m.judged + 1.0, MEMORY_OF_NOISE)
+    m.judged = choose(with_position | with_attitude, judged, m.judged)
 
 
 @compiled
@@ -651,7 +651,9 @@ def _restart(f: Record, pose: Array, at_position: bool, at_attitude: bool) -> No
         doubt = prior[i] + x[1 + i] * x[1 + i]
         P[i, i] = choose(restarted & (P[i, i] < doubt), doubt, P[i, i])
     for i in range(6):
-        f.poses.residual[i] = choose(at_attitude if i < 3 else at_position, 0.0, f.poses.residual[i])
+        f.poses.residual[i] = choose(
+            at_attitude if i < 3 else at_position, 0.0, f.poses.residual[i]
+        )
     f.restarts = choose(restarted, f.restarts + 1.0, f.restarts)
     # one that repeats another does not allow a third
     repeated = f.poses.settling > 0.0

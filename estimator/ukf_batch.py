@@ -19,7 +19,16 @@ from ..dynamics.vehicle import Vehicle
 from ..runtime.arguments import described, real_numbers
 from ..runtime.compiled import compiled_without_gil
 from ..runtime.errors import InputError
-from .estimate import EXCESS, MODEL, RESTARTS, STATE_SIZE, STATUS, WITHOUT_COVARIANCE, Array, WrenchEstimate
+from .estimate import (
+    EXCESS,
+    MODEL,
+    RESTARTS,
+    STATE_SIZE,
+    STATUS,
+    WITHOUT_COVARIANCE,
+    Array,
+    WrenchEstimate,
+)
 from .filter_record import NUMBERS, N
 from .recovery import Recovery
 from .sample import convert
