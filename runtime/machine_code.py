@@ -10,6 +10,7 @@ import os
 import shutil
 import stat
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -25,6 +26,9 @@ _ROOT = Path(__file__).resolve().parent.parent
 # all rooms with compiled functions, and all that those import
 ROOMS = ("runtime", "dynamics", "estimator", "controllers", "envs", "identification", "paper")
 _PREFIX = "windwrench-"
+_STARTED = time.time_ns()
+# ours, since then and before their import: the digest is of what was before
+_edited: list[Path] = []
 _KEPT = 8  # folders of machine code, those that were used last; one takes up to 30 MB
 
 
@@ -43,19 +47,23 @@ def code_folder(function: Callable[..., Any]) -> Iterator[bool]:
         config.CACHE_DIR = before
 
 
-@cache
 def _folder_for(file: str) -> str | None:
     """Return the folder for machine code of a file's functions, or None where none can be kept."""
-    path = Path(file).resolve()
-    if not path.is_file():  # a prompt's or a notebook's
+    is_ours = _is_ours(file)
+    if _edited or not os.path.isfile(file):  # a prompt and a notebook have no file
         return None
-    digest = code_digest(ROOMS)
-    if not any(path.is_relative_to(_ROOT / room) for room in ROOMS):
-        digest = _digest_beside(path.parent)
-    return _prepared(digest)
+    return _prepared(code_digest(ROOMS) if is_ours else _digest_beside(Path(file).parent))
 
 
 @cache
+def _is_ours(file: str) -> bool:
+    path = Path(file).resolve()
+    is_ours = any(path.is_relative_to(_ROOT / room) for room in ROOMS)
+    if is_ours and path.stat().st_ctime_ns > _STARTED:
+        _edited.append(path)
+    return is_ours
+
+
 def _digest_beside(folder: Path) -> str:
     """Return a digest of the package and the Python files of a folder, a user's own."""
     digest = hashlib.sha256(code_digest(ROOMS).encode())
@@ -88,13 +96,14 @@ def _parent() -> Path | None:
     the user's cache, a temporary one.
     """
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    chosen = [Path(config.CACHE_DIR)] if config.CACHE_DIR else []
-    for path in (*chosen, _ROOT / "__pycache__", Path(home) / "windwrench"):
+    chosen = [os.path.abspath(config.CACHE_DIR)] if config.CACHE_DIR else []
+    for path in map(Path, (*chosen, _ROOT / "__pycache__", f"{home}/windwrench")):
         if path.is_absolute() and _is_writable(path):
             return path
-    path = Path(tempfile.gettempdir()) / f"windwrench-{os.getuid()}"
-    if _is_writable(path) and _is_private(path):
-        return path
+    with suppress(OSError):  # no temporary folder either
+        path = Path(tempfile.gettempdir(), f"windwrench-{os.getuid()}")
+        if _is_writable(path) and _is_private(path):
+            return path
     notice.is_kept = False
     return None
 
