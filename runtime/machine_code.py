@@ -50,11 +50,12 @@ def code_folder(function: Callable[..., Any]) -> Iterator[bool]:
 
 def _folder_for(file: str) -> str | None:
     """Return the folder for machine code of a file's functions, or None where none can be kept."""
-    is_ours = _is_ours(file)
-    if _edited or not os.path.isfile(file):  # a prompt and a notebook have no file
+    is_ours, parent = _is_ours(file), _parent()
+    # a prompt and a notebook have no file
+    if parent is None or _edited or not os.path.isfile(file):
         return None
-    folder = _parent() and _prepared(_parent(), code_digest(ROOMS))
-    return folder if is_ours or folder is None else _prepared(folder, _digest_beside(file))
+    folder = _prepared(parent, code_digest(ROOMS))
+    return folder if is_ours else _prepared(folder, _digest_beside(file))
 
 
 @cache
