@@ -18,6 +18,7 @@ from ..runtime.compile_notice import notice
 from ..runtime.page_files import write_text
 from ..runtime.plain_values import plain
 from ..runtime.provenance import package_versions
+from ..runtime.threads import one_thread
 from .options import check_values, declared
 from .terminal import DryRun, command_line, console, errors, run
 
@@ -48,7 +49,8 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
         notice.quiet = quiet
         try:
             check_values(name, options)
-            outcome: dict[str, Any] = {"result": work(**_grouped(signature, options))}
+            with one_thread():
+                outcome: dict[str, Any] = {"result": work(**_grouped(signature, options))}
             if run.record is not None:
                 write_run(run.record, name, options)
         except DryRun as stopped:

@@ -30,6 +30,7 @@ from ..estimator.row_steps import steps_between
 from ..estimator.sample import Sample, convert
 from ..estimator.ukf import CALL, IMU_PARTS, make_calls
 from ..runtime.errors import InputError
+from ..runtime.threads import one_thread
 from .inertial_wrench import inertial_wrench
 from .logs.flight_log import FlightLog
 from .logs.screening import screen_log
@@ -84,6 +85,7 @@ class WrenchSeries(WrenchEstimate):
         self.loads = loads
 
 
+@one_thread()
 def estimate_log(
     log: FlightLog,
     vehicle: Vehicle,

@@ -10,6 +10,7 @@ import os
 import shutil
 import stat
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -25,7 +26,11 @@ _ROOT = Path(__file__).resolve().parent.parent
 # all rooms with compiled functions, and all that those import
 ROOMS = ("runtime", "dynamics", "estimator", "controllers", "envs", "identification", "paper")
 _PREFIX = "windwrench-"
-_KEPT = 8  # folders of machine code, those that were used last; one takes up to 30 MB
+_STARTED = time.time_ns()
+# ours, since then and before their import: the digest is of what was before
+_edited: list[Path] = []
+_KEPT = 8  # folders, those that were used last; one takes up to 30 MB
+_IN_USE = 3600.0  # s, that a folder stays in any case
 
 
 @contextmanager
@@ -43,65 +48,69 @@ def code_folder(function: Callable[..., Any]) -> Iterator[bool]:
         config.CACHE_DIR = before
 
 
-@cache
 def _folder_for(file: str) -> str | None:
     """Return the folder for machine code of a file's functions, or None where none can be kept."""
-    path = Path(file).resolve()
-    if not path.is_file():  # a prompt's or a notebook's
+    is_ours, parent = _is_ours(file), _parent()
+    # a prompt and a notebook have no file
+    if parent is None or _edited or not os.path.isfile(file):
         return None
-    digest = code_digest(ROOMS)
-    if not any(path.is_relative_to(_ROOT / room) for room in ROOMS):
-        digest = _digest_beside(path.parent)
-    return _prepared(digest)
+    folder = _prepared(parent, code_digest(ROOMS))
+    return folder if is_ours else _prepared(folder, _digest_beside(file))
 
 
 @cache
-def _digest_beside(folder: Path) -> str:
-    """Return a digest of the package and the Python files of a folder, a user's own."""
-    digest = hashlib.sha256(code_digest(ROOMS).encode())
-    for path in sorted(folder.glob("*.py")):
+def _is_ours(file: str) -> bool:
+    path = Path(file).resolve()
+    is_ours = any(path.is_relative_to(_ROOT / room) for room in ROOMS)
+    if is_ours and path.stat().st_ctime_ns > _STARTED:
+        _edited.append(path)
+    return is_ours
+
+
+def _digest_beside(file: str) -> str:
+    """Return a digest of the Python files of a folder, a user's own."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(file).parent.glob("*.py")):
         with suppress(OSError):
             digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 
 
 @cache
-def _prepared(digest: str) -> str | None:
-    """Return a folder that can be written, and remove those not used for longest."""
-    parent = _parent()
-    if parent is None:
-        return None
-    folder = parent / f"{_PREFIX}{digest}"
+def _prepared(parent: str, digest: str) -> str:
+    """Return a folder for machine code, and remove those not used for longest."""
+    folder = Path(parent, f"{_PREFIX}{digest}")
     with suppress(OSError):
         folder.mkdir(exist_ok=True)
         os.utime(folder)  # its last use
-        others = [path for path in parent.glob(f"{_PREFIX}*") if path != folder]
-        used = {path: path.stat().st_mtime for path in others}
-        for path in sorted(used, key=lambda path: used[path], reverse=True)[_KEPT - 1 :]:
-            shutil.rmtree(path, ignore_errors=True)
+        used = {path: path.stat().st_mtime for path in folder.parent.glob(f"{_PREFIX}*")}
+        for path in sorted(used, key=lambda path: used[path])[:-_KEPT]:
+            if time.time() - used[path] > _IN_USE:
+                shutil.rmtree(path, ignore_errors=True)
     return str(folder)
 
 
 @cache
-def _parent() -> Path | None:
+def _parent() -> str | None:
     """Return the first of some folders that can be written: the user's choice, beside the sources,
     the user's cache, a temporary one.
     """
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    chosen = [Path(config.CACHE_DIR)] if config.CACHE_DIR else []
-    for path in (*chosen, _ROOT / "__pycache__", Path(home) / "windwrench"):
+    chosen = [os.path.abspath(config.CACHE_DIR)] if config.CACHE_DIR else []
+    for path in map(Path, (*chosen, _ROOT / "__pycache__", f"{home}/windwrench")):
         if path.is_absolute() and _is_writable(path):
-            return path
-    path = Path(tempfile.gettempdir()) / f"windwrench-{os.getuid()}"
-    if _is_writable(path) and _is_private(path):
-        return path
+            return str(path)
+    with suppress(OSError):  # no temporary folder either
+        path = Path(tempfile.gettempdir(), f"windwrench-{os.getuid()}")
+        if _is_writable(path, 0o700) and _is_private(path):
+            return str(path)
     notice.is_kept = False
     return None
 
 
-def _is_writable(path: Path) -> bool:
+def _is_writable(path: Path, mode: int = 0o777) -> bool:
     try:
-        path.mkdir(mode=0o700, parents=True, exist_ok=True)
+        path.mkdir(mode, parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=path).close()
     except OSError:
         return False

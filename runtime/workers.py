@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.managers import DictProxy, SyncManager
 from pathlib import Path
@@ -20,14 +20,13 @@ from typing import Any, TypeVar
 
 from .cluster import connected
 from .errors import InputError
+from .threads import one_thread
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 # forked workers would share the locks of compiled code and of linear algebra
 _CONTEXT = multiprocessing.get_context("spawn")
-# one process a core: further threads of linear algebra would only wait for each other
-SINGLE_THREADED = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 _FIRST_TO_GO = 500  # of 1000: where memory runs out, the system ends a worker before its parent
 _LOOK = 0.2  # s, after which tasks are looked at again
 _ATTEMPTS = 4  # at a task of ``every``
@@ -77,8 +76,6 @@ class _Local:
         self.count = count
         self._work, self._most_seconds = work, most_seconds
         self._before = {child.pid for child in multiprocessing.active_children()}
-        self._set = {k: value for k, value in SINGLE_THREADED.items() if k not in os.environ}
-        os.environ.update(self._set)  # read by the libraries as a worker imports them
         self._begin()
 
     def _begin(self) -> None:
@@ -110,8 +107,6 @@ class _Local:
             if child.pid not in self._before:
                 child.kill()
         self._pool.join()
-        for name in self._set:
-            os.environ.pop(name, None)
 
 
 class _OnCluster:
@@ -197,7 +192,7 @@ def each(
         InputError: as ``runtime.cluster.connected``, or the work fails on a cluster.
         Exception: what the work itself raises.
     """
-    with nullcontext() if cluster is None else connected(cluster) as ray:
+    with one_thread() if cluster is None else connected(cluster) as ray:
         crew: _Local | _OnCluster = (
             _Local(work, jobs or os.cpu_count() or 1, most_seconds)
             if cluster is None

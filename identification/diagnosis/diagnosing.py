@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ...dynamics.effects import get, names, playing
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError, unknown_name
+from ...runtime.threads import one_thread
 from ..findings import (
     CHANNELS,
     Alternative,
@@ -66,6 +67,7 @@ LEAST_SIZE = 0.1  # typical sizes, from which a calibration is worth a name
 LEAST_SHOWN = 13.0
 
 
+@one_thread()
 def diagnose(
     logs: Sequence[FlightLog],
     vehicle: Vehicle,

@@ -25,8 +25,8 @@ from ...runtime.extras import need
 from ...runtime.file_limits import LIMITS, check_count
 from ...runtime.page_files import write_text
 from ...runtime.regular_files import check_archive, check_regular, read_bytes
+from ...runtime.threads import SINGLE_THREADED
 from ...runtime.whole_files import replaced
-from ...runtime.workers import SINGLE_THREADED
 from .table import (
     ARRAY_SUFFIXES,
     SUFFIXES,

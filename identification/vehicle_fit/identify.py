@@ -16,6 +16,7 @@ import numpy as np
 from ...dynamics.effects import Role
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
+from ...runtime.threads import one_thread
 from ..logs.flight_log import FlightLog
 from ..prediction import PredictionErrors
 from .assemble import advice_of, vehicle_of
@@ -45,6 +46,7 @@ _LEAST_LAG = 4.0  # standard deviations of a lag behind rotor speeds that were l
 _LAGS = (0.03, 0.08)  # s, where the search for it starts
 
 
+@one_thread()
 def identify(
     logs: Sequence[FlightLog],
     mass: float,
