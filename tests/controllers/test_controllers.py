@@ -107,6 +107,30 @@ def test_the_torque_is_answered_before_anything_has_moved():
     np.testing.assert_allclose(fed(felt)[0], expected, rtol=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("felt", "axes", "time", "other"),
+    [
+        ({"FORCE": [0.0, 0.0, 0.1]}, [2], "force_time", "torque_time"),
+        ({"TORQUE": [-0.01, 0.01, 0.0]}, [0, 1], "torque_time", "force_time"),
+    ],
+)
+def test_what_lasts_longer_is_answered_by_more(felt, axes, time, other):
+    """A torque has no part in the vertical axis, and a force's duration none in a torque's answer
+    (0.1 %).
+    """
+    seen_in_hover = _hovering() + frame(**felt)
+
+    def answer(**times):
+        law = LQG(**times)
+        return np.abs([law(seen_in_hover) for _ in range(10)][-1][axes])
+
+    usual = answer()
+    assert (answer(**{time: 4.0 * getattr(LQG, time)}) > 1.01 * usual).all()
+    assert (answer(**{time: 0.25 * getattr(LQG, time)}) < 0.97 * usual).all()
+    for share in (0.25, 4.0):
+        np.testing.assert_allclose(answer(**{other: share * getattr(LQG, other)}), usual, rtol=5e-3)
+
+
 def _hovering():
     o = np.zeros(WIND_OBSERVATION_SIZE)
     o[20] = o[23] = 9.81
@@ -162,6 +186,39 @@ def test_a_set_point_at_rest_is_not_dragged_along():
     for _ in range(400):
         move_setpoint(c, np.array([3.0, -2.0, 1.0]), 0.005)
     np.testing.assert_array_equal(c["setpoint"], np.zeros(len(c["setpoint"])))
+
+
+def test_a_set_point_beyond_the_leash_still_comes_back():
+    """A gust has thrown the vehicle 3 m off: the set point may come nearer, but go no further."""
+    c, vehicle = flight_record(VEHICLE)[0], np.array([-3.0, 3.0, -3.0])
+    c["setpoint"][3:6] = -0.4, 0.4, 0.4
+    for _ in range(200):
+        move_setpoint(c, vehicle, 0.005)
+    np.testing.assert_allclose(c["setpoint"][:3], [-0.4, 0.4, 0.0], atol=1e-12)
+
+
+def test_a_vehicle_held_for_long_is_not_thrown_on():
+    """Held 1 m low and 1 rad off for a minute: the integrals push by 2 m/s2 and 4 rad/s2. Let go,
+    it rises 0.36 m too far.
+    """
+    c, x = flight_record(VEHICLE)[0], np.zeros(STATE_SIZE)
+    x[3], c["setpoint"][2], c["setpoint"][9] = 1.0, 1.0, 1.0
+
+    def pushed():
+        fly(c, x, 0.005)
+        thrust, *torque = VEHICLE.mixing @ c["command"] ** 2
+        return thrust / VEHICLE.mass - VEHICLE.gravity, torque[2] / VEHICLE.inertia[2, 2]
+
+    for _ in range(60 * 200):
+        fly(c, x, 0.005)
+    x[2], c["setpoint"][9] = 1.0, 0.0
+    np.testing.assert_allclose(pushed(), [2.0, 4.0], rtol=1e-9)
+    x[2], highest = 0.0, 0.0
+    for _ in range(10 * 200):
+        x[9] += 0.005 * pushed()[0]
+        x[2] += 0.005 * x[9]
+        highest = max(highest, x[2])
+    assert highest < 1.4
 
 
 def test_the_integral_follows_and_does_not_wind_up():
