@@ -2,13 +2,21 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from windwrench.controllers import CONTROLLERS, AdmittancePID, make_controller
 from windwrench.controllers import wind_observation as seen
 from windwrench.controllers.axis_models import PLACE, axis_models
 from windwrench.controllers.flight import flight_record, fly, move_setpoint
 from windwrench.controllers.lqg import LQG
-from windwrench.controllers.observation import FORCE_X, MAX_COMMAND, OBSERVATION_SIZE, TORQUE_Z
+from windwrench.controllers.observation import (
+    DECISION_PERIOD,
+    FORCE_X,
+    MAX_COMMAND,
+    OBSERVATION_SIZE,
+    TORQUE_Z,
+)
+from windwrench.controllers.preview import DISTURBANCE_TIME, lasting
 from windwrench.controllers.registry import TASK_LAWS, tuned_gains
 from windwrench.controllers.wind_laws import INDI, PID, L1Adaptive, PIDWithWrench
 from windwrench.controllers.wind_observation import TORQUE, WIND_OBSERVATION_SIZE, WIND_PERIOD
@@ -166,6 +174,50 @@ def test_the_flight_loop_s_commands_can_be_flown():
         fly(c, turning, 0.005)
         assert np.all(np.isfinite(c["command"]))
         assert np.all((c["command"] >= 0) & (c["command"] <= VEHICLE.omega_max))
+
+
+def flown(c, q, rate=(0.0, 0.0, 0.0)):
+    """Thrust (N) and torques (Nm, body) that a flight loop commands at an attitude and a rate."""
+    x = np.zeros(STATE_SIZE)
+    x[3:7], x[10:13] = q.as_quat(scalar_first=True), rate
+    fly(c, x, 0.005)
+    thrust, *torque = VEHICLE.mixing @ c["command"] ** 2
+    return thrust, np.array(torque)
+
+
+@pytest.mark.parametrize(("axis", "pitched"), [(0, 1.0), (1, -1.0)])
+def test_a_far_set_point_tilts_by_the_limit_and_no_further(axis, pitched):
+    about = np.eye(3)[1 - axis] * pitched
+    for tilt, sign in ((0.49, 1.0), (0.51, -1.0)):
+        c = flight_record(VEHICLE)[0]
+        c["setpoint"][axis] = 100.0
+        _, torque = flown(c, Rotation.from_rotvec(tilt * about))
+        assert sign * torque @ about > 1e-3
+
+
+def test_a_vehicle_that_sinks_keeps_three_tenths_of_its_weight_to_steer_with():
+    c = flight_record(VEHICLE)[0]
+    c["setpoint"][2] = -100.0
+    thrust, _ = flown(c, Rotation.identity())
+    assert thrust == pytest.approx(0.3 * VEHICLE.weight)
+
+
+def test_a_steady_turn_about_the_vertical_costs_a_tilted_vehicle_the_gyroscopic_torque_alone():
+    tilted, turning = flight_record(VEHICLE)[0], flight_record(VEHICLE)[0]
+    q = Rotation.from_euler("zyx", [0.7, 0.1, -0.2])
+    rate = q.inv().apply([0.0, 0.0, 1.5])
+    tilted["setpoint"][9] = turning["setpoint"][9] = 0.7
+    turning["setpoint"][10] = 1.5
+    more = flown(turning, q, rate)[1] - flown(tilted, q)[1]
+    np.testing.assert_allclose(more, np.cross(rate, VEHICLE.inertia @ rate), atol=1e-12)
+
+
+@pytest.mark.parametrize("period", [WIND_PERIOD, DECISION_PERIOD])
+def test_what_an_oracle_expects_of_a_disturbance_is_its_mean_over_each_decision(period):
+    t = np.arange(0.0, 12 * period, period / 200) + period / 400
+    means = np.exp(-t / DISTURBANCE_TIME).reshape(12, 200).mean(axis=1)
+    wrench = np.array([0.2, -0.01])
+    np.testing.assert_allclose(lasting(wrench, 12, period), np.outer(means, wrench), rtol=4e-3)
 
 
 def test_a_moving_set_point_waits_for_the_vehicle():
