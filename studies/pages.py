@@ -25,6 +25,8 @@ from windwrench.studies.scoring import share
 # what the template of each page shows, of kept results
 PAGES: Mapping[str, Callable[[], Mapping[str, Any]]] = {"tasks": tasks.page, "trust": trust.page}
 _MODULE = re.compile(r"`((?:[a-z_]+/)+[a-z_0-9]+\.py)`")
+_COMMAND = re.compile(r"python -m ((?:studies|windwrench)\.[a-z_.]+)")
+_COMMIT = re.compile(r"commits? [0-9a-f]{7,}")
 
 
 @cache
@@ -54,14 +56,28 @@ def differing_lines(name: str) -> list[str]:
 
 
 def missing_sources() -> list[str]:
-    """Return the modules that pages name and that do not exist, each with its page."""
+    """Return the modules that pages name and that do not exist, each with its page; of a command
+    that has gone, unless its paragraph names a commit.
+    """
     pages = (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md")))
-    return [
-        f"{page.name} names {name}"
-        for page in pages
-        for name in sorted(set(_MODULE.findall(page.read_text(encoding="utf-8"))))
-        if not (ROOT / name).exists() and not name.startswith(("my_", "live/ros2"))
-    ]
+    missing = []
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        names = set(_MODULE.findall(text))
+        found = [x for x in names if (ROOT / x).exists() or x.startswith(("my_", "live/ros2"))]
+        missing += [f"{page.name} names {name}" for name in sorted(names.difference(found))]
+        missing += [
+            f"{page.name} names {module} and no commit that has it"
+            for paragraph in text.split("\n\n")
+            for module in _COMMAND.findall(paragraph)
+            if not _runs(module) and not _COMMIT.search(paragraph)
+        ]
+    return missing
+
+
+def _runs(module: str) -> bool:
+    path = ROOT / module.removeprefix("windwrench.").replace(".", "/")
+    return path.with_suffix(".py").exists() or (path / "__main__.py").exists()
 
 
 def main() -> int:

@@ -12,6 +12,7 @@ def page() -> dict[str, Any]:
     tasks = {task: shown(kept(f"results/tasks/{task}.json.gz")) for task in TASKS}
     return {
         "tasks": tasks,
+        "unfelt": kept("results/tasks/unfelt.json")[1],
         "hover": _by_name(tasks["WindHover"]),
         "trajectory": _by_name(tasks["WindTrajectory"]),
         "fan": _by_name(tasks["FanTracking2D"]),

@@ -10,6 +10,7 @@ from windwrench.studies.probabilities import calibration
 def page() -> dict[str, Any]:
     """Return what the page shows."""
     return {
+        "identified": kept("identify/flights.json"),
         "benchmark": kept("identify/nanodrone.json"),
         "flights": measured_flights.shown(),
         "probabilities": calibration.shown(),

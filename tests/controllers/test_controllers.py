@@ -2,13 +2,21 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from windwrench.controllers import CONTROLLERS, AdmittancePID, make_controller
 from windwrench.controllers import wind_observation as seen
 from windwrench.controllers.axis_models import PLACE, axis_models
 from windwrench.controllers.flight import flight_record, fly, move_setpoint
 from windwrench.controllers.lqg import LQG
-from windwrench.controllers.observation import FORCE_X, MAX_COMMAND, OBSERVATION_SIZE, TORQUE_Z
+from windwrench.controllers.observation import (
+    DECISION_PERIOD,
+    FORCE_X,
+    MAX_COMMAND,
+    OBSERVATION_SIZE,
+    TORQUE_Z,
+)
+from windwrench.controllers.preview import DISTURBANCE_TIME, lasting
 from windwrench.controllers.registry import TASK_LAWS, tuned_gains
 from windwrench.controllers.wind_laws import INDI, PID, L1Adaptive, PIDWithWrench
 from windwrench.controllers.wind_observation import TORQUE, WIND_OBSERVATION_SIZE, WIND_PERIOD
@@ -107,6 +115,30 @@ def test_the_torque_is_answered_before_anything_has_moved():
     np.testing.assert_allclose(fed(felt)[0], expected, rtol=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("felt", "axes", "time", "other"),
+    [
+        ({"FORCE": [0.0, 0.0, 0.1]}, [2], "force_time", "torque_time"),
+        ({"TORQUE": [-0.01, 0.01, 0.0]}, [0, 1], "torque_time", "force_time"),
+    ],
+)
+def test_what_lasts_longer_is_answered_by_more(felt, axes, time, other):
+    """A torque has no part in the vertical axis, and a force's duration none in a torque's answer
+    (0.1 %).
+    """
+    seen_in_hover = _hovering() + frame(**felt)
+
+    def answer(**times):
+        law = LQG(**times)
+        return np.abs([law(seen_in_hover) for _ in range(10)][-1][axes])
+
+    usual = answer()
+    assert (answer(**{time: 4.0 * getattr(LQG, time)}) > 1.01 * usual).all()
+    assert (answer(**{time: 0.25 * getattr(LQG, time)}) < 0.97 * usual).all()
+    for share in (0.25, 4.0):
+        np.testing.assert_allclose(answer(**{other: share * getattr(LQG, other)}), usual, rtol=5e-3)
+
+
 def _hovering():
     o = np.zeros(WIND_OBSERVATION_SIZE)
     o[20] = o[23] = 9.81
@@ -144,6 +176,50 @@ def test_the_flight_loop_s_commands_can_be_flown():
         assert np.all((c["command"] >= 0) & (c["command"] <= VEHICLE.omega_max))
 
 
+def flown(c, q, rate=(0.0, 0.0, 0.0)):
+    """Thrust (N) and torques (Nm, body) that a flight loop commands at an attitude and a rate."""
+    x = np.zeros(STATE_SIZE)
+    x[3:7], x[10:13] = q.as_quat(scalar_first=True), rate
+    fly(c, x, 0.005)
+    thrust, *torque = VEHICLE.mixing @ c["command"] ** 2
+    return thrust, np.array(torque)
+
+
+@pytest.mark.parametrize(("axis", "pitched"), [(0, 1.0), (1, -1.0)])
+def test_a_far_set_point_tilts_by_the_limit_and_no_further(axis, pitched):
+    about = np.eye(3)[1 - axis] * pitched
+    for tilt, sign in ((0.49, 1.0), (0.51, -1.0)):
+        c = flight_record(VEHICLE)[0]
+        c["setpoint"][axis] = 100.0
+        _, torque = flown(c, Rotation.from_rotvec(tilt * about))
+        assert sign * torque @ about > 1e-3
+
+
+def test_a_vehicle_that_sinks_keeps_three_tenths_of_its_weight_to_steer_with():
+    c = flight_record(VEHICLE)[0]
+    c["setpoint"][2] = -100.0
+    thrust, _ = flown(c, Rotation.identity())
+    assert thrust == pytest.approx(0.3 * VEHICLE.weight)
+
+
+def test_a_steady_turn_about_the_vertical_costs_a_tilted_vehicle_the_gyroscopic_torque_alone():
+    tilted, turning = flight_record(VEHICLE)[0], flight_record(VEHICLE)[0]
+    q = Rotation.from_euler("zyx", [0.7, 0.1, -0.2])
+    rate = q.inv().apply([0.0, 0.0, 1.5])
+    tilted["setpoint"][9] = turning["setpoint"][9] = 0.7
+    turning["setpoint"][10] = 1.5
+    more = flown(turning, q, rate)[1] - flown(tilted, q)[1]
+    np.testing.assert_allclose(more, np.cross(rate, VEHICLE.inertia @ rate), atol=1e-12)
+
+
+@pytest.mark.parametrize("period", [WIND_PERIOD, DECISION_PERIOD])
+def test_what_an_oracle_expects_of_a_disturbance_is_its_mean_over_each_decision(period):
+    t = np.arange(0.0, 12 * period, period / 200) + period / 400
+    means = np.exp(-t / DISTURBANCE_TIME).reshape(12, 200).mean(axis=1)
+    wrench = np.array([0.2, -0.01])
+    np.testing.assert_allclose(lasting(wrench, 12, period), np.outer(means, wrench), rtol=4e-3)
+
+
 def test_a_moving_set_point_waits_for_the_vehicle():
     c = flight_record(VEHICLE)[0]
     c["setpoint"][4] = 1.0
@@ -162,6 +238,39 @@ def test_a_set_point_at_rest_is_not_dragged_along():
     for _ in range(400):
         move_setpoint(c, np.array([3.0, -2.0, 1.0]), 0.005)
     np.testing.assert_array_equal(c["setpoint"], np.zeros(len(c["setpoint"])))
+
+
+def test_a_set_point_beyond_the_leash_still_comes_back():
+    """A gust has thrown the vehicle 3 m off: the set point may come nearer, but go no further."""
+    c, vehicle = flight_record(VEHICLE)[0], np.array([-3.0, 3.0, -3.0])
+    c["setpoint"][3:6] = -0.4, 0.4, 0.4
+    for _ in range(200):
+        move_setpoint(c, vehicle, 0.005)
+    np.testing.assert_allclose(c["setpoint"][:3], [-0.4, 0.4, 0.0], atol=1e-12)
+
+
+def test_a_vehicle_held_for_long_is_not_thrown_on():
+    """Held 1 m low and 1 rad off for a minute: the integrals push by 2 m/s2 and 4 rad/s2. Let go,
+    it rises 0.36 m too far.
+    """
+    c, x = flight_record(VEHICLE)[0], np.zeros(STATE_SIZE)
+    x[3], c["setpoint"][2], c["setpoint"][9] = 1.0, 1.0, 1.0
+
+    def pushed():
+        fly(c, x, 0.005)
+        thrust, *torque = VEHICLE.mixing @ c["command"] ** 2
+        return thrust / VEHICLE.mass - VEHICLE.gravity, torque[2] / VEHICLE.inertia[2, 2]
+
+    for _ in range(60 * 200):
+        fly(c, x, 0.005)
+    x[2], c["setpoint"][9] = 1.0, 0.0
+    np.testing.assert_allclose(pushed(), [2.0, 4.0], rtol=1e-9)
+    x[2], highest = 0.0, 0.0
+    for _ in range(10 * 200):
+        x[9] += 0.005 * pushed()[0]
+        x[2] += 0.005 * x[9]
+        highest = max(highest, x[2])
+    assert highest < 1.4
 
 
 def test_the_integral_follows_and_does_not_wind_up():

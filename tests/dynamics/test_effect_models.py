@@ -404,6 +404,15 @@ def test_latency_stays_within_the_samples_where_they_leap_or_are_not_even():
     np.testing.assert_allclose(out, 400.0 + 10.0 * (t - 0.0125), rtol=1e-12)
 
 
+def test_latency_draws_a_line_where_samples_are_six_times_as_far_apart_as_others():
+    """A cubic through such four would swing between them."""
+    rotors, times = Rotors(setting("latency", d=0.0125)), np.cumsum([0.03, PERIOD] * 20)
+    speeds = 400.0 + 10.0 * np.random.default_rng(0).standard_normal(len(times))
+    steps = np.diff(times, prepend=0.0)
+    late = [rotors(w * np.ones(4), dt=dt)[0] for w, dt in zip(speeds, steps, strict=True)]
+    np.testing.assert_allclose(late, np.interp(times - 0.0125, times, speeds), rtol=1e-12)
+
+
 POSE = np.array([0.4, -1.2, 1.5])
 Q = Rotation.from_matrix(R).as_quat(scalar_first=True)
 

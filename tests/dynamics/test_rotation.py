@@ -68,6 +68,13 @@ def test_the_attitude_error_stands_in_the_world_frame(q, reference):
     np.testing.assert_allclose(scipy_of(again).as_matrix(), scipy_of(q).as_matrix(), atol=1e-12)
 
 
+@drawn(quaternions, st.tuples(numbers, numbers, numbers), st.floats(0.01, 6.0))
+def test_a_turn_of_any_size_is_the_exponential_of_its_vector(q, axis, time):
+    turned = call(r.turn_body, q, *axis, time)
+    expected = scipy_of(q) * Rotation.from_rotvec(time * np.array(axis))
+    np.testing.assert_allclose(scipy_of(turned).as_matrix(), expected.as_matrix(), atol=1e-14)
+
+
 @drawn(quaternions, st.tuples(numbers, numbers, numbers), st.floats(1e-12, 1e-3))
 def test_turning_by_next_to_nothing_loses_no_digits(q, axis, angle):
     turned = call(r.turn_body, q, *axis, angle)

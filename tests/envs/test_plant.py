@@ -18,6 +18,7 @@ from windwrench.envs.plant import (
     TICK,
     PlantSettings,
     actuate,
+    disturb,
     load_world,
     plant_record,
     reset_plant,
@@ -125,6 +126,28 @@ def test_a_recorded_rotor_speed_is_rounded_once():
     # as it is at the pose's instant, between two ticks
     assert np.max(np.abs(log - (0.25 * before + 0.75 * after))) < 2.0 + 1e-9
     assert np.max(np.abs(log / 4.0 - np.round(log / 4.0))) < 1e-9
+
+
+def test_the_disturbance_has_its_declared_size_and_lasts_as_long_as_it_says():
+    """100 s on six axes: 0.03 N and 0.01 Nm, a correlation of 1/e after 0.3 s."""
+    settings, rng = PlantSettings(), np.random.default_rng(0)
+    bench, found = Bench(settings=settings), np.empty((20_000, 6))
+    for row in found:
+        disturb(bench.plant, rng.standard_normal(NOISE))
+        row[:] = bench.plant["disturbance"]
+    sizes = np.repeat([settings.disturbance_force, settings.disturbance_torque], 3)
+    unit = found[1000:] / sizes
+    assert np.sqrt(np.mean(unit**2)) == pytest.approx(1.0, abs=0.06)
+    later = round(settings.disturbance_time / TICK)
+    assert np.mean(unit[later:] * unit[:-later]) == pytest.approx(np.exp(-1.0), abs=0.08)
+
+
+def test_a_battery_sags_by_a_twentieth_under_twice_the_hover_s_load():
+    bench = Bench()
+    for load in (1.0, 2.0, 1.0):
+        bench.run([np.sqrt(load) * HOVER] * 4, 300)
+        full = 1.05 - 0.05 * (load - 1.0) - 0.1 * bench.plant["time"] / 480.0
+        assert bench.plant["battery"] / VEHICLE.voltage_ref == pytest.approx(full, abs=1e-4)
 
 
 def sensed(quaternion, count=400, settings=QUIET, seed=0):

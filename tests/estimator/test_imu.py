@@ -344,6 +344,34 @@ def test_a_gate_leaves_the_gyro_in_where_the_accelerometer_saturates():
     np.testing.assert_allclose(e.state[:19], expected.state[:19], atol=1e-9)
 
 
+def hovering(gate=None):
+    """A filter after one step of hover."""
+    f = WrenchUKF(VEHICLE, UKFTuning(), PERIOD, gate)
+    f.reset([0, 0, 1], [1, 0, 0, 0])
+    f.predict(np.full(4, VEHICLE.hover_rate))
+    return f
+
+
+@pytest.mark.parametrize("likelier", [0, 1])
+def test_of_two_sensors_that_are_unlikely_together_alone_the_likelier_counts(likelier):
+    """Gates of 0.999: 16.3 for one sensor, 22.5 for both."""
+    expected, off = np.array([[0.0] * 3, [0.0, 0.0, 9.81]]), np.eye(3)[0]
+    wanted, read = [15.0, 15.0], expected.copy()
+    wanted[likelier] = 9.0
+    for sensor in (0, 1):
+        alone = [None, None]
+        alone[sensor] = expected[sensor] + off
+        size = np.sqrt(wanted[sensor] / hovering().correct_imu(*alone).nis)
+        read[sensor] = expected[sensor] + size * off
+    f, g = hovering(0.999), hovering()
+    both, one = (
+        f.correct_imu(*read),
+        g.correct_imu(*(read[0], None) if likelier == 0 else (None, read[1])),
+    )
+    assert (f.imu_refused, both.nis > 22.5) == (1, True)
+    np.testing.assert_allclose(both.state[:19], one.state[:19], atol=1e-12)
+
+
 def test_a_push_is_believed_although_it_is_unlikely():
     """Five samples that agree are no vibration, and two weights are no saturated sensor."""
     push = np.zeros((400, 6))

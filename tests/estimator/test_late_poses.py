@@ -182,14 +182,29 @@ def test_what_is_wrong_is_named_and_changes_nothing():
         np.testing.assert_array_equal(timed.estimate.state, before)
 
 
-def test_what_is_kept_does_not_grow():
+def test_a_wrong_measurement_at_any_time_leaves_the_past_as_it_was():
+    """Some stamps are just behind a snapshot of the filter, which must stay."""
+    flight = FLIGHTS["plain"]
+    measurements = measured(flight, [time(k) for k in (5, 20, 60)], [3, 3, 3])
+    timed = stream(TimedFilter(make(WrenchUKF, PLAIN), 0.6), flight, measurements, [0.0] * 3)
+    for k in range(1, 119):
+        with pytest.raises(InputError, match="length 1"):
+            timed.correct(time(k) - 0.001, flight["position"][0], [2.0, 0.0, 0.0, 0.0])
+        if k % 17 == 0:
+            measurements += measured(flight, [time(k)], [3])
+            timed.correct(time(k), *measurements[-1][2])
+    assert_same(timed, batch(make(WrenchUKF, PLAIN), flight, measurements))
+
+
+@pytest.mark.parametrize("late", [0.0, 0.0025])
+def test_what_is_kept_does_not_grow(late):
     timed = TimedFilter(make(WrenchUKF, PLAIN))
     flight = FLIGHTS["plain"]
     start(timed, flight)
     sizes = []
     for k in range(1, 1001):
         timed.predict(time(k), flight["rotors"][1])
-        timed.correct(time(k) - 0.0025, flight["position"][0], flight["quaternion"][0])
+        timed.correct(time(k) - late, flight["position"][0], flight["quaternion"][0])
         sizes.append((len(timed._events), sum(e.before is not None for e in timed._events)))
     assert max(sizes) == max(sizes[:200])
     assert max(events for events, _ in sizes) <= 2 * (60 + 5)

@@ -82,6 +82,11 @@ def test_nothing_is_smoothed_across_a_restart():
     jump = smooth(t, speeds, moved, q, restarted=[250])
     assert np.array_equal(jump.state[:250], whole.state[:250], equal_nan=True)
     assert np.sqrt(np.mean(np.square(jump.force - whole.force))) < 1e-9
+    # of itself, without a gate, the filter restarts at a pose that jumps
+    alone = smooth(t, speeds, moved, q)
+    assert np.array_equal(np.flatnonzero(np.diff(alone.restarts)), [249])
+    assert np.allclose(alone.state[:250, :19], before.state[:, :19], rtol=0, atol=1e-9)
+    assert np.allclose(alone.std[:250], before.std, rtol=1e-9)
 
 
 def test_a_link_is_cut_where_there_is_no_joint_distribution():

@@ -8,6 +8,7 @@ from dataclasses import asdict
 import pytest
 
 from tests.support.paths import ROOT
+from windwrench.identification.diagnosis.settings import DIAGNOSIS
 from windwrench.identification.diagnosis.unknown import UNKNOWN
 from windwrench.studies import pages as rendering
 from windwrench.studies import quotes as quoting
@@ -75,6 +76,25 @@ def test_a_quote_of_a_row_that_is_not_there_is_refused(tmp_path):
 
 def test_modules_that_pages_name_are_there():
     assert missing_sources() == []
+
+
+def test_a_command_that_is_gone_is_seen_unless_its_commit_is_named(tmp_path, monkeypatch):
+    gone = "Measured by `python -m studies.gone --count 3`, windwrench 1.0.0"
+    text = f"Made by `python -m studies.pages`.\n\n{gone}, commit 0123abc.\n\n{gone}.\n"
+    (tmp_path / "page.md").write_text(text, encoding="utf-8")
+    monkeypatch.setattr(rendering, "DOCS", tmp_path)
+    assert missing_sources() == ["page.md names studies.gone and no commit that has it"]
+
+
+def test_the_rule_of_a_sure_name_is_that_of_the_code():
+    """A report shows a probability times that of nothing unknown: 0.95 x 0.75 at the least."""
+    text = (rendering.DOCS / "diagnosis.md").read_text(encoding="utf-8")
+    rule = " ".join(text.split()).replace(" %", "%")
+    least, most = DIAGNOSIS.least_sure_probability, DIAGNOSIS.most_unknown
+    assert f"its probability is {least:.0%} or more if nothing" in rule
+    assert f"they show {least * (1.0 - most):.0%} or more" in rule
+    assert f"has a probability of {most:.0%} at most" in rule
+    assert f"the flight has {DIAGNOSIS.least_seconds:g} s" in rule
 
 
 def test_the_weights_in_use_are_those_of_the_kept_flights():

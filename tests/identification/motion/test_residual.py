@@ -21,7 +21,7 @@ from windwrench.identification.motion.noise_spectrum import (
 )
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals
-from windwrench.identification.motion.smoothing import low_pass
+from windwrench.identification.motion.smoothing import lagged, low_pass
 from windwrench.studies.trials.logged_poses import FILTERS
 from windwrench.studies.trials.practice_flights import fly_practice
 
@@ -64,6 +64,17 @@ def test_the_low_pass_is_that_of_scipy_to_the_last_digit(shape):
     for cutoff in (1.0, 5.0, 40.0):
         there = sosfiltfilt(butter(2, cutoff / 100.0, output="sos"), x, axis=0)
         np.testing.assert_array_equal(low_pass(x, cutoff, 0.005), there)
+
+
+@pytest.mark.parametrize("lag", [0.004, 0.03, 0.2])
+def test_a_first_order_lag_has_made_63_per_cent_of_a_step_after_its_time(lag):
+    """At rest before the step, and each sample held over the period that ends there."""
+    period, rest, step = 0.005, np.array([300.0, -1.0]), np.array([100.0, 2.0])
+    x = rest + np.outer(np.arange(200) >= 20, step)
+    since = np.maximum(period * (np.arange(200) - 19), 0.0)
+    made = rest + np.outer(1.0 - np.exp(-since / lag), step)
+    np.testing.assert_allclose(lagged(x, lag, period), made, rtol=1e-12)
+    np.testing.assert_array_equal(lagged(x, 0.0, period), x)
 
 
 def test_a_gap_ends_a_piece_and_a_lost_sample_does_not():
