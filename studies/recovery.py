@@ -129,7 +129,7 @@ def exact_flight(flown: str, seconds: float, seed: int = 0) -> Flight:
     torque = TORQUE * vehicle.weight * vehicle.arm_l * directions[0]
     force = FORCE * vehicle.weight * directions[1]
     end = _MARGIN + 2 * round(seconds * float(rate))
-    t = _FADE + half * np.arange(end + _MARGIN)
+    t = _FADE + half * np.arange(end + _MARGIN, dtype=np.float64)
     path = draw_trajectory("gentle", rng, t)
     lift = vehicle.mass * (path[:, 6:9] + [0.0, 0.0, vehicle.gravity]) - force
     thrust = np.linalg.norm(lift, axis=1)
@@ -167,7 +167,7 @@ def befall(
     jump lasts.
     """
     away = rng.standard_normal(3)
-    quaternion = attitude.as_quat(scalar_first=True)
+    position, quaternion = position.copy(), attitude.as_quat(scalar_first=True)
     if event == "gap":
         position[begin:end], quaternion[begin:end] = np.nan, np.nan
     elif event == "jump":
@@ -221,7 +221,7 @@ def _rms(values: Array) -> float:
 class Verdict(NamedTuple):
     """What good poses after an event make of a filter."""
 
-    restarts: int = 0
+    restarts: float = 0
     error: float = 0.0  # rms of the force from ``SETTLED`` on, in weights
     early: float = 0.0  # the same from half of that on
     beyond: float = 0.0  # share of rows
@@ -306,8 +306,8 @@ def combinations(noises: Mapping[str, Errors], only: str, seeds: int, told: bool
                 failed.update(words)
                 reasons.update(verdict.failures)
                 print(f"{' '.join(words):50} {verdict}: {', '.join(verdict.failures)}", flush=True)
-    for word, count in flown.items():
-        print(f"{word:14} {failed[word]:4} of {count} beyond")
+    for word in filter(flown.get, itertools.chain(*axes)):
+        print(f"{word:14} {failed[word]:4} of {flown[word]} beyond")
     if told:
         print(f"{wrong[True]} beyond, of filters that know the noise; worst: {worst[True]}")
     why = ", ".join(f"{count} by {reason}" for reason, count in reasons.items())
@@ -341,11 +341,11 @@ def fly_wrong_attitudes(seed: int) -> tuple[str, Claim, Claim]:
     happens, and what it claims meanwhile and later: from ``SETTLED`` to twice that after them.
     """
     rng = np.random.default_rng([seed, _SEQUENCES])
-    kind, flown = str(rng.choice(list(FILTERS))), str(rng.choice(list(FLOWN)))
+    kind, flown, noise = (str(rng.choice(list(axis))) for axis in (FILTERS, FLOWN, NOISES))
     seconds = math.exp(rng.uniform(math.log(0.1), math.log(1.5)))
     flight = exact_flight(flown, BEFORE + 1.5 + 2.0 * SETTLED)
     begin, end = flight.row(BEFORE), flight.row(BEFORE + seconds)
-    position, attitude = measured(flight, normal(1.0), rng)
+    position, attitude = measured(flight, NOISES[noise], rng)
     quaternion = attitude.as_quat(scalar_first=True)
     words, wrong = turned(rng, attitude[begin:end])
     quaternion[begin:end] = wrong.as_quat(scalar_first=True)
@@ -354,7 +354,7 @@ def fly_wrong_attitudes(seed: int) -> tuple[str, Claim, Claim]:
     meanwhile, after = (
         Claim(float(z[rows].max()), float(error[rows].max())) for rows in (slice(begin, end), later)
     )
-    return f"{kind} {flown} {words} {seconds:.2f} s", meanwhile, after
+    return f"{kind} {flown} {noise} {words} {seconds:.2f} s", meanwhile, after
 
 
 def wrong_attitudes(seeds: int) -> None:
@@ -367,7 +367,7 @@ def wrong_attitudes(seeds: int) -> None:
         worst = [Claim(*map(max, w, c)) for w, c in zip(worst, claims, strict=True)]
         if not max(claim.z for claim in claims) <= WRONG:
             told = ", ".join(f"z {claim.z:.1f} force {claim.error:.2f}" for claim in claims)
-            print(f"{seed:4} {words:45} meanwhile and later: {told}", flush=True)
+            print(f"{seed:4} {words:50} meanwhile and later: {told}", flush=True)
     for when, n, claim in zip(("meanwhile", f"{SETTLED:g} s later"), wrong, worst, strict=True):
         print(
             f"{when}: z over {WRONG:g} in {n} of {count}; worst z {claim.z:.1f}, force "
@@ -395,12 +395,12 @@ def quiet_flights(only: str, seeds: int) -> None:
         position, attitude = measured(flight, QUIET_NOISES[noise], drawing(words, seed))
         quaternion = attitude.as_quat(scalar_first=True)
         said = estimated(kind, flight, position, quaternion, GATES[gate])
-        for word in (*words, f"{noise} {gate}", "all"):
+        for word in ("all", f"{noise} {gate}", *words):
             restarts[word] += int(said.restarts[-1])
             hours[word] += seconds / 3600.0
         if hasattr(said, "noise_scale"):
             scales[noise].append(np.asarray(said.noise_scale))
-    for word, time_flown in hours.items():
+    for word, time_flown in sorted(hours.items()):
         low, high = poisson_band(restarts[word], time_flown)
         print(
             f"{word:16} {restarts[word]:6} restarts in {time_flown:.3f} h: "

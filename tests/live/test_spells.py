@@ -31,13 +31,13 @@ def seen(estimator):
 
 
 @cache
-def calm(name, imu, kind):
+def calm(name, imu, kind, noise):
     """A flight without faults and its rows a second, what a filter says at each row, and copies of
     the filter.
     """
     estimator = export_c(vehicle_of(name), kind, gate=GATE).filter
     rate = 200 // FLIGHTS[name][4]
-    flown = flight(name, 15 * rate, SEED, faults=False, imu=imu)
+    flown = flight(name, 15 * rate, SEED, faults=False, imu=imu, noise=noise)
     begin(estimator, flown)
     said, copies = [None], {}
     for k in range(1, len(flown["dt"])):
@@ -48,9 +48,11 @@ def calm(name, imu, kind):
     return flown, rate, said, copies
 
 
-@pytest.mark.parametrize("count", [10, pytest.param(170, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("count", "noise"), [(10, 1.0), pytest.param(170, 1.0, marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("kind", ESTIMATORS)
-def test_all_is_right_again_after_any_spell_of_bad_poses(kind, count):
+def test_all_is_right_again_after_any_spell_of_bad_poses(kind, count, noise):
     """Spells of 5 ms to 3 s, of jumps by 10 cm to 30 m and of turns by up to 180 degrees."""
     flights = [(name, imu) for name in FLIGHTS for imu in (False, kind != "constant-gain")]
     flights = flights if count > 10 else flights[2:4]
@@ -58,7 +60,7 @@ def test_all_is_right_again_after_any_spell_of_bad_poses(kind, count):
     for i in range(count):
         rng = np.random.default_rng((SEED, i))
         name, imu = flights[int(rng.integers(len(flights)))]
-        sound, rate, said, copies = calm(name, imu, kind)
+        sound, rate, said, copies = calm(name, imu, kind, noise)
         rows = len(said) - (LONGEST + SOON) * rate
         k = KEPT * int(rng.integers(np.ceil(BEGUN * rate / KEPT), rows // KEPT))
         when = slice(k + 1, k + 1 + int(rng.integers(1, LONGEST * rate)))

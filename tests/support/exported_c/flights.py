@@ -1,8 +1,10 @@
 """Five flights for C and Python, with faults of a pose: numbers as single precision holds them."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from tests.support.exported_c.hostile import befall
 from windwrench.dynamics import load_vehicle
@@ -36,12 +38,13 @@ def vehicle_of(name):
     return replace(model, mocap=rate).with_effects(*(parse_setting(e, model) for e in effects))
 
 
-def flight(name, steps, seed=0, faults=True, imu=False):
+def flight(name, steps, seed=0, faults=True, imu=False, noise=1.0):
     """Return ``dt`` (n,), ``rotor_speeds`` (n, 4), ``position`` (n, 3), ``quaternion`` (n, 4), and
     with an IMU ``gyro`` and ``accelerometer`` (n, 3); what was not measured is NaN.
 
     Steps are uneven by 2 %. Faults are gaps, positions or attitudes alone, jumps by 1.5 m, and
-    tilts by half a radian, of 15 ms to 1.5 s.
+    tilts by half a radian, of 15 ms to 1.5 s. ``noise`` is that of poses in declared deviations, at
+    least one.
     """
     vehicle, trajectory, _, com, every = FLIGHTS[name]
     model = replace(load_vehicle(vehicle), com=np.array(com))
@@ -52,6 +55,8 @@ def flight(name, steps, seed=0, faults=True, imu=False):
     rows = slice(0, steps * every, every)
     position, quaternion = log["position"][rows].copy(), log["quaternion"][rows].copy()
     n, period = len(position), every / 200.0
+    if noise > 1.0:
+        _disturb(position, quaternion, model.mocap, noise, np.random.default_rng((seed, 1)))
     out = {
         "dt": period * (1.0 + 0.02 * rng.uniform(-1.0, 1.0, n)),
         "rotor_speeds": log["rotor_speeds"][rows],
@@ -72,6 +77,15 @@ def flight(name, steps, seed=0, faults=True, imu=False):
             k = rows.stop
         k += 1
     return {key: np.asarray(value, dtype=np.float32).astype(float) for key, value in out.items()}
+
+
+def _disturb(position, quaternion, mocap, noise, rng):
+    """Bring the noise of poses to so many times the declared deviation."""
+    more = math.sqrt(noise * noise - 1.0)
+    position += more * mocap.sigma_pos_m * rng.standard_normal(position.shape)
+    turns = Rotation.from_rotvec(more * mocap.sigma_att_rad * rng.standard_normal(position.shape))
+    seen = turns * Rotation.from_quat(quaternion, scalar_first=True)
+    quaternion[:] = seen.as_quat(scalar_first=True)
 
 
 def _saturate(rng, accelerometer):
