@@ -40,15 +40,13 @@ def error_from(after: Array, centre: Array, error: Array) -> None:
 
 @compiled
 def fold(f: Record, base: Array, error: Array) -> None:
-    """Make ``base`` plus the error state (18,) the estimate; the mean MRP folds into q, (26), (35),
-    (37).
+    """Make ``base``, which is not the estimate itself, plus the error state (18,) the estimate; the
+    mean MRP folds into q, (26), (35), (37).
     """
     x = f.x
     quaternion_from_mrp(error[0:3], f.q)
-    quaternion_multiply(f.q, base[3:7], f.point[3:7])
-    normalise(f.point[3:7])
-    for i in range(4):
-        x[3 + i] = f.point[3 + i]
+    quaternion_multiply(f.q, base[3:7], x[3:7])
+    normalise(x[3:7])
     for i in range(3):
         x[10 + i] = base[10 + i] + error[3 + i]
         x[i] = base[i] + error[6 + i]

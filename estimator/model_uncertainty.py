@@ -144,7 +144,14 @@ def _taken_in(f: Record, i: int, walk: float) -> float:
     """Return which share of the variance of torque or force number ``i`` the corrections since the
     last prediction took away.
     """
-    before, now = f.predicted[i], f.P[12 + i, 12 + i]
+    before, now = f.predicted[i], wrench_variance(f, i)
     f.predicted[i] = now + walk
     share: float = choose(now < before, 1.0 - now / before, 0.0)
     return share
+
+
+@compiled_for_vectors
+def wrench_variance(f: Record, i: int) -> float:
+    """Return the filter's variance of torque or force number ``i``."""
+    variance: float = f.P[12 + i, 12 + i]
+    return variance

@@ -14,6 +14,7 @@ from ...estimator.error_state import bound_variance, displace, error_from, fold
 from ...estimator.filter_record import FILTER, IMU, N, fields_between, propagate
 from ...estimator.hover_covariance import heading, turn_vectors, turn_world
 from ...estimator.imu import _believed, expected_imu
+from ...estimator.model_uncertainty import follow_loads
 from ...estimator.recovery import (
     MEMORY,
     after_prediction,
@@ -41,6 +42,7 @@ _CALLED: dict[Any, tuple[Value | None, ...]] = {
     **dict.fromkeys((innovate, bound_biases, heading, turn_vectors, turn_world), ()),
     bound_variance: (Array("", ("WW_STATES", "WW_STATES"), root="matrix"), None, None),
     model_jacobian: (None, None, Array("", ("12", str(N)), root="matrix"), None),
+    follow_loads: (None, Array("", ("3", "3"), root="matrix"), None),
     _believed: (None, Array("", ("6", "6"), root="matrix"), None, None, None),
 }
 # steps of difference quotients that single precision can still tell apart
@@ -65,9 +67,11 @@ def filter_code(record: np.void, source: str) -> str:
         name: ("int" if kind.base.kind == "i" else "float", tuple(map(str, kind.shape)))
         for name, kind in (_KEPT | _OF_IMU).items()
     }
-    by_hand = _BY_HAND
+    by_hand = set(_BY_HAND)
+    if record["steady"]:  # which has no covariance at hand
+        by_hand.add("wrench_variance")
     if record["wrench_count"]:
-        by_hand = {*_BY_HAND, "apply_effects"}
+        by_hand.add("apply_effects")
     else:
         del memory["effect_wrench"]  # zeros
     library = Library(constants=record, memory=memory, by_hand=by_hand, numbers=_STEPS)

@@ -123,13 +123,14 @@ class CompiledFilter:
 
 
 def differences(c, python):
-    """Return the largest difference of each part of two estimates, in standard deviations of the
-    Python filter's; that of the standard deviations, relative; and whether status or restarts
-    differ.
+    """Return the largest difference of each part of two estimates, in standard deviations of noise
+    in the Python filter's; that of the stated standard deviations, relative; and whether status or
+    restarts differ.
     """
     e, p = c.estimate, python.estimate
-    std = np.sqrt(np.diag(p.covariance)).reshape(6, 3)
+    std = p.std.reshape(6, 3).copy()
     std[0] *= 4.0  # an MRP is a quarter of an angle
+    stated = np.concatenate([std[:4], p.std_wrench.reshape(2, 3)])
     out = {}
     for k, name in enumerate(PARTS):
         if name == "attitude":
@@ -140,7 +141,7 @@ def differences(c, python):
             difference = np.abs(np.array(getattr(e, name), dtype=float) - getattr(p, name))
         out[name] = float(np.max(difference / std[k]))
         mine = np.array(getattr(e, f"std_{name}"), dtype=float)
-        out["std"] = max(out.get("std", 0.0), float(np.max(np.abs(mine / std[k] - 1.0))))
+        out["std"] = max(out.get("std", 0.0), float(np.max(np.abs(mine / stated[k] - 1.0))))
     same = STATUSES[e.status] == p.status and e.restarts == p.restarts
     out["status"] = 0.0 if same else 1.0
     return out
