@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-import yaml
 
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.regular_files import check_regular
+from ..runtime.yaml_file import read_yaml
 
-_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # a fifth of the time, where it is built
-_OPTIONS = yaml.load(Path(__file__).with_name("options.yaml").read_bytes(), Loader=_LOADER)
+_OPTIONS: dict[str, Any] = read_yaml(Path(__file__).with_name("options.yaml"), "options")
 
 
 def _described(command: str, name: str) -> dict[str, Any]:

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from ..runtime.errors import unknown_name
+from ..runtime.yaml_file import read_yaml
 from .fan_laws import Admittance, AdmittancePID, Hover, Lead, Ratio
 from .lqg import LQG
 from .preview import Oracle, WindOracle
@@ -52,8 +52,9 @@ def tuned_gains(task: str = STANDARD_TASK) -> dict[str, dict[str, Any]]:
     """Return what is known of a task's gains: law, of FanTracking also scenario, and then ``gains``
     and how they were found.
     """
-    text = (resources.files(__package__) / "tuned.yaml").read_text(encoding="utf-8")
-    sections: dict[str, dict[str, dict[str, Any]]] = yaml.safe_load(text)
+    sections: dict[str, dict[str, dict[str, Any]]] = read_yaml(
+        Path(__file__).with_name("tuned.yaml"), "tuned gains"
+    )
     if task != STANDARD_TASK:
         return sections.get(task, {})
     return {law: found for law, found in sections.items() if law in LAWS}

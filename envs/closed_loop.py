@@ -486,8 +486,6 @@ class ClosedLoop:
         yaw: float = 0.0,
         winds: Sequence[Wind] = (),
         reference: Array | None = None,
-        fan_path: Array | None = None,
-        settle: int = 0,
     ) -> None:
         """Hover at ``position`` (3,) m and ``yaw`` rad, with the filter started from one measured
         pose.
@@ -499,8 +497,6 @@ class ClosedLoop:
             winds: what blows, at its time 0 until the episode begins.
             reference: (n, REFERENCE_SIZE), a row a tick; default: the set point stays where it is,
                 and moves with the velocity that it is given.
-            fan_path: where the fan stands while the filter settles, as ``run`` takes it.
-            settle: ticks before the episode begins; even, so that the winds blow from the first.
 
         Raises:
             InputError: something that is no wind, or another shape.
@@ -522,7 +518,7 @@ class ClosedLoop:
         self.action[:] = 0.0
         if self.accelerometer is not None:
             loop["accelerometer_bias"] = self.accelerometer[1] * rng.standard_normal(3)
-        loop["ticks"], self._settled = -settle, settle
+        loop["ticks"] = self._settled = 0
         reset_plant(loop["plant"], self._body)
         self.position[:], self.quaternion[:] = position, quaternion_of_yaw(yaw)
         loop["plant"]["past_poses"] = self.world.qpos
@@ -538,8 +534,17 @@ class ClosedLoop:
         if self.load is not None:
             set_down(self.model, self.data, self.load)
         mujoco.mj_forward(self.model, self.data)
-        if settle > 0:
-            self.run(rng.standard_normal((settle, self.noise_size)), fan_path)
+
+    def settle(self, rng: np.random.Generator, ticks: int, fan_path: Array | None = None) -> None:
+        """Let the filter settle for ``ticks`` of flight before the episode begins.
+
+        Args:
+            rng: what the noise is drawn from.
+            ticks: even, so that the winds blow from the first.
+            fan_path: where the fan stands meanwhile, as ``run`` takes it.
+        """
+        self.record[0]["ticks"], self._settled = -ticks, ticks
+        self.run(rng.standard_normal((ticks, self.noise_size)), fan_path)
 
     def hang_load(self) -> None:
         """Hang the load on: at rest below its anchor on the taut thread.

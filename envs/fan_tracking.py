@@ -66,11 +66,11 @@ class FanTask(Task):
         motions = Motions(scenario.motions, scenario.speed, offset=scenario.offset)
         return Briefing(self.vehicle, FilterNoise.of(self.tuning, TICK), air, jet, motions)
 
-    def _start(self, path: Array, settle: int, offset: Array) -> None:
-        """Hover ``offset`` (2,) m beside the fan's axis for ``settle`` ticks."""
+    def _start(self, path: Array, offset: Array) -> None:
+        """Hover ``offset`` (2,) m beside the fan's axis."""
         self.path, self.distance = path, self.drawn.get("distance", DISTANCE)
         start = np.array([self.distance, *(path[0] + offset)])
-        self.loop.reset(self.np_random, start, math.pi, fan_path=path[:1], settle=settle)
+        self.loop.reset(self.np_random, start, math.pi)
 
     def _truth(self) -> dict[str, Any]:
         """Return beside ``Task._truth`` the places (3,) m of vehicle and set point, and where the
@@ -230,8 +230,8 @@ class FanTrackingEnv(FanTask):
         self._see_by(View(observe, self.normalize))
         self.fan_path = fan_path
 
-    def hover(self, settle: int = 0) -> None:
-        """Draw an episode and let the vehicle hover at its start for ``settle`` ticks."""
+    def hover(self) -> None:
+        """Draw a path of the fan, and place the vehicle in hover beside its start."""
         rng, scenario = self.np_random, self.scenario
         self.drawn_label, fan_y = draw_fan_path(scenario, rng, FAN_TIMES)
         if self.fan_path is not None:
@@ -244,7 +244,7 @@ class FanTrackingEnv(FanTask):
                 )
         offset = float(rng.uniform(*scenario.offset) * rng.choice([-1.0, 1.0]))
         path = np.column_stack([fan_y, np.full(len(fan_y), self.fan.height)])
-        self._start(path, settle, np.array([offset, 0.0]))
+        self._start(path, np.array([offset, 0.0]))
 
 
 __all__ = ["DECISION_TICKS", "EPISODE_SECONDS", "LOST_OFFSET", "FanTrackingEnv"]

@@ -130,8 +130,8 @@ class FanTracking2DEnv(FanTask):
         """
         return super().make_loop(vehicle, fan, accelerometer=(0.0, 0.0), **given)
 
-    def hover(self, settle: int = 0) -> None:
-        """Draw an episode and let the vehicle hover at its start for ``settle`` ticks."""
+    def hover(self) -> None:
+        """Draw a path of the fan, and place the vehicle in hover beside its start."""
         rng, scenario = self.np_random, self.scenario
         sideways, y = draw_fan_path(scenario, rng, FAN_TIMES)
         upwards, z = draw_fan_path(scenario, rng, FAN_TIMES)
@@ -139,4 +139,4 @@ class FanTracking2DEnv(FanTask):
         path = np.column_stack([y, self.fan.height + _VERTICAL * z])
         offset, side = float(rng.uniform(*scenario.offset)), float(rng.uniform(-math.pi, math.pi))
         beside = offset * np.array([math.cos(side), 0.5 * math.sin(side)])
-        self._start(path, settle, beside)
+        self._start(path, beside)

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
@@ -104,8 +102,7 @@ class Scenario:
 
 def kept_scenarios(section: str, form: type[AnyScenario]) -> dict[str, AnyScenario]:
     """Return the kit's own scenarios of a section of ``scenarios.yaml``, by name."""
-    text = (resources.files(__package__) / "scenarios.yaml").read_text(encoding="utf-8")
-    stated = yaml.safe_load(text)[section].items()
+    stated = read_yaml(Path(__file__).with_name("scenarios.yaml"), "scenarios")[section].items()
     return {name: checked(form, fields, f"scenarios.yaml: {name}") for name, fields in stated}
 
 

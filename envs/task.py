@@ -182,9 +182,8 @@ class Task(gym.Env[Frame, Frame], ABC):
         self.command: Array = np.zeros(self.action_size)  # the last one, in SI units
         self.foresight = 0  # decisions to come that ``info`` tells of, for the oracle
         self._see_by(View("wrench", self.normalize, self.limits, self.scales))
-        # of an episode: the fan's path (m, 2) m, its distance in m, what is flown, and its name
+        # of an episode: the fan's path (m, 2) m, its distance in m, and its name
         self.path, self.distance = np.zeros((1, 2)), 0.0
-        self.reference: Array = _NO_REFERENCE
         self.drawn_label = ""
         self._frames = np.zeros((1, len(self.limits)), dtype=np.float32)
         self._table = np.zeros(1, dtype=self.values)
@@ -237,6 +236,11 @@ class Task(gym.Env[Frame, Frame], ABC):
         if self._loop is None:
             raise InputError(f"{self.name}: call reset before step")
         return self._loop
+
+    @property
+    def reference(self) -> Array:
+        """Reference (n, REFERENCE_SIZE) of the flight loop, a row a tick; n = 0: a set point."""
+        return _NO_REFERENCE if self._loop is None else self._loop.reference
 
     @property
     def declared(self) -> Vehicle:
@@ -308,7 +312,8 @@ class Task(gym.Env[Frame, Frame], ABC):
         """
         self.draw_loop()
         for _ in range(self.draws):
-            self.hover(SETTLE_TICKS)
+            self.hover()
+            self.loop.settle(self.np_random, SETTLE_TICKS, self.path[:1])
             self._lay_episode()
             self._look_around()
             if not self._table["lost"][0]:
@@ -324,8 +329,8 @@ class Task(gym.Env[Frame, Frame], ABC):
             )
 
     @abstractmethod
-    def hover(self, settle: int = 0) -> None:
-        """Draw an episode and let the vehicle hover at its start for ``settle`` ticks."""
+    def hover(self) -> None:
+        """Draw an episode, and place the vehicle in hover at its start."""
 
     def _get_obs(self) -> Frame:
         """Return what the agent sees now."""

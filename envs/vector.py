@@ -2,9 +2,10 @@
 what came of all of them.
 """
 
+import inspect
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
@@ -20,6 +21,8 @@ from .task import Frame, Task
 from .untimed import Untimed
 
 Infos = dict[str, Any]
+# hooks of a task for users; ``look`` writes observation, terms of the reward and ``lost``
+_HOOKS = ("make_loop", "draw_loop", "hover", "fly")
 
 
 class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
@@ -43,9 +46,22 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         **kwargs: of ``task``.
 
     Raises:
-        InputError: ``num_envs`` or ``threads`` is not positive, another mode, or what ``task``
-            refuses.
+        InputError: ``num_envs`` or ``threads`` is not positive, another mode, what ``task``
+            refuses, or a ``task`` with its own ``step``, ``reset``, ``_get_obs`` or any other
+            method of ``Task`` outside ``called``.
     """
+
+    # methods of ``Task`` whose overrides hold in every environment here
+    called: ClassVar[frozenset[str]] = frozenset(
+        {
+            # construction, start of an episode, flight of a decision
+            *("_see_by", "declared", "tuning", "make_loop", "loop", "take_loop", "reference"),
+            *("_begin", "draw_loop", "hover", "refuse_draws", "fly", "decisions"),
+            *("unit_of_actions", "render", "close"),
+            # for controllers of single environments alone
+            *("briefing", "_truth"),
+        }
+    )
 
     def __init__(
         self,
@@ -70,6 +86,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         self.threads = min(threads, num_envs)
         self.envs = self._make_envs(kwargs)
         first = self.envs[0]
+        self._refuse_uncalled(first)
         self.metadata = {**first.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = first.render_mode
         self.single_action_space = first.action_space
@@ -79,12 +96,12 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         self._decisions = np.zeros(num_envs, dtype=np.int64)  # of the episode in hand
         self._begun = np.zeros(num_envs, dtype=np.bool_)
         self._over = np.zeros(num_envs, dtype=np.bool_)  # episodes that ended at the last step
-        self._episodes = Episodes.alike(num_envs, task.action_size, first.path, first.reference)
+        self._episodes = Episodes.alike(num_envs, first.action_size, first.path, first.reference)
         self._view = first.view.of_many(num_envs)
         self._frames = np.zeros(self.observation_space.shape or (), dtype=np.float32)
         # frames before a view is taken of them
-        self._whole = np.zeros((num_envs, len(task.limits)), dtype=np.float32)
-        self._table = np.zeros(num_envs, dtype=task.values)
+        self._whole = np.zeros((num_envs, len(first.limits)), dtype=np.float32)
+        self._table = np.zeros(num_envs, dtype=first.values)
         self._labels = np.zeros(num_envs, dtype=object)
         self._all = np.ones(num_envs, dtype=np.bool_)
         self._pool: ThreadPoolExecutor | None = None
@@ -94,10 +111,11 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
     @property
     def _values(self) -> Infos:
         """Entries of ``infos``, as views."""
-        values: Infos = {name: self._table[name] for name in self.task.values.names or ()}
-        if self.envs[0].version > 0:
+        env = self.envs[0]
+        values: Infos = {name: self._table[name] for name in env.values.names or ()}
+        if env.version > 0:
             values |= {"observation": self._whole, "command": self._episodes.commands}
-        return values | {self.task.label: self._labels}
+        return values | {env.label: self._labels}
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a copy starts from: all but threads and compiled code."""
@@ -151,7 +169,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         if not self._begun.all():
             raise InputError(f"{task.name}: call reset before step")
         flying = ~self._over
-        limit, commands = task.largest_action, self._episodes.commands
+        limit, commands = env.largest_action, self._episodes.commands
         given = np.clip(env.action_scale * wanted, -limit, limit)
         self._episodes.changes[flying] = (given - commands)[flying]
         commands[flying] = given[flying]
@@ -187,6 +205,20 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         for name in ("reward_tracking", "reward_change", "lost"):  # decided by steps
             self._table[name][which] = 0
         self._begun[which] = True
+
+    def _refuse_uncalled(self, env: Task) -> None:
+        """Refuse an environment with an override of a method outside ``called``."""
+        for name, own in inspect.getmembers_static(Task):
+            method = callable(own) or isinstance(own, property | classmethod | staticmethod)
+            if name.startswith("__") or name in self.called or not method:
+                continue
+            if inspect.getattr_static(env, name) is not own:
+                kind, many = type(env).__qualname__, type(self).__name__
+                held = ", ".join(n for n in _HOOKS if n in self.called)
+                raise InputError(
+                    f"{many}: task {kind} overrides {name}, which {many} never calls; "
+                    f"gym.vector.SyncVectorEnv calls {name}, and {many} calls {held} and look"
+                )
 
     def _make_envs(self, kwargs: dict[str, Any]) -> list[Task]:
         """Return the environments."""

@@ -210,16 +210,14 @@ class WindHoverEnv(Task):
             **given,
         )
 
-    def hover(self, settle: int = 0) -> None:
-        """Draw winds and reference, and let the vehicle hover at its start for ``settle`` ticks."""
+    def hover(self) -> None:
+        """Draw winds and reference, and place the vehicle in hover at its start."""
         rng = self.np_random
         drawn = draw_winds(self.scenario, rng, EPISODE_SECONDS)
         winds = drawn if self.winds is None else self.winds
-        self.drawn_label, self.reference = draw_reference(
-            rng, math.pi, EPISODE_SECONDS, self.moving
-        )
+        self.drawn_label, reference = draw_reference(rng, math.pi, EPISODE_SECONDS, self.moving)
         self.path = np.array([[0.0, HEIGHT]])
-        self.loop.reset(rng, START, math.pi, winds, self.reference, settle=settle)
+        self.loop.reset(rng, START, math.pi, winds, reference)
 
     def _truth(self) -> dict[str, Any]:
         """Return beside ``Task._truth`` the actuators' disturbance (6,) N and Nm, world, and the

@@ -10,6 +10,40 @@ from .file_limits import LIMITS
 from .regular_files import read_bytes
 
 LARGEST = LIMITS.yaml_text
+_UNMADE = ("tag:yaml.org,2002:merge", "tag:yaml.org,2002:value")  # keys << and =, without a value
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML's safe loader, which also refuses deep values and a key that comes twice: the second
+    would overwrite the first.
+    """
+
+    _depth = 0
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        """Return the next node; raise ValueError where values lie too deep in one another."""
+        self._depth += 1
+        if self._depth > LIMITS.yaml_depth:
+            raise ValueError(f"values within values, more than {LIMITS.yaml_depth} deep")
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+    def compose_mapping_node(self, anchor: Any) -> Any:
+        """Return a mapping's node; raise ValueError where a key comes twice."""
+        node = super().compose_mapping_node(anchor)
+        lines: dict[Any, int] = {}
+        for key, _ in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                continue
+            name = key.value if key.tag in _UNMADE else self.construct_object(key)
+            line = key.start_mark.line + 1
+            if name in lines:
+                raise ValueError(
+                    f"key {name!r} comes twice, in lines {lines[name]} and {line}; expected once"
+                )
+            lines[name] = line
+        return node
 
 
 def read_yaml(path: Path, what: str) -> Any:
@@ -34,18 +68,20 @@ def parse_yaml(text: str, where: str) -> Any:
     """Return the plain value (mappings, lists, texts, numbers, dates) that a YAML text stands for.
 
     Raises:
-        InputError: not valid YAML, an object of another kind, or aliases that write out to too many
-            values.
+        InputError: not valid YAML, a key twice in one mapping, an object of another kind, or
+            aliases that write out to too many values.
     """
     try:
-        _check_depth(text)
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
-        if node is not None and _size(node, {}, 0) > LIMITS.yaml_values:
+        loader = _Loader(text)
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        if _size(node, {}, 0) > LIMITS.yaml_values:
             raise InputError(
                 f"{where}: more than {LIMITS.yaml_values} values, its aliases written out; "
                 f"expected a few"
             )
-        return yaml.safe_load(text)
+        return loader.construct_document(node)
     except InputError:
         raise
     # what a constructor makes of a spoiled date or number is any error of Python's
@@ -60,19 +96,6 @@ def parse_yaml(text: str, where: str) -> Any:
         RecursionError,
     ) as error:
         raise InputError(f"{where}: not valid YAML: {error or type(error).__name__}") from error
-
-
-def _check_depth(text: str) -> None:
-    """Raise ValueError where values lie too deep in one another: what builds them would go as deep,
-    and slowly.
-    """
-    depth = 0
-    for event in yaml.parse(text, Loader=yaml.SafeLoader):
-        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(
-            event, yaml.CollectionEndEvent
-        )
-        if depth > LIMITS.yaml_depth:
-            raise ValueError(f"values within values, more than {LIMITS.yaml_depth} deep")
 
 
 def _size(node: yaml.Node, known: dict[int, int], depth: int) -> int:

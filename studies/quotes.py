@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from windwrench.runtime.yaml_file import read_yaml
 from windwrench.studies.kept_results import DOCS, kept
 
 ROOT = DOCS.parent
@@ -38,7 +37,7 @@ def read_quotes(path: Path = FILE) -> tuple[list[Quote], dict[str, list[str]]]:
     Raises:
         LookupError: a figure is not found in its results.
     """
-    listed = yaml.safe_load(path.read_text(encoding="utf-8"))
+    listed = read_yaml(path, "quotes")
     quotes = []
     for page, entries in listed["quotes"].items():
         for entry in entries:

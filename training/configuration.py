@@ -4,11 +4,8 @@ override.
 
 import copy
 from collections.abc import Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Any
-
-import yaml
 
 from ..controllers.features import Features
 from ..runtime.errors import InputError, unknown_name
@@ -34,10 +31,9 @@ def load_config(algorithm: str, overrides: Sequence[str] = (), file: Path | None
     """
     if algorithm not in ALGORITHMS:
         raise unknown_name("algorithm", algorithm, ALGORITHMS)
-    text = (resources.files(__package__) / "configs" / f"{algorithm}.yaml").read_text(
-        encoding="utf-8"
+    config: Config = read_yaml(
+        Path(__file__).parent / "configs" / f"{algorithm}.yaml", "a configuration of training"
     )
-    config: Config = yaml.safe_load(text)
     if file is not None:
         changes = read_yaml(file, "a configuration of training")
         if not isinstance(changes, dict):

@@ -10,13 +10,12 @@ from ..envs.closed_loop import ClosedLoop
 from ..envs.fan_tracking import FanTrackingEnv
 from ..envs.lanes.vector import TaskLanes
 from ..envs.scenarios import SCENARIOS
-from ..envs.task import Frame
 from ..envs.vector import TaskVectorEnv
 from ..evaluation.episodes import DECISIONS
 from ..runtime.errors import InputError, unknown_name
 
 LANES = "ukf-lanes"
-_SCENARIO = 1  # second word of the seed from which the scenario of an episode is drawn
+_SCENARIO = 1  # second word of the seed that draws the scenario of an episode
 
 # a scenario that comes twice is drawn twice as often
 TIERS: dict[str, tuple[str, ...]] = {
@@ -59,22 +58,19 @@ class MixedFanTracking(FanTrackingEnv):
         self._names = scenario
         self._loops: dict[str, ClosedLoop | None] = {}  # of the scenarios that were flown
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Frame, dict[str, Any]]:
-        """Draw a scenario and start an episode in it.
+    def draw_loop(self) -> None:
+        """Draw a scenario, and the closed loop of an episode in it.
 
-        The episode is that of the scenario with the same seed; which scenario it is, is drawn by
-        itself, or it would settle the fan's motion, too.
+        The state of the episode's generator seeds another one for the scenario: a draw of the
+        former would settle the fan's motion, too.
         """
-        inner = int(self.np_random.integers(2**31)) if seed is None else seed
-        generator = np.random.default_rng((inner, _SCENARIO))
+        state = self.np_random.bit_generator.state["state"]["state"]
+        generator = np.random.default_rng((state, _SCENARIO))
         name = self._names[int(generator.integers(len(self._names)))]
         self.scenario, self._loop = SCENARIOS[name], self._loops.get(name)
         self.fan = replace(self.fan, turbulence=self.scenario.turbulence)
-        started = super().reset(seed=inner, options=options)
+        super().draw_loop()
         self._loops[name] = self._loop
-        return started
 
 
 def make_training_env(name: str, **given: Any) -> FanTrackingEnv:

@@ -1,7 +1,6 @@
 """Tuning the gains of the designed laws of every task, on validation episodes."""
 
 from collections.abc import Callable
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +17,7 @@ from ..runtime.yaml_file import read_yaml
 from .seeds import validation_seeds
 from .training_envs import check_training_env, make_training_env
 
-_GAINS = yaml.safe_load(
-    (resources.files(__package__) / "configs" / "gains.yaml").read_text(encoding="utf-8")
-)
+_GAINS = read_yaml(Path(__file__).parent / "configs" / "gains.yaml", "ranges of gains")
 RANGES: dict[str, dict[str, dict[str, list[float]]]] = _GAINS["ranges"]  # by task, law and gain
 STARTS: dict[str, dict[str, float]] = _GAINS["starts"]  # by law
 _PRUNE_AFTER = 10  # episodes

@@ -41,7 +41,9 @@ class TaskLanes(TaskVectorEnv):
     All scenarios fly, with any ``vehicle``, ``truth``, ``fan``, ``settings``, ``fan_path``,
     ``gains``, view and compiled ``winds``. What does not, and is refused: effects other than those
     of the rigid body (mass, inertia, com_offset), declared or not; ``estimator="constant-gain"``;
-    ``render_mode``; ``stages`` and winds of one's own.
+    ``render_mode``; ``stages`` and winds of one's own; a task with its own ``fly``, ``draw_loop``
+    or ``_begin``. One environment draws the episodes of all: an override of ``hover`` or
+    ``make_loop`` must keep nothing from episode to episode.
 
     Args:
         num_envs: how many.
@@ -51,6 +53,8 @@ class TaskLanes(TaskVectorEnv):
     Raises:
         InputError: what does not fly in lanes, or what ``TaskVectorEnv`` refuses.
     """
+
+    called = TaskVectorEnv.called - {"_begin", "draw_loop", "fly"}
 
     def _make_envs(self, kwargs: dict[str, Any]) -> list[Task]:
         """Return one environment: it says what all are, and never flies."""
@@ -130,7 +134,7 @@ class TaskLanes(TaskVectorEnv):
                 first, last = part * count // parts, (part + 1) * count // parts
                 memory = *blocks.addresses, work.ctypes.data, self._step, self._like.jet_table
                 flown = blocks.drawn, blocks.motion, *given
-                kind = self._like.noise_size, self.task.accelerates
+                kind = self._like.noise_size, self.envs[0].accelerates
                 self._call(fly_blocks, first, last, *memory, *flown, *kind)
             finally:
                 self._works.append(work)
@@ -140,7 +144,7 @@ class TaskLanes(TaskVectorEnv):
     def _fly(self, which: Flags) -> None:
         slots = np.full(len(self._flying) * WIDTH, -1)
         slots[: self.num_envs][which] = np.flatnonzero(which)
-        self._fly_blocks(self._flying, slots, self.task.decision_ticks)
+        self._fly_blocks(self._flying, slots, self.envs[0].decision_ticks)
         self._call(start_over, which, *self._motion[:2], self._episodes.broken)
 
     def _hover(self, which: list[int], seeds: Sequence[int | None]) -> None:

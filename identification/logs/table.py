@@ -99,7 +99,7 @@ def one_line(what: str, expected: str = "") -> Iterator[None]:
     except InputError:
         raise
     except Exception as error:
-        words = f"{what}: {error or type(error).__name__}"
+        words = f"{what}: {' '.join(str(error).split()) or type(error).__name__}"
         raise InputError(f"{words}; expected {expected}" if expected else words) from error
 
 

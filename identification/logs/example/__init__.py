@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-import yaml
+from ....runtime.yaml_file import read_yaml
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,6 @@ class Example:
 def example_flight() -> Iterator[Example]:
     """Give the flight; its file is there for as long as the block lasts."""
     folder = resources.files(__package__)
-    about = yaml.safe_load((folder / "about.yaml").read_text(encoding="utf-8"))
+    about = read_yaml(Path(__file__).with_name("about.yaml"), "what is known of the example")
     with resources.as_file(folder / about["log"]) as log:
         yield Example(**about | {"log": log, "known": [Known(**one) for one in about["known"]]})

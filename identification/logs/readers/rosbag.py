@@ -84,9 +84,11 @@ def read(
         InputError: rosbags is missing, the bag or the map cannot be read, a topic is missing,
             ambiguous or of another type, or a message cannot be used.
     """
-    stem = path.name if os.path.isdir(path) else path.stem
-    file = Path(option) if option else path.with_name(f"{stem}.topics.yaml")
+    named = path if path.name.strip(".") else Path(os.path.abspath(path))  # "." has no name
+    stem = named.name if os.path.isdir(path) else named.stem
+    file = Path(option) if option else named.parent / f"{stem}.topics.yaml"
     given = given_map(file) if option or os.path.exists(file) else {}
+    path = _bag_in(path)
     decoded: list[tuple[NDArray[np.int64], dict[str, Array], str]] = []
     with _opened(path) as (types, messages):
         log_map, notes = map_of(types, given, str(path), str(file))
@@ -113,6 +115,24 @@ def read(
         for times, columns, name in decoded
     ]
     return recording_of(path, recorded, log_map, "rosbag", notes, piece).log(vehicle)
+
+
+def _bag_in(path: Path) -> Path:
+    """Return what of a path is read: of a folder without metadata its only file.
+
+    Raises:
+        InputError: the folder has no metadata, and several files of bags or none.
+    """
+    if not os.path.isdir(path) or os.path.lexists(path / "metadata.yaml"):
+        return path
+    found = sorted(path.iterdir())
+    files = [x for x in found if x.suffix.lower() in (".db3", ".mcap") and not x.is_dir()]
+    if len(files) != 1:
+        raise InputError(
+            f"{path}: no metadata.yaml, and {len(files)} .db3 or .mcap files; expected "
+            f"metadata.yaml (ros2 bag reindex {path} writes one), or the name of one file"
+        )
+    return files[0]
 
 
 def given_map(file: Path) -> Mapping[str, Any]:

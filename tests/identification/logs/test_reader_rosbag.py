@@ -20,6 +20,7 @@ from tests.support.autopilot_flight import (
     motion,
     ned,
 )
+from windwrench.cli import app
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.logs.readers import rosbag
 from windwrench.identification.logs.reading import read_log
@@ -335,7 +336,7 @@ def test_what_is_not_there_is_refused(tmp_path):
     (tmp_path / "flight.csv").write_text("t")
     for path, reader_name, expected in (
         (tmp_path / "absent.bag", "rosbag", r"absent.bag: cannot be read as a ROS bag"),
-        (tmp_path, "rosbag", r"cannot be read as a ROS 2 bag: .*metadata"),
+        (tmp_path, "rosbag", r"no metadata\.yaml, and 0 \.db3"),
         (tmp_path, None, r"is a folder; expected a file, or .* ROS 2 bag, .*; found flight.csv"),
     ):
         with pytest.raises(InputError, match=expected):
@@ -427,3 +428,60 @@ def test_files_and_messages_packed_one_by_one_are_refused(mode, write):
         match=rf"metadata.yaml: compression_mode {mode.name.lower()}: expected a bag that is not",
     ):
         read_log(path, "rosbag", VEHICLE)
+
+
+@pytest.mark.parametrize("kind", ["db3", "mcap"])
+@pytest.mark.parametrize("has_metadata", [True, False])
+def test_the_folder_one_stands_in_is_a_bag(kind, has_metadata, write, monkeypatch):
+    """With the map beside the folder, and without the metadata where one file is all there is."""
+    path = write({"/a": pose(), "/b": pose(), "/m": motors()}, kind, topic_map="position: /b")
+    whole = read_log(path, None, VEHICLE)
+    if not has_metadata:
+        (path / "metadata.yaml").unlink()
+    (path / "inner").mkdir()
+    for folder, given in ((path, "."), (path / "inner", "..")):
+        monkeypatch.chdir(folder)
+        log = read_log(given, None, VEHICLE)
+        np.testing.assert_array_equal(log.position, whole.position)
+
+
+def broken_database(folder):
+    (folder / "x.db3").write_bytes(b"SQLite format 3\0" + bytes(5000))
+
+
+def two_files(folder):
+    for name in ("a.db3", "b.mcap"):
+        (folder / name).touch()
+
+
+def another_database(folder):
+    with closing(sqlite3.connect(folder / "x.db3")) as database:
+        database.execute("CREATE TABLE a (b INTEGER)")
+
+
+def metadata_alone(folder):
+    (folder / "metadata.yaml").write_text("rosbag2_bagfile_information: {version: 5, version: 6}")
+
+
+FOLDERS = {
+    lambda folder: None: r"^\.: is a folder; .*found nothing in it",
+    lambda folder: (folder / "x.db3").touch(): r"^x\.db3: cannot be read as a ROS 2 bag",
+    lambda folder: (folder / "x.db3").mkdir(): r"^\.: no metadata\.yaml, and 0 \.db3 or \.mcap",
+    lambda folder: (folder / "metadata.yaml").mkdir(): r"^metadata\.yaml: is a folder",
+    lambda folder: (folder / "x.db3").symlink_to("gone"): r"^x\.db3: cannot be read .*No such file",
+    broken_database: r"^x\.db3: cannot be read as a ROS 2 bag: .*; expected a whole bag",
+    another_database: r"^x\.db3: cannot be read as a ROS 2 bag: .*missing tables",
+    two_files: r"^\.: no metadata\.yaml, and 2 \.db3 or \.mcap files; expected metadata\.yaml",
+    metadata_alone: r"^\.: cannot be read as a ROS 2 bag: ",
+}
+
+
+@pytest.mark.parametrize("make", FOLDERS)
+@pytest.mark.parametrize("command", ["check", "estimate", "diagnose"])
+def test_a_folder_that_is_no_bag_is_refused_in_one_line(command, make, tmp_path, monkeypatch):
+    make(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    words = [] if command == "check" else ["--vehicle", "ardrone2"]
+    with pytest.raises(InputError, match=FOLDERS[make]) as raised:
+        app([command, ".", *words], standalone_mode=False)
+    assert "\n" not in str(raised.value)
