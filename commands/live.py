@@ -171,6 +171,8 @@ def _summary(session: "Session") -> dict[str, Any]:
         "consistency": tallies.consistency.as_dict() if tallies.consistency.seconds else None,
         "period_s": session.filter.period,
         "clock_drift_ppm": session.clocks.drift,
+        "poses": session.watch.poses,
+        "poses_too_late": session.watch.too_late,
         "latency_ms": {"median": median, "p99": most},
         "processor_ms": dict(
             zip(("median", "p99"), tallies.processor.median_and_most, strict=True)
@@ -190,6 +192,7 @@ def _summary(session: "Session") -> dict[str, Any]:
         lines.append(f"the filter restarted {restarts} time(s): after gaps or jumps")
     if tallies.consistency.seconds:
         lines.append(f"tuning: {tuning_words(tallies.consistency)}")
+    lines += session.watch.words
     if not np.isnan(median):
         lines.append(f"latency: median {median:.2f} ms, 99 % within {most:.2f} ms")
     force, torque = (" ".join(f"{x:+.4g}" for x in part) for part in (mean[:3], mean[3:]))
