@@ -80,9 +80,10 @@ def _objects(data: bytes) -> list[dict[str, Any]]:
     except (ValueError, RecursionError) as error:
         raise Malformed(f"{data[:60]!r}; expected a datagram of JSON") from error
     items = value if isinstance(value, list) else [value]
-    other = next((item for item in items if not isinstance(item, dict)), None)
-    if other is not None:
-        raise Malformed(f"{json.dumps(other)[:60]}; expected an object of named numbers")
+    others = [item for item in items if not isinstance(item, dict)]
+    if others or not items:
+        shown = json.dumps(others[0] if others else items)[:60]
+        raise Malformed(f"{shown}; expected an object of named numbers")
     return items
 
 

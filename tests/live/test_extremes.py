@@ -116,6 +116,8 @@ def test_a_datagram_that_costs_much_is_malformed(data):
     stream.source.link, stream.source._understood = SimpleNamespace(read=lambda _: data), True
     stream.session._once()
     assert stream.source.tallies.counts == {"malformed": 64}
+    (said,) = stream.said()
+    assert "left out as malformed" in said
 
 
 @counts

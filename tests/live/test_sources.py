@@ -74,12 +74,23 @@ def test_a_table_of_another_kind_by_its_map(tmp_path):
     assert run_text(text, wanted).session.estimates == 3
 
 
-def test_a_bad_line_on_the_way_is_counted():
+@pytest.mark.parametrize("bad", [(500,), (1,), (1, 2, 3)])
+def test_bad_lines_are_counted_wherever_they_stand(bad):
+    """Also right behind the header, such as a line of units."""
     lines = as_csv(flight()).splitlines()
-    lines[500] = lines[500][:20]
+    for k in bad:
+        lines[k] = lines[k][:20]
     stream = run_text("\n".join(lines))
-    assert stream.tallies.counts == {"malformed": 1}
-    assert len(stream.outputs) == len(flight()["t"]) - 1
+    assert not stream.failed
+    assert stream.tallies.counts == {"malformed": len(bad)}
+    assert len(stream.outputs) == len(flight()["t"]) - len(bad)
+    said = stream.tallies.news()
+    assert "standard input: left out as malformed: a row of 2 field(s)" in said[0]
+
+
+def test_a_table_without_a_good_line_is_refused_after_100():
+    said = run_text(OWN + 200 * "1,2\n").failed[0]
+    assert "all of the first 100 messages are malformed, the first: a row of 2 field(s)" in said
 
 
 class Sender(Running):
@@ -143,8 +154,10 @@ def test_what_is_missing_in_a_senders_count_is_lost_unless_it_was_late(wraps, nu
 
 
 def first_datagram(data):
+    """Nothing else comes: 100 times the same."""
     sender = Sender()
-    sender.send(data)
+    for _ in range(100):
+        sender.send(data)
     sender.thread.join()
     return sender.end()
 
@@ -160,7 +173,19 @@ def first_datagram(data):
         (run_text, "", "no message came"),
         (run_text, b"\x00\x01\x02" * 50_000, "a line of more than"),
         (first_datagram, b"hello", "expected a datagram of JSON"),
-        (first_datagram, b"[1, 2]", "an object"),
+        (first_datagram, b"[1, 2]", "1; expected an object"),
+        (first_datagram, b"null", "null; expected an object"),
+        (first_datagram, b"[null]", "null; expected an object"),
+        (first_datagram, b"[]", "[]; expected an object"),
+        (first_datagram, b"3", "3; expected an object"),
+        (first_datagram, b'"x"', '"x"; expected an object'),
+        (first_datagram, b"NaN", "NaN; expected an object"),
+        (first_datagram, b"", "expected a datagram of JSON"),
+        (first_datagram, b"{}", "none of the fields"),
+        (first_datagram, b'{"t": NaN, "px": 1}', "nan; expected a time"),
+        (first_datagram, b'{"t": {"s": [1]}, "px": 1}', "expected a time"),
+        (first_datagram, b'{"t": 1, "px": "\xff\xfe"}', "expected a datagram of JSON"),
+        (first_datagram, b'{"t": 1, "\\ud800": 1}', "none of the fields"),
         (first_datagram, b'{"t": 1, "px": 1, "py": 2}', "no field pz"),
         (first_datagram, b'{"t": "soon", "px": 1}', "expected a time"),
         (first_datagram, b'{"t": 1, "speed": 4}', "none of the fields"),
@@ -174,6 +199,28 @@ def first_datagram(data):
 )
 def test_what_is_no_table_and_no_datagram_is_refused(run, data, said):
     assert said in run(data).failed[0]
+
+
+@pytest.mark.parametrize("data", [b"null", b"[]", b"hello", b'{"t": 1}', b"[" * 5000])
+def test_a_bad_datagram_at_the_beginning_is_counted(data):
+    sender = Sender()
+    sender.send(data)
+    for k, one in enumerate(as_objects(flight())[:50]):
+        sender.send(one)
+        sender.taken("row", k + 1)
+    assert not sender.end().failed
+    assert sender.tallies.counts == {"malformed": 1}
+    assert len(sender.outputs) == 50
+    assert "left out as malformed" in sender.tallies.news()[-1]
+
+
+def test_where_nothing_good_comes_the_error_says_what_came():
+    sender = Sender()
+    sender.send(b"null")
+    sender.until(lambda: sender.tallies.counts["malformed"])
+    said = str(sender.session._nothing("within 1 s"))
+    assert "no good message came within 1 s; 1 malformed, the first: null; expected an" in said
+    sender.end()
 
 
 def test_a_source_that_says_nothing_and_a_second_one_at_its_address_end():
