@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rich.live import Live
 
 from ..runtime.errors import InputError
-from ..runtime.interrupts import INTERRUPTED, taken
+from ..runtime.interrupts import INTERRUPTED, TERMINATED, taken, terminable
 from .flight_logs import Reading
 from .terminal import console, errors, gate_of, note, run, working
 
@@ -88,7 +88,8 @@ def live(
 
             address = shown.enter_context(WebView(session, port)).address
             note(f"page: {address}")
-        interrupted = _watch(session)
+        with terminable() as terminated:
+            interrupted = _watch(session)
     if telling is not None and telling.problem:
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - or the end stalls too
     if any(outlet.problem for outlet in session.outlets):
@@ -104,7 +105,7 @@ def live(
 
         result["diagnosis"] = diagnose([recorder.path], reading=Reading(vehicle=flown), out=out)
     if interrupted:
-        run.code = INTERRUPTED
+        run.code = TERMINATED if terminated() else INTERRUPTED
     return result
 
 
