@@ -53,10 +53,10 @@ class Json:
         named = {"t": stamp} if stamp is not None else {}
         if kind == "motors":
             values = flown["rotor_speeds"][k]
-            return named | {f"omega{i + 1}": float(x) for i, x in enumerate(values)}
+            return named | {f"omega{i + 1}": float(x) for i, x in enumerate(values)}, "here"
         values = [*flown["position"][k], *flown["quaternion"][k]]
         names = ("px", "py", "pz", "qw", "qx", "qy", "qz")
-        return named | dict(zip(names, map(float, values), strict=True))
+        return named | dict(zip(names, map(float, values), strict=True)), "here"
 
 
 class Mavlink:
@@ -68,6 +68,7 @@ class Mavlink:
 
         self.flown, self.esc_status = flown, add_esc_status(common)
         self.source = make_source("mavlink:udp://:9?pose=ODOMETRY", VEHICLE, None, Tallies())
+        self.source.link.sender = "here"
         self.bytes = []
         self.sender = common.MAVLink(SimpleNamespace(write=self.bytes.append), srcSystem=7)
         self.parser = common.MAVLink(None)

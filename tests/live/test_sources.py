@@ -14,6 +14,7 @@ from windwrench.identification.logs.reading import read_log
 from windwrench.live.field_map import FieldMap
 from windwrench.live.messages import Malformed
 from windwrench.live.sources.open import make_source
+from windwrench.live.sources.senders import Senders
 from windwrench.live.tallies import Tallies
 
 OWN = "t,px,py,pz,qw,qx,qy,qz,omega1,omega2,omega3,omega4\n"
@@ -139,6 +140,78 @@ def test_datagrams_with_faults_over_the_loopback():
     assert len(sender.outputs) == len(answers) == len(sent)
     assert answers[-1]["fx"] == sender.outputs[-1].estimate.force[0]
     assert answers[-1]["status"] == "tracking"
+
+
+def taken(senders, sender, seconds, *quantities):
+    return senders.take(sender, quantities, round(seconds * 1e9))
+
+
+def test_the_first_of_two_senders_of_the_same_is_taken_until_it_is_silent():
+    tallies = Tallies()
+    senders = Senders("port", tallies)
+    for k in range(100):  # 100 Hz each
+        assert taken(senders, "a", 0.01 * k, "position", "rotor_speeds")
+        # the first could be a program that sends once from each address
+        assert taken(senders, "b", 0.01 * k + 0.005, "position", "rotor_speeds") == (k < 1)
+    assert tallies.counts == {"other senders": 99}
+    assert not taken(senders, "b", 1.0, "voltage")  # nor anything else of it
+    assert not taken(senders, "b", 2.5, "position")
+    assert tallies.news() == [
+        "warning: port: a and b send the same; a is listened to until it is silent for 2 s"
+    ]
+    assert taken(senders, "b", 3.1, "position")
+    assert tallies.news() == ["warning: port: a is silent; b is listened to"]
+    assert not taken(senders, "a", 3.2, "position")
+
+
+def test_senders_of_different_quantities_join():
+    tallies = Tallies()
+    senders = Senders("port", tallies)
+    for k in range(300):
+        assert taken(senders, "camera", 0.01 * k, "position")
+        assert taken(senders, "autopilot", 0.01 * k, "rotor_speeds")
+    assert not tallies.counts
+    assert not tallies.news()
+
+
+def test_of_two_vehicles_whose_messages_alternate_one_is_taken_whole():
+    """The second's rotor speeds come before the first's: they are not joined with its poses."""
+    tallies = Tallies()
+    senders = Senders("port", tallies)
+    order = [("a", "position"), ("b", "rotor_speeds"), ("b", "position"), ("a", "rotor_speeds")]
+    found = [(who, taken(senders, who, 0.01 * k, what)) for k in range(50) for who, what in order]
+    assert len({who for who, is_taken in found[8:] if is_taken}) == 1
+    assert sum(is_taken for _, is_taken in found) >= 98
+
+
+def test_a_socket_for_each_message_is_one_sender():
+    tallies = Tallies()
+    senders = Senders("port", tallies)
+    assert all(taken(senders, f"address {k}", 0.01 * k, "position") for k in range(1000))
+    assert not tallies.news()
+    assert len(senders._last) == 1
+
+
+def test_two_senders_on_one_port_are_told_by_their_addresses():
+    sender, flown = Sender(), as_objects(flight())
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 0))
+        for k, one in enumerate(flown[:100]):
+            sender.send(one)
+            sender.taken("row", k + 1)
+            if k > 10:  # another vehicle, 5 m away
+                away = json.dumps(one | {"px": one["px"] + 5.0}).encode()
+                other.sendto(away, ("127.0.0.1", sender.port))
+        sender.until(lambda: sender.tallies.counts["other senders"] == 89)
+        addresses = [f"127.0.0.1:{one.getsockname()[1]}" for one in (sender.socket, other)]
+        with pytest.raises(BlockingIOError):  # nothing is answered to it
+            other.recv(4096, socket.MSG_DONTWAIT)
+    assert len(sender.end().answers) == len(sender.outputs) == 100
+    assert (
+        f"{addresses[0]} and {addresses[1]} send the same; {addresses[0]} is listened"
+        in (sender.tallies.news()[-1])
+    )
+    assert max(abs(o.estimate.position[0]) for o in sender.outputs) < 1.0
 
 
 @pytest.mark.parametrize(
