@@ -27,7 +27,7 @@ from .commands.running import as_command, command_name
 from .commands.terminal import errors
 from .commands.warming import warm
 from .runtime.errors import InputError, unknown_name
-from .runtime.interrupts import INTERRUPTED, forget, noted
+from .runtime.interrupts import INTERRUPTED, TERMINATED, forget, noted
 from .runtime.printable import printable
 
 
@@ -52,8 +52,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     epilog="Exit codes: 0 success; 1 internal error, with its traceback; 2 invalid option or input "
-    "file, or output that cannot be written, with a one-line message; 130 interrupted. "
-    "NO_COLOR=1 disables colours.",
+    "file, or output that cannot be written, with a one-line message; 130 interrupted; 143 live "
+    "terminated, with its summary. NO_COLOR=1 disables colours.",
 )
 _UsageError: Any = typer.BadParameter.__base__  # an option or argument that typer cannot use
 
@@ -134,9 +134,9 @@ def main() -> None:
             if not interrupted():
                 raise
             code = INTERRUPTED
-    if code == INTERRUPTED:
+    if code in (INTERRUPTED, TERMINATED):
         forget()
-        errors.print("interrupted")
+        errors.print("interrupted" if code == INTERRUPTED else "terminated")
     sys.exit(code)
 
 

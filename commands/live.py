@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rich.live import Live
 
 from ..runtime.errors import InputError
-from ..runtime.interrupts import INTERRUPTED, taken
+from ..runtime.interrupts import INTERRUPTED, TERMINATED, taken, terminable
 from .flight_logs import Reading
 from .terminal import console, errors, gate_of, note, run, working
 
@@ -88,7 +88,8 @@ def live(
 
             address = shown.enter_context(WebView(session, port)).address
             note(f"page: {address}")
-        interrupted = _watch(session)
+        with terminable() as terminated:
+            interrupted = _watch(session)
     if telling is not None and telling.problem:
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - or the end stalls too
     if any(outlet.problem for outlet in session.outlets):
@@ -104,7 +105,7 @@ def live(
 
         result["diagnosis"] = diagnose([recorder.path], reading=Reading(vehicle=flown), out=out)
     if interrupted:
-        run.code = INTERRUPTED
+        run.code = TERMINATED if terminated() else INTERRUPTED
     return result
 
 
@@ -171,6 +172,8 @@ def _summary(session: "Session") -> dict[str, Any]:
         "consistency": tallies.consistency.as_dict() if tallies.consistency.seconds else None,
         "period_s": session.filter.period,
         "clock_drift_ppm": session.clocks.drift,
+        "poses": session.watch.poses,
+        "poses_too_late": session.watch.too_late,
         "latency_ms": {"median": median, "p99": most},
         "processor_ms": dict(
             zip(("median", "p99"), tallies.processor.median_and_most, strict=True)
@@ -190,6 +193,7 @@ def _summary(session: "Session") -> dict[str, Any]:
         lines.append(f"the filter restarted {restarts} time(s): after gaps or jumps")
     if tallies.consistency.seconds:
         lines.append(f"tuning: {tuning_words(tallies.consistency)}")
+    lines += session.watch.words
     if not np.isnan(median):
         lines.append(f"latency: median {median:.2f} ms, 99 % within {most:.2f} ms")
     force, torque = (" ".join(f"{x:+.4g}" for x in part) for part in (mean[:3], mean[3:]))

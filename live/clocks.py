@@ -1,15 +1,22 @@
 """Stamps of clocks that are not ours, on one time: the stream's.
 
-The stream's time is the first sender's clock itself, in s; it begins at zero where that clock
-counts from 1970. What only one clock has stamped is so never moved about: its estimates are those
-of the log offline. Stamps of a second clock (a camera's beside the autopilot's) are brought over by
-how much earlier than here each of them reads: the least over the last half minute, since transport
-only delays. That follows clocks that drift. A clock that jumps (an autopilot that boots again) goes
-on where the stream was, once enough messages agree that it did.
+The stream's time is the first sender's clock, in s; it begins at zero where that clock counts from
+1970. The filter's steps are the sender's, also where a simulator runs at half of real time. Stamps
+of one clock are never moved about: the estimates are those of the log offline.
+
+A message without a stamp gets the newest stamp before it, plus the time since then at the sender's
+rate. A silence does not tell whether the sender's clock went on or a simulator was paused: 0.1 s of
+each count. A rotor speed that is placed too early is held until the next one. One that is placed
+too late carries the filter past the poses to come.
+
+Stamps of a second clock (a camera's beside the autopilot's) are brought over by the lines of both
+clocks (``clock_line``). A clock that jumps (an autopilot that boots again) goes on where the stream
+was, once enough messages agree.
 """
 
 from collections import deque
 
+from .clock_line import ClockLine
 from .messages import SECOND, Sample
 from .tallies import Tallies
 
@@ -22,47 +29,20 @@ _AHEAD = 1.0
 # messages in a row, and s over which they come, that must agree that a clock has jumped; a burst of
 # delayed messages is shorter
 _AGREEING, _LASTING = 20, 0.2
-_WINDOW = 30  # s, over which the least delay is looked for
+_SILENCE = SECOND // 10  # ns that count of a silence: a message of the slowest ESC comes sooner
+_JITTER = SECOND // 50  # ns by which delays of a link differ, as a rule
+_UNSTAMPED = 1.0  # s of poses without any stamp, after which the stream's time is ours
 _EPOCH = 1e8  # s: stamps above it are counted from 1970, and the stream's time begins at zero
 _REMEMBERED = 64  # stamps of a kind, among which one that comes again is a double
-
-
-class _Offset:
-    """How much earlier a clock reads than ours, at the least delay of the last seconds."""
-
-    def __init__(self) -> None:
-        self._least: dict[int, int] = {}  # offset, ns, by the second of arrival
-        self.first: tuple[int, int] | None = None  # arrival and offset, ns, at the beginning
-        self.value = 0
-
-    def add(self, arrival: int, offset: int) -> None:
-        least, second = self._least, arrival // SECOND
-        if self.first is None and len(least) == 5 and second not in least:
-            self.first = arrival, min(least.values())
-        least[second] = min(offset, least.get(second, offset))
-        while (oldest := next(iter(least))) <= second - _WINDOW:
-            del least[oldest]
-        self.value = min(least.values())
-
-    def drift(self) -> float | None:
-        """Return by how much faster the clock runs than ours, in ppm; None: not known yet."""
-        latest = list(self._least.items())[-5:]
-        if self.first is None or len(latest) < 5:
-            return None
-        elapsed = latest[-1][0] - self.first[0] // SECOND
-        if elapsed < 10:
-            return None
-        change = min(least for _, least in latest) - self.first[1]
-        return -1e6 * change / (elapsed * SECOND)
 
 
 class _Clock:
     """One sender's clock."""
 
-    def __init__(self, shift: int, stamp: int, arrival: int) -> None:
+    def __init__(self, shift: int, stamp: int, arrival: int, horizon: int) -> None:
         self.shift = shift  # ns, from stamps to the stream's time
         self.newest, self.newest_arrival = stamp, arrival
-        self.offset = _Offset()
+        self.line = ClockLine(arrival, stamp, horizon)
         self.odd: list[tuple[int, int]] = []  # stamps and arrivals that would be a jump
 
 
@@ -81,6 +61,10 @@ class Clocks:
         self._horizon = round(horizon * SECOND)
         self._clocks: list[_Clock] = []  # the first is the reference
         self._kinds: dict[str, tuple[_Clock, deque[int]]] = {}  # and the last stamps
+        self._first_pose: int | None = None  # ns, arrival of the first pose without a stamp
+        self._ours = False  # the reference is this machine's clock: nothing was stamped
+        self._latest = 0  # ns, arrival of the newest message
+        self._awake = 0  # ns since the reference's newest stamp, without silences
 
     @property
     def count(self) -> int:
@@ -88,18 +72,23 @@ class Clocks:
         return len(self._clocks)
 
     @property
+    def line(self) -> ClockLine | None:
+        """The reference's line against this machine's clock; None: nothing is known of it."""
+        known = self._clocks and self._paced and not self._ours
+        return self._clocks[0].line if known else None
+
+    @property
     def drift(self) -> float | None:
         """By how much faster the reference runs than this machine's clock, ppm; None: not known."""
-        return self._clocks[0].offset.drift() if self._clocks and self._paced else None
+        rate = None if self.line is None else self.line.mean_rate
+        return None if rate is None else 1e6 * (rate - 1.0)
 
     def time(self, sample: Sample) -> float | None:
         """Return when a message was measured, s of the stream's time; None where it is left out."""
-        if sample.stamp is None:  # as if its delay were the least
-            if not self._clocks:
-                return None
-            reference, arrival = self._clocks[0], sample.arrival
-            stamp = arrival - reference.offset.value if self._paced else reference.newest
-            return 1e-9 * (stamp + reference.shift)
+        self._awake += min(max(sample.arrival - self._latest, 0), _SILENCE)
+        self._latest = max(sample.arrival, self._latest)
+        if sample.stamp is None:
+            return self._unstamped(sample)
         if sample.kind not in self._kinds:
             found = self._clock_of(sample.stamp, sample.arrival)
             self._kinds[sample.kind] = found, deque(maxlen=_REMEMBERED)
@@ -110,49 +99,75 @@ class Clocks:
         if not self._goes_on(clock, sample.stamp, sample.arrival):
             return None
         recent.append(sample.stamp)
+        reference, stamp = self._clocks[0], sample.stamp
         if self._paced:
-            clock.offset.add(sample.arrival, sample.arrival - sample.stamp)
-        if sample.stamp > clock.newest:
-            clock.newest, clock.newest_arrival = sample.stamp, sample.arrival
+            clock.line.add(sample.arrival, stamp)
+        if stamp >= clock.newest:
+            clock.newest, clock.newest_arrival = stamp, sample.arrival
+            self._awake = 0 if clock is reference else self._awake
+        if clock is not reference:
+            stamp = reference.line.stamp_of(clock.line.arrival_of(stamp))
+        return 1e-9 * (stamp + reference.shift)
+
+    def _unstamped(self, sample: Sample) -> float | None:
+        """Return the time of a message without a stamp; None where no clock is known yet."""
+        arrival = sample.arrival
+        if not self._clocks:
+            if self._first_pose is None and sample.has_pose:
+                self._first_pose = arrival
+            if self._first_pose is None or arrival - self._first_pose < _UNSTAMPED * SECOND:
+                return None
+            self._ours = True
+            self._tallies.say(
+                "warning: no message has a stamp: each counts as measured when it came, at this "
+                "machine's clock; delays of the link count as motion"
+            )
+            self._clocks.append(_Clock(-arrival, arrival, arrival, self._horizon))
         reference = self._clocks[0]
-        ahead = 0 if clock is reference else clock.offset.value - reference.offset.value
-        return 1e-9 * (sample.stamp + ahead + reference.shift)
+        if self._ours:
+            return 1e-9 * (arrival + reference.shift)
+        stamp, line = reference.newest, reference.line
+        if self._paced:
+            stamp += round(self._awake * line.rate)
+            if line.known:  # the newest may itself have come late
+                stamp = max(stamp, min(line.stamp_of(arrival), stamp + _JITTER))
+        return 1e-9 * (stamp + reference.shift)
 
     def _clock_of(self, stamp: int, arrival: int) -> _Clock:
         """Return the clock that a new kind of message is stamped by."""
         if self._clocks and not self._paced:
             return self._clocks[0]
         for clock in self._clocks:
-            if abs(arrival - stamp - clock.offset.value) < _SAME * SECOND:
+            if abs(clock.line.delay(arrival, stamp)) < _SAME * SECOND:
                 return clock
         shift = -stamp if not self._clocks and stamp > _EPOCH * SECOND else 0
-        clock = _Clock(shift, stamp, arrival)
-        clock.offset.add(arrival, arrival - stamp)
-        self._clocks.append(clock)
-        return clock
+        self._clocks.append(_Clock(shift, stamp, arrival, self._horizon))
+        return self._clocks[-1]
 
     def _goes_on(self, clock: _Clock, stamp: int, arrival: int) -> bool:
         """Return whether a stamp is taken: none is that would be a jump, until enough agree."""
+        passed = max(arrival - clock.newest_arrival, 0) * max(clock.line.rate, 1.0)
         late = stamp < clock.newest - self._horizon
-        ahead = self._paced and arrival - stamp < clock.offset.value - _AHEAD * SECOND
+        ahead = self._paced and stamp - clock.newest > passed + _AHEAD * SECOND
         if not late and not ahead:
             clock.odd.clear()
             return True
-        if clock.odd and not 0 < stamp - clock.odd[-1][0] < _AHEAD * SECOND:
+        # kinds of messages alternate, and some come late: stamps need not rise at each
+        if clock.odd and not abs(stamp - clock.odd[-1][0]) < _AHEAD * SECOND:
             clock.odd.clear()
         clock.odd.append((stamp, arrival))
-        agree = len(clock.odd) >= _AGREEING
+        first, first_arrival = clock.odd[0]
+        agree = len(clock.odd) >= _AGREEING and stamp > first
         if agree and self._paced:
-            agree = arrival - clock.odd[0][1] > _LASTING * SECOND
+            agree = arrival - first_arrival > _LASTING * SECOND
         if not agree:
             self._tallies.counts["implausible times" if ahead else "too late"] += 1
             return False
-        del clock.odd[:-1]
         self._tallies.counts["clock jumps"] += 1
         # the stream goes on for as long as passed here since the last message before
-        passed = max(arrival - clock.newest_arrival, 1_000_000) if self._paced else 1_000_000
-        clock.shift += clock.newest + passed - stamp
+        gone = max(round(clock.line.rate * (arrival - clock.newest_arrival)), 1_000_000)
+        clock.shift += clock.newest - stamp + (gone if self._paced else 1_000_000)
         clock.newest, clock.newest_arrival = stamp, arrival
-        clock.offset = _Offset()
+        clock.line = ClockLine(arrival, stamp, self._horizon)
         clock.odd.clear()
         return True

@@ -115,12 +115,15 @@ class FieldMap:
             kit = np.clip(kit, 0.0, 1.0)
         setattr(found, _FIELDS.get(section, section), kit)
 
-    def _stamp(self, fields: Mapping[str, Any]) -> int:
+    def _stamp(self, fields: Mapping[str, Any]) -> int | None:
+        """Return the time of a message, ns; None: it has no such field."""
         clock = next((c for c in self._clocks if c.column in fields), self.map.time)
         if not clock.column:
             self._rows += 1
             return round((self._rows - 1) * SECOND / clock.rate_hz)
-        value = fields.get(clock.column)
+        if clock.column not in fields:
+            return None
+        value = fields[clock.column]
         if isinstance(value, int) and not isinstance(value, bool):
             if abs(value) < 2**63:
                 return round(value * round(UNITS["time"][clock.unit] * SECOND))

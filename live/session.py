@@ -21,6 +21,7 @@ from .messages import SECOND, Row, Sample
 from .outlets import WAITING, Outlet
 from .rows import Joiner
 from .sources.base import Source
+from .watch import Watch
 
 _VIEWED = 50.0  # estimates that a view shows, a second
 VIEWED = 1500  # in all: of the last 30 s
@@ -53,6 +54,7 @@ class Session:
         self._settings = self.filter.settings
         self.clocks = Clocks(tallies, self._settings.horizon, source.paced)
         self._joiner = Joiner(source.vehicle, tallies)
+        self.watch = Watch(tallies, self.clocks, self._settings.horizon)
         self._stop = threading.Event()
         self._first = self._last = time.monotonic_ns()  # of messages
         self._begun = 0.0  # s, stream's time of the first estimate
@@ -151,6 +153,7 @@ class Session:
                 self.tallies.processor.add(spent // len(self._fresh))
             self._fresh.clear()
             self._record()
+            self.watch.look(now)
         wait = self._settings.wait
         if not self.estimates and wait and now - self._first > wait * SECOND:
             raise self._nothing(f"within {wait:g} s")
@@ -159,6 +162,12 @@ class Session:
     def take(self, sample: Sample) -> None:
         """Deal with one message."""
         self.tallies.rates[sample.kind].add(sample.arrival)
+        late = self.tallies.counts["too late"]
+        self._estimate(sample)
+        if sample.has_pose:
+            self.watch.count(self.tallies.counts["too late"] - late)
+
+    def _estimate(self, sample: Sample) -> None:
         t = self.clocks.time(sample)
         row = None if t is None else self._joiner.take(sample, t)
         if row is None:
@@ -196,12 +205,15 @@ class Session:
         """Return the error for a stream without an estimate."""
         waiting = self.tallies.counts["waiting"]
         came = ", ".join(sorted(self.tallies.rates))
+        bad, problems = self.tallies.counts["malformed"], self.source.problems
         if not came:
-            found = "no message came"
+            found = "no good message came" if bad else "no message came"
         elif waiting:
             found = f"poses came ({came}), and no rotor speeds"
         else:
             found = f"{came} came, which is no estimate yet"
+        if problems:
+            when += f"; {bad} malformed, the first: {problems[0]}"
         return InputError(f"{self.source.name}: {found} {when}; expected {self.source.expected}")
 
 

@@ -66,13 +66,14 @@ class Tallies:
 
     The names of ``counts``: ``doubled`` (the same message again), ``late`` (measured before what
     was known already, and fused where it belongs), ``too late`` (older than the horizon: left out),
-    ``lost`` (missing in the sender's own count, or in its regular times), ``malformed``, ``clock
-    jumps``, ``implausible times``, ``waiting`` (poses that came while no rotor speeds were known),
-    ``stops`` (times that the source was silent and came back), ``refused`` (poses that the gate
-    took for outliers), ``not decoded``, ``not read`` and ``not estimated`` (messages, reads of the
-    link and rows at which this kit or a library of it failed), ``not sent``, ``not recorded``,
-    ``not told`` (what the link, the log or standard output did not take), ``not drawn`` (a terminal
-    that failed), ``not shown`` (events that a browser was too slow for), ``turned away`` (browsers
+    ``lost`` (missing in the sender's own count, or in its regular times), ``malformed``, ``other
+    senders`` (messages of a second sender of the same), ``clock jumps``, ``implausible times``,
+    ``waiting`` (poses that came while no rotor speeds were known), ``stops`` (times that the source
+    was silent and came back), ``refused`` (poses that the gate took for outliers), ``not decoded``,
+    ``not read`` and ``not estimated`` (messages, reads of the link and rows at which this kit or a
+    library of it failed), ``not sent``, ``not recorded``, ``not told`` (what the link, the log or
+    standard output did not take), ``not drawn`` (a terminal that failed), ``not shown`` (events
+    that a browser was too slow for), ``turned away`` (browsers
     beyond those that are served).
     """
 

@@ -46,6 +46,7 @@ def _lines(session: Session) -> list[Text]:
     output, tallies = session.output, session.tallies
     assert output is not None
     silence, counts, drift = session.silence, tallies.found, session.clocks.drift
+    watch = session.watch
     silent = silence > SILENT
     status = f"SILENT for {silence:.1f} s" if silent else output.estimate.status
     good = not silent and output.estimate.status == "tracking"
@@ -64,12 +65,13 @@ def _lines(session: Session) -> list[Text]:
         lines.append(Text(f"tuning   {tuning_words(tallies.consistency)}", style))
     median, most = tallies.latency.median_and_most
     timing = f"latency  {median:.2f} ms, 99 % within {most:.2f} ms" if median == median else ""
-    if drift is not None:
+    if drift is not None and not watch.rate_words:
         timing += f"   vehicle's clock {drift:+.0f} ppm"
     if session.clocks.count > 1:
         timing += f"   {session.clocks.count} clocks"
     if timing:
         lines.append(Text(timing))
+    lines += [Text(f"warning  {words}", "yellow") for words in watch.words]
     trouble = {k: n for k, n in counts.items() if k not in _HARMLESS}
     lines.append(
         Text("dropped  " + (counts_words(counts) or "nothing"), "yellow" if trouble else "")

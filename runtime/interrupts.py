@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-INTERRUPTED = 130  # exit code
+INTERRUPTED, TERMINATED = 130, 143  # exit codes
 _AGAIN = 0.02  # s until an interrupt that was lost comes again
 # what ``sys.argv`` begins with while ``python -m`` looks for the package, and as a program
 _COMMAND = ("-m", "windwrench", "windwrench.exe", "windwrench-script.py")
@@ -45,6 +45,7 @@ class _Interrupt(KeyboardInterrupt):
     """
 
     taken = True  # by who answers it, or no command runs
+    number = signal.SIGINT  # of the signal that it came by
 
     def __del__(self) -> None:
         if not self.taken:
@@ -53,7 +54,12 @@ class _Interrupt(KeyboardInterrupt):
 
 def _come_again() -> None:
     if not _Interrupt.taken:
-        _thread.interrupt_main()
+        _thread.interrupt_main(_Interrupt.number)
+
+
+def _interrupt(number: int) -> None:
+    _Interrupt.taken, _Interrupt.number = False, signal.Signals(number)
+    raise _Interrupt
 
 
 def taken() -> None:
@@ -72,8 +78,7 @@ def noted() -> Iterator[Callable[[], bool]]:
 
     def note(number: int, frame: FrameType | None) -> None:
         came.append(number)
-        _Interrupt.taken = False
-        raise _Interrupt
+        _interrupt(number)
 
     def answer() -> bool:
         taken()
@@ -92,6 +97,30 @@ def noted() -> Iterator[Callable[[], bool]]:
         if usual:
             sys.unraisablehook = told
             signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@contextmanager
+def terminable() -> Iterator[Callable[[], bool]]:
+    """Have a termination interrupt the block as Ctrl-C does, and give a function that says whether
+    one came. Whatever started the command may have it ignore interrupts, as a shell script does
+    behind ``&``: a termination is answered all the same.
+    """
+    came: list[int] = []
+
+    def end(number: int, frame: FrameType | None) -> None:
+        came.append(number)
+        _interrupt(number)
+
+    usual = threading.current_thread() is threading.main_thread() and (
+        signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    )
+    if usual:
+        signal.signal(signal.SIGTERM, end)
+    try:
+        yield lambda: bool(came)
+    finally:
+        if usual:
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def forget() -> None:

@@ -19,6 +19,8 @@ from ..tallies import Tallies
 WAITS = 60.0
 Found = TypeVar("Found")
 _RESTARTED = 1_000  # messages; a count that falls by more has begun again
+_NONE_GOOD = 100  # malformed messages without a good one that say the stream is of another kind
+_TOLD = 3  # malformed messages that are told; all are counted
 LARGEST_SHARE = 1.5  # motor commands that none exceeds are shares of the full one
 _MOST_LOST = 1_000_000  # messages; a count that rises by more is another
 
@@ -41,7 +43,7 @@ class Source(ABC):
     library = ""  # that the extra of the kind's name brings
     paced = True  # messages arrive at the vehicle's own pace
     patience = 0.0  # s for which what is not paced waits for those who take the estimates
-    strict = False  # a first message that is malformed says that the stream is of another kind
+    strict = False  # where nothing but malformed messages comes, the stream is of another kind
     answers = False  # estimates are sent back
     link: Any = None  # a ``Link`` that messages come by, of a source that has one
     expected = ""  # what must come, for the error of a stream from which nothing came
@@ -54,6 +56,7 @@ class Source(ABC):
         self.name = text  # for people
         self.address = read_address(text, self.kind, self.options)
         self.vehicle, self.tallies, self.log_map = vehicle, tallies, log_map
+        self.problems: list[str] = []  # of the first malformed messages
         self._understood = not self.strict
         self._numbers: dict[object, int] = {}  # the newest of each sender's own count
         self._prepare()
@@ -97,7 +100,7 @@ class Source(ABC):
         """Return what the messages hold that have come; None: the stream has ended.
 
         Raises:
-            InputError: as ``read``; or the first message of a strict source is malformed.
+            InputError: as ``read``; or the first 100 messages of a strict source are malformed.
         """
         messages = self.read(timeout)
         if messages is None:
@@ -113,9 +116,15 @@ class Source(ABC):
             with self.tallies.spared("not decoded", f"a message of {self.name}"):
                 return decode(*message)
         except Malformed as why:
-            if not self._understood:
-                raise InputError(f"{self.name}: {why}") from why
             self.tallies.counts["malformed"] += 1
+            if len(self.problems) < _TOLD and str(why) not in self.problems:
+                self.problems.append(str(why))
+                self.tallies.say(f"warning: {self.name}: left out as malformed: {why}")
+            if not self._understood and self.tallies.counts["malformed"] >= _NONE_GOOD:
+                raise InputError(
+                    f"{self.name}: all of the first {_NONE_GOOD} messages are malformed, the "
+                    f"first: {self.problems[0]}"
+                ) from why
         return None
 
     def send(self, output: Output) -> None:  # noqa: B027 - most senders want to know nothing

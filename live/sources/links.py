@@ -30,6 +30,7 @@ class Link(ABC):
         self._text = text
         self.opened: Any = None  # a socket or a port, once it is open
         self.peer: Any = None  # whom to send to, once it is known
+        self.sender: Any = None  # of what was read last
 
     @abstractmethod
     def open(self) -> str:
@@ -58,6 +59,10 @@ class Link(ABC):
         """
         return self._receive() if select.select([self.opened], [], [], timeout)[0] else None
 
+    def answer(self, sender: Any) -> None:
+        """Send to a sender from now on."""
+        self.peer = sender
+
     def close(self) -> None:
         """Close it."""
         if self.opened is not None:
@@ -67,7 +72,7 @@ class Link(ABC):
 
 class Datagrams(Link):
     """A link by UDP: listens, on this machine alone unless the address names another host, and
-    answers whoever spoke last; or calls an address.
+    answers who is listened to; or calls an address.
 
     Args:
         address: where.
@@ -110,8 +115,14 @@ class Datagrams(Link):
             return None
         if len(data) > self._largest:
             raise Malformed(f"a datagram of more than {self._largest} bytes")
-        self.peer = self.peer if self._calls else peer
+        self.sender = peer
+        self.peer = self.peer or peer
         return bytes(data)
+
+    def answer(self, sender: Any) -> None:
+        """Send to a sender from now on, unless an address was called."""
+        if not self._calls:
+            super().answer(sender)
 
     def write(self, data: bytes) -> None:
         """Send to whoever there is."""
@@ -133,7 +144,7 @@ class SerialPort(Link):
         serial: Any = importlib.import_module("serial")
         try:
             self.opened = serial.Serial(self._path, self._baud, timeout=0, write_timeout=0)
-            self.peer = self._path
+            self.peer = self.sender = self._path
         except (OSError, ValueError) as error:
             raise InputError(f"{self._text}: cannot be opened: {error}") from error
         return f"reading {self._path} at {self._baud} baud"
@@ -147,6 +158,11 @@ class SerialPort(Link):
     def write(self, data: bytes) -> None:
         """Send by the port."""
         self.opened.write(data)
+
+
+def sender_name(sender: Any) -> str:
+    """Return a sender of a link in words."""
+    return sender if isinstance(sender, str) else "{}:{}".format(*sender)
 
 
 def make_link(address: Address, baud: int) -> Link:

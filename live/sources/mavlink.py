@@ -28,9 +28,10 @@ from ..filtering import Output
 from ..messages import SECOND, Malformed, Sample
 from .base import Source
 from .esc_status import add_esc_status
-from .links import make_link
+from .links import make_link, sender_name
 from .mavlink_answer import send_wrench
 from .mavlink_messages import POSES, MessageReader
+from .senders import Senders
 
 _AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
 _OURS = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
@@ -59,6 +60,7 @@ class Mavlink(Source):
         self.link = make_link(self.address, _BAUD)
         self._rate = self.address.number("rate", 0.0)
         self._reader = MessageReader(self.vehicle, self.address.choice("pose", ("", *POSES)))
+        self._senders = Senders(self.name, self.tallies)
         self._mav: Any = None
         self._requested = False
         self._due_heartbeat = self._due_plot = 0  # ns
@@ -91,17 +93,25 @@ class Mavlink(Source):
         kind = message.get_type()
         if kind == "BAD_DATA":
             raise Malformed("bytes that are no message")
-        sender = (message.get_srcSystem(), message.get_srcComponent())
-        self.count_lost(sender, int(message.get_seq()), 256)
-        if message.get_srcComponent() == _OURS:
+        system, component = message.get_srcSystem(), message.get_srcComponent()
+        who = f"system {system} at {sender_name(self.link.sender)}"
+        if not self._senders.leaves_out(who):
+            self.count_lost((system, component), int(message.get_seq()), 256)
+        if component == _OURS:
             return None
-        if kind == "HEARTBEAT":
+        alive = kind == "HEARTBEAT" and component == _AUTOPILOT
+        if not (alive or self._reader.reads(kind)):
+            return None
+        if not self._senders.take(who, (kind,), arrival):
+            return None
+        self.link.answer(self.link.sender)
+        if alive:
             self._request(message)
         return self._reader.read(message, arrival)
 
     def _request(self, heartbeat: Any) -> None:
         """Ask the autopilot for the messages, once, at the rate that the user wants."""
-        if not self._rate or self._requested or heartbeat.get_srcComponent() != _AUTOPILOT:
+        if not self._rate or self._requested:
             return
         self._requested = True
         numbers = {m.msgname: number for number, m in self._dialect.mavlink_map.items()}

@@ -58,6 +58,11 @@ class MessageReader:
             "SYS_STATUS": self._system_status,
         }
 
+    def reads(self, kind: str) -> bool:
+        """Return whether messages of a kind are read; keep that one came."""
+        self.seen.add(kind)
+        return kind in self._readers
+
     def read(self, message: Any, arrival: int) -> Sample | None:
         """Return what a message that arrived at ``arrival`` ns holds, or None.
 
@@ -65,7 +70,6 @@ class MessageReader:
             Malformed: it says nothing.
         """
         kind = message.get_type()
-        self.seen.add(kind)
         reader = self._readers.get(kind)
         if reader is None:
             return None

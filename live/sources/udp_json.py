@@ -2,7 +2,8 @@
 
 ``udp-json://HOST:PORT`` listens there. An object is a row of this kit's columns, or of those that a
 map names, or a part of one; beside them ``seq``, a count of the sender's by which lost ones are
-known. With ``?reply=1`` each estimate is sent back to where the last datagram came from. Datagrams
+known. With ``?reply=1`` each estimate is sent back to where the last one that was taken came from.
+Of two senders of the same quantities the first is listened to (``senders``). Datagrams
 beyond 16,384 bytes, 1,024 values or 64 objects are malformed: a batch of 0.3 s at 200 Hz is within
 them, and what others cost would delay estimates.
 """
@@ -17,7 +18,8 @@ from ..filtering import Output
 from ..messages import Malformed, Sample
 from ..outputs import as_fields
 from .base import Source
-from .links import Datagrams
+from .links import Datagrams, sender_name
+from .senders import Senders
 
 _AT_ONCE = 64  # datagrams, and objects of one, taken before their estimates are out
 _LARGEST, _VALUES = 16_384, 1_024  # bytes and values of a datagram
@@ -35,6 +37,7 @@ class UdpJson(Source):
             raise InputError(f"{self.name}: no port; expected udp-json://HOST:PORT")
         self._map = FieldMap(self.log_map, self.vehicle, self.name)
         self.link = Datagrams(self.address, _LARGEST)
+        self._senders = Senders(self.name, self.tallies)
 
     def read(self, timeout: float) -> list[tuple[Any, int]] | None:
         """Return the objects of the datagrams that are there."""
@@ -45,24 +48,28 @@ class UdpJson(Source):
                 break
             arrival = time.monotonic_ns()
             objects = self.unless_malformed(_objects, data) or ()
-            items += [(item, arrival) for item in objects]
+            items += [((item, self.link.sender), arrival) for item in objects]
         return items
 
     def decode(self, message: Any, arrival: int) -> Sample | None:
-        """Return what an object holds."""
-        sample = self._map.sample("json", message, arrival)
+        """Return what an object holds, if its sender is listened to."""
+        fields, sender = message
+        sample = self._map.sample("json", fields, arrival)
         sample.kind = _kind(sample)
         if sample.kind == "json":
             raise Malformed(
-                f"none of the fields that are looked for; found {', '.join(message)[:200]}; "
+                f"none of the fields that are looked for; found {', '.join(fields)[:200]}; "
                 "expected such as px, omega1, gx, vbat, or those of --map"
             )
-        if type(number := message.get("seq")) is int:
+        if not self._senders.take(sender_name(sender), sample.measured, arrival):
+            return None
+        self.link.answer(sender)
+        if type(number := fields.get("seq")) is int:
             self.count_lost("", number)
         return sample
 
     def send(self, output: Output) -> None:
-        """Send the estimate to where the last datagram came from, if it wants to know."""
+        """Send the estimate to the sender that is listened to, if it wants to know."""
         if self.answers:
             self.link.write(json.dumps(as_fields(output)).encode())
 
@@ -80,9 +87,10 @@ def _objects(data: bytes) -> list[dict[str, Any]]:
     except (ValueError, RecursionError) as error:
         raise Malformed(f"{data[:60]!r}; expected a datagram of JSON") from error
     items = value if isinstance(value, list) else [value]
-    other = next((item for item in items if not isinstance(item, dict)), None)
-    if other is not None:
-        raise Malformed(f"{json.dumps(other)[:60]}; expected an object of named numbers")
+    others = [item for item in items if not isinstance(item, dict)]
+    if others or not items:
+        shown = json.dumps(others[0] if others else items)[:60]
+        raise Malformed(f"{shown}; expected an object of named numbers")
     return items
 
 

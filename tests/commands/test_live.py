@@ -117,11 +117,23 @@ def test_the_page_in_a_real_browser(watched, tmp_path):
     assert not [line for line in shown.stderr.splitlines() if "CONSOLE" in line]
 
 
-def test_its_user_ends_it_and_loses_nothing(tmp_path):
+@pytest.mark.parametrize(
+    ("sent", "taken", "code", "word"),
+    [
+        (signal.SIGINT, signal.default_int_handler, 130, "interrupted"),
+        (signal.SIGTERM, signal.default_int_handler, 143, "terminated"),
+        (signal.SIGTERM, signal.SIG_IGN, 143, "terminated"),  # interrupts are ignored, as by nohup
+    ],
+)
+def test_its_user_or_its_system_ends_it_and_loses_nothing(tmp_path, sent, taken, code, word):
     """It has been fed 700 rows of a flight, and has printed as many estimates."""
     log = tmp_path / "flight.csv"
     pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
-    running = started("live", "-", "--vehicle", "ardrone2", "--record", log, **pipes)
+    running = started(
+        *("live", "-", "--vehicle", "ardrone2", "--record", log),
+        preexec_fn=lambda: signal.signal(signal.SIGINT, taken),
+        **pipes,
+    )
     lines = []
     reader = threading.Thread(target=lambda: lines.extend(running.stdout))
     reader.start()
@@ -129,12 +141,12 @@ def test_its_user_ends_it_and_loses_nothing(tmp_path):
     running.stdin.write("".join(fed).encode())
     running.stdin.flush()
     until(lambda: len(lines) >= len(fed) or running.poll() is not None)
-    running.send_signal(signal.SIGINT)
+    running.send_signal(sent)
     said = running.stderr.read().decode()
-    assert running.wait() == 130
+    assert running.wait() == code
     reader.join()
     assert "700 estimates over 3.5 s" in said
-    assert said.rstrip().endswith("interrupted")
+    assert said.rstrip().endswith(word)
     found = np.array([line.split(b",")[:7] for line in lines[1:]], dtype=float)
     np.testing.assert_allclose(found, offline(flight())[:700], atol=1e-9, rtol=0)
     assert len(read_log(log).t) == 700

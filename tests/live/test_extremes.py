@@ -76,7 +76,7 @@ def changed(rng, data, share):
 class Link:
     """A link by which one piece of bytes comes at a time."""
 
-    peer = opened = "here"
+    peer = sender = opened = "here"
 
     def __init__(self):
         self.pieces = []
@@ -88,6 +88,9 @@ class Link:
         return self.pieces.pop(0) if self.pieces else None
 
     def write(self, data):
+        pass
+
+    def answer(self, sender):
         pass
 
 
@@ -116,6 +119,8 @@ def test_a_datagram_that_costs_much_is_malformed(data):
     stream.source.link, stream.source._understood = SimpleNamespace(read=lambda _: data), True
     stream.session._once()
     assert stream.source.tallies.counts == {"malformed": 64}
+    (said,) = stream.said()
+    assert "left out as malformed" in said
 
 
 @counts

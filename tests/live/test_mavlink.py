@@ -129,6 +129,41 @@ def test_a_flight_with_faults():
     assert np.abs(found - flight()["force"][1200:1400].mean(axis=0)).max() < 0.1
 
 
+def test_of_two_vehicles_at_one_address_one_is_listened_to():
+    """The second has another number and comes from elsewhere; a ground station disturbs nobody."""
+    pilot = Autopilot()
+    other, station = (
+        mavutil.mavlink_connection(
+            f"udpout:127.0.0.1:{pilot.port}",
+            source_system=number,
+            source_component=component,
+            dialect="common",
+        )
+        for number, component in ((8, 1), (255, 190))
+    )
+
+    def beside(k):
+        station.mav.heartbeat_send(common.MAV_TYPE_GCS, common.MAV_AUTOPILOT_INVALID, 0, 0, 0)
+        if k > 20:
+            q = flight()["quaternion"][k] * HALF
+            other.mav.att_pos_mocap_send(pilot.us(k), q, 9.0, 0.0, 0.0)
+            other.mav.odometry_send(
+                pilot.us(k), 1, 12, 9.0, 0.0, 0.0, q, *[0] * 6, *[[0.0] * 21] * 2, 0, 0, 0
+            )
+
+    pilot.play(range(200), beside=beside)
+    pilot.until(lambda: pilot.tallies.counts["other senders"] >= 179)
+    pilot.end()
+    other.close()
+    station.close()
+    assert not pilot.failed
+    assert len(pilot.outputs) == 200
+    assert max(abs(o.row.position[0]) for o in pilot.outputs) < 5.0
+    (said,) = [line for line in pilot.tallies.news() if "send the same" in line]
+    assert "system 7 at 127.0.0.1:" in said
+    assert "and system 8 at 127.0.0.1:" in said
+
+
 def test_the_wrench_comes_back_in_the_vehicles_own_frame():
     drag = EffectSetting("rotor_drag", {"kdx": 1.2e-4, "kdy": 1.2e-4})
     pilot = Autopilot(VEHICLE.with_effects(drag)).play(range(100))

@@ -14,6 +14,7 @@ from windwrench.identification.logs.reading import read_log
 from windwrench.live.field_map import FieldMap
 from windwrench.live.messages import Malformed
 from windwrench.live.sources.open import make_source
+from windwrench.live.sources.senders import Senders
 from windwrench.live.tallies import Tallies
 
 OWN = "t,px,py,pz,qw,qx,qy,qz,omega1,omega2,omega3,omega4\n"
@@ -74,12 +75,23 @@ def test_a_table_of_another_kind_by_its_map(tmp_path):
     assert run_text(text, wanted).session.estimates == 3
 
 
-def test_a_bad_line_on_the_way_is_counted():
+@pytest.mark.parametrize("bad", [(500,), (1,), (1, 2, 3)])
+def test_bad_lines_are_counted_wherever_they_stand(bad):
+    """Also right behind the header, such as a line of units."""
     lines = as_csv(flight()).splitlines()
-    lines[500] = lines[500][:20]
+    for k in bad:
+        lines[k] = lines[k][:20]
     stream = run_text("\n".join(lines))
-    assert stream.tallies.counts == {"malformed": 1}
-    assert len(stream.outputs) == len(flight()["t"]) - 1
+    assert not stream.failed
+    assert stream.tallies.counts == {"malformed": len(bad)}
+    assert len(stream.outputs) == len(flight()["t"]) - len(bad)
+    said = stream.tallies.news()
+    assert "standard input: left out as malformed: a row of 2 field(s)" in said[0]
+
+
+def test_a_table_without_a_good_line_is_refused_after_100():
+    said = run_text(OWN + 200 * "1,2\n").failed[0]
+    assert "all of the first 100 messages are malformed, the first: a row of 2 field(s)" in said
 
 
 class Sender(Running):
@@ -130,6 +142,78 @@ def test_datagrams_with_faults_over_the_loopback():
     assert answers[-1]["status"] == "tracking"
 
 
+def taken(senders, sender, seconds, *quantities):
+    return senders.take(sender, quantities, round(seconds * 1e9))
+
+
+def test_the_first_of_two_senders_of_the_same_is_taken_until_it_is_silent():
+    tallies = Tallies()
+    senders = Senders("port", tallies)
+    for k in range(100):  # 100 Hz each
+        assert taken(senders, "a", 0.01 * k, "position", "rotor_speeds")
+        # the first could be a program that sends once from each address
+        assert taken(senders, "b", 0.01 * k + 0.005, "position", "rotor_speeds") == (k < 1)
+    assert tallies.counts == {"other senders": 99}
+    assert not taken(senders, "b", 1.0, "voltage")  # nor anything else of it
+    assert not taken(senders, "b", 2.5, "position")
+    assert tallies.news() == [
+        "warning: port: a and b send the same; a is listened to until it is silent for 2 s"
+    ]
+    assert taken(senders, "b", 3.1, "position")
+    assert tallies.news() == ["warning: port: a is silent; b is listened to"]
+    assert not taken(senders, "a", 3.2, "position")
+
+
+def test_senders_of_different_quantities_join():
+    tallies = Tallies()
+    senders = Senders("port", tallies)
+    for k in range(300):
+        assert taken(senders, "camera", 0.01 * k, "position")
+        assert taken(senders, "autopilot", 0.01 * k, "rotor_speeds")
+    assert not tallies.counts
+    assert not tallies.news()
+
+
+def test_of_two_vehicles_whose_messages_alternate_one_is_taken_whole():
+    """The second's rotor speeds come before the first's: they are not joined with its poses."""
+    tallies = Tallies()
+    senders = Senders("port", tallies)
+    order = [("a", "position"), ("b", "rotor_speeds"), ("b", "position"), ("a", "rotor_speeds")]
+    found = [(who, taken(senders, who, 0.01 * k, what)) for k in range(50) for who, what in order]
+    assert len({who for who, is_taken in found[8:] if is_taken}) == 1
+    assert sum(is_taken for _, is_taken in found) >= 98
+
+
+def test_a_socket_for_each_message_is_one_sender():
+    tallies = Tallies()
+    senders = Senders("port", tallies)
+    assert all(taken(senders, f"address {k}", 0.01 * k, "position") for k in range(1000))
+    assert not tallies.news()
+    assert len(senders._last) == 1
+
+
+def test_two_senders_on_one_port_are_told_by_their_addresses():
+    sender, flown = Sender(), as_objects(flight())
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 0))
+        for k, one in enumerate(flown[:100]):
+            sender.send(one)
+            sender.taken("row", k + 1)
+            if k > 10:  # another vehicle, 5 m away
+                away = json.dumps(one | {"px": one["px"] + 5.0}).encode()
+                other.sendto(away, ("127.0.0.1", sender.port))
+        sender.until(lambda: sender.tallies.counts["other senders"] == 89)
+        addresses = [f"127.0.0.1:{one.getsockname()[1]}" for one in (sender.socket, other)]
+        with pytest.raises(BlockingIOError):  # nothing is answered to it
+            other.recv(4096, socket.MSG_DONTWAIT)
+    assert len(sender.end().answers) == len(sender.outputs) == 100
+    assert (
+        f"{addresses[0]} and {addresses[1]} send the same; {addresses[0]} is listened"
+        in (sender.tallies.news()[-1])
+    )
+    assert max(abs(o.estimate.position[0]) for o in sender.outputs) < 1.0
+
+
 @pytest.mark.parametrize(
     ("wraps", "numbers"), [(0, (7, 8, 12, 10, 12)), (256, (254, 255, 3, 1, 3))]
 )
@@ -143,8 +227,10 @@ def test_what_is_missing_in_a_senders_count_is_lost_unless_it_was_late(wraps, nu
 
 
 def first_datagram(data):
+    """Nothing else comes: 100 times the same."""
     sender = Sender()
-    sender.send(data)
+    for _ in range(100):
+        sender.send(data)
     sender.thread.join()
     return sender.end()
 
@@ -160,7 +246,19 @@ def first_datagram(data):
         (run_text, "", "no message came"),
         (run_text, b"\x00\x01\x02" * 50_000, "a line of more than"),
         (first_datagram, b"hello", "expected a datagram of JSON"),
-        (first_datagram, b"[1, 2]", "an object"),
+        (first_datagram, b"[1, 2]", "1; expected an object"),
+        (first_datagram, b"null", "null; expected an object"),
+        (first_datagram, b"[null]", "null; expected an object"),
+        (first_datagram, b"[]", "[]; expected an object"),
+        (first_datagram, b"3", "3; expected an object"),
+        (first_datagram, b'"x"', '"x"; expected an object'),
+        (first_datagram, b"NaN", "NaN; expected an object"),
+        (first_datagram, b"", "expected a datagram of JSON"),
+        (first_datagram, b"{}", "none of the fields"),
+        (first_datagram, b'{"t": NaN, "px": 1}', "nan; expected a time"),
+        (first_datagram, b'{"t": {"s": [1]}, "px": 1}', "expected a time"),
+        (first_datagram, b'{"t": 1, "px": "\xff\xfe"}', "expected a datagram of JSON"),
+        (first_datagram, b'{"t": 1, "\\ud800": 1}', "none of the fields"),
         (first_datagram, b'{"t": 1, "px": 1, "py": 2}', "no field pz"),
         (first_datagram, b'{"t": "soon", "px": 1}', "expected a time"),
         (first_datagram, b'{"t": 1, "speed": 4}', "none of the fields"),
@@ -174,6 +272,28 @@ def first_datagram(data):
 )
 def test_what_is_no_table_and_no_datagram_is_refused(run, data, said):
     assert said in run(data).failed[0]
+
+
+@pytest.mark.parametrize("data", [b"null", b"[]", b"hello", b'{"t": 1}', b"[" * 5000])
+def test_a_bad_datagram_at_the_beginning_is_counted(data):
+    sender = Sender()
+    sender.send(data)
+    for k, one in enumerate(as_objects(flight())[:50]):
+        sender.send(one)
+        sender.taken("row", k + 1)
+    assert not sender.end().failed
+    assert sender.tallies.counts == {"malformed": 1}
+    assert len(sender.outputs) == 50
+    assert "left out as malformed" in sender.tallies.news()[-1]
+
+
+def test_where_nothing_good_comes_the_error_says_what_came():
+    sender = Sender()
+    sender.send(b"null")
+    sender.until(lambda: sender.tallies.counts["malformed"])
+    said = str(sender.session._nothing("within 1 s"))
+    assert "no good message came within 1 s; 1 malformed, the first: null; expected an" in said
+    sender.end()
 
 
 def test_a_source_that_says_nothing_and_a_second_one_at_its_address_end():

@@ -1,0 +1,91 @@
+"""Whose messages are taken where several send to one address.
+
+Two vehicles in one stream would give one calm and wrong estimate. So each quantity is taken from
+the sender that has sent it first, and all messages of a second sender of the same are left out,
+until the first is silent for 2 s. Senders of different quantities (a camera's poses, an autopilot's
+rotor speeds) join. A program that opens a socket for each message never sends twice from one
+address: nobody is first by a single message.
+"""
+
+from collections import deque
+from collections.abc import Collection
+
+from ..messages import SECOND
+from ..tallies import Tallies
+
+_SILENT = 2.0  # s without a message, after which another sender is taken
+_REMEMBERED = 64  # senders
+_TOLD = 4  # lines, however many senders there are
+
+
+class Senders:
+    """Who sends what to an address.
+
+    Args:
+        name: of the address, for people.
+        tallies: where messages of others are counted.
+    """
+
+    def __init__(self, name: str, tallies: Tallies) -> None:
+        self._name, self._tallies = name, tallies
+        self._last: dict[str, int] = {}  # ns, of senders that are taken, the first one first
+        self._single: dict[str, bool] = {}  # of the same: whether one message came
+        self._sender_of: dict[str, str] = {}  # of a quantity
+        self._rivals: dict[str, str] = {}  # senders that are left out, and beside whom
+        self._once: deque[str] = deque(maxlen=_REMEMBERED)  # senders of one message
+        self._lines = 0
+
+    def take(self, sender: str, quantities: Collection[str], arrival: int) -> bool:
+        """Return whether a message of a sender is taken that came at ``arrival``, ns."""
+        other = self._rivals.get(sender)
+        for name in quantities:
+            if other is None and self._sender_of.get(name, sender) != sender:
+                other = self._sender_of[name]
+        if other is None:
+            self._last[sender] = arrival
+            self._single[sender] = sender not in self._single and sender not in self._once
+            self._sender_of |= dict.fromkeys(quantities, sender)
+            return True
+        if arrival - self._last[other] > _SILENT * SECOND:
+            self._forget(other)
+            self._say(f"{other} is silent; {sender} is listened to")
+        elif self._single[other]:
+            self._once.append(other)
+            self._forget(other)
+        elif self._is_before(sender, other):
+            self._leave_out(other, sender)
+        else:
+            self._leave_out(sender, other)
+            self._tallies.counts["other senders"] += 1
+            return False
+        return self.take(sender, quantities, arrival)
+
+    def leaves_out(self, sender: str) -> bool:
+        """Return whether the messages of a sender are left out."""
+        return sender in self._rivals
+
+    def _is_before(self, sender: str, other: str) -> bool:
+        taken = list(self._last)
+        return sender in taken and taken.index(sender) < taken.index(other)
+
+    def _leave_out(self, rival: str, first: str) -> None:
+        if rival in self._rivals:
+            return
+        if rival in self._last:
+            self._forget(rival)
+        if len(self._rivals) < _REMEMBERED:
+            self._rivals[rival] = first
+        self._say(
+            f"{first} and {rival} send the same; {first} is listened to until it is silent for "
+            f"{_SILENT:g} s"
+        )
+
+    def _forget(self, sender: str) -> None:
+        del self._last[sender], self._single[sender]
+        self._sender_of = {what: who for what, who in self._sender_of.items() if who != sender}
+        self._rivals = {rival: first for rival, first in self._rivals.items() if first != sender}
+
+    def _say(self, line: str) -> None:
+        if self._lines < _TOLD:
+            self._lines += 1
+            self._tallies.say(f"warning: {self._name}: {line}")

@@ -1,0 +1,258 @@
+"""Senders whose clocks are not ours: simulators at any rate, paused ones, restarted ones; by their
+messages, with and without stamps. No time passes: messages carry the times at which they come.
+"""
+
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.live import stream
+from tests.live.stream import VEHICLE, Pipeline
+from windwrench.live.clock_line import ClockLine
+from windwrench.live.messages import SECOND
+from windwrench.live.sources.open import make_source
+from windwrench.live.tallies import Tallies
+
+RATES = (0.5, 0.7, 0.9, 1.0, 1.1, 1.5)
+START = 100.0  # s, on our clock
+LATENCY, JITTER = 0.005, 0.015  # s: delays of 5 to 20 ms
+
+
+def flight():
+    """A flight whose poses need no stamp: in 15 ms it moves by less than they are off."""
+    return stream.flight(8.0, "gentle")
+
+
+def times_of(flown, ours, jitter=JITTER, bursts=(), in_order=False):
+    """When messages come, s on our clock, with their kinds and rows: rotor speeds of each row, a
+    pose of every second. ``ours`` makes our time of the sender's.
+    """
+    rng, found = np.random.default_rng(1), []
+    for k, t in enumerate(flown["t"]):
+        for kind in ("motors", "pose")[: 2 - k % 2]:
+            at = ours(t) + LATENCY + rng.uniform(0.0, jitter)
+            at = next((end for begin, end in bursts if begin <= at < end), at)
+            found.append([START + at, kind, k])
+    if in_order:
+        for before, one in pairwise(found):
+            one[0] = max(one[0], before[0])
+    return sorted(found, key=lambda one: one[0])
+
+
+class Json:
+    """Objects of JSON."""
+
+    def __init__(self, flown):
+        self.flown = flown
+        self.source = make_source("udp-json://:9", VEHICLE, None, Tallies())
+
+    def message(self, kind, k, stamp):
+        flown = self.flown
+        named = {"t": stamp} if stamp is not None else {}
+        if kind == "motors":
+            values = flown["rotor_speeds"][k]
+            return named | {f"omega{i + 1}": float(x) for i, x in enumerate(values)}, "here"
+        values = [*flown["position"][k], *flown["quaternion"][k]]
+        names = ("px", "py", "pz", "qw", "qx", "qy", "qz")
+        return named | dict(zip(names, map(float, values), strict=True)), "here"
+
+
+class Mavlink:
+    """Messages of an autopilot; rotor speeds without a stamp are those that ArduPilot sends."""
+
+    def __init__(self, flown):
+        common = pytest.importorskip("pymavlink.dialects.v20.ardupilotmega")
+        from windwrench.live.sources.esc_status import add_esc_status
+
+        self.flown, self.esc_status = flown, add_esc_status(common)
+        self.source = make_source("mavlink:udp://:9?pose=ODOMETRY", VEHICLE, None, Tallies())
+        self.source.link.sender = "here"
+        self.bytes = []
+        self.sender = common.MAVLink(SimpleNamespace(write=self.bytes.append), srcSystem=7)
+        self.parser = common.MAVLink(None)
+
+    def message(self, kind, k, stamp):
+        flown, us = self.flown, round(1e6 * (stamp or 0.0))
+        if kind == "motors":
+            rpm = [round(w * 30 / np.pi) for w in flown["rotor_speeds"][k][[3, 1, 0, 2]]]
+            if stamp is None:
+                self.sender.esc_telemetry_1_to_4_send(*[[0] * 4] * 4, rpm, [0] * 4)
+            else:
+                self.sender.send(self.esc_status(0, us, rpm, [11.0] * 4, [1.0] * 4))
+        else:
+            x, y, z = flown["position"][k] * [1, -1, -1]
+            q = flown["quaternion"][k] * [1, 1, -1, -1]
+            self.sender.odometry_send(us, 1, 12, x, y, z, q, *[0] * 6, *[[0.0] * 21] * 2, 0, 0, 0)
+        return self.parser.parse_buffer(self.bytes.pop())[0]
+
+
+def played(sender, times, stamped, stamp_of=lambda kind, t: t):
+    """The stream of a sender's messages; ``stamped`` are the kinds that have a stamp."""
+    live, flown = Pipeline(), sender.flown
+    for at, kind, k in times:
+        stamp = stamp_of(kind, float(flown["t"][k])) if kind in stamped else None
+        message = sender.message(kind, k, stamp)
+        live.session.take(sender.source.decode(message, round(at * SECOND)))
+        live.session.watch.look(round(at * SECOND))
+    return live
+
+
+def error_of(live, after=4.0):
+    """Root mean square of the force's error, N."""
+    t, force = live.wrench()[:, 0], live.wrench()[:, 1:4]
+    truth = [np.interp(t - t[0], flight()["t"], part) for part in flight()["force"].T]
+    wrong = force - np.transpose(truth)
+    return float(np.sqrt(np.mean(np.square(wrong[t - t[0] > after]))))
+
+
+SENDERS = [
+    (Json, ("motors", "pose")),
+    (Json, ("pose",)),
+    (Json, ("motors",)),
+    (Mavlink, ("motors", "pose")),
+    (Mavlink, ("pose",)),
+]
+IDS = ["JSON", "JSON, rotors unstamped", "JSON, poses unstamped", "MAVLink", "ESC telemetry"]
+senders = pytest.mark.parametrize(("kind", "stamped"), SENDERS, ids=IDS)
+
+
+@pytest.mark.parametrize("jitter", [0.0, JITTER])
+@pytest.mark.parametrize("rate", RATES)
+@senders
+def test_a_simulator_of_any_rate_has_no_pose_too_late(kind, stamped, rate, jitter):
+    """The filter's steps are the simulator's: so is the stream's time, and the force is right."""
+    flown = flight()
+    live = played(kind(flown), times_of(flown, lambda t: t / rate, jitter), stamped)
+    assert live.tallies.counts["too late"] == 0
+    assert live.session.watch.poses == 801
+    assert len(live.outputs) >= 795  # the first poses wait for rotor speeds
+    assert live.outputs[-1].t - live.outputs[0].t == pytest.approx(8.0, abs=0.06)
+    assert live.session.filter.restarts == 0
+    assert error_of(live) < 0.04
+    said = " ".join(live.tallies.news())
+    if abs(rate - 1.0) > 0.01 and 8.0 / rate > 10.5:
+        assert f"the sender's clock runs at {rate:.2f}" in said
+    elif rate == 1.0:
+        assert not said
+
+
+PAUSED = {
+    "paused for 2 s": lambda t: t + 2.0 * (t > 4.0),
+    "paused for 0.2 s, often": lambda t: t + 0.2 * np.floor(t),
+    "0.5, then 1.5, then 0.6 of real time": lambda t: np.interp(
+        t, [0.0, 2.0, 5.0, 8.0], [0.0, 4.0, 6.0, 11.0]
+    ),
+    "a rate that comes and goes": lambda t: t + 0.3 * np.sin(1.2 * t),
+}
+
+
+@pytest.mark.parametrize("pace", PAUSED)
+@senders
+def test_a_clock_that_changes_its_rate_costs_no_pose(kind, stamped, pace):
+    flown = flight()
+    live = played(kind(flown), times_of(flown, PAUSED[pace]), stamped)
+    assert live.tallies.counts["too late"] == 0
+    assert len(live.outputs) >= 795
+    assert live.outputs[-1].t - live.outputs[0].t == pytest.approx(8.0, abs=0.11)
+    assert error_of(live) < 0.06
+
+
+@pytest.mark.parametrize("in_order", [False, True])
+@senders
+def test_bursts_of_a_link_cost_no_pose(kind, stamped, in_order):
+    """Nothing comes for up to 0.5 s, then all at once, of a simulator at 0.9 of real time."""
+    flown = flight()
+    bursts = [(2.0, 2.5), (4.0, 4.2), (6.0, 6.1)]
+    times = times_of(flown, lambda t: t / 0.9, bursts=bursts, in_order=in_order)
+    live = played(kind(flown), times, stamped)
+    assert live.tallies.counts["too late"] == 0
+    assert len(live.outputs) >= 795
+    assert error_of(live) < 0.1
+
+
+@pytest.mark.parametrize("rate", [0.5, 1.0, 1.5])
+@senders
+def test_a_sender_that_restarts_is_followed_after_20_messages(kind, stamped, rate):
+    """Stamps begin at zero again, of two kinds of messages that come in turns."""
+    flown = flight()
+    live = played(
+        kind(flown),
+        times_of(flown, lambda t: t / rate),
+        stamped,
+        lambda kind, t: t - 4.0 if t > 4.0 else t,
+    )
+    assert live.tallies.counts["clock jumps"] == 1
+    lasted = max(20, 0.2 * rate * (200 * ("motors" in stamped) + 100 * ("pose" in stamped)))
+    assert live.tallies.counts["too late"] <= 1.2 * lasted
+    assert live.outputs[-1].t - live.outputs[0].t == pytest.approx(8.0, abs=0.06)
+
+
+@pytest.mark.parametrize("rate", [0.5, 1.0, 1.5])
+def test_where_poses_stop_the_estimate_goes_on_in_the_senders_time(rate):
+    """Rotor speeds without a stamp carry it for 2 s, as those with one do."""
+    flown = flight()
+    times = [
+        one
+        for one in times_of(flown, lambda t: t / rate)
+        if one[1] == "motors" or not 4.0 < flown["t"][one[2]] < 6.0
+    ]
+    live = played(Json(flown), times, ("pose",))
+    assert live.tallies.counts["too late"] == 0
+    gap = [o.t for o in live.outputs if 4.2 < o.t < 5.9]
+    assert len(gap) >= 9  # a row each 0.15 s
+    assert np.diff(gap).max() < 0.2
+
+
+def test_a_stream_without_any_stamp_is_in_our_time_and_says_so():
+    flown = flight()
+    live = played(Json(flown), times_of(flown, lambda t: t, 0.0), ())
+    assert len(live.outputs) == pytest.approx(700, abs=3)  # but for a second in which one may come
+    assert error_of(live) < 0.04
+    assert any("no message has a stamp" in line for line in live.tallies.news())
+
+
+@pytest.mark.parametrize(("simulator", "camera"), [(0.9, 1.0), (0.5, 1.0), (1.0, 0.9), (1.5, 1.0)])
+def test_two_clocks_of_different_rates_are_one_time(simulator, camera):
+    """Rotor speeds in the simulator's time, poses stamped from 1970 on another clock."""
+    flown, live = flight(), Pipeline()
+    sender = Json(flown)
+    for at, kind, k in times_of(flown, lambda t: t / simulator, JITTER):
+        t = float(flown["t"][k])
+        stamp = 1.7e9 + camera * t / simulator if kind == "pose" else t
+        message = sender.message(kind, k, stamp)
+        live.session.take(sender.source.decode(message, round(at * SECOND)))
+    assert live.session.clocks.count == 2
+    assert live.tallies.counts["too late"] <= 8  # 1 %
+    assert error_of(live) < 0.04
+
+
+def test_poses_that_are_too_late_are_told_with_their_share():
+    flown = flight()
+    times = [
+        [at + 0.6 * (kind == "pose" and k % 20 == 0), kind, k]
+        for at, kind, k in times_of(flown, lambda t: t)
+    ]
+    live = played(Json(flown), sorted(times), ("motors", "pose"))
+    late, poses = live.session.watch.too_late, live.session.watch.poses
+    assert (late, poses) == (77, 801)  # but for the last
+    (said,) = live.tallies.news()
+    assert "poses came more than 0.3 s late and were left out; --horizon takes later" in said
+    assert f"{late} of {poses} poses" in live.session.watch.late_words
+
+
+@pytest.mark.parametrize("rate", [0.3, 0.9, 1.0, 1.5])
+def test_the_line_of_a_clock_is_below_its_messages(rate):
+    rng = np.random.default_rng(3)
+    line = ClockLine(round(0.01 * SECOND), 7 * SECOND, SECOND)
+    for t in np.arange(0.0, 20.0, 0.01):
+        delay = 0.005 + rng.exponential(0.01)
+        arrival, stamp = round((t + delay) * SECOND), round((7.0 + rate * t) * SECOND)
+        line.add(arrival, stamp)
+        assert line.delay(arrival, stamp) >= 0.0
+    assert line.rate == pytest.approx(rate, rel=5e-3)
+    assert line.mean_rate == pytest.approx(rate, rel=1e-3)
+    least = 1e-9 * line.arrival_of(stamp) - t
+    assert least == pytest.approx(0.005, abs=0.003)
+    assert line.stamp_of(line.arrival_of(stamp)) == pytest.approx(stamp, abs=10)
