@@ -50,11 +50,11 @@ RESTARTS = 2
 SETTLED = 2.0  # s after an event, two rise times: the force holds from here on
 ERROR = 0.05  # of the weight, rms: as much as the default tuning lets a step's thrust miss
 BEYOND, SHARE = 4.0, 0.02  # deviations; share of rows: a normal wrench's is 4e-4
+SEQUENCES = 157  # of wrong attitudes
 WRONG = 6.0  # deviations after wrong attitudes: a normal wrench's share is 1e-8
 
 _MARGIN = 8  # half periods at the ends of a path, which derivatives use up
 _FADE = 2.0  # s, in which a trajectory fades in
-_SEQUENCES = 157  # of wrong attitudes
 _QUIET, _QUIET_ROWS = 60.0, 30_000  # s and rows, at most, of a flight without an event
 
 
@@ -340,7 +340,7 @@ def fly_wrong_attitudes(seed: int) -> tuple[str, Claim, Claim]:
     """Fly a drawn filter without a gate through wrong attitudes of .1 to 1.5 s; return what
     happens, and what it claims meanwhile and later: from ``SETTLED`` to twice that after them.
     """
-    rng = np.random.default_rng([seed, _SEQUENCES])
+    rng = np.random.default_rng([seed, SEQUENCES])
     kind, flown, noise = (str(rng.choice(list(axis))) for axis in (FILTERS, FLOWN, NOISES))
     seconds = math.exp(rng.uniform(math.log(0.1), math.log(1.5)))
     flight = exact_flight(flown, BEFORE + 1.5 + 2.0 * SETTLED)
@@ -359,7 +359,7 @@ def fly_wrong_attitudes(seed: int) -> tuple[str, Claim, Claim]:
 
 def wrong_attitudes(seeds: int) -> None:
     """Fly sequences of wrong attitudes; print those whose wrench is off by more than it says."""
-    count = seeds * _SEQUENCES
+    count = seeds * SEQUENCES
     wrong, worst = [0, 0], [Claim(), Claim()]
     for seed in progress(range(count)):
         words, *claims = fly_wrong_attitudes(seed)

@@ -186,7 +186,7 @@ LIVES = (
 )
 
 
-@pytest.mark.parametrize("noise", mostly_slow([0.0, 1.0], lambda noise: noise == 0.0))
+@pytest.mark.parametrize("noise", mostly_slow([0.0, 1.0, 1.5, 2.0, 3.0], lambda n: n == 0.0))
 @pytest.mark.parametrize("life", LIVES, ids=lambda life: " ".join(map(str, life)))
 def test_the_wrench_is_right_again_after_two_rise_times(life, noise):
     vehicle, kind, dt, gate, fault, *beside = life

@@ -37,6 +37,7 @@ from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
 from windwrench.live.export_c.c_numbers import FUNCTIONS
 from windwrench.live.export_c.effect_code import exportable_effects
 from windwrench.live.export_c.policies import PARTICLES, briefing_of
+from windwrench.studies.recovery import QUIET_NOISES, exact_flight, measured
 
 LARGEST = 0.01  # of a standard deviation
 QUICK = 1_200  # steps of each of five flights
@@ -152,6 +153,26 @@ def test_c_and_python_agree_along_hostile_sequences(
         assert max(worst[part] for part in PARTS) < ROUNDING[precision], (seed, worst)
         restarts += worst["restarts"]
     assert restarts > 0
+
+
+@pytest.mark.parametrize("gate", [None, 0.9999])
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_good_poses_restart_c_as_rarely_as_python(estimator, gate, tmp_path):
+    """However much noisier than declared they are."""
+    good = exact_flight("ardrone2@200", 20.0)
+    exported = export_c(good.vehicle, estimator, good.rate, gate=gate)
+    c = CompiledFilter(exported, tmp_path)
+    for noise, errors in QUIET_NOISES.items():
+        position, attitude = measured(good, errors, np.random.default_rng(0))
+        flown = {
+            "dt": np.full(len(position), 1.0 / good.rate),
+            "rotor_speeds": good.rotor_speeds,
+            "position": position,
+            "quaternion": attitude.as_quat(scalar_first=True),
+        }
+        flown = {name: x.astype(np.float32).astype(float) for name, x in flown.items()}
+        worst = compare(c, exported.filter, flown, 20)
+        assert worst["status"] == worst["restarts"] == c.estimate.restarts == 0, noise
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)

@@ -49,7 +49,8 @@ def calm(name, imu, kind, noise):
 
 
 @pytest.mark.parametrize(
-    ("count", "noise"), [(10, 1.0), pytest.param(170, 1.0, marks=pytest.mark.slow)]
+    ("count", "noise"),
+    [(10, 1.0), *(pytest.param(*many, marks=pytest.mark.slow) for many in ((170, 1.0), (80, 1.5)))],
 )
 @pytest.mark.parametrize("kind", ESTIMATORS)
 def test_all_is_right_again_after_any_spell_of_bad_poses(kind, count, noise):

@@ -10,7 +10,9 @@ from windwrench.studies.recovery import (
     FLOWN,
     GATES,
     NOISES,
+    SEQUENCES,
     TAILS,
+    WRONG,
     Verdict,
     befall,
     estimated,
@@ -25,6 +27,7 @@ from windwrench.studies.recovery import (
     turned,
 )
 
+AXES = (FILTERS, FLOWN, NOISES, EVENTS, GATES)
 SIZES = {"x1": 1.0, "x3": 3.0, "student": 1.0, "quantised": np.sqrt(1.0 + 4.0**2 / 12.0)}
 
 
@@ -74,10 +77,9 @@ def test_what_happens_to_poses_happens_to_them_alone():
 
 
 def test_there_are_576_and_each_word_chooses():
-    axes = (FILTERS, FLOWN, NOISES, EVENTS, GATES)
-    assert len(named(axes, "")) == 576
-    assert len(named(axes, "gap ukf")) == 48
-    assert named(axes, "ukf ardrone2@200 x2 tilt no-gate") == [
+    assert len(named(AXES, "")) == 576
+    assert len(named(AXES, "gap ukf")) == 48
+    assert named(AXES, "ukf ardrone2@200 x2 tilt no-gate") == [
         ("ukf", "ardrone2@200", "x2", "tilt", "no-gate")
     ]
 
@@ -98,6 +100,37 @@ def test_poses_as_noisy_as_declared_are_within_the_limits(kind, event):
     assert verdict.error > 0.0
     assert fly_combination(words) == verdict
     assert fly_combination(words, seed=1) != verdict
+
+
+# in these, one restart once brought the next for ever
+ENDLESS = [
+    (kind, *words)
+    for kind in FILTERS
+    for words in (
+        ("crazyflie@100", "x2", "gap", "gate=.9999"),
+        ("hummingbird@100", "x1.5", "jump", "gate=.99"),
+        ("ardrone2@200", "x3", "nothing", "no-gate"),
+    )
+]
+
+
+@pytest.mark.parametrize("words", ENDLESS, ids=" ".join)
+def test_noisier_poses_than_declared_are_within_the_limits(words):
+    assert fly_combination(words).failures == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", FILTERS)
+def test_all_combinations_are_within_the_limits(kind):
+    verdicts = {words: fly_combination(words) for words in named(AXES, kind)}
+    assert len(verdicts) == 192
+    assert [(words, v) for words, v in verdicts.items() if v.failures] == []
+
+
+@pytest.mark.slow
+def test_wrong_attitudes_are_got_over_without_a_gate():
+    later = {words: claim.z for words, _, claim in map(fly_wrong_attitudes, range(SEQUENCES))}
+    assert [(words, z) for words, z in later.items() if not z <= WRONG] == []
 
 
 def test_a_filter_that_knows_the_noise_is_told_it():
