@@ -5,7 +5,8 @@ A Kalman filter's model knows none of five events. Each breaks another assumptio
 * *Noise* other than declared makes every pose unlikely, or none. The filter learns the variances of
   measured attitudes and positions from the poses (``learn_noise``), starting at the declared ones.
   Where poses refute the declared variance the filter takes a wider one. The filter never takes a
-  narrower one: smooth errors of a motion capture change little from pose to pose.
+  narrower one: smooth errors of a motion capture change little from pose to pose. Until a refutation
+  the filter is the paper's, bit for bit.
 * A *gap* makes the covariance grow. A part that is known no better than a prior is *lost*: pose and
   twist are held with the prior's covariance, and the next measurement restarts them.
 * An *outlier* is a pose that jumps: far from the filter's expectation and, by more than a vehicle
@@ -83,8 +84,9 @@ MEMORY_OF_NOISE = 200.0
 # a pose counts with at most this many times the square expected of its three numbers: noise alone
 # exceeds that in one of 140, and a jump of any size counts as little
 LARGEST_SQUARE = 4.0
-# times the deviation of what was learned beyond which the declared noise is refuted
-SURE = 3.0
+# The declared variance is refuted where a learned one, less three of its own deviations, exceeds it
+# by half: vehicle files state deviations to some 20 %
+SURE, REFUTED = 3.0, 1.5
 
 # Phases, what a filter makes of measured poses, as a record holds them, lanes too
 BELIEVING = 0.0  # the last pose was taken in, or the filter restarted there
@@ -206,9 +208,10 @@ def grow_older(f: Record, dt: float) -> None:
     what was learned of it.
     """
     m = f.poses
-    allowed = 1.0 + SURE / math.sqrt(PRIOR_OF_NOISE + m.judged)
+    uncertainty = 1.0 + SURE / math.sqrt(PRIOR_OF_NOISE + m.judged)
     for part in range(2):
-        m.widened[part] = max((1.0 + f.excess[part]) / allowed - 1.0, 0.0)
+        proved = (1.0 + f.excess[part]) / uncertainty
+        m.widened[part] = choose(proved > REFUTED, proved - 1.0, 0.0)
     m.settling -= dt
     m.strain -= min(dt / f.patience, 1.0) * m.strain
     m.position_age += dt
