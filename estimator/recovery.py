@@ -5,8 +5,8 @@ A Kalman filter's model knows none of five events. Each breaks another assumptio
 * *Noise* other than declared makes every pose unlikely, or none. The filter learns the variances of
   measured attitudes and positions from the poses (``learn_noise``), starting at the declared ones.
   Where poses refute the declared variance the filter takes a wider one. The filter never takes a
-  narrower one: smooth errors of a motion capture change little from pose to pose. Until a refutation
-  the filter is the paper's, bit for bit.
+  narrower one: smooth errors of a motion capture change little from pose to pose. Unrefuted, the
+  filter is the paper's, bit for bit.
 * A *gap* makes the covariance grow. A part that is known no better than a prior is *lost*: pose and
   twist are held with the prior's covariance, and the next measurement restarts them.
 * An *outlier* is a pose that jumps: far from the filter's expectation and, by more than a vehicle
