@@ -16,7 +16,7 @@ _SECONDS = 12.0  # of the flight that is recorded, the shortest that is diagnose
 
 
 def warm() -> dict[str, Any]:
-    """Compile what the common commands need. Once for an installation; no later start waits for it.
+    """Compile what the common commands need. Once for this code; no later start waits for it.
 
     Example: windwrench warm
     """

@@ -13,7 +13,7 @@ PATIENCE = 2.0  # s of compiling until the line
 _PAUSE = 1.0  # s between two functions, while which the words stay
 _ONCE, _EACH = "compiling, once for this code", "compiling, at each start"
 LINE = f"windwrench: {_ONCE}; later starts load it"
-NOT_KEPT = f"windwrench: {_EACH}: no folder can be written that keeps it; NUMBA_CACHE_DIR names one"
+NOT_KEPT = f"windwrench: {_EACH}: found no folder to keep it; NUMBA_CACHE_DIR can name one"
 
 
 class CompileNotice:
