@@ -21,7 +21,7 @@ from windwrench.identification.motion.noise_spectrum import (
 )
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals
-from windwrench.identification.motion.smoothing import lagged, low_pass
+from windwrench.identification.motion.smoothing import high_pass, lagged, low_pass, robust_std
 from windwrench.studies.trials.logged_poses import FILTERS
 from windwrench.studies.trials.practice_flights import fly_practice
 
@@ -64,6 +64,14 @@ def test_the_low_pass_is_that_of_scipy_to_the_last_digit(shape):
     for cutoff in (1.0, 5.0, 40.0):
         there = sosfiltfilt(butter(2, cutoff / 100.0, output="sos"), x, axis=0)
         np.testing.assert_array_equal(low_pass(x, cutoff, 0.005), there)
+
+
+def test_the_size_of_white_noise_is_read_behind_a_high_pass_and_through_outliers():
+    noise = 0.02 * np.random.default_rng(0).standard_normal((20_000, 1))
+    assert robust_std(noise) == pytest.approx(0.02, rel=0.02)
+    assert robust_std(high_pass(noise, 0.25)) == pytest.approx(0.02, rel=0.03)
+    noise[::50] += 1.0
+    assert robust_std(noise) == pytest.approx(0.02, rel=0.05)
 
 
 @pytest.mark.parametrize("lag", [0.004, 0.03, 0.2])
