@@ -169,6 +169,14 @@ def test_the_pose_s_scalar_part_is_never_negative_so_its_sign_flips_facing_backw
     np.testing.assert_allclose(np.linalg.norm(rows[:, 3:], axis=1), 1.0, atol=1e-14)
 
 
+def test_the_pose_has_the_noise_that_the_vehicle_s_motion_capture_states():
+    rows, _ = sensed([1.0, 0.0, 0.0, 0.0], 3000, replace(QUIET, sensor_noise=True))
+    angles = Rotation.from_quat(rows[:, 3:], scalar_first=True).as_rotvec()
+    mocap = VEHICLE.mocap
+    np.testing.assert_allclose(angles.std(axis=0), mocap.sigma_att_rad, rtol=0.06)
+    np.testing.assert_allclose(rows[:, :3].std(axis=0), mocap.sigma_pos_m, rtol=0.06)
+
+
 def test_the_filter_flies_on_through_dropouts():
     loop = ClosedLoop(VEHICLE, settings=PlantSettings(dropout=0.3))
     rng = np.random.default_rng(3)

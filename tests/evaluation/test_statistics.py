@@ -39,6 +39,8 @@ def test_probability_of_improvement_counts_all_pairs_of_runs_task_by_task():
 def test_paired_wins_are_of_an_episode_and_changes_of_the_means():
     assert relative_change([[0.9, 0.9]], [[1.0, 1.0]]) == pytest.approx(-0.1)
     assert paired_wins([[1.0, 5.0], [3.0, 5.0]], [[2.0, 5.0]]) == (1 + 0.5 + 0 + 0.5) / 4
+    # a rival of several runs is their mean, neither the best of them nor the worst
+    assert paired_wins([[1.9], [2.1]], [[1.0], [3.0]]) == 0.5
 
 
 def test_the_bootstrap_covers_the_truth_as_often_as_it_says():

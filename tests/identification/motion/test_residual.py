@@ -14,14 +14,17 @@ from windwrench.dynamics import EffectSetting, InputError, load_vehicle, preset_
 from windwrench.dynamics.effects import compile_effects
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.inertial_fusion import Readings, fuse
+from windwrench.identification.motion.inertial_signals import inertial_signals
 from windwrench.identification.motion.noise_spectrum import (
     filtering_notes,
     noise_spectra,
     pose_was_filtered,
 )
 from windwrench.identification.motion.residual import residual_wrench
+from windwrench.identification.motion.sensing_effects import undo_log_sensing
+from windwrench.identification.motion.sensor_noise import noisy_logs
 from windwrench.identification.motion.signals import log_signals
-from windwrench.identification.motion.smoothing import lagged, low_pass
+from windwrench.identification.motion.smoothing import high_pass, lagged, low_pass, robust_std
 from windwrench.studies.trials.logged_poses import FILTERS
 from windwrench.studies.trials.practice_flights import fly_practice
 
@@ -66,6 +69,14 @@ def test_the_low_pass_is_that_of_scipy_to_the_last_digit(shape):
         np.testing.assert_array_equal(low_pass(x, cutoff, 0.005), there)
 
 
+def test_the_size_of_white_noise_is_read_behind_a_high_pass_and_through_outliers():
+    noise = 0.02 * np.random.default_rng(0).standard_normal((20_000, 1))
+    assert robust_std(noise) == pytest.approx(0.02, rel=0.02)
+    assert robust_std(high_pass(noise, 0.25)) == pytest.approx(0.02, rel=0.03)
+    noise[::50] += 1.0
+    assert robust_std(noise) == pytest.approx(0.02, rel=0.05)
+
+
 @pytest.mark.parametrize("lag", [0.004, 0.03, 0.2])
 def test_a_first_order_lag_has_made_63_per_cent_of_a_step_after_its_time(lag):
     """At rest before the step, and each sample held over the period that ends there."""
@@ -86,6 +97,68 @@ def test_a_gap_ends_a_piece_and_a_lost_sample_does_not():
     assert [round(piece.t[-1] - piece.t[0], 1) for piece in pieces] == [6.0, 5.5]
     with pytest.raises(InputError, match="3 s"):
         log_signals(replace(log, valid=np.arange(len(log.t)) < 300))
+
+
+def still_log(rate, seconds=20.0, **channels):
+    """A log of a vehicle at rest in the air, without any noise."""
+    n = round(rate * seconds)
+    attitude, speeds = np.tile([1.0, 0, 0, 0], (n, 1)), np.full((n, 4), VEHICLE.hover_rate)
+    return FlightLog(np.arange(n) / rate, np.zeros((n, 3)), attitude, speeds, **channels)
+
+
+@pytest.mark.parametrize(("lost", "pieces"), [(2, 1), (4, 2)])
+def test_at_20_hz_two_lost_samples_are_bridged_and_four_are_a_gap(lost, pieces):
+    log = still_log(20.0)
+    log.valid[200 : 200 + lost] = False
+    assert len(log_signals(log)) == pieces
+
+
+def test_a_declared_clock_offset_delays_the_voltage_and_takes_the_first_poses_after_a_break():
+    log = still_log(200.0, voltage=np.linspace(12.0, 11.0, 4000))
+    log.valid[1000:1100] = False
+    late = VEHICLE.with_effects(EffectSetting("clock_offset", {"dt": -0.02}))
+    undone = undo_log_sensing(log, late)
+    np.testing.assert_allclose(undone.voltage[4:], log.voltage[:-4], rtol=1e-9)
+    unseen = np.flatnonzero(~undone.valid)
+    np.testing.assert_array_equal(unseen, [*range(4), *range(1000, 1104)])
+
+
+@pytest.mark.parametrize(
+    ("own", "hidden", "added"), [(0.0, False, 0.0), (0.0, True, 1.0), (5.0, True, 5.0)]
+)
+def test_noise_that_a_filter_hid_is_what_the_vehicle_states_of_its_motion_capture(
+    own, hidden, added
+):
+    """In units of the vehicle's."""
+    log, stated = still_log(200.0), VEHICLE.mocap.sigma_pos_m
+    noise = np.random.default_rng(1).standard_normal(log.position.shape)
+    log = replace(log, position=own * stated * noise)
+    (noisier,) = noisy_logs([log], VEHICLE, hidden)
+    assert (noisier.position - log.position).std() == pytest.approx(added * stated, rel=0.05)
+
+
+def test_an_imu_at_1_khz_tells_as_much_as_one_of_half_its_noise_at_250_hz():
+    found = []
+    for rate, size in ((1000.0, 2.0), (250.0, 1.0)):
+        rng, log = np.random.default_rng(0), still_log(rate, 8.0)
+        position = np.full_like(log.position, np.nan)
+        tenth = slice(None, None, round(rate / 10.0))
+        position[tenth] = 0.002 * rng.standard_normal(position[tenth].shape)
+        gyro = 0.01 * size * rng.standard_normal(position.shape)
+        force = [0.0, 0.0, GRAVITY] + 0.1 * size * rng.standard_normal(position.shape)
+        (signals,) = inertial_signals(
+            replace(
+                log,
+                position=position,
+                quaternion=np.full_like(log.quaternion, np.nan),
+                valid=np.zeros(len(log.t), dtype=bool),
+                gyro=gyro,
+                accelerometer=force,
+            ),
+            GRAVITY,
+        )
+        found.append(np.concatenate([signals.attitude_std[-1], signals.velocity_std[-1]]))
+    np.testing.assert_allclose(found[0], found[1], rtol=0.15)
 
 
 @pytest.fixture(scope="module", params=["excite", "hover"])
