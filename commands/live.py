@@ -143,6 +143,12 @@ def _watch(session: "Session") -> bool:
     return interrupted
 
 
+def _noise(session: "Session") -> dict[str, float] | None:
+    """Return the noise of poses as multiples of the declared one; None: not known."""
+    scales = session.watch.noise_scales
+    return None if scales is None else dict(zip(("attitude", "position"), scales, strict=True))
+
+
 def _say(session: "Session") -> None:
     """Say what is new to its user, of a link or a failure."""
     for line in session.tallies.news():
@@ -172,6 +178,7 @@ def _summary(session: "Session") -> dict[str, Any]:
         "consistency": tallies.consistency.as_dict() if tallies.consistency.seconds else None,
         "period_s": session.filter.period,
         "clock_drift_ppm": session.clocks.drift,
+        "noise_scale": _noise(session),
         "poses": session.watch.poses,
         "poses_too_late": session.watch.too_late,
         "latency_ms": {"median": median, "p99": most},

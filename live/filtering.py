@@ -80,6 +80,11 @@ class LiveFilter:
         """How often the filter restarted."""
         return 0 if self._timed is None else self._timed.estimate.restarts
 
+    @property
+    def tuning(self) -> UKFTuning | None:
+        """Of the filter, in its period; None: it has not begun."""
+        return None if self._timed is None else self._timed.ukf.tuning
+
     def take(self, row: Row) -> list[Output]:
         """Return what a row leads to: nothing while rows are held back, then an estimate each."""
         if self._timed is None:

@@ -54,7 +54,7 @@ class Session:
         self._settings = self.filter.settings
         self.clocks = Clocks(tallies, self._settings.horizon, source.paced)
         self._joiner = Joiner(source.vehicle, tallies)
-        self.watch = Watch(tallies, self.clocks, self._settings.horizon)
+        self.watch = Watch(tallies, self.clocks, self.filter)
         self._stop = threading.Event()
         self._first = self._last = time.monotonic_ns()  # of messages
         self._begun = 0.0  # s, stream's time of the first estimate
@@ -189,6 +189,7 @@ class Session:
             self._begun = output.t
         self.estimates += 1
         self.output = output
+        self.watch.add(output)
         with self.tallies.spared("not sent", f"the answer to {self.source.name}"):
             self.source.send(output)
         self.tallies.wrench += output.wrench, output.wrench**2

@@ -1,13 +1,20 @@
 """What a user must know of a stream: said once while it runs, and summed up at its end."""
 
+from collections import deque
+
+import numpy as np
+
+from ..estimator.noise_scale import noise_scales_of, noise_warning
 from .clocks import Clocks
-from .messages import SECOND
+from .filtering import LiveFilter, Output
+from .messages import SECOND, Array
 from .tallies import Tallies
 
 _EVERY = SECOND  # ns between two looks
 _RATE = 0.01  # by which a clock differs from ours before it is told; devices' differ by 1e-4
 _LATE = 0.01  # share of poses; a link in order has none
 _POSES = 100  # poses before their share is told
+_NOISE, _LOOKS = 0.1, 50  # s between two looks at the noise, and looks whose median is told: 5 s
 
 
 class Watch:
@@ -16,12 +23,14 @@ class Watch:
     Args:
         tallies: where warnings are said.
         clocks: of the stream.
-        horizon: that a pose may be late, s.
+        live: the filter.
     """
 
-    def __init__(self, tallies: Tallies, clocks: Clocks, horizon: float) -> None:
-        self._tallies, self._clocks, self._horizon = tallies, clocks, horizon
+    def __init__(self, tallies: Tallies, clocks: Clocks, live: LiveFilter) -> None:
+        self._tallies, self._clocks, self._filter = tallies, clocks, live
         self.poses = self.too_late = 0
+        self._noise: deque[Array] = deque(maxlen=_LOOKS)
+        self._due_noise = -np.inf  # s, stream's time
         self._due = 0  # ns
         self._said: set[str] = set()  # subjects
 
@@ -29,6 +38,12 @@ class Watch:
         """Count a pose that came, and how many were found too late by it."""
         self.poses += 1
         self.too_late += too_late
+
+    def add(self, output: Output) -> None:
+        """Take in an estimate."""
+        if output.row.has_pose and output.t >= self._due_noise:
+            self._due_noise = output.t + _NOISE
+            self._noise.append(noise_scales_of(output.estimate))
 
     def look(self, now: int) -> None:
         """Warn of what is amiss, once a subject; ``now`` in ns."""
@@ -41,15 +56,34 @@ class Watch:
             self._warn("rate", f"{_clock_words(rate)}; the filter's steps are in the sender's time")
         if late := self.late_words:
             self._warn("late", late)
+        if noise := self.noise_words:
+            self._warn("noise", noise)
+
+    @property
+    def noise_scales(self) -> Array | None:
+        """Median noise of attitudes and positions (2,) over 5 s, as multiples of the declared
+        standard deviations; None: not known yet.
+        """
+        looks = self._noise.copy()
+        return np.median(looks, axis=0) if len(looks) == _LOOKS else None
+
+    @property
+    def noise_words(self) -> str:
+        """What is to be done where the poses' noise is not the declared one; else empty."""
+        scales, tuning = self.noise_scales, self._filter.tuning
+        if scales is None or tuning is None:
+            return ""
+        return noise_warning(scales, tuning, self._filter.settings.tuning is None)
 
     @property
     def late_words(self) -> str:
         """How many poses were too late; empty where that is hardly any."""
         if self.poses < _POSES or self.too_late <= _LATE * self.poses:
             return ""
+        horizon = self._filter.settings.horizon
         return (
-            f"{self.too_late} of {self.poses} poses came more than {self._horizon:g} s late and "
-            "were left out; --horizon takes later ones"
+            f"{self.too_late} of {self.poses} poses came more than {horizon:g} s late and were "
+            "left out; --horizon takes later ones"
         )
 
     @property
@@ -62,7 +96,7 @@ class Watch:
     @property
     def words(self) -> list[str]:
         """What there is to tell at the end."""
-        return [words for words in (self.rate_words, self.late_words) if words]
+        return [words for words in (self.rate_words, self.late_words, self.noise_words) if words]
 
     def _warn(self, subject: str, words: str) -> None:
         if subject not in self._said:

@@ -1,0 +1,55 @@
+"""How noisy measured poses are, beside the declared noise, and what a user does about it."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .estimate import Array
+from .tuning import UKFTuning
+
+# multiples of the declared standard deviation that need no word: a wrench follows twice as late or
+# is twice as restless beyond them
+QUIET, LOUD = 0.5, 2.0
+
+
+def noise_scales_of(estimate: Any) -> Array:
+    """Return the noise of measured attitudes and positions (..., 2) of an estimate or a series, as
+    multiples of the filter's standard deviations.
+    """
+    one: Array = np.ones((*np.shape(estimate.nis), 2))
+    scales: Array = getattr(estimate, "noise_scales", one)
+    return scales
+
+
+def noise_warning(scales: ArrayLike, tuning: UKFTuning, file: bool) -> str:
+    """Say what is to be set where poses are noisier or calmer than declared; empty: nothing.
+
+    Args:
+        scales: of attitude and position (2,), medians over some seconds.
+        tuning: of the filter, which has the declared noise.
+        file: whether that noise is the vehicle file's; else it is a tuning's.
+    """
+    attitude, position = np.asarray(scales, dtype=np.float64).tolist()
+    declared = "vehicle file's" if file else "tuning's"
+    words = []
+    for what, scale, noise, shown, unit, fields in (
+        ("Position", position, tuning.position_noise, 1e3, "mm", ("sigma_pos_m", "position_noise")),
+        (
+            "Attitude",
+            attitude,
+            tuning.attitude_noise,
+            1.0,
+            "rad",
+            ("sigma_att_rad", "attitude_noise"),
+        ),
+    ):
+        if QUIET <= scale <= LOUD:
+            continue
+        std = float(np.sqrt(np.mean(np.square(noise))))
+        name = f"mocap {fields[0]}" if file else fields[1]
+        words.append(
+            f"{what} noise is {scale:.2g} times the {declared} {shown * std:.3g} {unit}: set "
+            f"{name} to {scale * std:.2g}"
+        )
+    return ". ".join(words)
