@@ -63,7 +63,7 @@ def estimate(
     """
     import numpy as np
 
-    from ..estimator.noise_scale import noise_scales_of, noise_warning
+    from ..estimator.noise_scale import noise_warning
     from ..identification.motion.inertial_signals import reads_imu
     from ..identification.report.wrench_picture import plot_wrench
     from ..identification.wrench_series import (
@@ -128,7 +128,7 @@ def estimate(
         result["consistency"] = consistency.as_dict()
         if consistency.too_slow:
             note(_TOO_SLOW[fit is not None])
-    noise = np.median(noise_scales_of(series)[flight.valid], axis=0) if flight.valid.any() else None
+    noise = np.median(series.noise_scales[flight.valid], axis=0) if flight.valid.any() else None
     if noise is not None:
         result["noise_scale"] = dict(zip(("attitude", "position"), noise, strict=True))
         if noisy := noise_warning(noise, series.tuning, fit is None and given is None):

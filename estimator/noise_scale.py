@@ -1,25 +1,13 @@
 """How noisy measured poses are, beside the declared noise, and what a user does about it."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .estimate import Array
 from .tuning import UKFTuning
 
 # multiples of the declared standard deviation that need no word: a wrench follows twice as late or
 # is twice as restless beyond them
 QUIET, LOUD = 0.5, 2.0
-
-
-def noise_scales_of(estimate: Any) -> Array:
-    """Return the noise of measured attitudes and positions (..., 2) of an estimate or a series, as
-    multiples of the filter's standard deviations.
-    """
-    one: Array = np.ones((*np.shape(estimate.nis), 2))
-    scales: Array = getattr(estimate, "noise_scales", one)
-    return scales
 
 
 def noise_warning(scales: ArrayLike, tuning: UKFTuning, file: bool) -> str:

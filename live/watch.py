@@ -4,7 +4,7 @@ from collections import deque
 
 import numpy as np
 
-from ..estimator.noise_scale import noise_scales_of, noise_warning
+from ..estimator.noise_scale import noise_warning
 from .clocks import Clocks
 from .filtering import LiveFilter, Output
 from .messages import SECOND, Array
@@ -43,7 +43,7 @@ class Watch:
         """Take in an estimate."""
         if output.row.has_pose and output.t >= self._due_noise:
             self._due_noise = output.t + _NOISE
-            self._noise.append(noise_scales_of(output.estimate))
+            self._noise.append(output.estimate.noise_scales)
 
     def look(self, now: int) -> None:
         """Warn of what is amiss, once a subject; ``now`` in ns."""
