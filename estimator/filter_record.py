@@ -56,6 +56,7 @@ FILTER = np.dtype(
         ("load", "f8", LOAD),  # what that uncertainty scales: estimator.model_uncertainty
         ("predicted", "f8", (6,)),  # variances of torque and force before the last measurement
         ("last_speeds", "f8", (4,)),  # rotor speeds that were measured last
+        ("gated", "i8"),
         ("alarm", "f8", (2,)),  # largest NIS taken in unseen: of three numbers, of six
         ("restart_at", "f8"),  # NIS beyond which no linear correction is made
         ("patience", "f8"),  # s

@@ -75,8 +75,9 @@ def turn_world(f: Record, pose: Array, w: float, z: float, before: Array, after:
     _turn_pose(f.poses.seen, w, z, before, after)
     turn_vectors(f.x[7:10], 1, cosine, sine)
     turn_vectors(f.x[13:19], 2, cosine, sine)
-    _turn_pose(f.poses.doubted, w, z, before, after)
-    turn_vectors(f.poses.pace, 2, cosine, sine)
+    if f.gated > 0:
+        _turn_pose(f.poses.doubted, w, z, before, after)
+        turn_vectors(f.poses.pace, 2, cosine, sine)
 
 
 @compiled

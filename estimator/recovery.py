@@ -10,18 +10,15 @@ A Kalman filter's model knows none of five events. Each breaks another assumptio
 * A *gap* makes the covariance grow. A part that is known no better than a prior is *lost*: pose and
   twist are held with the prior's covariance, and the next measurement restarts them.
 * An *outlier* is a pose that jumps: far from the filter's expectation and, by more than a vehicle
-  can move, from the pose just before. The filter refuses the pose and its successors, which a
-  filter that has not seen for a while would take for likely. Poses are accepted again once the
+  can move, from the pose just before. A gate refuses the pose and its successors, which a filter
+  that has not seen for a while would take for likely. Poses are accepted again once the
   jumps cancel, however wrong the wrench is. Or once the innovation says that there was no jump: a
   clock's blur also exceeds a vehicle's motion by a little.
 * A *push* is harder than the random walk of the wrench expects. The pose is far from the
-  expectation, yet goes on from the pose before. The filter takes the pose in.
+  expectation, yet goes on from the pose before. The filter takes the pose in, gate or not.
 * A *jump for good* is an outlier whose successors all agree with each other. The filter restarts
-  there after ``Recovery.patience``. Poses that do not even agree with each other restart the filter
-  after ``Recovery.give_up``, known no better than they disagree.
-
-A pose is unlikely beyond the gate's probability; without a gate, beyond ``Recovery.jump_at``
-standard deviations.
+  there after ``Recovery.patience``, without a gate at once. Poses that do not even agree with each
+  other restart the filter after ``Recovery.give_up``, known no better than they disagree.
 
 After a restart attitude and rate may be so little known that a pose which contradicts them would be
 explained by a spin, and then by a torque. So the filter restarts again at poses that come back to
@@ -36,6 +33,7 @@ So a filter is in one of three phases, and each measured pose has one verdict, i
     any                 of a part that is lost            RESTARTED   BELIEVING
     BELIEVING           likely                            TRACKING    BELIEVING
     BELIEVING           unlikely, goes on (``continues``) TRACKING    BELIEVING
+    BELIEVING           unlikely, jumped; no gate         RESTARTED   BELIEVING
     BELIEVING           unlikely, jumped                  REJECTED    ONE_REFUSED
     ONE_REFUSED, more   back (``_is_back``)               TRACKING    BELIEVING
     ONE_REFUSED, more   neither                           REJECTED    REFUSING
@@ -98,6 +96,7 @@ MEMORY = np.dtype(
     [
         ("phase", "f8"),
         ("strain", "f8"),  # NIS, of 1 expected, of unlikely poses that were taken in; falls
+        ("astray", "f8"),  # s for which a jump that was followed at once may have been an outlier
         ("settling", "f8"),  # s for which a restart may be repeated; a repetition ends it
         ("judged", "f8"),  # poses that the noise was learned from, up to ``MEMORY_OF_NOISE``
         ("widened", "f8", (2,)),  # by this share the filter takes more than the declared variance
@@ -173,6 +172,7 @@ def load_recovery(record: np.void, vehicle: Vehicle, gate: float | None, given: 
         from scipy.stats import chi2
 
         record["alarm"] = chi2.ppf(gate, (3, 6))
+    record["gated"] = gate is not None
     record["restart_at"] = given.restart_at**2
     record["patience"], record["give_up"] = given.patience, given.give_up
     torque = given.torque_std * weight * vehicle.arm_l
@@ -213,6 +213,7 @@ def grow_older(f: Record, dt: float) -> None:
         proved = (1.0 + f.excess[part]) / uncertainty
         m.widened[part] = choose(proved > REFUTED, proved - 1.0, 0.0)
     m.settling -= dt
+    m.astray -= dt
     m.strain -= min(dt / f.patience, 1.0) * m.strain
     m.position_age += dt
     m.attitude_age += dt
@@ -254,10 +255,11 @@ def learn_noise(f: Record, with_position: bool, with_attitude: bool) -> None:
             expected = 2.0 * noise + variance * (variance / (variance + noise))
             share = share + 2.0 * noise / (3.0 * expected)
             square = square + f.increment[i] * f.increment[i] / (3.0 * expected)
-        # the excess that this pose shows is wide - 1 + wide (square - 1) / share, and its weight
-        # is the square of the share: an innovation of an unknown pose is no noise
-        news = share * (wide - 1.0 - f.excess[part]) + wide * (min(square, LARGEST_SQUARE) - 1.0)
-        f.excess[part] += choose(measured, share * news / poses, 0.0)
+        # the variance that this pose shows, times the share; the weight is the square of the share:
+        # an innovation of an unknown pose is no noise
+        shown = max(wide * (share + min(square, LARGEST_SQUARE) - 1.0), 0.0)
+        news = share * (shown - share * (1.0 + f.excess[part])) / poses
+        f.excess[part] += choose(measured, news, 0.0)
     judged = min(m.judged + 1.0, MEMORY_OF_NOISE)
     m.judged = choose(with_position | with_attitude, judged, m.judged)
 
@@ -406,17 +408,23 @@ def _judge(
     explained = continues(
         f, pose, m.seen, m.position_age, m.attitude_age, with_position, with_attitude
     )
-    _compare_refused(f, pose, with_position, with_attitude)
-    back = _is_back(f, pose, with_position, with_attitude)
-    back = back & (explained | opposite(unlikely))
-    explained = choose(believing, explained, back)
+    if f.gated > 0:
+        _compare_refused(f, pose, with_position, with_attitude)
+        back = _is_back(f, pose, with_position, with_attitude)
+        back = back & (explained | opposite(unlikely))
+        explained = choose(believing, explained, back)
     # among refused ones a likely pose too has to come back first
     refused = (unlikely | (measured & opposite(believing))) & opposite(lost | explained)
-    _remember_refused(f, pose, refused & with_position, refused & with_attitude)
-    lasting = _outlasts(f, with_position, refused)  # writes: asked whatever else holds
-    restarted = (measured & (lost | (explained & beyond))) | (refused & lasting)
-    refused = refused & opposite(restarted)
-    m.phase = choose(refused, choose(believing, ONE_REFUSED, REFUSING), m.phase)
+    restarted = measured & (lost | (explained & beyond))
+    if f.gated > 0:
+        _remember_refused(f, pose, refused & with_position, refused & with_attitude)
+        lasting = _outlasts(f, with_position, refused)  # writes: asked whatever else holds
+        restarted = restarted | (refused & lasting)
+        refused = refused & opposite(restarted)
+        m.phase = choose(refused, choose(believing, ONE_REFUSED, REFUSING), m.phase)
+    else:
+        restarted = restarted | refused
+        m.astray = choose(refused, f.patience, m.astray)
     _restart(f, pose, restarted & with_position, restarted & with_attitude)
     verdict = choose(refused, REJECTED, choose(measured, TRACKING, f.status))
     final: float = choose(restarted, RESTARTED, verdict)
@@ -673,19 +681,21 @@ def remember(f: Record, pose: Array, with_position: bool, with_attitude: bool) -
         m.seen[i] = choose(with_position if i < 3 else with_attitude, pose[i], m.seen[i])
     m.position_age = choose(with_position, 0.0, m.position_age)
     m.attitude_age = choose(with_attitude, 0.0, m.attitude_age)
-    for i in range(6):
-        away = abs(m.jump[i]) > m.blur[i]
-        done = done & ((with_attitude if i < 3 else with_position) | opposite(away))
-    m.phase = choose(done, BELIEVING, m.phase)
+    if f.gated > 0:
+        for i in range(6):
+            away = abs(m.jump[i]) > m.blur[i]
+            done = done & ((with_attitude if i < 3 else with_position) | opposite(away))
+        m.phase = choose(done, BELIEVING, m.phase)
 
 
 @compiled
 def doubted_variance(f: Record, out: Array) -> None:
-    """Write into ``out`` (18,) what refused poses add to the variances of the error state.
+    """Write into ``out`` (18,) what poses that jumped add to the variances of the error state.
 
     Either the poses are wrong or the filter is. Over ``Recovery.patience`` the weight of the second
     grows to one: a restart there would move the pose to the refused one, and leave twist and wrench
-    a prior's variance.
+    a prior's variance. Without a gate the filter has followed, and the weight of the first falls
+    from one to zero in that time.
     """
     x, m, patience = f.x, f.poses, f.patience
     weight = choose(m.phase > BELIEVING, 1.0 / patience, 0.0)
@@ -701,5 +711,6 @@ def doubted_variance(f: Record, out: Array) -> None:
         out[6 + i] = at_position * min(away * away, f.prior[6 + i])
         out[3 + i] = at_attitude * f.prior[3 + i]
         out[9 + i] = at_position * f.prior[9 + i]
+    astray = max(m.astray, 0.0) / patience
     for i in range(12, N):
-        out[i] = max(at_position, at_attitude) * f.prior[i]
+        out[i] = max(max(at_position, at_attitude), astray) * f.prior[i]

@@ -403,7 +403,8 @@ def make_calls(
         numbers[row, STATUS], numbers[row, RESTARTS] = f.status, f.restarts
         numbers[row, EXCESS] = f.excess
         std[row] = np.diag(f.P)
-        if f.poses.phase > BELIEVING or f.poses.strain > _STRAINED:
+        m = f.poses
+        if m.phase > BELIEVING or m.strain > _STRAINED or m.astray > 0.0:
             _add_doubt(record, std[row])
         std[row] = np.sqrt(std[row])
     return len(calls)
@@ -423,9 +424,9 @@ class WrenchUKF:
         tuning: noise of model and measurement; default ``UKFTuning.for_vehicle(vehicle, period)``.
         period: time between steps, s.
         gate: refuse poses, or parts of one, whose NIS has a smaller chance than ``1 - gate``
-            (0.999, say) and which do not go on from the pose before. None: refuse those alone that
-            are ``recovery.jump_at`` standard deviations off. Refused poses that agree with each
-            other for ``recovery.patience`` are believed, and the filter restarts there.
+            (0.999, say) and which do not go on from the pose before; None takes in any. Refused
+            poses that agree with each other for ``recovery.patience`` are believed, and the filter
+            restarts there.
         recovery: how gaps, outliers and restarts are dealt with, gate or not; default
             ``Recovery()``.
 
@@ -485,8 +486,8 @@ class WrenchUKF:
         self._sample = Sample(self.record["z"][0])
         self._address: int = self.record.ctypes.data
         self._now: Array = np.ndarray(ESTIMATE_SIZE, buffer=self.record, offset=ESTIMATE)
-        # phase and strain, read at a third of an array's cost
-        self._doubts = memoryview(np.ndarray(2, buffer=self.record, offset=_POSES))  # type: ignore[arg-type]
+        # phase, strain and astray, read at a third of an array's cost
+        self._doubts = memoryview(np.ndarray(3, buffer=self.record, offset=_POSES))  # type: ignore[arg-type]
         self._call: Callable[..., int] | None = None
 
     def __getstate__(self) -> dict[str, object]:
@@ -636,7 +637,7 @@ class WrenchUKF:
         covariance widens.
         """
         numbers, doubts = self._now.copy(), self._doubts
-        if doubts[0] > BELIEVING or doubts[1] > _STRAINED:
+        if doubts[0] > BELIEVING or doubts[1] > _STRAINED or doubts[2] > 0.0:
             _add_doubt(self.record, numbers[_VARIANCES])
         return WrenchEstimate(numbers)
 

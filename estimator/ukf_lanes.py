@@ -28,7 +28,7 @@ _MEMORY = {"poses": LaneRecord(MEMORY, MEMORY.names or ())}
 _WORK = LaneRecord(
     FILTER,
     (*_KEPT, "rotor_wrench", *fields_between("z", "innovation")),
-    ("body", "effect_wrench", *fields_between("alarm", "period")),
+    ("body", "effect_wrench", *fields_between("gated", "period")),
     _MEMORY,
 )
 _BLOCK = LaneRecord(FILTER, _KEPT, nested=_MEMORY)

@@ -482,6 +482,6 @@ def test_what_an_unlikely_pose_leaves_is_forgotten_in_the_patience():
         q = [np.cos(half), np.sin(half), 0.0, 0.0] if k == 0 else STILL
         e = ukf.step(speeds, place, q)
         assert e.status == "tracking"
-        widened.append(e.std_force[2] ** 2 / calm.std_force[2] ** 2 - 1.0)
+        widened.append(e.std[17] ** 2 / calm.std[17] ** 2 - 1.0)
     assert widened[0] > 1.0
     assert widened[120] == pytest.approx(widened[0] / np.e, rel=0.1)
