@@ -1,8 +1,9 @@
 """What a file may cost before it is refused: a few kilobytes may unpack to any size, and a short
 text may take any time.
 
-With these limits no file takes more than about 1 GB of memory or 10 s before it is refused; files
-that pass may take longer. Everything is counted while it is unpacked; of a Parquet file's columns
+With these limits no file takes more than about 1 GB of memory before it is refused, and none more
+than 10 s before its rows are read: a table of 4 million rows whose last one is wrong takes 20 s.
+Files that pass take more. Everything is counted while it is unpacked; of a Parquet file's columns
 the sizes are believed that its footer states.
 """
 
@@ -16,12 +17,15 @@ class FileLimits:
     """Limits of what is read from files. Sizes are in bytes unpacked unless something else is said.
 
     Attributes:
-        table_text: characters of a CSV file. A flight of one hour at 200 Hz with 25 columns has
-            about 2e8.
+        table_text: characters of a CSV file, or bytes of a Parquet file and of each of its
+            columns. A flight of three hours at 200 Hz with 20 columns has 7.5e8 characters.
         table_line: characters of one of its lines.
         table_rows: rows of a table or messages of a topic: more than an hour at 1 kHz.
         table_numbers: rows times columns that are read; each number takes 8 bytes, and a flight
-            log is copied about twice.
+            log is copied about twice. That flight has 4.3e7.
+        list_numbers: of all columns of lists and structs in a Parquet file, which are unpacked to
+            find their parts.
+        arrays: bytes of the arrays in a MATLAB or NumPy file.
         parquet_footer: items of a list, or bytes of a text, in what describes a Parquet file.
         yaml_text: bytes of a YAML file, the settings of a vehicle or of a training.
         yaml_values: values in it, with every alias written out.
@@ -42,10 +46,12 @@ class FileLimits:
         ulog_damages: places in it where no message can be read; each takes some 0.1 ms.
     """
 
-    table_text: int = 2**29
+    table_text: int = 2**30
     table_line: int = 1_000_000
     table_rows: int = 4_000_000
-    table_numbers: int = 2**25
+    table_numbers: int = 2**26
+    list_numbers: int = 2**25
+    arrays: int = 2**29
     parquet_footer: int = 2**20
     yaml_text: int = 200_000
     yaml_values: int = 20_000

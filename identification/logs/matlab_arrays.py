@@ -2,18 +2,51 @@
 NumPy archive (.npz): a field of a struct is ``struct.field``. scipy's reader, and HDF5's, may end
 the process at a spoiled file, so ``tables`` gives them one of their own.
 
-    python matlab_arrays.py MOST_BYTES < flight.mat > flight.npz
+    python matlab_arrays.py MOST_BYTES MEMORY < flight.mat > flight.npz
+
+Files that unpack to more than ``MOST_BYTES`` are refused before an array is made; what else a
+spoiled file asks for, the limit on the process's memory refuses.
 """
 
-import io
 import sys
 import warnings
+import zlib
 from collections.abc import Iterator
 from importlib import import_module
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from scipy.io import loadmat
+
+_HEADER = 128  # bytes of a file of version 5 to 7
+_BIG, _LITTLE = b"MI", b"IM"  # its last two
+_PACKED = 15  # type of an element that is packed
+_PIECE = 2**16  # bytes packed or unpacked at a time
+
+
+def check_unpacked(data: BinaryIO, most: int) -> None:
+    """Check that the elements of a file of version 5 to 7 unpack to at most ``most`` bytes.
+
+    Raises:
+        ValueError: they do not, or are spoiled.
+    """
+    begin = data.read(_HEADER)
+    order = {_BIG: "big", _LITTLE: "little"}.get(begin[-2:])
+    left = most
+    while order and len(tag := data.read(8)) == 8:
+        kind, size = (int.from_bytes(tag[i : i + 4], order) for i in (0, 4))  # type: ignore[arg-type]
+        if kind != _PACKED:
+            left -= size
+            data.seek(size, 1)
+        machine = zlib.decompressobj()
+        while kind == _PACKED and size and left >= 0 and (piece := data.read(min(size, _PIECE))):
+            size -= len(piece)
+            while piece and left >= 0:
+                left -= len(machine.decompress(piece, _PIECE))
+                piece = machine.unconsumed_tail
+        if left < 0:
+            raise ValueError(f"it unpacks to more than {most} bytes; expected one flight")
+    data.seek(0)
 
 
 def named(name: str, value: Any) -> Iterator[tuple[str, Any]]:
@@ -23,27 +56,37 @@ def named(name: str, value: Any) -> Iterator[tuple[str, Any]]:
             if not key.startswith(("__", "#")):
                 yield from named(f"{name}.{key}" if name else key, inner)
     elif getattr(value, "dtype", np.dtype(object)).kind in "biuf":
-        yield name, value[()]
+        yield name, value
 
 
 def main() -> None:
     """Read and write."""
     warnings.simplefilter("ignore")
+    most, memory = map(int, sys.argv[1:])
     try:
         import resource
     except ImportError:  # Windows
         pass
     else:
-        most = int(sys.argv[1])
-        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
-    data = sys.stdin.buffer.read()
-    if data.startswith(b"MATLAB 7.3"):  # HDF5, with its axes turned
-        with import_module("h5py").File(io.BytesIO(data), "r") as file:
-            found = {name: value.T for name, value in named("", file)}
+        resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
+    data = sys.stdin.buffer
+    data.seek(0)  # whoever opened the file has looked into it
+    is_hdf5 = data.read(10) == b"MATLAB 7.3"
+    data.seek(0)
+    if is_hdf5:  # with its axes turned
+        with import_module("h5py").File(data, "r") as file:
+            sets = dict(named("", file))
+            if sum(value.nbytes for value in sets.values()) > most:
+                raise ValueError(f"it unpacks to more than {most} bytes; expected one flight")
+            found = {name: value[()].T for name, value in sets.items()}
     else:
-        found = dict(named("", loadmat(io.BytesIO(data), simplify_cells=True)))
+        check_unpacked(data, most)
+        found = dict(named("", loadmat(data, simplify_cells=True)))
     np.savez(sys.stdout.buffer, **{f"_{name}": value for name, value in found.items()})
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except MemoryError:
+        raise ValueError(f"it takes more than {sys.argv[2]} bytes of memory") from None

@@ -8,7 +8,6 @@ dictionary of one text may stand for any number of its copies, so its columns mu
 """
 
 import gzip
-import io
 import os
 import subprocess
 import sys
@@ -16,7 +15,9 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from subprocess import PIPE
+from tempfile import TemporaryFile
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -24,8 +25,12 @@ from ...runtime.errors import InputError
 from ...runtime.extras import need
 from ...runtime.file_limits import LIMITS, check_count
 from ...runtime.page_files import write_text
+<<<<<<< HEAD
 from ...runtime.regular_files import check_archive, check_regular, read_bytes
 from ...runtime.threads import SINGLE_THREADED
+=======
+from ...runtime.regular_files import check_archive, check_regular, open_regular
+>>>>>>> files
 from ...runtime.whole_files import replaced
 from .table import (
     ARRAY_SUFFIXES,
@@ -39,7 +44,7 @@ from .table import (
 )
 from .text_table import open_text
 
-_MEMORY = 4  # times the bytes that a file may unpack to, of the process that reads MATLAB's
+_MEMORY = 7 * 2**27  # bytes of the process that reads MATLAB's files
 _SHOWN = 10  # arrays that a note lists
 _BUFFER = 2**20  # bytes of a column of Parquet that are read at a time
 
@@ -117,13 +122,16 @@ def _open_arrays(path: Path) -> Table:
     """Open the arrays of a file. Rows are as many as most arrays have; arrays of other lengths are
     left out, with a note.
     """
-    data = read_bytes(path, WHAT, LIMITS.binary_log)
-    with one_line(f"{path}: cannot be read as {WHAT}"):
-        is_matlab = not path.name.lower().endswith(".npz")
-        data = _matlab(path, data) if is_matlab else data
-        check_archive(path, io.BytesIO(data), LIMITS.table_text, WHAT)
-        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            read = {name[is_matlab:]: array for name, array in archive.items()}
+    check_regular(path, WHAT, LIMITS.binary_log)
+    is_matlab = not path.name.lower().endswith(".npz")
+    with one_line(f"{path}: cannot be read as {WHAT}"), TemporaryFile() as made:
+        with open_regular(path, WHAT) as data:
+            if is_matlab:
+                _write_matlab(path, data, made)
+            archived = made if is_matlab else data
+            check_archive(path, archived, LIMITS.arrays, WHAT)
+            with np.load(archived, allow_pickle=False) as archive:
+                read = {name[is_matlab:]: array for name, array in archive.items()}
         for name, array in list(read.items()):
             read |= {f"{name}.{field}": array[field] for field in array.dtype.names or ()}
         arrays = {name: x.squeeze() for name, x in read.items() if x.dtype.kind in "biuf"}
@@ -149,8 +157,8 @@ def _open_arrays(path: Path) -> Table:
     return Table(path, tuple(columns), rows, load, notes=tuple(notes if other else ()))
 
 
-def _matlab(path: Path, data: bytes) -> bytes:
-    """Return the arrays of numbers in a MATLAB file as a NumPy archive.
+def _write_matlab(path: Path, data: BinaryIO, made: BinaryIO) -> None:
+    """Write the arrays of numbers in a MATLAB file into a file, as a NumPy archive.
 
     scipy reads it in a process of its own: of 8 x 400 files with spoiled bytes, one in each 8 ended
     the process by a segmentation fault before the 214th.
@@ -159,20 +167,20 @@ def _matlab(path: Path, data: bytes) -> bytes:
         InputError: it is of version 7.3 and h5py is not installed.
         ValueError: it is no such file, is spoiled, or unpacks to too much.
     """
-    if data.startswith(b"MATLAB 7.3") and find_spec("h5py") is None:
+    if data.read(10) == b"MATLAB 7.3" and find_spec("h5py") is None:
         raise InputError(
             f"{path}: is MATLAB's version 7.3; expected version 7, as save('flight.mat', '-v7') "
             "writes, or h5py installed"
         )
     program = str(Path(__file__).with_name("matlab_arrays.py"))
-    command = [sys.executable, "-P", program, str(_MEMORY * LIMITS.table_text)]
+    command = [sys.executable, "-P", program, str(LIMITS.arrays), str(_MEMORY)]
     # threads of linear algebra would take memory of what the file may
     alone = {**os.environ, **SINGLE_THREADED}
-    ran = subprocess.run(command, input=data, capture_output=True, check=False, env=alone)
+    ran = subprocess.run(command, stdin=data, stdout=made, stderr=PIPE, check=False, env=alone)
     if ran.returncode:
         said = ran.stderr.decode("utf-8", "replace").strip().rpartition("\n")[2]
         raise ValueError(said.partition(": ")[2] or said or "a spoiled MATLAB file")
-    return ran.stdout
+    made.seek(0)
 
 
 def _open_parquet(path: Path) -> Table:
@@ -190,10 +198,16 @@ def _open_parquet(path: Path) -> Table:
             thrift_container_size_limit=LIMITS.parquet_footer,
         )
         rows = int(file.metadata.num_rows)
+        nested = [field.name for field in file.schema_arrow if pyarrow.types.is_nested(field.type)]
+        _check_claims(path, file, nested, 8 * LIMITS.list_numbers, LIMITS.list_numbers, "of lists")
         columns: list[tuple[str, Any]] = []  # names, and arrays of their own or the file's fields
+        held = 0
         for field in file.schema_arrow:
-            if pyarrow.types.is_nested(field.type):
-                columns += _within(path, field.name, _column(path, file, field.name))
+            if field.name in nested:
+                parts = list(_within(path, field.name, _column(path, file, field.name)))
+                held += rows * len(parts)
+                check_count(path, held, LIMITS.list_numbers, "numbers of lists")
+                columns += parts
             else:
                 columns.append((field.name, field))
     except (OSError, pyarrow.ArrowException) as error:
@@ -208,6 +222,8 @@ def _open_parquet(path: Path) -> Table:
                     "numbers"
                 )
             if isinstance(values, pyarrow.Field):
+                most = LIMITS.table_text, LIMITS.table_numbers
+                _check_claims(path, file, [name], *most, f"in column {name}")
                 values = _column(path, file, name)
             if len(values) != rows:
                 raise InputError(
@@ -220,22 +236,26 @@ def _open_parquet(path: Path) -> Table:
     return Table(path, tuple(name for name, _ in columns), rows, load, numeric=numeric)
 
 
+def _check_claims(
+    path: Path, file: Any, names: Sequence[str], size: int, count: int, what: str
+) -> None:
+    """Raise InputError where a file says of columns that they unpack to more bytes or numbers."""
+    groups = map(file.metadata.row_group, range(file.metadata.num_row_groups))
+    chunks = [chunk for group in groups for chunk in map(group.column, range(group.num_columns))]
+    chunks = [chunk for chunk in chunks if chunk.path_in_schema.split(".")[0] in names]
+    unpacked = sum(max(chunk.total_uncompressed_size, 0) for chunk in chunks)
+    check_count(path, unpacked, size, f"bytes {what}")
+    check_count(path, sum(max(chunk.num_values, 0) for chunk in chunks), count, f"numbers {what}")
+
+
 def _column(path: Path, file: Any, name: str) -> Any:
     """Return a whole column, in one piece.
 
     Raises:
-        InputError: it cannot be read, or is more than ``FileLimits`` allows, by what the file says
-            of it.
+        InputError: it cannot be read.
     """
     import pyarrow
 
-    groups = map(file.metadata.row_group, range(file.metadata.num_row_groups))
-    chunks = [chunk for group in groups for chunk in map(group.column, range(group.num_columns))]
-    chunks = [chunk for chunk in chunks if chunk.path_in_schema.split(".")[0] == name]
-    size = sum(max(chunk.total_uncompressed_size, 0) for chunk in chunks)
-    most = max((chunk.num_values for chunk in chunks), default=0)
-    check_count(path, size, LIMITS.table_text, f"bytes in column {name}")
-    check_count(path, most, LIMITS.table_numbers, f"numbers in column {name}")
     try:
         return file.read(columns=[name]).column(0).combine_chunks()
     except (OSError, pyarrow.ArrowException) as error:
@@ -266,12 +286,12 @@ def _within(path: Path, name: str, array: Any) -> Iterator[tuple[str, Any]]:
                 "expected one length"
             )
         count = int(sizes[0]) if len(sizes) else 0
-        check_count(path, len(array) * count, LIMITS.table_numbers, f"numbers in column {name}")
-        values = np.full((len(array), count), np.nan)
+        check_count(path, len(array) * count, LIMITS.list_numbers, f"numbers in column {name}")
+        values = np.full((count, len(array)), np.nan)
         if count:
             flat = array.flatten().cast(pyarrow.float64()).to_numpy(zero_copy_only=False)
-            values[lengths > 0] = flat.reshape(-1, count)
-        for i, column in enumerate(values.T):
+            values[:, lengths > 0] = flat.reshape(-1, count).T
+        for i, column in enumerate(values):  # of which Arrow takes no copy
             yield f"{name}[{i}]", pyarrow.array(column)
     else:
         yield name, array

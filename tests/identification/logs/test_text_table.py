@@ -1,9 +1,15 @@
 """Text tables as people write them."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from tests.support.programs import said
+from windwrench.identification.logs.flight_log import REQUIRED
 from windwrench.identification.logs.tables import open_table
+from windwrench.runtime.file_limits import LIMITS
 
 
 @pytest.fixture
@@ -66,3 +72,41 @@ def test_rows_with_few_numbers_at_the_start_are_rows(opened):
 
 def test_latin_letters_of_an_old_encoding_are_read(opened):
     assert opened("t;roll [°]\n0;1\n1;2\n", encoding="latin-1").header == ("t", "roll [°]")
+
+
+def test_three_hours_at_200_hz_are_within_the_limits():
+    rows, columns, characters = 3 * 3600 * 200, 20, 7.5e8
+    assert rows < LIMITS.table_rows
+    assert rows * columns < LIMITS.table_numbers
+    assert characters < LIMITS.table_text
+
+
+CHECK = """
+import sys
+from pathlib import Path
+from windwrench.identification.report.log_channels import plot_channels
+from windwrench.identification.report.log_check import check_log
+
+found = check_log(Path(sys.argv[1]), None, None, None, None)
+plot_channels("flight", found.channels, Path(sys.argv[1]).with_suffix(".png"))
+status = Path("/proc/self/status").read_text()
+print(len(found.log.t), 1024 * int(status.split("VmHWM:")[1].split()[0]))
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory as Linux tells it")
+def test_the_memory_of_a_check_is_in_proportion_to_the_numbers_that_are_read(tmp_path):
+    header = [*REQUIRED, "vbat", "fx", "fy", "fz", "tx", "ty", "tz"]
+    taken = {}
+    for rows in (1_000, 150_000):
+        columns = np.random.default_rng(0).normal(0.0, 0.001, (rows, len(header)))
+        columns[:, 0] = 0.005 * np.arange(rows)
+        columns[:, 4:8] = 1.0, 0.0, 0.0, 0.0
+        columns[:, 8:12] += 300.0
+        columns[:, 12] += 12.0
+        path = tmp_path / f"{rows}.csv"
+        np.savetxt(path, columns, "%.6g", ",", header=",".join(header), comments="")
+        read, taken[columns.nbytes] = map(int, said(sys.executable, "-c", CHECK, path).split())
+        assert read == rows
+    (few, before), (many, after) = taken.items()
+    assert after - before < 5.0 * (many - few)  # 3.5 over three hours

@@ -17,6 +17,7 @@ import pytest
 from tests.support.browser import look, needs_browser
 from tests.support.diagnoses import made_diagnosis, made_trace
 from windwrench.identification.findings import CHANNELS
+from windwrench.identification.report import log_channels
 from windwrench.identification.report.files import write_report
 from windwrench.identification.report.page import error_table, report_page
 from windwrench.identification.report.plot_numbers import page_plots, telling_samples
@@ -203,3 +204,15 @@ def test_cursors_over_a_long_flight_say_one_time(tmp_path):
     done = look(report_page(made_diagnosis(trace), "command"), 1280, tmp_path, act=act)["done"]
     for texts in (done["linked"], done["zoomed"]):
         assert len({text.split(":")[0] for text in texts}) == 1
+
+
+def test_a_line_of_many_rows_is_drawn_by_its_extremes():
+    rows = 1_000_003
+    values = np.random.default_rng(1).normal(size=(rows, 2))
+    values[777_777, 0], values[rows - 1, 1] = 50.0, -50.0
+    shown = log_channels._extremes(values)
+    assert np.all(np.diff(shown) > 0)
+    assert {0, 777_777, rows - 1} <= set(shown.tolist())
+    assert len(shown) < 5 * log_channels._BINS
+    few = values[: 2 * log_channels._BINS]
+    np.testing.assert_array_equal(few[log_channels._extremes(few)], few)
