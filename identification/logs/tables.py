@@ -25,12 +25,8 @@ from ...runtime.errors import InputError
 from ...runtime.extras import need
 from ...runtime.file_limits import LIMITS, check_count
 from ...runtime.page_files import write_text
-<<<<<<< HEAD
-from ...runtime.regular_files import check_archive, check_regular, read_bytes
-from ...runtime.threads import SINGLE_THREADED
-=======
 from ...runtime.regular_files import check_archive, check_regular, open_regular
->>>>>>> files
+from ...runtime.threads import SINGLE_THREADED
 from ...runtime.whole_files import replaced
 from .table import (
     ARRAY_SUFFIXES,
