@@ -259,7 +259,8 @@ def learn_noise(f: Record, with_position: bool, with_attitude: bool) -> None:
         # an innovation of an unknown pose is no noise
         shown = max(wide * (share + min(square, LARGEST_SQUARE) - 1.0), 0.0)
         news = share * (shown - share * (1.0 + f.excess[part])) / poses
-        f.excess[part] += choose(measured, news, 0.0)
+        # a covariance whose numbers overflow says nothing
+        f.excess[part] += choose(measured & math.isfinite(news), news, 0.0)
     judged = min(m.judged + 1.0, MEMORY_OF_NOISE)
     m.judged = choose(with_position | with_attitude, judged, m.judged)
 
