@@ -2,37 +2,38 @@
 well: in metres and as NIS.
 
 All three run the model of plant and filter. ``predict`` and ``rollout_error`` give what a planner
-would see: the model is let go from the flight's own state, and compared with the flight a second
-later. ``nis_without_wrench_state`` is what a filter would see that has nothing but the model to
-explain the motion with.
+would see: the model is let go from the flight's own state, which knows no later row, and compared
+with the flight a second later. ``nis_without_wrench_state`` is what a filter would see that has
+nothing but the model to explain the motion with.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from ..dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model
-from ..dynamics.motion import accelerations
-from ..dynamics.rotation import turn_body
+from ..dynamics.rotation import quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
 from ..estimator import UKFTuning
-from ..estimator.estimate import STATE_SIZE
+from ..estimator.estimate import POSITION, QUATERNION, RATE, STATE_SIZE, VELOCITY
 from ..estimator.filter_record import propagate
 from ..estimator.innovations import innovations, pieces_of
 from ..estimator.ukf import default_covariance
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
+from .causal_states import STATE, causal_states
 from .logs.commanded_speeds import with_commanded_speeds
-from .logs.flight_log import FlightLog
+from .logs.flight_log import NORM_TOLERANCE, FlightLog
+from .logs.table import finite_rows
 from .motion.sensing_effects import undo_log_sensing
-from .motion.signals import Signals, log_signals
-from .motion.smoothing import CUTOFFS, continuous, low_pass
+from .motion.signals import Signals, known_pieces, log_signals, longest_step
+from .motion.smoothing import continuous, resampled, unbroken
 
 Array = NDArray[np.float64]
 Segments = Sequence[tuple[float, float]]
@@ -40,14 +41,15 @@ Segments = Sequence[tuple[float, float]]
 
 @dataclass(frozen=True)
 class PredictionSettings:
-    """How a model is flown from a logged state, and how the filter without a wrench is set up."""
+    """How a model is flown from a state, and how the filter without a wrench is set up."""
 
     longest_rotor_step: float = 0.005  # s, over which rotors are held
     # of the motion in one of those: one step alone, at its zero-order hold, adds 5 mm in a second
     motion_steps: int = 4
-    # s at an end of unbroken pose, where a low-pass has but one side to go by
+    # s after the start of unbroken pose: the filter that a prediction starts from settles
     start_margin: float = 0.5
-    end_margin: float = 0.1  # s, the same for the position that a prediction is compared with
+    # s before its end: the low-pass of the flight that a prediction is compared with
+    end_margin: float = 0.1
     horizon: float = 1.0  # s, of ``rollout_error``
     start_every: float = 0.25  # s, of an error's predictions
     most_starts: int = 2000  # of an error's predictions in a piece, spread over it
@@ -60,6 +62,7 @@ class PredictionSettings:
 PREDICTION = PredictionSettings()
 # compiled code takes plain numbers
 _MOTION_STEPS, _STEP_TOLERANCE = PREDICTION.motion_steps, PREDICTION.step_tolerance
+_LONGEST_ROTOR_STEP = PREDICTION.longest_rotor_step
 
 
 _MODEL = np.dtype([*MODEL_FIELDS, ("acceleration", "f8", (6,)), ("rotation", "f8", (3, 3))])
@@ -77,41 +80,103 @@ class Prediction:
     angular_velocity: Array  # (n, m, 3) rad/s, body
 
 
-def predict(log: FlightLog, vehicle: Vehicle, horizon_s: float = 0.5, every: int = 1) -> Prediction:
+def predict(
+    log: FlightLog,
+    vehicle: Vehicle,
+    horizon_s: float = 0.5,
+    every: int = 1,
+    state: ArrayLike | None = None,
+) -> Prediction:
     """Predict a flight from its own states by a vehicle's model and the logged rotor speeds alone.
 
-    The model starts from the flight's position, velocity, attitude and angular velocity, and from
-    then on is given the logged rotor speeds and voltage; a rotor speed holds over the interval that
-    ends at its sample. Rotors and effects start with the memory that the flight before gave them.
-    Declared sensing effects are taken out of the log.
+    The model starts at a row from position, velocity, attitude and angular velocity. From then on
+    it is given the logged rotor speeds and voltage; a rotor speed holds over the interval that ends
+    at its sample. Rotors and effects start with the memory that the flight before gave them.
+    Declared sensing effects are taken out of the log. No row after a start changes its state.
 
     What limits a prediction is its start: 1 mrad of tilt is 5 mm after a second, 10 mrad/s of
-    angular velocity is 16 mm. See ``start_states``.
+    angular velocity is 16 mm. See ``causal_states``.
 
     Args:
         log: the flight.
         vehicle: whose model predicts, with its declared effects.
         horizon_s: s.
         every: samples from start to start. Starts without a whole horizon behind them, before the
-            next break of the pose, are left out.
+            next break of the pose, or with a state before the next break of the rows, are left out.
+        state: (N, 13) position, quaternion (body to world), velocity (world) and angular velocity
+            (body) at each row, taken as they are; of the log without declared sensing effects.
+            Rows that are not finite cannot start. None: a filter's, which has seen no later row.
 
     Raises:
-        InputError: no stretch of pose is unbroken for 3 s, or the vehicle has more effects than a
-            model holds.
+        InputError: no stretch of pose is unbroken for 3 s, a state has another shape or a
+            quaternion of another length than 1, or the vehicle has more effects than a model holds.
     """
     log = undo_log_sensing(log, vehicle)
-    starts, paths = [], []
-    for piece in log_signals(log):
-        ahead = max(1, round(horizon_s / piece.period))
-        begun = np.arange(0, len(piece.t) - ahead, every)
-        _, path = _rolled_out(piece, vehicle, begun, ahead, float(log.t[0]))
-        rows = np.interp(piece.t[begun], log.t, np.arange(len(log.t)))
-        starts.append(np.rint(rows).astype(np.intp))
-        paths.append(path)
-    x = np.concatenate(paths)
-    return Prediction(
-        np.concatenate(starts), piece.period, x[..., :3], x[..., 7:10], x[..., 3:7], x[..., 10:13]
+    if state is None:
+        pieces, states = known_pieces(log), causal_states(log, vehicle)
+    else:
+        states = _checked(log, state)
+        pieces = unbroken(log.t, np.arange(len(log.t)), longest_step(log))
+    ahead = max(1, round(horizon_s / log.period))
+    last = log.t - (ahead - _STEP_TOLERANCE) * log.period  # s, of a start whose horizon ends there
+    starts = np.concatenate(
+        [
+            np.arange(rows[0], np.searchsorted(log.t, last[rows[-1]], side="right"), every)
+            for rows in pieces
+        ]
     )
+    starts = starts[finite_rows(states[starts])]
+    x = _flown(log, vehicle, states, starts, ahead)
+    return Prediction(
+        starts, log.period, x[..., POSITION], x[..., VELOCITY], x[..., QUATERNION], x[..., RATE]
+    )
+
+
+def _checked(log: FlightLog, state: ArrayLike) -> Array:
+    """Return states (N, STATE) that a user gives, with quaternions of length 1.
+
+    Raises:
+        InputError: the shape is another, or a quaternion is none of a rotation.
+    """
+    states = np.array(state, dtype=np.float64)
+    if states.shape != (len(log.t), STATE):
+        raise InputError(
+            f"{log.name}: state has shape {states.shape}; expected ({len(log.t)}, {STATE}): "
+            "position, quaternion, velocity and angular velocity at each row"
+        )
+    length = np.linalg.norm(states[:, QUATERNION], axis=1)
+    wrong = np.flatnonzero(np.abs(length - 1.0) > NORM_TOLERANCE)  # False where it is not finite
+    if wrong.size:
+        raise InputError(
+            f"{log.name}: state: the quaternion of row {wrong[0]} has length {length[wrong[0]]:.4g}"
+            "; expected 1"
+        )
+    states[:, QUATERNION] /= length[:, None]
+    return states
+
+
+def _flown(
+    log: FlightLog, vehicle: Vehicle, states: Array, starts: NDArray[np.intp], ahead: int
+) -> Array:
+    """Return the states (starts, ahead, STATE) that the model predicts, a period apart, from the
+    states (N, STATE) of a log at some rows in ascending order. Between rows without a state the
+    last one holds, for what effects remember.
+    """
+    path = np.zeros((len(starts), ahead, STATE))
+    if not len(starts):
+        return path
+    known = finite_rows(states)
+    first = int(np.argmax(known))
+    last_known = np.maximum.accumulate(np.where(known, np.arange(len(log.t)), 0))[first:]
+    # the model that flies along, and the copy of it that is let go
+    models = np.zeros(2, dtype=_MODEL)
+    load_model(models[0], vehicle)
+    t = log.t[first:] - log.t[0]
+    models[0]["time"] = t[0]
+    voltage = np.zeros(len(log.t)) if log.voltage is None else log.voltage
+    speeds, volts = (np.ascontiguousarray(x[first:]) for x in (log.rotor_speeds, voltage))
+    _fly_along(models, t, speeds, volts, states[last_known], starts - first, log.period, path)
+    return path
 
 
 def rollout_error(log: FlightLog, vehicle: Vehicle, segments: Segments) -> float:
@@ -131,12 +196,11 @@ def rollout_error(log: FlightLog, vehicle: Vehicle, segments: Segments) -> float
         InputError: the vehicle has more effects than a model holds.
     """
     try:
-        parts = list(_predictions(log, vehicle, segments, PREDICTION.horizon))
+        _, seen, path = _predictions(log, vehicle, segments, PREDICTION.horizon)
     except InputError:
         return math.nan
-    off = [path[:, -1, :3] - states[rows[:, -1], :3] for _, states, rows, path in parts]
-    squares = [np.sum(np.square(x), axis=1) for x in off]
-    return math.sqrt(float(np.mean(np.concatenate(squares)))) if squares else math.nan
+    off = path[:, -1, POSITION] - seen[:, -1, POSITION]
+    return math.sqrt(float(np.mean(np.sum(np.square(off), axis=1)))) if len(off) else math.nan
 
 
 QUANTITIES = {"position": "m", "velocity": "m/s", "attitude": "rad", "body rate": "rad/s"}
@@ -151,7 +215,7 @@ class PredictionErrors:
     starts: int
     horizon: Array  # (m,) s after the start
     model: Array  # (4, m)
-    still: Array  # (4, m) where velocity and body rate stay as the pose has them at the start
+    still: Array  # (4, m) where velocity and body rate stay as they are at the start
 
     @property
     def worse(self) -> list[str]:
@@ -176,8 +240,9 @@ def prediction_errors(
 ) -> PredictionErrors:
     """Return how well a model predicts flights, beside the guess that nothing changes.
 
-    A prediction starts every 0.25 s, as ``predict`` makes it. The flight that it is compared with
-    is the pose below 5 Hz; the angle between two attitudes is their distance.
+    A prediction starts every 0.25 s, as ``predict`` makes it, and the guess from the same state.
+    The flight that both are compared with is the pose below 15 Hz; the angle between two attitudes
+    is their distance.
 
     Args:
         logs: with a pose; flights that the model was not fitted to, or its errors mean little. For
@@ -191,196 +256,144 @@ def prediction_errors(
     """
     model: list[Array] = []
     still: list[Array] = []
+    horizons: list[Array] = []
     whole = [[(0.0, math.inf)]] * len(logs)
     for log, parts in zip(logs, windows or whole, strict=True):
         first, last = log.t[[0, -1]].tolist()
         ends = [(first + begin, min(first + end, last)) for begin, end in parts]
         flown = with_commanded_speeds(log, vehicle)
-        for piece, _, rows, path in _predictions(flown, vehicle, ends, horizon_s):
-            begun = rows[:, 0] - 1
-            ahead = piece.period * np.arange(1, rows.shape[1] + 1)[:, None]
-            seen = Rotation.from_matrix(piece.rotation)
-            guess = np.zeros_like(path)
-            guess[..., 7:10] = piece.velocity[begun, None]
-            guess[..., 10:13] = piece.angular_velocity[begun, None]
-            guess[..., :3] = piece.position[begun, None] + ahead * guess[..., 7:10]
-            turn = Rotation.from_rotvec((ahead * guess[..., 10:13]).reshape(-1, 3))
-            turned = seen[np.repeat(begun, rows.shape[1])] * turn
-            guess[..., 3:7] = turned.as_quat(scalar_first=True).reshape(*rows.shape, 4)
-            for out, x in ((model, path), (still, guess)):
-                attitude = Rotation.from_quat(x[..., 3:7].reshape(-1, 4), scalar_first=True)
-                angle = (seen[rows.ravel()].inv() * attitude).magnitude().reshape(rows.shape)
-                off = [
-                    np.linalg.norm(x[..., :3] - piece.position[rows], axis=2),
-                    np.linalg.norm(x[..., 7:10] - piece.velocity[rows], axis=2),
-                    angle,
-                    np.linalg.norm(x[..., 10:13] - piece.angular_velocity[rows], axis=2),
-                ]
-                out.append(np.stack(off, axis=1))
-    if len({x.shape[2] for x in model}) != 1:
+        begun, seen, path = _predictions(flown, vehicle, ends, horizon_s)
+        if len(path):
+            horizons.append(log.period * np.arange(1, path.shape[1] + 1))
+            model.append(_distances(path, seen))
+            still.append(_distances(_unchanged(begun, horizons[-1]), seen))
+    if len({len(horizon) for horizon in horizons}) != 1:
         names = ", ".join(log.name for log in logs)
         raise InputError(f"{names}: expected poses at one rate, unbroken for {horizon_s + 1:g} s")
     both = np.concatenate(model), np.concatenate(still)
-    return PredictionErrors(len(both[0]), ahead[:, 0], *(x.mean(axis=0) for x in both))
+    return PredictionErrors(len(both[0]), horizons[-1], *(x.mean(axis=0) for x in both))
+
+
+def _unchanged(begun: Array, ahead: Array) -> Array:
+    """Return the states (n, m, STATE) at m times ``ahead`` (s) of states (n, STATE) whose velocity
+    and angular velocity stay as they are.
+    """
+    out = np.repeat(begun[:, None], len(ahead), axis=1)
+    out[..., POSITION] += ahead[:, None] * out[..., VELOCITY]
+    turn = Rotation.from_rotvec((ahead[:, None] * out[..., RATE]).reshape(-1, 3))
+    turned = Rotation.from_quat(out[..., QUATERNION].reshape(-1, 4), scalar_first=True) * turn
+    out[..., QUATERNION] = turned.as_quat(scalar_first=True).reshape(*out.shape[:2], 4)
+    return out
+
+
+def _distances(x: Array, y: Array) -> Array:
+    """Return the distances (n, 4, m), in the order of ``QUANTITIES``, of states (n, m, STATE)."""
+    one, other = (
+        Rotation.from_quat(z[..., QUATERNION].reshape(-1, 4), scalar_first=True) for z in (x, y)
+    )
+    off = [np.linalg.norm(x[..., i] - y[..., i], axis=2) for i in (POSITION, VELOCITY, RATE)]
+    off.insert(2, (one.inv() * other).magnitude().reshape(x.shape[:2]))
+    return np.stack(off, axis=1)
 
 
 def _predictions(
     log: FlightLog, vehicle: Vehicle, segments: Segments, horizon: float
-) -> Iterator[tuple[Signals, Array, NDArray[np.intp], Array]]:
-    """Yield for each unbroken piece of a log its signals and states (n, STATE_SIZE), the samples
-    (starts, m) that predictions come to, and the states (starts, m, STATE_SIZE) that they say.
+) -> tuple[Array, Array, Array]:
+    """Return the states (n, STATE) from which predictions start, and the states (n, m, STATE) of
+    flight and prediction at the m samples that follow.
     """
     log = undo_log_sensing(log, vehicle)
+    ahead = max(1, round(horizon / log.period))
+    starts, seen = [], []
     for piece in log_signals(log):
-        ahead = max(1, round(horizon / piece.period))
-        starts = _start_samples(piece, segments, horizon)
-        starts = starts[starts + ahead < len(piece.t)]
-        if starts.size:
-            starts = starts[:: math.ceil(len(starts) / PREDICTION.most_starts)]
-            states, path = _rolled_out(piece, vehicle, starts, ahead, float(log.t[0]))
-            yield piece, states, starts[:, None] + np.arange(1, ahead + 1), path
+        rows = _start_rows(log, piece, segments, horizon)
+        rows = rows[:: math.ceil(len(rows) / PREDICTION.most_starts) or 1]
+        starts.append(rows)
+        seen.append(_seen(piece, log.t[rows, None] + log.period * np.arange(1, ahead + 1)))
+    rows, target = np.concatenate(starts), np.concatenate(seen)
+    if not rows.size:
+        return np.empty((0, STATE)), target, target
+    states = causal_states(log, vehicle)
+    return states[rows], target, _flown(log, vehicle, states, rows, ahead)
 
 
-def _rolled_out(
-    signals: Signals, vehicle: Vehicle, starts: NDArray[np.intp], ahead: int, take_off: float
-) -> tuple[Array, Array]:
-    """Return the flight's states (n, STATE_SIZE) over one unbroken piece of a log that began at
-    ``take_off`` s, and the states (starts, ahead, STATE_SIZE) that the model predicts.
-    """
-    substeps = max(1, math.ceil(signals.period / PREDICTION.longest_rotor_step - _STEP_TOLERANCE))
-    dt = signals.period / substeps
-    columns = signals.columns()
-    modelled = np.zeros((len(signals.t), 6))
-    path = np.zeros((len(starts), ahead, STATE_SIZE))
-    states = np.zeros((0, STATE_SIZE))
-    # along the flight once for the model's accelerations, and once more with the starts' states
-    for begun in (starts[:0], starts):
-        # the model that flies along, and the copy of it that is let go
-        models = np.zeros(2, dtype=_MODEL)
-        load_model(models[0], vehicle)
-        models[0]["time"] = signals.t[0] - take_off
-        modelled[:] = 0.0
-        _fly_along(models, begun, ahead, dt, substeps, *columns, states, modelled, path)
-        if not len(begun):
-            states = start_states(signals, modelled)
-    return states, path
-
-
-def _start_samples(signals: Signals, segments: Segments, horizon: float) -> NDArray[np.intp]:
-    """Return the samples at which predictions start that lie in a segment and well inside this
-    piece.
-    """
+def _start_rows(
+    log: FlightLog, piece: Signals, segments: Segments, horizon: float
+) -> NDArray[np.intp]:
+    """Return the rows at which predictions start that lie in a segment and well inside a piece."""
     use = PREDICTION
-    first = signals.t[0] + use.start_margin
-    last = signals.t[-1] - max(horizon + use.end_margin, use.start_margin)
+    first = piece.t[0] + use.start_margin
+    last = piece.t[-1] - horizon - use.end_margin
     each = (np.arange(t0, t1 - horizon + 1e-9, use.start_every) for t0, t1 in segments)
     times = np.concatenate([np.empty(0), *each])
     times = times[(times >= first) & (times <= last)]
-    return np.unique(np.round((times - signals.t[0]) / signals.period).astype(np.intp))
+    return np.unique(np.searchsorted(log.t, times - 0.5 * log.period))
 
 
-def start_states(signals: Signals, modelled: Array) -> Array:
-    """Return the flight's state (n, STATE_SIZE) in the filter's layout, without the wrench and
-    without a filter's delay.
-
-    Velocity, attitude and angular velocity are the pose's below 1 Hz and the model's above, where
-    the pose is mostly noise: what the two differ by goes through a zero-phase low-pass. A quadrotor
-    steers above 1 Hz, but what its model lacks acts mostly below. At 5 mrad of noise in a pose at
-    200 Hz that leaves 0.5 mrad of tilt and 3 mrad/s of angular velocity; from the pose alone, cut
-    at 5 Hz, it is 1.1 mrad, 19 mrad/s and the flight's own fast motion lost.
-
-    Args:
-        signals: n samples.
-        modelled: (n, 6) the model's acceleration (m/s2, world) and angular acceleration (rad/s2,
-            body) over the interval that ends at each sample.
-    """
-    period = signals.period
-    integral = period * np.cumsum(modelled, axis=0)
-    measured = np.column_stack([signals.velocity, signals.angular_velocity])
-    twist = integral + low_pass(measured - integral, CUTOFFS.twist_hz, period)
-    # the attitude that this angular velocity integrates to drifts slowly off the measured one:
-    # low-pass the difference
-    attitude = Rotation.from_matrix(signals.rotation)
-    turned = np.empty((len(signals.t), 4))
-    turned[0] = attitude[0].as_quat(scalar_first=True)
-    _integrate_angular_velocity(np.ascontiguousarray(twist[:, 3:]), period, turned)
-    path = Rotation.from_quat(turned, scalar_first=True)
-    drift = (attitude * path.inv()).as_quat(scalar_first=True)
-    drift = low_pass(continuous(drift), CUTOFFS.twist_hz, period)
-    states = np.zeros((len(signals.t), STATE_SIZE))
-    states[:, 0:3] = low_pass(signals.position, CUTOFFS.position_hz, period)
-    states[:, 3:7] = (Rotation.from_quat(drift, scalar_first=True) * path).as_quat(
-        scalar_first=True
-    )
-    states[:, 7:13] = twist
-    return states
-
-
-@compiled
-def _integrate_angular_velocity(rate: Array, period: float, out: Array) -> None:
-    """Write the attitude (n, 4) that turns at a angular velocity (n, 3) into ``out``, from its
-    first row on.
-    """
-    for k in range(1, len(rate)):
-        a, b = rate[k - 1], rate[k]
-        w = 0.5 * (a + b)
-        turn_body(out[k - 1], w[0], w[1], w[2], period, out[k])
+def _seen(piece: Signals, times: Array) -> Array:
+    """Return the flight's states (..., STATE) at times (...) of a piece."""
+    turned = Rotation.from_matrix(piece.rotation).as_quat(scalar_first=True)
+    columns = piece.position, continuous(turned), piece.velocity, piece.angular_velocity
+    states = resampled(times.ravel(), piece.t, np.column_stack(columns))
+    return states.reshape(*times.shape, STATE)
 
 
 @compiled
 def _fly_along(
     models: Record,
-    starts: np.ndarray,
-    ahead: int,
-    dt: float,
-    substeps: int,
+    t: Array,
     speeds: Array,
     voltage: Array,
-    position: Array,
-    rotation: Array,
-    velocity: Array,
-    rate: Array,
     states: Array,
-    modelled: Array,
+    starts: np.ndarray,
+    period: float,
     path: Array,
 ) -> None:
-    """Run the first model along a flight and write its accelerations (n, 6); let a copy of it go at
-    each start, and write the states (starts, ahead, STATE_SIZE) that it comes to.
+    """Run the first model along a flight of n rows, for what rotors and effects remember; let a
+    copy of it go at each start, and write the states (starts, ahead, STATE) that it comes to.
     """
     f, g = models[0], models[1]
-    nothing, after = np.zeros(3), np.zeros(path.shape[2])
-    at, fine = 0, dt / _MOTION_STEPS
-    for k in range(len(speeds)):
+    after, x, between = np.zeros(STATE_SIZE), np.zeros(STATE_SIZE), np.empty(4)
+    steps = _rotor_steps(period)
+    dt, at, size = period / steps, 0, len(states[0])
+    for k in range(len(t)):
         if k > 0:
-            j = k - 1
-            for _ in range(substeps):
-                drive(f, speeds[k], dt, voltage[k])
-                apply_effects(f, position[j], rotation[j], velocity[j], rate[j])
-                accelerations(
-                    f.body,
-                    rotation[j],
-                    rate[j],
-                    f.rotor_wrench,
-                    nothing,
-                    nothing,
-                    f.effect_wrench,
-                    f.acceleration,
-                )
-                f.time += dt
-                for i in range(6):
-                    modelled[k, i] += f.acceleration[i] / substeps
-        if at < len(starts) and starts[at] == k:
+            last, length = states[k - 1], t[k] - t[k - 1]
+            along = _rotor_steps(length)
+            quaternion_to_matrix(last[3:7], f.rotation)
+            for _ in range(along):
+                drive(f, speeds[k], length / along, voltage[k])
+                apply_effects(f, last[0:3], f.rotation, last[7:10], last[10:13])
+                f.time += length / along
+        if at == len(starts):
+            return
+        if starts[at] == k:
             models[1] = f
-            x = states[k].copy()
-            for i in range(ahead):
-                for _ in range(substeps):
-                    drive(g, speeds[k + 1 + i], dt, voltage[k + 1 + i])
+            for i in range(size):
+                x[i] = states[k, i]
+            row = k
+            for i in range(path.shape[1]):
+                time = t[k] + (i + 1) * period
+                while row < len(t) - 2 and t[row + 1] < time:
+                    row += 1
+                share = min((time - t[row]) / (t[row + 1] - t[row]), 1.0)
+                for j in range(4):
+                    between[j] = (1.0 - share) * speeds[row, j] + share * speeds[row + 1, j]
+                volts = (1.0 - share) * voltage[row] + share * voltage[row + 1]
+                for _ in range(steps):
+                    drive(g, between, dt, volts)
                     for _ in range(_MOTION_STEPS):
-                        propagate(g, x, fine, after)
+                        propagate(g, x, dt / _MOTION_STEPS, after)
                         x[:] = after
                     g.time += dt
-                path[at, i] = x
+                path[at, i] = x[:size]
             at += 1
+
+
+@compiled
+def _rotor_steps(length: float) -> int:
+    """Return in how many steps the rotors are carried over ``length`` s."""
+    return max(1, math.ceil(length / _LONGEST_ROTOR_STEP - _STEP_TOLERANCE))
 
 
 def nis_without_wrench_state(log: FlightLog, vehicle: Vehicle, segments: Segments) -> float:

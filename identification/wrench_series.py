@@ -156,7 +156,7 @@ def _estimate(
     for begin in range(first + 1, count, _REPORTED):
         report(begin / count)
         rows = np.arange(begin, min(begin + _REPORTED, count))
-        calls, to = _calls(log, rows, ukf, not smooth)
+        calls, to = calls_of(log, rows, ukf, not smooth)
         made = make_calls(ukf.record, calls, to, numbers, std, loads)
         if made < len(calls):
             raise Sample(calls["z"][made]).bad_quaternion()
@@ -310,7 +310,7 @@ def _of_poses(
         raise InputError(f"{log.source or log.name}: {error}") from error
 
 
-def _calls(log: FlightLog, rows: Rows, ukf: WrenchUKF, with_imu: bool) -> tuple[np.ndarray, Rows]:
+def calls_of(log: FlightLog, rows: Rows, ukf: WrenchUKF, with_imu: bool) -> tuple[np.ndarray, Rows]:
     """Return the calls that take a filter to each of some rows from the one before, in equal steps
     of at most one period, and correct it there with what was measured; and the row of each call.
     """

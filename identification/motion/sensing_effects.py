@@ -42,6 +42,12 @@ def sensing_of(vehicle: Vehicle) -> tuple[EffectSetting, ...]:
     return tuple(e for e in vehicle.effects if get(e.name).kind == "sensing")
 
 
+def delay_of(vehicle: Vehicle) -> float:
+    """Return by how much (s) rows without a vehicle's sensing effects tell of an earlier flight."""
+    late = [e for e in sensing_of(vehicle) if get(e.name).role == Role.DELAY]
+    return float(sum(abs(get(e.name).vector(e.coefficients)[0]) for e in late))
+
+
 def undo_log_sensing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     """Return the log with the vehicle's declared sensing effects taken out of its poses and rotor
     speeds.
@@ -51,14 +57,13 @@ def undo_log_sensing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     after a break of more than 0.1 s have no pose; the voltage, which is of the row's own instant,
     is that of then, and the truth stays as it is.
     """
-    if not (sensing := sensing_of(vehicle)):
+    if not sensing_of(vehicle):
         return log
     models = np.zeros(1, dtype=_MODEL)
     load_model(models[0], vehicle)
     samples = np.column_stack([log.rotor_speeds, log.position, log.quaternion])
     _undo(models, np.ascontiguousarray(log.t), np.ascontiguousarray(log.valid), samples)
-    late = [e for e in sensing if get(e.name).role == Role.DELAY]
-    delay = sum(abs(get(e.name).vector(e.coefficients)[0]) for e in late)
+    delay = delay_of(vehicle)
     valid = log.valid & _settled(log, delay)
     samples[~valid, 4:] = np.nan
     voltage = None if log.voltage is None else np.interp(log.t - delay, log.t, log.voltage)

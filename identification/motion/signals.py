@@ -67,18 +67,31 @@ def log_signals(log: FlightLog, wide_hz: float = CUTOFFS.pose_hz) -> list[Signal
     Raises:
         InputError: no piece is longer than 3 s.
     """
-    out = [_piece(log, piece, wide_hz) for piece in pose_pieces(log)]
-    if not out:
+    return [_piece(log, piece, wide_hz) for piece in known_pieces(log)]
+
+
+def known_pieces(log: FlightLog) -> list[NDArray[np.intp]]:
+    """Return the rows of each unbroken run of poses that is long enough to say something.
+
+    Raises:
+        InputError: none is longer than 3 s.
+    """
+    pieces = pose_pieces(log)
+    if not pieces:
         raise InputError(
             f"{log.name}: no unbroken piece of pose is longer than {SHORTEST_PIECE:g} s"
         )
-    return out
+    return pieces
 
 
 def pose_pieces(log: FlightLog) -> list[NDArray[np.intp]]:
-    """Return the rows of each unbroken run of poses that is long enough to say something."""
-    gap = max(LONGEST_GAP, 3.5 * log.period)
-    return unbroken(log.t, np.flatnonzero(log.valid), gap, 8, SHORTEST_PIECE)
+    """Return the same, or none."""
+    return unbroken(log.t, np.flatnonzero(log.valid), longest_step(log), 8, SHORTEST_PIECE)
+
+
+def longest_step(log: FlightLog) -> float:
+    """Return the time (s) between two rows beyond which a log is broken there."""
+    return max(LONGEST_GAP, 3.5 * log.period)
 
 
 def _piece(log: FlightLog, rows: NDArray[np.intp], wide_hz: float) -> Signals:

@@ -33,11 +33,6 @@ class Cutoffs:
     # of a disturbance that counts for the verdict; what is faster is in part noise: of the pose, of
     # the rounding of rotor speeds
     calm_hz: float = 2.0
-    # of the position from which a model is flown
-    position_hz: float = 10.0
-    # below it the measured velocity and angular velocity are used, above it the model's: with the
-    # true model, predictions of 46 flights out of 46 came nearer than with 1.5
-    twist_hz: float = 1.0
     # of the motion by which a log's conventions are told: well above a trajectory, well below the
     # noise of a differentiated pose
     convention_hz: float = 3.0
