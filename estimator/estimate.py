@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum
 from typing import Any
 
@@ -47,12 +48,13 @@ class WrenchEstimate:
     Args:
         numbers: (28,) state, status, restarts and the model's variances, or (352,), the covariance
             behind them.
-        std: (18,) standard deviations of the error state, where there is no covariance.
+        std: (18,) standard deviations of the error state, where there is no covariance; or what
+            returns them, called when they are asked for.
     """
 
     __slots__ = ("_std", "numbers")
 
-    def __init__(self, numbers: Array, std: Array | None = None) -> None:
+    def __init__(self, numbers: Array, std: Array | Callable[[], Array] | None = None) -> None:
         self.numbers = numbers
         self._std = std
 
@@ -69,7 +71,7 @@ class WrenchEstimate:
 
     def at(self, i: int) -> WrenchEstimate:
         """Return the estimate at place ``i`` of the axis in front."""
-        return WrenchEstimate(self.numbers[i], None if self._std is None else self._std[i])
+        return WrenchEstimate(self.numbers[i], None if self._std is None else self.std[i])
 
     @property
     def state(self) -> Array:
@@ -96,6 +98,8 @@ class WrenchEstimate:
     @property
     def std(self) -> Array:
         """Standard deviations (18,) of the same: without the vehicle's own uncertainty."""
+        if callable(self._std):
+            self._std = self._std()
         if self._std is None:
             return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
         return self._std
