@@ -48,8 +48,7 @@ class WrenchEstimate:
     Args:
         numbers: (28,) state, status, restarts and the model's variances, or (352,), the covariance
             behind them.
-        std: (18,) standard deviations of the error state, where there is no covariance; or what
-            returns them, called when they are asked for.
+        std: (18,) standard deviations of the error state, where there is no covariance.
     """
 
     __slots__ = ("_std", "numbers")
@@ -98,7 +97,7 @@ class WrenchEstimate:
     @property
     def std(self) -> Array:
         """Standard deviations (18,) of the same: without the vehicle's own uncertainty."""
-        if callable(self._std):
+        if callable(self._std):  # worked out when they are asked for
             self._std = self._std()
         if self._std is None:
             return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))

@@ -42,8 +42,8 @@ def _forward_with_links(
         event = events[k]
         f.z[:] = event.z  # a step brings its quaternion to length 1 in place
         step_with_link(f, f.z, event.parts, event.dt, event.voltage, links[1 + k])
-        numbers[k, STATUS], numbers[k, RESTARTS] = f.status, f.restarts
         strains[k] = f.poses.strain
+        numbers[k, STATUS], numbers[k, RESTARTS] = f.status, f.restarts
 
 
 @compiled

@@ -52,12 +52,12 @@ def _step_records(
     for n in range(len(records)):
         f = records[n]
         step(f, z[n], parts, dt, voltage[n])
+        write_variances(f, variances[n])
         for i in range(STATE_SIZE):
             out[n, i] = f.x[i]
         out[n, STATUS], out[n, RESTARTS] = f.status, f.restarts
         for i in range(6):
             out[n, STATE_SIZE + 2 + i] = f.model[i]
-        write_variances(f, variances[n])
 
 
 class _Records:

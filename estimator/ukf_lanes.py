@@ -122,14 +122,14 @@ def _step_blocks(
         call_at(step, work)
         put_down(blocks + b * BLOCK_SIZE, work)
         for lane in range(min(WIDTH, count - WIDTH * b)):
+            for i in range(N):
+                variances[WIDTH * b + lane, i] = work_variances[i, lane]
             for i in range(STATE_SIZE):
                 out[WIDTH * b + lane, i] = estimates[b, i, lane]
             out[WIDTH * b + lane, STATE_SIZE] = status[b, lane]
             out[WIDTH * b + lane, STATE_SIZE + 1] = restarts[b, lane]
             for i in range(6):
                 out[WIDTH * b + lane, STATE_SIZE + 2 + i] = model[b, i, lane]
-            for i in range(N):
-                variances[WIDTH * b + lane, i] = work_variances[i, lane]
 
 
 def new_work(record: np.ndarray) -> np.ndarray:
