@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum
 from typing import Any
 
@@ -53,7 +54,7 @@ class WrenchEstimate:
 
     __slots__ = ("_std", "numbers")
 
-    def __init__(self, numbers: Array, std: Array | None = None) -> None:
+    def __init__(self, numbers: Array, std: Array | Callable[[], Array] | None = None) -> None:
         self.numbers = numbers
         self._std = std
 
@@ -70,7 +71,7 @@ class WrenchEstimate:
 
     def at(self, i: int) -> WrenchEstimate:
         """Return the estimate at place ``i`` of the axis in front."""
-        return WrenchEstimate(self.numbers[i], None if self._std is None else self._std[i])
+        return WrenchEstimate(self.numbers[i], None if self._std is None else self.std[i])
 
     @property
     def state(self) -> Array:
@@ -97,6 +98,8 @@ class WrenchEstimate:
     @property
     def std(self) -> Array:
         """Standard deviations (18,) of the same: without the vehicle's own uncertainty."""
+        if callable(self._std):  # worked out when they are asked for
+            self._std = self._std()
         if self._std is None:
             return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
         return self._std

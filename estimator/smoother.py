@@ -36,35 +36,51 @@ _BLOCK = 1024  # steps in memory at a time: 10 MB
 
 @compiled
 def _forward_with_links(
-    record: np.ndarray, events: np.ndarray, links: np.ndarray, numbers: Array
+    record: np.ndarray, events: np.ndarray, links: np.ndarray, numbers: Array, strains: Array
 ) -> None:
     f = record[0]
     for k in range(len(events)):
         event = events[k]
         f.z[:] = event.z  # a step brings its quaternion to length 1 in place
         step_with_link(f, f.z, event.parts, event.dt, event.voltage, links[1 + k])
+        strains[k] = f.poses.strain
         numbers[k, STATUS], numbers[k, RESTARTS] = f.status, f.restarts
         numbers[k, EXCESS] = f.excess
 
 
 @compiled
-def _write(x: Array, P: Array, model: Array, numbers: Array, std: Array, k: int) -> None:
-    numbers[k, :STATE_SIZE], numbers[k, MODEL], std[k] = x, model, np.sqrt(np.diag(P))
+def _write(record: np.ndarray, numbers: Array, std: Array, k: int) -> None:
+    f = record[0]
+    widened = (1.0 + f.poses.strain) * np.diag(f.P)
+    numbers[k, :STATE_SIZE], numbers[k, MODEL], std[k] = f.x, f.model, np.sqrt(widened)
     if numbers.shape[1] == ESTIMATE_SIZE:
-        numbers[k, WITHOUT_COVARIANCE:] = P.flatten()
+        numbers[k, WITHOUT_COVARIANCE:] = f.P.flatten()
+        numbers[k, WITHOUT_COVARIANCE :: N + 1] = widened
 
 
 @compiled
-def _backward(links: np.ndarray, record: np.ndarray, numbers: Array, std: Array) -> None:
+def _backward(
+    links: np.ndarray,
+    events: np.ndarray,
+    strains: Array,
+    record: np.ndarray,
+    numbers: Array,
+    std: Array,
+) -> None:
     """Write the smoothed estimates of a block, from the last, which ``record`` holds; leave in it
     the one before the block, whose link is the first.
+
+    Unlikely poses that were taken in widen what is smoothed before them as what is after: the
+    ``strains`` (n,) of the filter fall backwards at the same rate.
     """
     f = record[0]
     for k in range(len(numbers) - 1, -1, -1):
+        f.poses.strain = max(f.poses.strain, strains[k])
         variances(f.uncertain, f.load, f.model)
-        _write(f.x, f.P, f.model, numbers, std, k)
+        _write(record, numbers, std, k)
         follow_back(f.load, links[k + 1].passed, links[k].load)
         step_back(f.x, f.P, links[k + 1], links[k].x)
+        f.poses.strain -= min(events[k].dt / f.patience, 1.0) * f.poses.strain
 
 
 class RecordingUKF(WrenchUKF):
@@ -134,11 +150,12 @@ class RecordingUKF(WrenchUKF):
                 calls, loads = events[here], np.empty((here.stop - first, *LOAD))
                 make_calls(record, calls, np.arange(len(calls)), numbers[here], std[here], loads)
             links = np.zeros(1 + min(_BLOCK, end - begin), dtype=LINK)
+            strains = np.empty(_BLOCK)
             for here, memory in reversed(blocks):
                 links["x"][0], links["load"][0] = memory["x"][0], memory["load"][0]
-                _forward_with_links(memory, events[here], links, numbers[here])
-                _backward(links, record, numbers[here], std[here])
-            _write(record["x"][0], record["P"][0], record["model"][0], numbers, std, begin)
+                _forward_with_links(memory, events[here], links, numbers[here], strains)
+                _backward(links, events[here], strains, record, numbers[here], std[here])
+            _write(record, numbers, std, begin)
         finite = np.isfinite(numbers[:, :NIS]).all(axis=1) & np.isfinite(std).all(axis=1)
         if not finite.all():
             raise InputError(

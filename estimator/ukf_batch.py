@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from copy import deepcopy
+from functools import partial
 from typing import Self
 
 import numpy as np
@@ -29,12 +30,12 @@ from .estimate import (
     Array,
     WrenchEstimate,
 )
-from .filter_record import NUMBERS, N
+from .filter_record import N
 from .recovery import Recovery
 from .sample import convert
 from .tuning import UKFTuning
 from .ukf import WrenchUKF, step
-from .ukf_lanes import Blocks
+from .ukf_lanes import Blocks, write_variances
 
 
 @compiled_without_gil
@@ -49,11 +50,18 @@ def _first_bad_quaternion(z: Array) -> int:
 
 @compiled_without_gil
 def _step_records(
-    records: np.ndarray, z: Array, parts: int, dt: float, voltage: Array, out: Array
+    records: np.ndarray,
+    z: Array,
+    parts: int,
+    dt: float,
+    voltage: Array,
+    out: Array,
+    variances: Array,
 ) -> None:
     for n in range(len(records)):
         f = records[n]
         step(f, z[n], parts, dt, voltage[n])
+        write_variances(f, variances[n])
         for i in range(STATE_SIZE):
             out[n, i] = f.x[i]
         out[n, STATUS], out[n, RESTARTS] = f.status, f.restarts
@@ -69,12 +77,10 @@ class _Records:
     def put(self, n: int, record: np.ndarray) -> None:
         self._records[n] = record[0]
 
-    def step(self, z: Array, parts: int, dt: float, voltage: Array, out: Array) -> None:
-        _step_records(self._records, z, parts, dt, voltage, out)
-
-    @property
-    def state(self) -> Array:
-        return np.column_stack([self._records[name] for name in NUMBERS])
+    def step(
+        self, z: Array, parts: int, dt: float, voltage: Array, out: Array, variances: Array
+    ) -> None:
+        _step_records(self._records, z, parts, dt, voltage, out, variances)
 
     @property
     def covariance(self) -> Array:
@@ -119,6 +125,8 @@ class WrenchUKFBatch:
         self._filters = [WrenchUKF(vehicle, tuning, period, gate, recovery) for vehicle in given]
         self.period = self._filters[0].period
         self._memory = self._new_memory()
+        # the estimates and the variances of the error states
+        self._now = np.zeros((self.count, WITHOUT_COVARIANCE)), np.zeros((self.count, N))
         self._voltage = np.resize([vehicle.voltage_ref for vehicle in given], self.count).astype(
             np.float64
         )
@@ -182,6 +190,7 @@ class WrenchUKFBatch:
             for name, value, shape in given
         ]
         memory = self._new_memory()
+        numbers, variances = np.empty((self.count, WITHOUT_COVARIANCE)), np.empty((self.count, N))
         for n, start in enumerate(zip(*starts, strict=True)):
             ukf = self._of(n)
             try:
@@ -189,19 +198,22 @@ class WrenchUKFBatch:
             except InputError as error:
                 raise InputError(f"{error} (filter {n})") from None
             memory.put(n, ukf.record)
-        self._memory = memory
+            numbers[n] = ukf.estimate.numbers[:WITHOUT_COVARIANCE]
+            variances[n] = np.diag(ukf.covariance)
+        self._memory, self._now = memory, (numbers, variances)
 
     @property
     def covariance(self) -> Array:
-        """Covariances (n, 18, 18) of the error states, as of ``WrenchUKF``; refused and unlikely
-        poses do not widen it.
-        """
-        return self._memory.covariance
+        """Covariances (n, 18, 18) of the error states, as of ``WrenchUKF``."""
+        P, i = self._memory.covariance, np.arange(N)
+        P[:, i, i] = self._now[1]
+        return P
 
     @property
     def estimate(self) -> WrenchEstimate:
         """What the filters believe now."""
-        return WrenchEstimate(self._memory.state)
+        numbers, variances = self._now
+        return WrenchEstimate(numbers.copy(), partial(np.sqrt, variances))
 
     def step(
         self,
@@ -232,9 +244,10 @@ class WrenchUKFBatch:
                 f"(filter {bad})"
             )
         volts = self._voltage if voltage is None else _rows("voltage", voltage, (), self.count)
-        out = np.empty((self.count, WITHOUT_COVARIANCE))
-        self._memory.step(z, parts, self.period, volts, out)
-        return WrenchEstimate(out)
+        self._now = np.empty((self.count, WITHOUT_COVARIANCE)), np.empty((self.count, N))
+        numbers, variances = self._now
+        self._memory.step(z, parts, self.period, volts, numbers, variances)
+        return WrenchEstimate(numbers, partial(np.sqrt, variances))
 
 
 def _rows(name: str, value: ArrayLike, shape: tuple[int, ...], count: int) -> Array:

@@ -16,11 +16,11 @@ from ..dynamics.motion import rotor_wrench
 from ..dynamics.rotation import quaternion_to_matrix
 from ..runtime.addresses import address_of, call_at, numbers_at
 from ..runtime.compiled import Record, compiled, compiled_without_gil
-from ..runtime.vector_lanes import WIDTH, LaneRecord, choose
+from ..runtime.vector_lanes import WIDTH, LaneRecord, any_of, choose
 from .estimate import STATE_SIZE, Array
-from .filter_record import FILTER, NUMBERS, fields_between
-from .recovery import MEMORY
-from .ukf import carry, correct
+from .filter_record import FILTER, NUMBERS, N, fields_between
+from .recovery import BELIEVING, MEMORY
+from .ukf import _STRAINED, _add_doubt, carry, correct
 
 # what a filter must not forget from one step to the next; first in both layouts
 _KEPT = fields_between("x", "last_speeds")
@@ -54,6 +54,20 @@ def _check(f: Record) -> None:
         last[i] = z[i]
 
 
+@compiled
+def write_variances(f: Record, out: Array) -> None:
+    """Write the variances (18,) of the error state into ``out``, with what refused and unlikely
+    poses add; of a single filter or of a block in hand.
+    """
+    doubted = (f.poses.phase > BELIEVING) | (f.poses.strain > _STRAINED)
+    for i in range(N):
+        out[i] = f.P[i, i]
+    if any_of(doubted):
+        _add_doubt((f,), out)
+        for i in range(N):
+            out[i] = choose(doubted, out[i], f.P[i, i])
+
+
 def _step_work(address: int) -> None:
     f = in_hand(address)
     _check(f)
@@ -63,6 +77,7 @@ def _step_work(address: int) -> None:
     s = f.z
     with_position = math.isfinite(s[4] + s[5] + s[6])
     correct(f, s[4:11], with_position, math.isfinite(s[7] + s[8] + s[9] + s[10]))
+    write_variances(f, f.S[0])
 
 
 def step_address() -> int:
@@ -89,10 +104,12 @@ def _step_blocks(
     step: int,
     work: int,
     work_z: Array,
+    work_variances: Array,
     blocks: int,
     kept: tuple[Array, Array, Array, Array, Array],
     z: Array,
     out: Array,
+    variances: Array,
 ) -> None:
     estimates, status, restarts, excess, model = kept
     count = len(z)
@@ -105,6 +122,8 @@ def _step_blocks(
         call_at(step, work)
         put_down(blocks + b * BLOCK_SIZE, work)
         for lane in range(min(WIDTH, count - WIDTH * b)):
+            for i in range(N):
+                variances[WIDTH * b + lane, i] = work_variances[i, lane]
             for i in range(STATE_SIZE):
                 out[WIDTH * b + lane, i] = estimates[b, i, lane]
             out[WIDTH * b + lane, STATE_SIZE] = status[b, lane]
@@ -149,28 +168,26 @@ class Blocks:
         lanes = slice(n % WIDTH, None if n == self.count - 1 else n % WIDTH + 1)
         write_lanes(self._blocks, n // WIDTH, lanes, record)
 
-    def step(self, z: Array, _parts: int, _dt: float, _voltage: Array, out: Array) -> None:
-        """Step all: samples (n, 11), NaN where nothing was measured; estimates (n, 28), written."""
+    def step(
+        self, z: Array, _parts: int, _dt: float, _voltage: Array, out: Array, variances: Array
+    ) -> None:
+        """Step all: samples (n, 11), NaN where nothing was measured; estimates (n, 28) and
+        variances of the error states (n, 18), written.
+        """
         kept: Any = tuple(self._blocks[name] for name in NUMBERS)
         _step_blocks(
             step_address(),
             self._work.ctypes.data,
             self._work["z"][0],
+            self._work["S"][0, 0],
             self._blocks.ctypes.data,
             kept,
             z,
             out,
+            variances,
         )
 
     @property
-    def state(self) -> Array:
-        """Estimates, status, count of restarts and the model's variances (n, 28)."""
-        return np.column_stack([self._each(name) for name in NUMBERS])
-
-    @property
     def covariance(self) -> Array:
-        """Covariances (n, 18, 18)."""
-        return self._each("P")
-
-    def _each(self, name: str) -> Array:
-        return np.concatenate(list(np.moveaxis(self._blocks[name], -1, 1)))[: self.count]
+        """Covariances (n, 18, 18), of noise alone."""
+        return np.concatenate(list(np.moveaxis(self._blocks["P"], -1, 1)))[: self.count]

@@ -7,7 +7,7 @@ filter's period, and its tuning follows from it.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -45,7 +45,13 @@ class Output:
     row: Row
     t: float  # s, stream's time, of the estimate
     estimate: WrenchEstimate
-    std: Array  # (6,) of force, N, and torque, Nm: the filter's own
+    std: Array  # (6,) of force, N, and torque, Nm: of noise and of the vehicle's uncertainty
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance (6, 6) of the wrench; ``std`` is that of its diagonal."""
+        noise = np.roll(self.estimate.covariance[12:, 12:], (3, 3), axis=(0, 1))
+        return noise + np.diag(self.std**2 - np.diag(noise))
 
     @property
     def wrench(self) -> Array:
@@ -111,6 +117,9 @@ class LiveFilter:
         tuning = None if given is None else given.scaled(PERIOD, period)
         ukf = WrenchUKF(self.vehicle, tuning, period, self.settings.gate)
         self._white = ukf.record["innovation"][0]  # of the last pose, whitened
+        commanded = WrenchUKF(replace(self.vehicle, omega_source="commanded"), tuning, period)
+        # how uncertain the vehicle is with rotor speeds that were measured, or are of commands
+        self._uncertain = tuple(one.record["uncertain"][0].copy() for one in (ukf, commanded))
         self._timed = TimedFilter(ukf, self.settings.horizon)
 
     def _process(self, row: Row) -> list[Output]:
@@ -141,6 +150,7 @@ class LiveFilter:
         """Carry the filter to a row, and correct it there."""
         before = self._before
         assert before is not None
+        timed.ukf.record["uncertain"][0] = self._uncertain[row.commanded]
         speeds = 0.5 * (before.rotor_speeds + row.rotor_speeds)
         voltage = None
         if before.voltage is not None and row.voltage is not None:

@@ -26,7 +26,7 @@ from ...estimator.filter_record import AGREEING, N
 from ...estimator.hover_covariance import CATCH_UP
 from ...estimator.imu import _PATIENCE as IMU_PATIENCE
 from ...estimator.recovery import NOISE
-from ...estimator.ukf import default_covariance
+from ...estimator.ukf import _STRAINED, default_covariance
 from ...runtime.errors import InputError
 from . import hover
 from .c_numbers import FUNCTIONS, PRECISIONS, in_precision, literal, shape, table
@@ -47,6 +47,7 @@ _KNOWN = {
     "NOISE": NOISE,
     "AGREEING": AGREEING,
     "PI": math.pi,
+    "STRAINED": _STRAINED,
     "LARGEST_MRP_VARIANCE": LARGEST_MRP_VARIANCE,
     "LONGEST_GAP": _LONGEST_GAP,
     "NEAR": _NEAR,

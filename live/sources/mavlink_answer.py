@@ -67,5 +67,5 @@ def _wind(vehicle: Vehicle, output: Output) -> tuple[Array, Array] | None:
     if not level > 0.0 or float(np.linalg.eigvalsh(drag)[0]) < _TILTED * level:
         return None
     inverse = np.linalg.inv(drag)
-    covariance = inverse @ output.estimate.covariance[15:17, 15:17] @ inverse.T
+    covariance = inverse @ output.covariance[:2, :2] @ inverse.T
     return inverse @ output.estimate.force[:2], np.sqrt(np.diagonal(covariance))

@@ -81,11 +81,8 @@ def acceleration_message(of: TypeOf, output: Output, frame: str, vehicle: Vehicl
     scale = np.zeros((6, 6))
     scale[:3, :3] = np.eye(3) / vehicle.mass
     scale[3:, 3:] = R @ np.linalg.inv(vehicle.inertia) @ R.T
-    order = [15, 16, 17, 12, 13, 14]  # force, then torque, in the error state
-    noise = estimate.covariance[np.ix_(order, order)]
-    stated = noise + np.diag(output.std**2 - np.diag(noise))  # with the vehicle's own uncertainty
-    covariance = scale @ stated @ scale.T
-    values = scale @ np.concatenate([estimate.force, estimate.torque])
+    covariance = scale @ output.covariance @ scale.T
+    values = scale @ output.wrench
     accel = of("geometry_msgs/msg/Accel")(
         linear=_vector(of, values[:3]), angular=_vector(of, values[3:])
     )

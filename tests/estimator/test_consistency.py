@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.support.model_flights import ANISOTROPIC, WITH_EFFECTS, YAWED, simulate_model
+from tests.support.model_flights import (
+    ANISOTROPIC,
+    WITH_EFFECTS,
+    YAWED,
+    drawn,
+    simulate_model,
+)
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import Uncertainty
 from windwrench.envs.recording import record_flight
@@ -76,20 +82,6 @@ def test_band_holds_the_mean_as_often_as_it_says():
     assert (low, high) == pytest.approx((5.341, 6.697), abs=2e-3)
     means = np.random.default_rng(0).chisquare(6, (4000, 100)).mean(axis=1)
     assert np.mean((means > low) & (means < high)) == pytest.approx(0.95, abs=0.015)
-
-
-def drawn(vehicle, rng):
-    """Return a vehicle as it may be where ``vehicle`` is declared."""
-    known, normal = vehicle.uncertainty, rng.standard_normal
-    command = 1.0 + known.command * normal() if vehicle.omega_source == "commanded" else 1.0
-    return replace(
-        vehicle,
-        mass=vehicle.mass * (1.0 + known.mass * normal()),
-        k=vehicle.k * (1.0 + known.thrust * normal()) * (1.0 + known.rotor * normal(4)) * command,
-        p=vehicle.p * max(1.0 + known.torque * normal(), 0.1) * command,
-        inertia=vehicle.inertia * max(1.0 + known.inertia * normal(), 0.2),
-        arm_l=vehicle.arm_l * (1.0 + known.arm_l * normal()),
-    )
 
 
 @pytest.mark.parametrize("source", ["measured", "commanded"])

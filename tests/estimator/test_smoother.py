@@ -8,6 +8,7 @@ import pytest
 
 from tests.support.model_flights import ANISOTROPIC, WITH_EFFECTS, YAWED, simulate_model
 from windwrench.dynamics import load_vehicle
+from windwrench.envs.recording import record_flight
 from windwrench.estimator import UKFTuning, rauch_tung_striebel, smoother
 from windwrench.estimator.consistency import chi2_band, state_error
 from windwrench.estimator.row_steps import steps_between
@@ -117,6 +118,23 @@ def test_blocks_change_nothing(block, monkeypatch):
     pieces = smooth(*log, covariance=True)
     assert np.array_equal(whole.state, pieces.state, equal_nan=True)
     assert np.array_equal(whole.covariance, pieces.covariance)
+
+
+def test_unlikely_poses_widen_what_is_smoothed_before_and_after():
+    """A pose that stands still for 0.4 s at 1.5 m/s: without the widening z is 37."""
+    flown = record_flight(VEHICLE, (), "circle", 6.0)
+    x, q = flown["position"], flown["quaternion"]
+    x[800:880], q[800:880] = x[800], q[800]
+    ukf = RecordingUKF(VEHICLE, gate=0.9999)
+    ukf.reset(x[0], q[0])
+    for k in range(1, len(x)):
+        ukf.step(flown["rotor_speeds"][k], x[k], q[k])
+    found = ukf.smooth(covariance=True)
+    z = np.abs(found.force - flown["force"]) / found.std_force
+    assert z[800:].max() < 6.0
+    assert z[700:800].max() < 6.0
+    diagonal = np.diagonal(found.covariance, axis1=1, axis2=2)
+    np.testing.assert_allclose(found.std**2, diagonal, rtol=1e-12)
 
 
 @pytest.mark.parametrize("seed", [0, 2, 5])
