@@ -64,6 +64,7 @@ class Clocks:
         self._first_pose: int | None = None  # ns, arrival of the first pose without a stamp
         self._ours = False  # the reference is this machine's clock: nothing was stamped
         self._latest = 0  # ns, arrival of the newest message
+        self._anew = False  # another sender is taken, none of whose stamps was yet
         self.poses_at_jumps = 0  # that were left out until it was known that a clock had jumped
         self._awake = 0  # ns since the reference's newest stamp, without silences
 
@@ -88,6 +89,7 @@ class Clocks:
         """Return when a message was measured, s of the stream's time; None where it is left out."""
         self._awake += min(max(sample.arrival - self._latest, 0), _SILENCE)
         self._latest = max(sample.arrival, self._latest)
+        self._anew |= sample.anew
         if sample.stamp is None:
             return self._unstamped(sample)
         if sample.kind not in self._kinds:
@@ -99,6 +101,7 @@ class Clocks:
             return None
         if not self._goes_on(clock, sample, sample.stamp):
             return None
+        self._anew = False
         recent.append(sample.stamp)
         reference, stamp = self._clocks[0], sample.stamp
         if self._paced:
@@ -162,7 +165,7 @@ class Clocks:
         if agree and self._paced:
             agree = arrival - odd[0].arrival > _LASTING * SECOND
         counts = self._tallies.counts
-        if not (agree or sample.anew):
+        if not (agree or self._anew):
             counts["implausible times" if ahead else "too late"] += 1
             return False
         counts["clock jumps"] += 1
