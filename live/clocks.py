@@ -43,7 +43,7 @@ class _Clock:
         self.shift = shift  # ns, from stamps to the stream's time
         self.newest, self.newest_arrival = stamp, arrival
         self.line = ClockLine(arrival, stamp, horizon)
-        self.odd: list[tuple[int, int]] = []  # stamps and arrivals that would be a jump
+        self.odd: list[Sample] = []  # messages whose stamps would be a jump
 
 
 class Clocks:
@@ -64,6 +64,8 @@ class Clocks:
         self._first_pose: int | None = None  # ns, arrival of the first pose without a stamp
         self._ours = False  # the reference is this machine's clock: nothing was stamped
         self._latest = 0  # ns, arrival of the newest message
+        self._anew = False  # another sender is taken, none of whose stamps was yet
+        self.poses_at_jumps = 0  # that were left out until it was known that a clock had jumped
         self._awake = 0  # ns since the reference's newest stamp, without silences
 
     @property
@@ -87,6 +89,7 @@ class Clocks:
         """Return when a message was measured, s of the stream's time; None where it is left out."""
         self._awake += min(max(sample.arrival - self._latest, 0), _SILENCE)
         self._latest = max(sample.arrival, self._latest)
+        self._anew |= sample.anew
         if sample.stamp is None:
             return self._unstamped(sample)
         if sample.kind not in self._kinds:
@@ -96,8 +99,9 @@ class Clocks:
         if sample.stamp in recent:
             self._tallies.counts["doubled"] += 1
             return None
-        if not self._goes_on(clock, sample.stamp, sample.arrival):
+        if not self._goes_on(clock, sample, sample.stamp):
             return None
+        self._anew = False
         recent.append(sample.stamp)
         reference, stamp = self._clocks[0], sample.stamp
         if self._paced:
@@ -144,30 +148,35 @@ class Clocks:
         self._clocks.append(_Clock(shift, stamp, arrival, self._horizon))
         return self._clocks[-1]
 
-    def _goes_on(self, clock: _Clock, stamp: int, arrival: int) -> bool:
+    def _goes_on(self, clock: _Clock, sample: Sample, stamp: int) -> bool:
         """Return whether a stamp is taken: none is that would be a jump, until enough agree."""
+        arrival, odd = sample.arrival, clock.odd
         passed = max(arrival - clock.newest_arrival, 0) * max(clock.line.rate, 1.0)
         late = stamp < clock.newest - self._horizon
         ahead = self._paced and stamp - clock.newest > passed + _AHEAD * SECOND
         if not late and not ahead:
-            clock.odd.clear()
+            odd.clear()
             return True
         # kinds of messages alternate, and some come late: stamps need not rise at each
-        if clock.odd and not abs(stamp - clock.odd[-1][0]) < _AHEAD * SECOND:
-            clock.odd.clear()
-        clock.odd.append((stamp, arrival))
-        first, first_arrival = clock.odd[0]
-        agree = len(clock.odd) >= _AGREEING and stamp > first
+        if odd and not abs(stamp - (odd[-1].stamp or 0)) < _AHEAD * SECOND:
+            odd.clear()
+        odd.append(sample)
+        agree = len(odd) >= _AGREEING and stamp > (odd[0].stamp or 0)
         if agree and self._paced:
-            agree = arrival - first_arrival > _LASTING * SECOND
-        if not agree:
-            self._tallies.counts["implausible times" if ahead else "too late"] += 1
+            agree = arrival - odd[0].arrival > _LASTING * SECOND
+        counts = self._tallies.counts
+        if not (agree or self._anew):
+            counts["implausible times" if ahead else "too late"] += 1
             return False
-        self._tallies.counts["clock jumps"] += 1
+        counts["clock jumps"] += 1
+        if late and len(odd) > 1:  # those before were not late
+            counts["too late"] -= len(odd) - 1
+            counts["implausible times"] += len(odd) - 1
+            self.poses_at_jumps += sum(one.has_pose for one in odd[:-1])
         # the stream goes on for as long as passed here since the last message before
         gone = max(round(clock.line.rate * (arrival - clock.newest_arrival)), 1_000_000)
         clock.shift += clock.newest - stamp + (gone if self._paced else 1_000_000)
         clock.newest, clock.newest_arrival = stamp, arrival
         clock.line = ClockLine(arrival, stamp, self._horizon)
-        clock.odd.clear()
+        odd.clear()
         return True

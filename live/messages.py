@@ -66,6 +66,7 @@ class Sample(Measured):
     stamp: int | None  # ns, sender's clock, when it was measured; None: the message does not say
     arrival: int  # ns, this machine's monotonic clock
     whole: bool = False  # it is a row by itself: pose and rotor speeds of one time
+    anew: bool = False  # the first of another sender, whose clock is another
 
 
 @dataclass(slots=True)

@@ -165,7 +165,7 @@ class Session:
         late = self.tallies.counts["too late"]
         self._estimate(sample)
         if sample.has_pose:
-            self.watch.count(self.tallies.counts["too late"] - late)
+            self.watch.count(max(self.tallies.counts["too late"] - late, 0))
 
     def _estimate(self, sample: Sample) -> None:
         t = self.clocks.time(sample)

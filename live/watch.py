@@ -28,7 +28,7 @@ class Watch:
 
     def __init__(self, tallies: Tallies, clocks: Clocks, live: LiveFilter) -> None:
         self._tallies, self._clocks, self._filter = tallies, clocks, live
-        self.poses = self.too_late = 0
+        self.poses = self._late = 0
         self._noise: deque[Array] = deque(maxlen=_LOOKS)
         self._due_noise = -np.inf  # s, stream's time
         self._due = 0  # ns
@@ -37,7 +37,12 @@ class Watch:
     def count(self, too_late: int) -> None:
         """Count a pose that came, and how many were found too late by it."""
         self.poses += 1
-        self.too_late += too_late
+        self._late += too_late
+
+    @property
+    def too_late(self) -> int:
+        """How many poses were too late; those that came while a clock jumped were not."""
+        return self._late - self._clocks.poses_at_jumps
 
     def add(self, output: Output) -> None:
         """Take in an estimate."""
@@ -90,7 +95,7 @@ class Watch:
     def rate_words(self) -> str:
         """How fast the sender's clock ran; empty where it ran as ours."""
         line = self._clocks.line
-        rate = None if line is None else line.mean_rate
+        rate = None if line is None else line.mean_rate or line.latest_rate
         return "" if rate is None or abs(rate - 1.0) <= _RATE else _clock_words(rate)
 
     @property

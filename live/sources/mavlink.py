@@ -107,7 +107,10 @@ class Mavlink(Source):
         self.link.answer(self.link.sender)
         if alive:
             self._request(message)
-        return self._reader.read(message, arrival)
+        sample = self._reader.read(message, arrival)
+        if sample is not None:
+            sample.anew = self._senders.changed()
+        return sample
 
     def _request(self, heartbeat: Any) -> None:
         """Ask the autopilot for the messages, once, at the rate that the user wants."""

@@ -34,6 +34,7 @@ class Senders:
         self._rivals: dict[str, str] = {}  # senders that are left out, and beside whom
         self._once: deque[str] = deque(maxlen=_REMEMBERED)  # senders of one message
         self._lines = 0
+        self._changed = False
 
     def take(self, sender: str, quantities: Collection[str], arrival: int) -> bool:
         """Return whether a message of a sender is taken that came at ``arrival``, ns."""
@@ -48,6 +49,7 @@ class Senders:
             return True
         if arrival - self._last[other] > _SILENT * SECOND:
             self._forget(other)
+            self._changed = True
             self._say(f"{other} is silent; {sender} is listened to")
         elif self._single[other]:
             self._once.append(other)
@@ -63,6 +65,11 @@ class Senders:
     def leaves_out(self, sender: str) -> bool:
         """Return whether the messages of a sender are left out."""
         return sender in self._rivals
+
+    def changed(self) -> bool:
+        """Return whether another sender is taken since the last call, for one that was silent."""
+        changed, self._changed = self._changed, False
+        return changed
 
     def _is_before(self, sender: str, other: str) -> bool:
         taken = list(self._last)

@@ -63,6 +63,7 @@ class UdpJson(Source):
             )
         if not self._senders.take(sender_name(sender), sample.measured, arrival):
             return None
+        sample.anew = self._senders.changed()
         self.link.answer(sender)
         if type(number := fields.get("seq")) is int:
             self.count_lost("", number)

@@ -185,9 +185,28 @@ def test_a_sender_that_restarts_is_followed_after_20_messages(kind, stamped, rat
         lambda kind, t: t - 4.0 if t > 4.0 else t,
     )
     assert live.tallies.counts["clock jumps"] == 1
+    assert live.tallies.counts["too late"] <= 3  # before the last ones of the old clock
+    assert live.session.watch.too_late <= 1
     lasted = max(20, 0.2 * rate * (200 * ("motors" in stamped) + 100 * ("pose" in stamped)))
-    assert live.tallies.counts["too late"] <= 1.2 * lasted
+    assert live.tallies.counts["implausible times"] <= 1.2 * lasted
     assert live.outputs[-1].t - live.outputs[0].t == pytest.approx(8.0, abs=0.06)
+
+
+@pytest.mark.parametrize("stamped", [("motors", "pose"), ("pose",)])
+def test_another_sender_in_place_of_a_silent_one_is_another_clock_at_once(stamped):
+    """Also where the first message that comes of it has no stamp."""
+    flown, live = flight(), Pipeline()
+    sender = Json(flown)
+    for at, kind, k in times_of(flown, lambda t: t + 2.5 * (t > 4.0)):
+        t, other = float(flown["t"][k]), flown["t"][k] > 4.0
+        stamp = t - 4.0 * other if kind in stamped else None
+        fields, _ = sender.message(kind, k, stamp)
+        message = fields, ("127.0.0.1", 1 + int(other))
+        live.session.take(sender.source.decode(message, round(at * SECOND)))
+    assert live.tallies.found.keys() <= {"clock jumps", "late", "waiting"}
+    assert live.tallies.counts["clock jumps"] == 1
+    assert len(live.outputs) >= 795
+    assert live.outputs[-1].t - live.outputs[0].t == pytest.approx(10.5, abs=0.06)
 
 
 @pytest.mark.parametrize("rate", [0.5, 1.0, 1.5])
