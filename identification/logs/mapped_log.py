@@ -84,7 +84,10 @@ def map_table(
         notes.insert(0, f"columns: by the map {log_map.name}")
     samples, words = rows_of(table, columns, log_map)
     notes += words
-    return recording_of(table.path, [samples], log_map, reader, notes, piece).log(vehicle)
+    recording = recording_of(table.path, [samples], log_map, reader, notes, piece)
+    del columns, samples
+    table.forget()  # the streams are copies
+    return recording.log(vehicle)
 
 
 def recording_of(

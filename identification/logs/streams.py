@@ -331,8 +331,8 @@ def source_rate(t: Array, values: Array) -> float:
         t: (N,) s, increasing.
         values: (N, K); a row with NaN is no sample.
     """
-    good = finite_rows(values)
-    t, values = t[good], values[good]
+    found = Stream("", t, values).whole()
+    t, values = found.t, found.values
     if len(t) < 2:
         return 0.0
     changes = np.flatnonzero(np.any(np.diff(values, axis=0) != 0.0, axis=1))
@@ -361,7 +361,10 @@ def _corners(t: Array, values: Array) -> Rows:
     if len(t) < 3:
         return np.empty(0, dtype=np.intp)
     share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
-    off = np.abs(values[1:-1] - (values[:-2] + share * (values[2:] - values[:-2])))
+    off = values[2:] - values[:-2]  # in place: a copy of an hour takes 23 MB a column
+    off *= share
+    off += values[:-2]
+    np.abs(np.subtract(values[1:-1], off, out=off), out=off)
     rms = np.sqrt(np.mean(np.square(off), axis=0))
     is_corner = (off > SOURCE_RATE.on_line * rms).any(axis=1)
     if np.mean(is_corner) > SOURCE_RATE.most_corners:

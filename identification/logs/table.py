@@ -68,6 +68,10 @@ class Table:
             self._columns[name].flags.writeable = False
         return {name: self._columns[name] for name in names}
 
+    def forget(self) -> None:
+        """Let go of the columns that were read; they are read anew where they are asked for."""
+        self._columns.clear()
+
     def row(self, index: int) -> str:
         """Return how to find a row (counted from 0) in the file: rows and lines count from 1."""
         if not self.first_line:
