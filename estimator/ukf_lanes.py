@@ -59,7 +59,8 @@ def write_variances(f: Record, out: Array) -> None:
     """Write the variances (18,) of the error state into ``out``, with what refused and unlikely
     poses add; of a single filter or of a block in hand.
     """
-    doubted = (f.poses.phase > BELIEVING) | (f.poses.strain > _STRAINED)
+    m = f.poses
+    doubted = (m.phase > BELIEVING) | (m.strain > _STRAINED) | (m.astray > 0.0)
     for i in range(N):
         out[i] = f.P[i, i]
     if any_of(doubted):
