@@ -80,9 +80,6 @@ def test_a_log_with_another_noise_is_told(tmp_path, call, monkeypatch):
     assert "Position noise is 2.5 times the vehicle file's 1 mm" in " ".join(said.split())
 
 
-@pytest.mark.skipif(
-    not hasattr(WrenchEstimate, "noise_scales"), reason="this filter does not learn the noise"
-)
 @pytest.mark.parametrize("times", [1.0, 3.0])
 def test_noise_that_is_three_times_the_declared_is_found(times):
     flown, rng = dict(flight(20.0, "gentle")), np.random.default_rng(4)

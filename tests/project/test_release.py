@@ -74,7 +74,6 @@ PAGES_OF_COMMANDS = (  # a line that says how the page was made, once or once a 
     "speed.md",
     "trust.md",
     "identify.md",
-    "tutorials/live.md",
 )
 MADE = re.compile(
     r"^Made by `(?:windwrench|python -m studies\.)[^`]+`, "
