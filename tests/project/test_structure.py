@@ -35,6 +35,7 @@ STOREYS = (
     {"logs.screening", "findings"},
     {"inertial_wrench"},
     {"wrench_series"},
+    {"causal_states"},
     {"prediction"},
     {"comparison", "vehicle_fit", "diagnosis"},
     {"report", "wrench_track"},
