@@ -62,8 +62,9 @@ def causal_states(log: FlightLog, vehicle: Vehicle) -> Array:
         vehicle, effects=tuple(e for e in vehicle.effects if get(e.name).kind != "sensing")
     )
     # of a period of its own: the log's, a median, would tell of later rows
+    usual = UKFTuning.for_vehicle(vehicle, PERIOD)
     filters = [
-        WrenchUKF(vehicle, _tuning(vehicle, *factors), PERIOD)
+        WrenchUKF(vehicle, _tuning(usual, *factors), PERIOD)
         for factors in _ASSUMED[: 1 if with_imu else None]
     ]
     rows = np.arange(first + 1, count)
@@ -85,22 +86,14 @@ def causal_states(log: FlightLog, vehicle: Vehicle) -> Array:
     return states
 
 
-def _tuning(vehicle: Vehicle, white: float, force: float, torque: float) -> UKFTuning:
-    """Return the default tuning with the white noise of the model and the walks times these
-    factors.
-
-    No vehicle has more inertia than with all of its mass at the rotors. If a file states more, the
-    torque noise grows with it: the angular velocity follows the pose as before.
-    """
-    usual = UKFTuning.for_vehicle(vehicle, PERIOD)
-    most = vehicle.mass * vehicle.arm_l**2 * np.array([1.0, 1.0, 2.0])
-    heavy = np.maximum(1.0, np.diagonal(vehicle.inertia) / most)
+def _tuning(usual: UKFTuning, white: float, force: float, torque: float) -> UKFTuning:
+    """Return a tuning with the white noise of the model and the walks times these factors."""
     return replace(
         usual,
         thrust_noise=white * np.asarray(usual.thrust_noise),
-        motor_torque_noise=white * heavy * np.asarray(usual.motor_torque_noise),
+        motor_torque_noise=white * np.asarray(usual.motor_torque_noise),
         force_walk=force * np.asarray(usual.force_walk),
-        torque_walk=torque * heavy * np.asarray(usual.torque_walk),
+        torque_walk=torque * np.asarray(usual.torque_walk),
     )
 
 

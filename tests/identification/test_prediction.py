@@ -206,7 +206,7 @@ def test_a_state_of_another_form_is_refused(clean):
         predict(log, VEHICLE, state=state)
 
 
-@pytest.mark.parametrize(("inertia", "most"), [(1.0, 0.045), (1.6, 0.2), (1e6, 0.4)])
+@pytest.mark.parametrize(("inertia", "most"), [(1.0, 0.045), (1.6, 0.2)])
 def test_a_start_knows_the_flight_whatever_the_model(inertia, most):
     """The angular velocity of a differentiated pose has 1.4 rad/s of noise."""
     log, vehicle = imu_flight(VEHICLE), replace(VEHICLE, inertia=inertia * VEHICLE.inertia)
@@ -217,7 +217,7 @@ def test_a_start_knows_the_flight_whatever_the_model(inertia, most):
         off = off - np.column_stack([velocity, log.gyro - [0.01, -0.005, 0.008]])[200:-200]
         speed, rate = (np.sqrt(np.mean(np.sum(x**2, axis=1))) for x in (off[:, :3], off[:, 3:]))
         assert speed < 0.02
-        assert rate < (most if known.gyro is None else 0.007)
+        assert rate < (most if known.gyro is None else 0.004)
 
 
 def test_only_whole_predictions_inside_a_segment_count(clean):
