@@ -237,6 +237,7 @@ def prediction_errors(
     vehicle: Vehicle,
     horizon_s: float = 0.5,
     windows: Sequence[Segments] | None = None,
+    start_by: Vehicle | None = None,
 ) -> PredictionErrors:
     """Return how well a model predicts flights, beside the guess that nothing changes.
 
@@ -250,6 +251,8 @@ def prediction_errors(
         vehicle: whose model predicts, with its declared effects.
         horizon_s: s.
         windows: for each log, its parts: from and to in s after its start; None: all of it.
+        start_by: whose filters give the starts, where models are compared from the same ones;
+            None: the vehicle's.
 
     Raises:
         InputError: no stretch of pose is long enough, or poses come at different rates.
@@ -262,7 +265,7 @@ def prediction_errors(
         first, last = log.t[[0, -1]].tolist()
         ends = [(first + begin, min(first + end, last)) for begin, end in parts]
         flown = with_commanded_speeds(log, vehicle)
-        begun, seen, path = _predictions(flown, vehicle, ends, horizon_s)
+        begun, seen, path = _predictions(flown, vehicle, ends, horizon_s, start_by)
         if len(path):
             horizons.append(log.period * np.arange(1, path.shape[1] + 1))
             model.append(_distances(path, seen))
@@ -297,7 +300,11 @@ def _distances(x: Array, y: Array) -> Array:
 
 
 def _predictions(
-    log: FlightLog, vehicle: Vehicle, segments: Segments, horizon: float
+    log: FlightLog,
+    vehicle: Vehicle,
+    segments: Segments,
+    horizon: float,
+    start_by: Vehicle | None = None,
 ) -> tuple[Array, Array, Array]:
     """Return the states (n, STATE) from which predictions start, and the states (n, m, STATE) of
     flight and prediction at the m samples that follow.
@@ -313,7 +320,7 @@ def _predictions(
     rows, target = np.concatenate(starts), np.concatenate(seen)
     if not rows.size:
         return np.empty((0, STATE)), target, target
-    states = causal_states(log, vehicle)
+    states = causal_states(log, start_by or vehicle)
     return states[rows], target, _flown(log, vehicle, states, rows, ahead)
 
 

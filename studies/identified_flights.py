@@ -65,7 +65,7 @@ def study(
         unseen = [log for path, log in flights.items() if path.stem.startswith(held)]
         vehicle = identify(seen, MASS, parse_geometry(str(ARM))).vehicle
         heavy = replace(vehicle, inertia=HEAVY * np.eye(3))
-        parts.append([prediction_errors(unseen, of) for of in (vehicle, heavy)])
+        parts.append([prediction_errors(unseen, of, start_by=vehicle) for of in (vehicle, heavy)])
         rows.append(row(held, *parts[-1]))
     rows.append(row("all", *(PredictionErrors.pooled(of) for of in zip(*parts, strict=True))))
     result = {"version": __version__, "commit": code, "paths": rows}

@@ -258,3 +258,13 @@ def test_a_turn_at_one_rate_is_no_change():
     assert np.all(found.model < 2e-3)
     with pytest.raises(InputError, match=r"flight: expected poses at one rate, unbroken for 4 s"):
         prediction_errors([replace(log, name="flight")], VEHICLE, 3.0, [[(0.0, 2.0)]])
+
+
+def test_models_are_compared_from_the_same_starts(clean):
+    """A vehicle with 1,000 kg m2 keeps the body rate of its start: of another's filters here."""
+    heavy = replace(VEHICLE, inertia=1e3 * np.eye(3))
+    own = prediction_errors([clean], VEHICLE)
+    kept = prediction_errors([clean], heavy, start_by=VEHICLE)
+    np.testing.assert_array_equal(kept.still, own.still)
+    assert kept.model[3] == pytest.approx(own.still[3], rel=1e-3)
+    assert np.all(own.model[:, -1] < kept.model[:, -1])
