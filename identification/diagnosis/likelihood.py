@@ -27,7 +27,7 @@ from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, log_signals
 from ..motion.smoothing import continuous, turn_between
 from .causal_filter import Poses, Track, level, run, sensitivities
-from .discrepancy import changing_columns, discrepancy_columns, joined, variables
+from .discrepancy import Columns, changing_columns, discrepancy_columns, joined, variables
 from .log_offsets import (
     ATTITUDE_TIME_OFFSET,
     LAG_ASYMMETRY,
@@ -146,8 +146,8 @@ class Likelihood:
         # what a unit of each column adds to the accelerations, or to the measured pose (n, 6), of
         # all pieces in turn; a column that was asked for once is kept. What any flight may have
         # changes little with effects
-        self._acting: dict[Column, Array] = {}
-        self._posed: dict[Column, Array] = {}
+        self._acting: Columns = {}
+        self._posed: Columns = {}
         if same:
             self._acting, self._posed = (
                 {c: x for c, x in part.items() if not c[0] and not c[1].startswith(UNKNOWN)}
@@ -318,9 +318,10 @@ class Likelihood:
         value, delta = self.flights.step(self.setting, (effect, name))
         there = {**self.setting, effect: {**own, name: value + delta}}
         with suppress(InputError, np.linalg.LinAlgError):
-            self._acting[column] = self._change(there, delta)
+            change = self._change(there, delta)
             if effect and get(effect).role == Role.CENTRE_OF_MASS:
-                self._swing(column)
+                self._swing(column, change)
+            self._acting[column] = change
 
     def _moved(self, column: Column) -> Array:
         """Return by how much a unit of a sensing effect moves the pose (n, 6), at the pose that the
@@ -424,13 +425,14 @@ class Likelihood:
         x = np.zeros((len(whole.t), 2, 6))
         for i, columns in enumerate((self._posed, self._acting)):
             for c, column in columns.items():
-                x[:, i] += coefficients.get(c, 0.0) * column
+                if c in coefficients:
+                    x[:, i] += coefficients[c] * column[:]
         x[:, 1, :3] += whole.rotors[:, :1] * (
             x[:, 0, 4:5] * whole.rotation[:, :, 0] - x[:, 0, 3:4] * whole.rotation[:, :, 1]
         )
         return np.split(x, ends)
 
-    def _swing(self, column: Column) -> None:
+    def _swing(self, column: Column, change: Array) -> None:
         """Have a centre of mass move the measured point as a marker does that lies as far on the
         other side; its torque alone acts.
 
@@ -438,7 +440,7 @@ class Likelihood:
         acceleration and of the filter's attitude, and their difference, which is noise, would fit
         the poses' own noise: of equal offsets of both only the torque of the thrust is left.
         """
-        self._acting[column][:, :3] = 0.0
+        change[:, :3] = 0.0
         axis = [c.name for c in get(column[0]).coefficients].index(column[1])
         (marker,) = playing(Role.MARKER)
         place = self._moved((marker, get(marker).coefficients[axis].name))
@@ -492,7 +494,9 @@ class Likelihood:
         names = (*asked, *drives)
         root = np.linalg.cholesky(steady.covariance)
         inverse = np.linalg.inv(root)
-        blocks, samples, first, still = [], 0, 0, np.zeros_like(self._base)
+        samples, first, still = 0, 0, np.zeros_like(self._base)
+        most = sum(len([*self._blocks(track)]) for track in self.tracks)
+        products, count = np.empty((most, len(names) + 1, len(names) + 1)), 0
         for i, (track, jumps) in enumerate(zip(self.tracks, self._jumps(), strict=True)):
             state, counts = np.zeros((6, 3, len(names))), self._counts(i)
             for at in self._blocks(track):
@@ -509,10 +513,12 @@ class Likelihood:
                 kept = (inverse @ out[counts[at]]).reshape(-1, out.shape[2])
                 samples += int(counts[at].sum())
                 if len(kept):
-                    blocks.append(kept.T @ kept)
+                    np.matmul(kept.T, kept, out=products[count])
+                    count += 1
             first += len(track.position)
         penalty = 2.0 * samples * float(np.log(np.diagonal(root)).sum())
-        return in_prior_units(self.flights, names, np.array(blocks), penalty, self.setting, starts)
+        blocks = products[:count]
+        return in_prior_units(self.flights, names, blocks, penalty, self.setting, starts)
 
     def _changes(
         self,

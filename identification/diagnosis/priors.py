@@ -73,7 +73,9 @@ class Base:
     size: Array  # (c,) prior standard deviations
     low: Array
     high: Array
-    blocks: Array
+    total: Array  # (c + 1, c + 1) sums of products, which are known to rounding
+    blocks: Array  # (blocks, k + 1, k + 1), the same of each block, of the columns ``single``
+    single: Index  # (k,) columns outside the dictionary, which would take nine tenths of it
     penalty: float
     effects: frozenset[str]  # of the setting
     plain: Index  # columns that any flight may have
@@ -91,12 +93,6 @@ class Base:
     def at(self, columns: Iterable[Column]) -> Index:
         """Return where some columns are."""
         return np.array([self.columns[c] for c in columns], dtype=np.intp)
-
-    @cached_property
-    def total(self) -> Array:
-        """Sums of products (c + 1, c + 1), which are known to rounding."""
-        total = self.blocks.sum(axis=0)
-        return np.asarray(total + np.diag(1e-12 * np.diagonal(total)))
 
     @property
     def asked(self) -> list[Column]:
@@ -203,7 +199,7 @@ def in_prior_units(
         flights: of the vehicle.
         names: (c,) columns.
         blocks: (blocks, c + 1, c + 1) sums of products, of columns and of what is left at the
-            setting (last), whitened.
+            setting (last), whitened; they are changed in place, since ten minutes take 0.2 GB.
         penalty: twice the sum over samples of the logarithm of the standard deviations.
         setting: of effects.
         starts: columns of whole effects.
@@ -214,21 +210,26 @@ def in_prior_units(
     here = [flights.coefficients(setting, e).get(n, 0.0) for e, n in own]
     back = np.append(np.subtract(here, [declared(c, flights) for c in own]), 1.0)
     whole = blocks @ back
-    blocks = blocks.copy()
     blocks[:, :, -1] = blocks[:, -1, :] = whole
     blocks[:, -1, -1] = whole @ back
     scale = np.append(size, 1.0)
-    blocks = blocks * scale[:, None] * scale
+    blocks *= scale[:, None]
+    blocks *= scale
     low, high = np.array([_bounds(c, flights) for c in names]).T / size
     plain = [i for i, c in enumerate(names) if not c[0] and not c[1].startswith(UNKNOWN)]
     dictionary = [i for i, c in enumerate(names) if not c[0] and c[1].startswith(UNKNOWN)]
     typical = np.array([typical_size(c, flights.vehicle) for c in own])
+    total = blocks.sum(axis=0)
+    single = np.delete(np.arange(len(names)), dictionary)
+    held = np.append(single, len(names))
     return Base(
         names,
         size,
         low,
         high,
-        blocks,
+        total + np.diag(1e-12 * np.diagonal(total)),
+        blocks[:, held[:, None], held],
+        single,
         penalty,
         frozenset(k for k in setting if k),
         np.array(plain, dtype=np.intp),

@@ -101,9 +101,12 @@ def rank(
         found = Posterior(flights, [*best.setting], (base, base))
         return found.scores.get(frozenset(best.setting), -math.inf)
 
-    nothing = best = Likelihood(flights, {})
-    starts = starts_of(flights, library, {})
-    loud = best.base(library, starts)
+    def first() -> tuple[Likelihood, Starts, Base]:
+        nothing, starts = Likelihood(flights, {}), starts_of(flights, library, {})
+        return nothing, starts, nothing.base(library, starts)
+
+    # made anew at the end where no set is likeliest: its columns of ten minutes take 0.5 GB
+    best, starts, loud = first()
     everything = loud.mode(np.append(loud.plain, loud.at(loud.asked)))
     quiet = best.quieter({c: x for c, (x, _) in everything.items()}, starts)
     found = Posterior(flights, library, (loud, quiet))
@@ -120,6 +123,7 @@ def rank(
         if max(scores) > score:
             best = [best, *rivals][scores.index(max(scores))]
             starts, found = around(best)
+        del rivals  # each holds a tenth of what a diagnosis takes
     for _ in range(ROUNDS):
         # the columns of the same set change with its coefficients, where these have moved far
         setting = found.best_setting()
@@ -130,7 +134,7 @@ def rank(
     # once more, with the dictionary's columns, that are dear, beside the likeliest set
     setting = found.best_setting()
     if setting.keys() != best.setting.keys():
-        best = Likelihood(flights, setting, best) if setting else nothing
+        best = Likelihood(flights, setting, best) if setting else first()[0]
         starts = starts_of(flights, library, setting, *([{}] if setting else []))
     whole = best.base(library, starts, unknown=True)
     found = Posterior(flights, library, (loud, whole), found.tempering())

@@ -139,7 +139,8 @@ class RowLikelihood:
             states.append(State(s.t, s.position, s.rotation, s.velocity, rate, push, rotors))
         whole, ends = joined(states)
         out: dict[Column, Array] = {}
-        for column, x in discrepancy_columns(whole, ends, flights).items():
+        for column, made in discrepancy_columns(whole, ends, flights).items():
+            x = made[:]
             if rows.with_torques or x[:, :3].any():
                 parts = zip(np.split(x, ends), pieces, strict=True)
                 sampled = np.concatenate([p.smooth(part) for part, p in parts])
@@ -148,7 +149,7 @@ class RowLikelihood:
         own = {e: rows.residual(without(setting, e)) - here for e in setting}
         at = np.concatenate([i + p.rows for i, p in zip([0, *ends], pieces, strict=True)])
         found = {name: rows.at_rows(x[at]) for name, x in variables(whole).items()}
-        return out | changing_columns(own, found)
+        return out | {column: x[:] for column, x in changing_columns(own, found).items()}
 
     # Fits
 

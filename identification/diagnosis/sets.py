@@ -140,8 +140,8 @@ class Posterior:
     def tempering(self) -> float:
         """Return the power of the likelihood that the scatter beside the likeliest set allows."""
         base, best = self._likeliest()
-        own = base.at(best.columns)
-        return tempering(base.blocks, np.sort(np.append(base.plain, own)))
+        fitted = np.sort(np.append(base.plain, base.at(best.columns)))
+        return tempering(base.blocks, np.searchsorted(base.single, fitted))
 
     def _negligible(self, base: Base, asked: Index) -> Array:
         """Return how much (len(asked),) of each column any flight may have."""

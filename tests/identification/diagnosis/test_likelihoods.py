@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.identification.diagnosis import diagnose
+from windwrench.identification.diagnosis.discrepancy import Product
 from windwrench.identification.diagnosis.evidence import (
     Marginal,
     evidence_of_one_more,
@@ -207,3 +208,19 @@ def test_noise_without_memory_only_scales():
     noise = RowNoise(np.zeros((0, 1, 1)), np.array([[4.0]]), np.array([True, False, False]))
     np.testing.assert_allclose(noise.white(np.array([[2.0], [4.0], [6.0]]))[:, 0], [1.0, 2.0, 3.0])
     assert noise.known.all()
+
+
+def test_a_column_of_factors_is_their_product_a_part_at_a_time():
+    rng = np.random.default_rng(3)
+    z, turned, part = rng.normal(size=50), rng.normal(size=(50, 3)), rng.normal(size=(50, 4))
+    force, torque, share = (
+        Product(1.7, z, turned, slice(3)),
+        Product(0.3, z, None, slice(4, 5)),
+        Product(1.0, z, part),
+    )
+    dense = np.zeros((2, 50, 6))
+    dense[0, :, :3], dense[1, :, 4] = 1.7 * z[:, None] * turned, 0.3 * z
+    for rows in (slice(None), slice(7, 31)):
+        np.testing.assert_array_equal(force[rows], dense[0, rows])
+        np.testing.assert_array_equal(torque[rows], dense[1, rows])
+        np.testing.assert_array_equal(share[rows], (part * z[:, None])[rows])
