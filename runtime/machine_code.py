@@ -24,7 +24,15 @@ from .compile_notice import notice
 
 _ROOT = Path(__file__).resolve().parent.parent
 # all rooms with compiled functions, and all that those import
-ROOMS = ("runtime", "dynamics", "estimator", "controllers", "envs", "identification", "paper")
+ROOMS = (
+    "runtime",
+    "dynamics",
+    "estimator",
+    "controllers",
+    "envs",
+    "identification",
+    "reproduction",
+)
 _PREFIX = "windwrench-"
 _STARTED = time.time_ns()
 # ours, since then and before their import: the digest is of what was before

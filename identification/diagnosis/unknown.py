@@ -15,7 +15,7 @@ MOST_STRUCTURE, MOST_DISTURBANCE = 15.0, 3.0
 
 @dataclass(frozen=True)
 class UnknownSettings:
-    """The weights, in nats. ``tests/studies/test_numbers.py`` fits them anew."""
+    """The weights, in nats. ``tests/evidence/test_numbers.py`` fits them anew."""
 
     nothing: float = -2.3  # log odds where nothing speaks for it
     disturbance: float = 1.89  # a nat of a disturbance over what counts for none

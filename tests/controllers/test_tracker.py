@@ -17,7 +17,7 @@ from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.envs.scenarios import SCENARIOS
 from windwrench.evaluation.episodes import fly_episode
 from windwrench.evaluation.tasks import TASKS
-from windwrench.studies.kept_results import kept
+from windwrench.evidence.kept_results import kept
 
 BRIEFING = Briefing()
 TRACKERS = [Tracker, InformedTracker, TrackerLQG]

@@ -33,11 +33,11 @@ from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import compile_effects, get, parse_setting
 from windwrench.dynamics.effects.base import ROTORS_SIZE, SAMPLE_SIZE, STATE_SIZE
 from windwrench.estimator import UKFTuning
+from windwrench.evidence.recovery import QUIET_NOISES, exact_flight, measured
 from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
 from windwrench.live.export_c.c_numbers import FUNCTIONS
 from windwrench.live.export_c.effect_code import exportable_effects
 from windwrench.live.export_c.policies import PARTICLES, briefing_of
-from windwrench.studies.recovery import QUIET_NOISES, exact_flight, measured
 
 LARGEST = 0.01  # of a standard deviation
 QUICK = 1_200  # steps of each of five flights

@@ -13,7 +13,7 @@ from tests.support.paths import ROOT
 from tests.support.programs import said as done
 from windwrench.cli import app
 
-CHECKOUT_ONLY = ("studies", "tests")
+CHECKOUT_ONLY = ("evidence", "reproduction", "tests")
 MOST_BYTES = 2_000_000  # of the wheel
 
 
@@ -99,7 +99,7 @@ def test_the_wheel_holds_code_and_data_and_nothing_else(installed):
     assert not [
         name
         for name in wrapped
-        if name.startswith(("studies", "tests")) or "fuzz" in name or "trials" in name
+        if name.startswith(("evidence", "tests")) or "fuzz" in name or "trials" in name
     ]
     entry = next(installed.glob("windwrench-*.dist-info")) / "entry_points.txt"
     assert "windwrench = windwrench.__main__:main" in entry.read_text()

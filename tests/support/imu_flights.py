@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from windwrench.envs.recording import background, record_flight
+from windwrench.evidence.trials.logged_poses import pose_removed
 from windwrench.identification.logs.flight_log import FlightLog
-from windwrench.studies.trials.logged_poses import pose_removed
 
 __all__ = ["imu_flight", "pose_removed"]
 

@@ -14,13 +14,13 @@ import pytest
 from tests.support.data_paths import data_file
 from tests.support.flown import without_pose
 from windwrench.dynamics import EffectSetting, Vehicle, load_vehicle
+from windwrench.evidence.trials.practice_flights import fly_practice, practise
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.regression import Flights, held_out
 from windwrench.identification.diagnosis.settings import DiagnosisSettings
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.motion.sensor_noise import sensor_noise, with_noise
-from windwrench.studies.trials.practice_flights import fly_practice, practise
 
 VEHICLE = load_vehicle("ardrone2")
 

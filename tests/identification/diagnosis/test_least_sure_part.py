@@ -9,14 +9,14 @@ import pytest
 
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import Need, needing
+from windwrench.evidence.trials.logged_poses import FILTERS
+from windwrench.evidence.trials.practice_flights import fly_practice, practise
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.commanded_rotors import UNSTATED_THRUST_STD
 from windwrench.identification.diagnosis.regression import Flights
 from windwrench.identification.diagnosis.residuals import transient_disturbances
 from windwrench.identification.report.headline import headline
 from windwrench.identification.report.words import remainder_sentence
-from windwrench.studies.trials.logged_poses import FILTERS
-from windwrench.studies.trials.practice_flights import fly_practice, practise
 
 VEHICLE = load_vehicle("ardrone2")
 

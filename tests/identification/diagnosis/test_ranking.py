@@ -13,10 +13,10 @@ import pytest
 from tests.support.alike import assert_alike
 from tests.support.flown import DRAG, VEHICLE, settings
 from tests.support.paths import ROOT
+from windwrench.evidence.trials.practice_flights import fly_practice
 from windwrench.identification.diagnosis.likelihood import Likelihood
 from windwrench.identification.diagnosis.ranking import rank
 from windwrench.identification.diagnosis.regression import Flights
-from windwrench.studies.trials.practice_flights import fly_practice
 
 GOLDEN = ROOT / "tests" / "golden" / "rankings.json"
 MASS = {"mass": {"dm": 0.03}}

@@ -8,6 +8,8 @@ import pytest
 from tests.support.imu_flights import imu_flight, pose_removed
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
+from windwrench.evidence.trials.logged_poses import FILTERS
+from windwrench.evidence.trials.practice_flights import fly_practice
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.priors import NUISANCE
 from windwrench.identification.diagnosis.ranking import rank_by_rows
@@ -17,8 +19,6 @@ from windwrench.identification.diagnosis.rows import Rows
 from windwrench.identification.diagnosis.worth import worth
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import InputError
-from windwrench.studies.trials.logged_poses import FILTERS
-from windwrench.studies.trials.practice_flights import fly_practice
 
 VEHICLE = load_vehicle("ardrone2")
 LIBRARY = ["com_offset", "rate_damping", "thrust_scale", "rotor_efficiency", "constant_torque"]

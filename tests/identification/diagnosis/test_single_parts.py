@@ -11,6 +11,7 @@ import pytest
 from tests.support.flown import VEHICLE, recorded, settings
 from tests.support.own_effects import HOSE, joined
 from windwrench.dynamics import EffectSetting, load_vehicle
+from windwrench.evidence.trials.practice_flights import fly_practice
 from windwrench.identification.diagnosis.advice import composites
 from windwrench.identification.diagnosis.commanded_rotors import TAKE_OFF, in_flight_by_thrust
 from windwrench.identification.diagnosis.log_offsets import LAG_ASYMMETRY
@@ -23,7 +24,6 @@ from windwrench.identification.diagnosis.turning_delay import turning_delay
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass
-from windwrench.studies.trials.practice_flights import fly_practice
 
 CASES = {
     "constant_torque": ({"tx": 0.01, "ty": 0.01, "tz": 0.0}, {"attitude"}, {"rotor speeds"}),

@@ -16,13 +16,13 @@ from tests.support.flown import VEHICLE, recorded, without_pose
 from tests.support.parameters import mostly_slow
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
+from windwrench.evidence.trials.practice_flights import practise
 from windwrench.identification.logs.evidence import Evidence, departures
 from windwrench.identification.logs.flight_log import FlightLog, with_rows, write_log
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.readings import DECLARED
 from windwrench.identification.logs.screening import screen_log, stuck_channels
 from windwrench.identification.wrench_series import estimate_log
-from windwrench.studies.trials.practice_flights import practise
 
 CLEAN = ("excite", "gentle", "circle", "yaw")
 # one effect of each kind

@@ -12,6 +12,8 @@ from scipy.spatial.transform import Rotation
 from tests.support.flown import VEHICLE, recorded
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle, preset_names
 from windwrench.dynamics.effects import compile_effects
+from windwrench.evidence.trials.logged_poses import FILTERS
+from windwrench.evidence.trials.practice_flights import fly_practice
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.inertial_fusion import Readings, fuse
 from windwrench.identification.motion.inertial_signals import inertial_signals
@@ -25,8 +27,6 @@ from windwrench.identification.motion.sensing_effects import undo_log_sensing
 from windwrench.identification.motion.sensor_noise import noisy_logs
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import high_pass, lagged, low_pass, robust_std
-from windwrench.studies.trials.logged_poses import FILTERS
-from windwrench.studies.trials.practice_flights import fly_practice
 
 AMENDED = VEHICLE.with_effects(
     EffectSetting("mass", {"dm": 0.05}),

@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 from windwrench.controllers import Hover
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.evaluation.episodes import fly_episode
-from windwrench.paper import NAMES, fig3, fig4, fig5, fig7
-from windwrench.paper.fig5_flights import NOISES
-from windwrench.paper.reproduce import chosen, write_page, write_result
-from windwrench.paper.result import Comparison, Result
+from windwrench.reproduction import NAMES, fig3, fig4, fig5, fig7
+from windwrench.reproduction.fig5_flights import NOISES
+from windwrench.reproduction.reproduce import chosen, write_page, write_result
+from windwrench.reproduction.result import Comparison, Result
 from windwrench.runtime.provenance import commit, made_by
 
 SHORT = {  # seeds, settings, and constants of the figure's module
@@ -120,8 +120,8 @@ CLAIMS = {
 @pytest.mark.parametrize("name", NAMES)
 def test_a_figure_shows_what_the_paper_says(name, monkeypatch):
     if name == "fig3":
-        pytest.importorskip("sklearn", reason="pip install 'windwrench[paper]'")
-    module, shares = import_module(f"windwrench.paper.{name}"), []
+        pytest.importorskip("sklearn", reason="pip install 'windwrench[reproduction]'")
+    module, shares = import_module(f"windwrench.reproduction.{name}"), []
     seeds, settings, constants = SHORT[name]
     for constant, value in constants.items():
         monkeypatch.setattr(module, constant, value)
@@ -139,7 +139,7 @@ def test_the_mixture_finds_the_three_wrenches():
     """One flight of 90 s a load: the actuator noise shifts its mean torque by 0.9 mNm in one
     standard deviation.
     """
-    pytest.importorskip("sklearn", reason="pip install 'windwrench[paper]'")
+    pytest.importorskip("sklearn", reason="pip install 'windwrench[reproduction]'")
     estimates, added = fig3.fly_loads(load_vehicle("ardrone2"), (True, True, True), 1, 90.0)
     found = fig3.fit_clusters(estimates)
     for target, real, cluster in zip(fig3.TARGETS, added, found, strict=True):

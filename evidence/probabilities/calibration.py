@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from windwrench.studies.kept_results import kept
-from windwrench.studies.probabilities.fitting import (
+from windwrench.evidence.kept_results import kept
+from windwrench.evidence.probabilities.fitting import (
     acts_unknown,
     is_right,
     right_set,
     stands_for,
 )
-from windwrench.studies.scoring import area_under_curve, share
+from windwrench.evidence.scoring import area_under_curve, share
 
 RESULTS = {  # kept flights, below docs/
     "first": "probabilities/results.json.gz",

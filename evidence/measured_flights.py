@@ -24,6 +24,9 @@ from windwrench import __version__
 from windwrench.dynamics.effects import get
 from windwrench.dynamics.vehicle import EffectSetting, Vehicle
 from windwrench.dynamics.vehicle_file import load_vehicle
+from windwrench.evidence.fan_wall import fan_wall
+from windwrench.evidence.kept_results import DOCS, kept
+from windwrench.evidence.runner import start
 from windwrench.identification.comparison.change import NOWHERE, Change
 from windwrench.identification.comparison.change import compare as compare_sets
 from windwrench.identification.comparison.fault_channels import read_channels
@@ -45,9 +48,6 @@ from windwrench.runtime.drawing import AFTER, BEFORE, new_figure, styled
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.page_files import write_json, write_png
 from windwrench.runtime.provenance import commit
-from windwrench.studies.fan_wall import fan_wall
-from windwrench.studies.kept_results import DOCS, kept
-from windwrench.studies.runner import start
 
 Array = NDArray[np.float64]
 

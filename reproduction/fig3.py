@@ -153,7 +153,7 @@ def fit_clusters(estimates: Array) -> list[Cluster]:
     except ImportError as error:
         raise InputError(
             "fig3 fits a Gaussian mixture with scikit-learn, which is not installed: "
-            "pip install 'windwrench[paper]'"
+            "pip install 'windwrench[reproduction]'"
         ) from error
     # in units of the allowed spread: newtons and newton metres are not alike
     scaled = estimates.reshape(-1, 2) / _STD_BOUND

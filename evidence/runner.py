@@ -30,7 +30,7 @@ def code_stamp(*modules: str) -> str:
     Args:
         modules: paths below this folder without their ending, such as ``trials/outsiders``.
     """
-    return code_digest(_ROOMS, tuple(f"studies/{name}.py" for name in modules))
+    return code_digest(_ROOMS, tuple(f"evidence/{name}.py" for name in modules))
 
 
 def run_tasks(

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from windwrench.evidence.kept_results import DOCS, kept
 from windwrench.runtime.yaml_file import read_yaml
-from windwrench.studies.kept_results import DOCS, kept
 
 ROOT = DOCS.parent
 FILE = Path(__file__).with_name("quotes.yaml")

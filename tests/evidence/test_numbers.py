@@ -8,16 +8,16 @@ from dataclasses import asdict
 import pytest
 
 from tests.support.paths import ROOT
+from windwrench.evidence import pages as rendering
+from windwrench.evidence import quotes as quoting
+from windwrench.evidence.kept_results import kept
+from windwrench.evidence.pages import missing_sources
+from windwrench.evidence.probabilities.__main__ import plan, plan_of_other_logs
+from windwrench.evidence.probabilities.calibration import RESULTS, flights_of
+from windwrench.evidence.probabilities.fitting import fit
+from windwrench.evidence.probabilities.flights import KINDS, WAYS_TO_LOG
 from windwrench.identification.diagnosis.settings import DIAGNOSIS
 from windwrench.identification.diagnosis.unknown import UNKNOWN
-from windwrench.studies import pages as rendering
-from windwrench.studies import quotes as quoting
-from windwrench.studies.kept_results import kept
-from windwrench.studies.pages import missing_sources
-from windwrench.studies.probabilities.__main__ import plan, plan_of_other_logs
-from windwrench.studies.probabilities.calibration import RESULTS, flights_of
-from windwrench.studies.probabilities.fitting import fit
-from windwrench.studies.probabilities.flights import KINDS, WAYS_TO_LOG
 
 QUOTES, NOT_RESULTS = quoting.read_quotes()
 
@@ -79,8 +79,8 @@ def test_modules_that_pages_name_are_there():
 
 
 def test_a_command_that_is_gone_is_seen_unless_its_commit_is_named(tmp_path, monkeypatch):
-    gone = "Measured by `python -m studies.gone --count 3`, windwrench 1.0.0"
-    text = f"Made by `python -m studies.pages`.\n\n{gone}, commit 0123abc.\n\n{gone}.\n"
+    gone = "Measured by `python -m evidence.gone --count 3`, windwrench 1.0.0"
+    text = f"Made by `python -m evidence.pages`.\n\n{gone}, commit 0123abc.\n\n{gone}.\n"
     (tmp_path / "page.md").write_text(text, encoding="utf-8")
     monkeypatch.setattr(rendering, "DOCS", tmp_path)
     assert missing_sources() == ["page.md names studies.gone and no commit that has it"]

@@ -13,15 +13,15 @@ import numpy as np
 import typer
 
 from windwrench import __version__
+from windwrench.evidence.kept_results import DOCS
+from windwrench.evidence.nanodrone_benchmark import ARM, MASS
+from windwrench.evidence.runner import start
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.prediction import PredictionErrors, prediction_errors
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
 from windwrench.identification.vehicle_fit.identify import identify
 from windwrench.runtime.page_files import write_json
 from windwrench.runtime.provenance import commit, made_by
-from windwrench.studies.kept_results import DOCS
-from windwrench.studies.nanodrone_benchmark import ARM, MASS
-from windwrench.studies.runner import start
 
 MAP = Path(__file__).with_name("nanodrone_map.yaml")
 HEAVY = 1e3  # kg m2: rotors turn nothing
@@ -43,7 +43,7 @@ def section(result: dict[str, Any]) -> str:
         for way in WAYS:
             cells = " | ".join(f"{x:.3g}" for x in found[way])
             lines.append(f"| {found['path']} | {found['starts']} | {way} | {cells} |")
-    made = made_by("python -m studies.identified_flights", [result["commit"]], result["version"])
+    made = made_by("python -m evidence.identified_flights", [result["commit"]], result["version"])
     return "\n".join([made, "", *lines, ""])
 
 

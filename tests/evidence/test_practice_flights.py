@@ -9,11 +9,11 @@ import pytest
 from tests.support.paths import ROOT
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import check_setting, get, names
+from windwrench.evidence.trials.outsiders import HELD_BACK, OUTSIDERS
+from windwrench.evidence.trials.practice_flights import SIZES, draw_effect, fly_practice
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass
-from windwrench.studies.trials.outsiders import HELD_BACK, OUTSIDERS
-from windwrench.studies.trials.practice_flights import SIZES, draw_effect, fly_practice
 
 VEHICLE = load_vehicle("ardrone2")
 WEIGHT, ARM = VEHICLE.weight, VEHICLE.arm_l

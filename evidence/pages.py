@@ -1,6 +1,6 @@
 """Pages that show kept results. Each page is a Jinja template, filled from files below ``docs/``.
 
-``python -m studies.pages`` compares every page with its results, and quoted figures with theirs;
+``python -m evidence.pages`` compares every page with its results, and quoted figures with theirs;
 ``--write PAGE`` writes a page anew. A test does the same comparison.
 """
 
@@ -15,17 +15,17 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from windwrench.evidence import tasks, trust
+from windwrench.evidence.kept_results import DOCS, ROOT
+from windwrench.evidence.quotes import read_quotes, unknown_numbers, wrong_quotes
+from windwrench.evidence.scoring import share
 from windwrench.runtime.page_files import write_text
 from windwrench.runtime.provenance import made_by
-from windwrench.studies import tasks, trust
-from windwrench.studies.kept_results import DOCS, ROOT
-from windwrench.studies.quotes import read_quotes, unknown_numbers, wrong_quotes
-from windwrench.studies.scoring import share
 
 # what the template of each page shows, of kept results
 PAGES: Mapping[str, Callable[[], Mapping[str, Any]]] = {"tasks": tasks.page, "trust": trust.page}
 _MODULE = re.compile(r"`((?:[a-z_]+/)+[a-z_0-9]+\.py)`")
-_COMMAND = re.compile(r"python -m ((?:studies|windwrench)\.[a-z_.]+)")
+_COMMAND = re.compile(r"python -m ((?:evidence|windwrench)\.[a-z_.]+)")
 _COMMIT = re.compile(r"commits? [0-9a-f]{7,}")
 
 
@@ -83,7 +83,7 @@ def _runs(module: str) -> bool:
 def main() -> int:
     """Print what differs; return 1 where something does, else 0."""
     parser = argparse.ArgumentParser(
-        prog="python -m studies.pages",
+        prog="python -m evidence.pages",
         description="Compare pages and quoted figures with their results.",
     )
     parser.add_argument(

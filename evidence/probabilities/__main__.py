@@ -1,4 +1,4 @@
-"""``python -m studies.probabilities`` flies and diagnoses flights whose truth is known, and keeps
+"""``python -m evidence.probabilities`` flies and diagnoses flights whose truth is known, and keeps
 what ``docs/trust.md`` shows of their probabilities.
 """
 
@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
+from windwrench.evidence.kept_results import DOCS
+from windwrench.evidence.probabilities.calibration import RESULTS
+from windwrench.evidence.probabilities.flights import OF_TEN, WAYS_TO_LOG, recorded
+from windwrench.evidence.runner import Jobs, Task, code_stamp, run_tasks, start
 from windwrench.runtime.errors import unknown_name
 from windwrench.runtime.page_files import write_json
-from windwrench.studies.kept_results import DOCS
-from windwrench.studies.probabilities.calibration import RESULTS
-from windwrench.studies.probabilities.flights import OF_TEN, WAYS_TO_LOG, recorded
-from windwrench.studies.runner import Jobs, Task, code_stamp, run_tasks, start
 
 _FIRST = {"first": (800_000, 3000), "later": (850_000, 5000), "other logs": (910_000, 170_000)}
 _MODULES = "logged_poses", "outsiders", "practice_flights"

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from windwrench.evidence.scoring import EQUIVALENTS
 from windwrench.identification.diagnosis.unknown import UnknownSettings, signs
-from windwrench.studies.scoring import EQUIVALENTS
 
 Array = NDArray[np.float64]
 

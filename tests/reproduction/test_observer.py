@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.flights import PERIOD, fly, yawing_flight
 from windwrench.dynamics import EffectSetting, load_vehicle
-from windwrench.paper import NonlinearObserver
+from windwrench.reproduction import NonlinearObserver
 
 VEHICLE = load_vehicle("ardrone2")
 FORCE, TORQUE = np.array([0.3, -0.2, -0.1]), np.array([0.0, 0.0, 0.02])  # of yawing_flight

@@ -29,14 +29,14 @@ from scipy.spatial.transform import Rotation
 
 from windwrench import __version__
 from windwrench.dynamics.rotation import quaternion_to_matrix, turn_body
+from windwrench.evidence.kept_results import DOCS
+from windwrench.evidence.runner import start
 from windwrench.identification.logs.tables import open_table
 from windwrench.identification.motion.smoothing import runs_of
 from windwrench.runtime.compiled import compiled
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.page_files import write_json
 from windwrench.runtime.provenance import commit, made_by
-from windwrench.studies.kept_results import DOCS
-from windwrench.studies.runner import start
 
 Array = NDArray[np.float64]
 
@@ -442,7 +442,7 @@ def section(result: Mapping[str, Any]) -> str:
     for c in result["coefficients"][: -len(PAST_NAMES)]:
         value = f"{c['value']:.3g} ± {1.96 * c['std']:.2g}"
         lines.append(f"| {c['what']} | {value} | {c['unit']} |")
-    made = made_by("python -m studies.nanodrone_benchmark", [result["commit"]], result["version"])
+    made = made_by("python -m evidence.nanodrone_benchmark", [result["commit"]], result["version"])
     return "\n".join([made, "", *lines, ""])
 
 

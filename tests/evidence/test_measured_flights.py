@@ -9,12 +9,9 @@ from scipy.spatial.transform import Rotation
 from tests.support.data_paths import crazyswarm2_file, data_file
 from tests.support.parameters import mostly_slow
 from windwrench.dynamics import load_vehicle
-from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.diagnosis.commanded_rotors import in_flight
-from windwrench.identification.logs.reading import read_log
-from windwrench.studies.kept_results import DOCS, kept
-from windwrench.studies.measured_flights import CARRIER, payload_vehicle, swing
-from windwrench.studies.nanodrone_benchmark import (
+from windwrench.evidence.kept_results import DOCS, kept
+from windwrench.evidence.measured_flights import CARRIER, payload_vehicle, swing
+from windwrench.evidence.nanodrone_benchmark import (
     BEGIN,
     FITTED,
     GRAVITY,
@@ -26,6 +23,9 @@ from windwrench.studies.nanodrone_benchmark import (
     section,
     study,
 )
+from windwrench.identification.diagnosis import diagnose
+from windwrench.identification.diagnosis.commanded_rotors import in_flight
+from windwrench.identification.logs.reading import read_log
 
 VEHICLE = load_vehicle("crazyflie")
 

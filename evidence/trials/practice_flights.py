@@ -18,10 +18,10 @@ from windwrench.dynamics.effects import get, names
 from windwrench.dynamics.vehicle import EffectSetting, Mocap, Vehicle
 from windwrench.envs.plant import TICK, is_a_body
 from windwrench.envs.recording import background, draw_trajectory, record_flight
+from windwrench.evidence.trials.outsiders import HELD_BACK, OUTSIDERS, wrench_input
 from windwrench.identification.diagnosis.regression import typical_size
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import InputError, unknown_name
-from windwrench.studies.trials.outsiders import HELD_BACK, OUTSIDERS, wrench_input
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from windwrench.studies.recovery import (
+from windwrench.evidence.recovery import (
     EVENTS,
     FILTERS,
     FLOWN,

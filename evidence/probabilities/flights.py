@@ -17,14 +17,14 @@ import numpy as np
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import Need, names, needing
 from windwrench.dynamics.vehicle import Vehicle
+from windwrench.evidence.scoring import EQUIVALENTS, STAND_INS
+from windwrench.evidence.trials.logged_poses import FILTERS, LOGS
+from windwrench.evidence.trials.outsiders import OUTSIDERS
+from windwrench.evidence.trials.practice_flights import of_mass, practise, shown_in
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.residuals import beyond_calm
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import InputError
-from windwrench.studies.scoring import EQUIVALENTS, STAND_INS
-from windwrench.studies.trials.logged_poses import FILTERS, LOGS
-from windwrench.studies.trials.outsiders import OUTSIDERS
-from windwrench.studies.trials.practice_flights import of_mass, practise, shown_in
 
 # how a flight is logged: as measured, by its IMU, or behind one of the filters in turn
 WAYS_TO_LOG = ("pose", *LOGS, "filtered")

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from windwrench.studies.kept_results import kept
+from windwrench.evidence.kept_results import kept
 
 TASKS = ("WindHover", "WindTrajectory", "FanTracking2D")
 

@@ -1,4 +1,4 @@
-"""``python -m studies.recovery`` measures how wrench filters recover from gaps, jumps and wrong
+"""``python -m evidence.recovery`` measures how wrench filters recover from gaps, jumps and wrong
 attitudes, while poses are noisier than declared.
 
 Flights are exact: a smooth path, and the rotor speeds that fly it under an external wrench that
@@ -30,8 +30,8 @@ from windwrench.estimator import (
     WrenchEstimate,
     WrenchUKF,
 )
+from windwrench.evidence.runner import start
 from windwrench.runtime.errors import unknown_name
-from windwrench.studies.runner import start
 
 Array = NDArray[np.float64]
 Words = tuple[str, ...]  # what a flight is: one key of each axis

@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from windwrench.studies import measured_flights
-from windwrench.studies.kept_results import kept
-from windwrench.studies.probabilities import calibration
+from windwrench.evidence import measured_flights
+from windwrench.evidence.kept_results import kept
+from windwrench.evidence.probabilities import calibration
 
 
 def page() -> dict[str, Any]:
