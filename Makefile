@@ -47,6 +47,7 @@ coverage-all: $(VENV)/.tested
 lint: $(VENV)/.tested
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check --quiet .
+	$(BIN)/python .ci/counters.py
 
 format: $(VENV)/.tested
 	$(BIN)/ruff check --fix .

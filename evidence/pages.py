@@ -25,8 +25,7 @@ from windwrench.runtime.provenance import made_by
 # what the template of each page shows, of kept results
 PAGES: Mapping[str, Callable[[], Mapping[str, Any]]] = {"tasks": tasks.page, "trust": trust.page}
 _MODULE = re.compile(r"`((?:[a-z_]+/)+[a-z_0-9]+\.py)`")
-_COMMAND = re.compile(r"python -m ((?:evidence|windwrench)\.[a-z_.]+)")
-_COMMIT = re.compile(r"commits? [0-9a-f]{7,}")
+_COMMAND = re.compile(r"python -m ((?:evidence|studies|windwrench)\.[a-z_.]+)")
 
 
 @cache
@@ -56,23 +55,23 @@ def differing_lines(name: str) -> list[str]:
 
 
 def missing_sources() -> list[str]:
-    """Return the modules that pages name and that do not exist, each with its page; of a command
-    that has gone, unless its paragraph names a commit.
+    """Return the modules that pages name and that do not exist, each with its page. The
+    changelog and the release page's table of kept results name what has left.
     """
     pages = (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md")))
     missing = []
     for page in pages:
         text = page.read_text(encoding="utf-8")
-        names = set(_MODULE.findall(text))
-        found = [x for x in names if (ROOT / x).exists() or x.startswith(("my_", "live/ros2"))]
-        missing += [f"{page.name} names {name}" for name in sorted(names.difference(found))]
-        missing += [
-            f"{page.name} names {module} and no commit that has it"
-            for paragraph in text.split("\n\n")
-            for module in _COMMAND.findall(paragraph)
-            if not _runs(module) and not _COMMIT.search(paragraph)
-        ]
+        if page.name == "release.md":
+            text = re.sub(r"(?m)^\|.*$", "", text)
+        names = [name for name in _MODULE.findall(text) if not _is_file(name)]
+        names += [module for module in _COMMAND.findall(text) if not _runs(module)]
+        missing += [f"{page.name} names {name}" for name in sorted(set(names))]
     return missing
+
+
+def _is_file(name: str) -> bool:
+    return (ROOT / name).exists() or name.startswith("my_")
 
 
 def _runs(module: str) -> bool:

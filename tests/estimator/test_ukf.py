@@ -1,6 +1,6 @@
 """The filters and the smoother against the literal ones, and what they must hold.
 
-A mass that is hung on, its rise time and its lateral force are ``tests/reproduction/test_figures.py``'s.
+A mass that is hung on, its rise time and its lateral force: ``tests/reproduction/test_figures.py``.
 """
 
 from dataclasses import replace

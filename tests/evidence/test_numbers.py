@@ -78,12 +78,13 @@ def test_modules_that_pages_name_are_there():
     assert missing_sources() == []
 
 
-def test_a_command_that_is_gone_is_seen_unless_its_commit_is_named(tmp_path, monkeypatch):
-    gone = "Measured by `python -m evidence.gone --count 3`, windwrench 1.0.0"
-    text = f"Made by `python -m evidence.pages`.\n\n{gone}, commit 0123abc.\n\n{gone}.\n"
+def test_what_is_gone_is_seen(tmp_path, monkeypatch):
+    text = "".join(
+        f"`python -m evidence.{name}`, `evidence/{name}.py`" for name in ("pages", "gone")
+    )
     (tmp_path / "page.md").write_text(text, encoding="utf-8")
     monkeypatch.setattr(rendering, "DOCS", tmp_path)
-    assert missing_sources() == ["page.md names studies.gone and no commit that has it"]
+    assert missing_sources() == ["page.md names evidence.gone", "page.md names evidence/gone.py"]
 
 
 def test_the_rule_of_a_sure_name_is_that_of_the_code():

@@ -20,9 +20,11 @@ from pathlib import Path
 import pytest
 import yaml
 from markdown_it import MarkdownIt
+from typer.main import get_command
 
 from tests.support.data_paths import DATA
 from tests.support.paths import ROOT
+from windwrench.cli import app
 
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 DRY_RUN = "<!-- dry run -->"
@@ -139,3 +141,13 @@ def test_every_code_block_runs(page, tmp_path, monkeypatch):
             run_shell(content, environment, dry, where)
         else:
             assert language in NOT_CODE, f"{where}: a block of {language!r} is not run"
+
+
+def test_pages_name_commands_that_are_there():
+    verbs = set(get_command(app).commands)
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        if page.name == "release.md":  # its table names commands that have left
+            text = re.sub(r"(?m)^\|.*$", "", text)
+        named = set(re.findall(r"`windwrench ([a-z][a-z-]+)(?=[ `])", text))
+        assert named <= verbs, page.name
