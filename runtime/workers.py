@@ -1,5 +1,5 @@
-"""Worker processes, of this machine or of a Ray cluster. They end with the work, and with the
-process that started them. A worker that dies, or takes too long, costs its own task alone.
+"""Worker processes, of this machine or of a Ray cluster. They end with the work, and with their
+parent process. A death or a timeout of a worker costs its own task alone.
 """
 
 import multiprocessing
@@ -23,15 +23,15 @@ from .threads import one_thread
 T = TypeVar("T")
 R = TypeVar("R")
 
-# of new processes: forked workers would share the locks of compiled code and of linear algebra
+# for new processes: forked workers would share the locks of compiled code and of linear algebra
 SPAWNED = multiprocessing.get_context("spawn")
 _FIRST_TO_GO = 500  # of 1000: where memory runs out, the system ends a worker before its parent
-_LOOK = 0.2  # s between two looks at the time and calls of ``idle``
+_LOOK = 0.2  # s between two checks of the time and calls of ``idle``
 _ATTEMPTS = 4  # at a task of ``every``
 
 
 def end_with_parent() -> None:
-    """Have this process end as soon as the process that started it is gone, even if killed.
+    """Have this process end as soon as its parent process is gone, even if killed.
 
     For the initializer of any pool: a killed parent tells its workers nothing, and they would wait
     for ever.
@@ -51,7 +51,7 @@ def end_with_parent() -> None:
 
 @dataclass(frozen=True)
 class Lost:
-    """Why a task has no result: its process died, or was ended since it took too long."""
+    """Why a task has no result: its process died, or was ended after too long a time."""
 
     kind: str  # died, or time
     words: str
@@ -64,8 +64,8 @@ class _Worker:
         self._work = work
         self._pool = ProcessPoolExecutor(1, SPAWNED, end_with_parent)
         others = {child.pid for child in multiprocessing.active_children()}
-        # threads and processes that start in the block see no interrupt: a key press in the
-        # terminal is the parent's to answer
+        # threads and processes started in the block see no interrupt: the parent answers key
+        # presses
         with interrupts_blocked():
             self._ready = self._pool.submit(callable, work)  # imports the work's modules
             new = (c for c in multiprocessing.active_children() if c.pid not in others)
@@ -88,7 +88,7 @@ class _Worker:
         return time.monotonic() - self._begun
 
     def end(self) -> int | None:
-        """End the process at once, whatever it does; return its exit code."""
+        """End the process at once, even in a task; return its exit code."""
         if self._process is not None:
             self._process.kill()
         self._pool.shutdown(cancel_futures=True)  # waits for the process
@@ -96,8 +96,8 @@ class _Worker:
 
 
 class _Local:
-    """Tasks on processes of this machine, whose linear algebra has one thread each; a process that
-    is gone is replaced.
+    """Tasks on processes of this machine, each with one thread of linear algebra; dead processes
+    are replaced.
     """
 
     def __init__(self, work: Callable[[Any], Any], count: int) -> None:
@@ -110,7 +110,7 @@ class _Local:
         worker = self._resting.pop() if self._resting else _Worker(self._work)
         try:
             future = worker.start(task)
-        except BrokenProcessPool:  # it died while it had no task
+        except BrokenProcessPool:  # died without a task
             worker.end()
             return self.start(task)
         self._busy[future] = worker
@@ -168,8 +168,8 @@ class _OnCluster:
         return future
 
     def wait(self, seconds: float | None) -> set[Future[Any]]:
-        """Ask Ray, always from this thread: a thread that asks while Ray is shut down, or that
-        drops a reference then, ends the whole process.
+        """Ask Ray, always from this thread: another thread that asks, or drops a reference, during
+        Ray's shutdown ends the whole process.
         """
         futures = {reference: future for future, (reference, _) in self._running.items()}
         for reference in self._ray.wait(list(futures), timeout=seconds)[0]:
@@ -197,7 +197,7 @@ class _OnCluster:
         return "its process on the cluster died" if died else None
 
     def end(self) -> None:
-        """Leave the rest to Ray, which ends a task with the program that asked for it."""
+        """Leave the rest to Ray: a task ends with its program."""
         self._running.clear()
 
 
@@ -210,17 +210,16 @@ def each(
     attempts: int = 2,
     idle: Callable[[], None] | None = None,
 ) -> Iterator[tuple[T, Any]]:
-    """Yield each task with its result, or with ``Lost``, as they come; tasks are taken when a
-    worker is free, so that no more than one a worker are held.
+    """Yield each task with its result, or with ``Lost``, as they come. A task is taken when a
+    worker is free: at most one a worker is held.
 
     Args:
-        work: what is done with a task; importable by its name.
-        tasks: what is given to the work.
+        work: function of a task; importable by its name.
+        tasks: arguments of the work.
         most_seconds: the longest time of a task; None: any time.
         jobs: number of processes; default: one a core.
         cluster: a Ray cluster's address, or ``local`` for one on this machine; None: no Ray.
-        attempts: at a task whose process dies, which may be its neighbour's fault; the further
-            ones come last, one at a time.
+        attempts: at a task where its process dies; the further ones come last, one at a time.
         idle: called a few times a second while all wait.
 
     Raises:
