@@ -73,12 +73,12 @@ def compare(
 
 
 class LogsAgainstLogs(TyperCommand):
-    """A command in which ``--against`` takes every log up to the next option, where logs stand
-    before it too; where they come behind it alone, one log.
+    """A command whose ``--against`` takes every log up to the next option. With logs behind
+    ``--against`` alone, it takes one.
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Return what is left of the words of a command line."""
+        """Return the rest of the words of a command line."""
         options = (one for one in self.params if not getattr(one, "is_flag", True))
         valued = {name for one in options for name in one.opts}
         return super().parse_args(ctx, list(_each_against(args, valued)))

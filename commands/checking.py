@@ -94,7 +94,7 @@ def check(
 
 
 def _write(flight: "FlightLog", log: Path, path: Path) -> str:
-    """Write a flight in the kit's own format; return what is to be said of it."""
+    """Write a flight in the kit's own format; return the lines to print."""
     import numpy as np
 
     from ..identification.logs.flight_log import write_log
@@ -103,7 +103,7 @@ def _write(flight: "FlightLog", log: Path, path: Path) -> str:
         raise InputError(f"--write {path}: is the log itself; expected another file")
     said = ""
     if flight.commanded and flight.command is not None:
-        # what a command makes is the vehicle's to say each time the log is read
+        # the vehicle gives the result of a command, each time the log is read
         flight = replace(flight, rotor_speeds=np.full_like(flight.rotor_speeds, np.nan))
         said = "the motor commands are written, and not the rotor speeds that follow them"
     with working("writing"):

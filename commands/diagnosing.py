@@ -19,7 +19,7 @@ _STAGES = {"looking at the logs": 0.0, "predicting the flights": 0.96}
 
 
 def staged(progress: Callable[..., None]) -> Callable[[str], None]:
-    """Return what takes the stages of a diagnosis and tells their progress."""
+    """Return a function of the stages of a diagnosis that tells their progress."""
     return lambda text: progress(_STAGES.get(text), text)
 
 
@@ -66,8 +66,8 @@ def diagnose(
 
 
 def confronted(example: "Example", effects: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Say which effects that are known were found, by name or as what cannot be told from one, and
-    which others were named; return the former. Effects are as ``report.json`` names them.
+    """Print the known effects found, by name or as one not told apart, and the others named; return
+    the former. Effects are as ``report.json`` names them.
     """
     rows, others = [], [str(effect["name"]) for effect in effects]
     for known in example.known:
@@ -94,9 +94,9 @@ def _diagnose(
     """Find the effects that a vehicle's model lacks; write the report.
 
     Args:
-        read: flights and their vehicle; those after the paths' own are test flights.
-        paths: of the logs to which effects are fitted.
-        without: effects that are left out of the library.
+        read: flights and their vehicle; flights after the paths' own are test flights.
+        paths: paths of the logs for the fit.
+        without: effects left out of the library.
         out: folder for the report.
     """
     from ..identification.diagnosis import diagnose as run
@@ -150,7 +150,7 @@ def _show(found: "Diagnosis") -> None:
 def _with_rotor_faults(
     found: "Diagnosis", paths: Sequence[Path], flights: "Sequence[FlightLog]"
 ) -> "Diagnosis":
-    """Add whether a rotor lost thrust during a flight, for the logs that can show it."""
+    """Add losses of a rotor's thrust during a flight, for logs fit to show one."""
     from ..identification.comparison.fault_channels import read_channels
     from ..identification.comparison.fault_detection import find_fault
     from ..identification.comparison.words import fault_data

@@ -111,8 +111,8 @@ def get(name: str) -> Effect:
     """Return an effect by its name.
 
     Raises:
-        InputError: no effect has this name, a user's own file holds none, or no coefficient of its
-            law has an effect alone and no starting points are given.
+        InputError: no such effect, none in a user's own file, or a law without starting points
+            whose coefficients do nothing alone.
     """
     if name not in names():
         raise unknown_name("effect", name, names())

@@ -2,9 +2,9 @@
 of a log.
 
 An effect is one file in this folder with an ``EFFECT``. Its equation, the effect model, is compiled
-to a C function, called through its address. So all its callers (a tick of the plant, a sigma point
-of the filter, a sample of a log) run the same machine code, and a new effect recompiles none of
-them. There are four kinds:
+to a C function, called through its address. All its callers (a tick of the plant, a sigma point of
+the filter, a sample of a log) run the same machine code. A new effect recompiles none of them.
+There are four kinds:
 
 ``rotor input``
     changes the delivered rotor speeds. Model ``(c, vehicle, rotors, memory)``: rewrites the four
