@@ -9,7 +9,7 @@ from typing import Any
 from typer.core import TyperCommand
 
 from ..runtime.errors import InputError
-from .flight_logs import AS_THEY_ARE, Reading, log_notes, read_flights
+from .flight_logs import AS_THEY_ARE, LogOptions, log_notes, read_flights
 from .terminal import console, results_folder, say, show_table
 
 _AGAINST = "--against"
@@ -24,7 +24,7 @@ def compare(
     against: list[Path] | None = None,
     by_folder: bool = False,
     example: bool = False,
-    reading: Reading = AS_THEY_ARE,
+    reading: LogOptions = AS_THEY_ARE,
     out: Path = Path("results/compare"),
 ) -> dict[str, Any]:
     """Find what changed between two sets of flights. Which rotor, which side: no model has to be

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import InputError
-from .flight_logs import AS_THEY_ARE, Reading, log_notes, read_flights
+from .flight_logs import AS_THEY_ARE, LogOptions, log_notes, read_flights
 from .terminal import command_line, console, results_folder, say, show_page, show_table, working
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def diagnose(
     example: bool = False,
     no_open: bool = False,
     test: list[Path] | None = None,
-    reading: Reading = AS_THEY_ARE,
+    reading: LogOptions = AS_THEY_ARE,
     rotor_faults: bool = False,
     without: list[str] | None = None,
     out: Path = Path("results/diagnose"),
@@ -49,7 +49,7 @@ def diagnose(
             console.print(f"{flight.what} ({flight.source})\nKnown before the diagnosis:")
             for why in (*(known.why for known in flight.known), flight.unknown):
                 console.print(f"  * {why}")
-            read = read_flights([flight.log], Reading(vehicle=flight.vehicle))
+            read = read_flights([flight.log], LogOptions(vehicle=flight.vehicle))
             result = _diagnose(read, [flight.log], without, out)
         result["known"] = confronted(flight, result["effects"])
         show_page(out / "report.html", not no_open)
@@ -166,7 +166,7 @@ def _with_rotor_faults(
     return replace(found, rotor_faults=tuple(faults), notes=(*found.notes, *notes))
 
 
-def _rotor_faults(logs: Sequence[Path], reading: Reading, out: Path) -> dict[str, Any]:
+def _rotor_faults(logs: Sequence[Path], reading: LogOptions, out: Path) -> dict[str, Any]:
     """Look for rotors that lost thrust during flights; write rotor_faults.json and a picture."""
     from ..dynamics.vehicle_file import load_vehicle
     from ..identification.comparison.fault_channels import read_channels

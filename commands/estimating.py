@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import InputError
 from ..runtime.extras import need
-from .flight_logs import AS_THEY_ARE, Reading, log_notes, read_flights
+from .flight_logs import AS_THEY_ARE, LogOptions, log_notes, read_flights
 from .terminal import (
     console,
     film_kinds,
@@ -43,7 +43,7 @@ _TOO_SLOW = (
 
 def estimate(
     log: Path,
-    reading: Reading = AS_THEY_ARE,
+    reading: LogOptions = AS_THEY_ARE,
     smooth: bool | None = None,
     gate: float | None = None,
     tune: bool | None = None,

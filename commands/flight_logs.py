@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Reading:
+class LogOptions:
     """How logs are read: the options of every command that reads some."""
 
     reader: str | None = None
@@ -25,11 +25,11 @@ class Reading:
     vehicle: str | None = None
 
 
-AS_THEY_ARE = Reading()
+AS_THEY_ARE = LogOptions()
 
 
 def read_flights(
-    paths: Sequence[Path], reading: Reading = AS_THEY_ARE
+    paths: Sequence[Path], reading: LogOptions = AS_THEY_ARE
 ) -> "tuple[list[FlightLog], Vehicle]":
     """Read flights of one vehicle, given or named by the logs.
 
@@ -54,7 +54,7 @@ def read_flights(
 
 
 def read_logs(
-    paths: Iterable[Path], reading: Reading, vehicle: "Vehicle | None" = None
+    paths: Iterable[Path], reading: LogOptions, vehicle: "Vehicle | None" = None
 ) -> "list[FlightLog]":
     """Read flight logs. A reader's warnings stand in the notes of its log.
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..runtime.errors import InputError, UnreadLogError
 from ..runtime.page_files import write_text
-from .flight_logs import AS_THEY_ARE, Reading
+from .flight_logs import AS_THEY_ARE, LogOptions
 from .terminal import (
     command_line,
     console,
@@ -32,7 +32,7 @@ def is_path(word: str) -> bool:
 
 def look(
     log: Path,
-    reading: Reading = AS_THEY_ARE,
+    reading: LogOptions = AS_THEY_ARE,
     no_open: bool = False,
     out: Path = Path("results/log"),
 ) -> dict[str, Any]:
@@ -103,7 +103,7 @@ def look(
     return {**results, "sentence": sentence, "page": page}
 
 
-def _typed(command: str, log: Path, reading: Reading) -> str:
+def _typed(command: str, log: Path, reading: LogOptions) -> str:
     """Return the command line of one step alone."""
     given = vars(reading).items()
     options = [str(x) for name, value in given if value is not None for x in (f"--{name}", value)]

@@ -55,7 +55,7 @@ errors = _Terminal(stderr=True, emoji=False, markup=False)
 
 
 @dataclass
-class Run:
+class CommandRun:
     """The running command's record so far."""
 
     dry: bool = False
@@ -76,7 +76,7 @@ class Run:
                 folder.rmdir()
 
 
-run = Run()
+run = CommandRun()
 
 
 class DryRun(Exception):  # noqa: N818 - the way out of a command whose request is good, no error
