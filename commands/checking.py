@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import InputError, UnreadLogError
 from ..runtime.page_files import write_text
-from .flight_logs import AS_THEY_ARE, Reading
+from .flight_logs import AS_THEY_ARE, LogOptions
 from .terminal import console, note, results_folder, say, show_table, working
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def check(
     log: Path,
-    reading: Reading = AS_THEY_ARE,
+    reading: LogOptions = AS_THEY_ARE,
     write_map: Path | None = None,
     write: Path | None = None,
     out: Path = Path("results/check"),
@@ -94,7 +94,7 @@ def check(
 
 
 def _write(flight: "FlightLog", log: Path, path: Path) -> str:
-    """Write a flight in the kit's own format; return what is to be said of it."""
+    """Write a flight in the kit's own format; return the lines to print."""
     import numpy as np
 
     from ..identification.logs.flight_log import write_log
@@ -103,7 +103,7 @@ def _write(flight: "FlightLog", log: Path, path: Path) -> str:
         raise InputError(f"--write {path}: is the log itself; expected another file")
     said = ""
     if flight.commanded and flight.command is not None:
-        # what a command makes is the vehicle's to say each time the log is read
+        # the vehicle gives the result of a command, each time the log is read
         flight = replace(flight, rotor_speeds=np.full_like(flight.rotor_speeds, np.nan))
         said = "the motor commands are written, and not the rotor speeds that follow them"
     with working("writing"):

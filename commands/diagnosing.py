@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import InputError
-from .flight_logs import AS_THEY_ARE, Reading, log_notes, read_flights
+from .flight_logs import AS_THEY_ARE, LogOptions, log_notes, read_flights
 from .terminal import command_line, console, results_folder, say, show_page, show_table, working
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ _STAGES = {"looking at the logs": 0.0, "predicting the flights": 0.96}
 
 
 def staged(progress: Callable[..., None]) -> Callable[[str], None]:
-    """Return what takes the stages of a diagnosis and tells their progress."""
+    """Return a function of the stages of a diagnosis that tells their progress."""
     return lambda text: progress(_STAGES.get(text), text)
 
 
@@ -28,7 +28,7 @@ def diagnose(
     example: bool = False,
     no_open: bool = False,
     test: list[Path] | None = None,
-    reading: Reading = AS_THEY_ARE,
+    reading: LogOptions = AS_THEY_ARE,
     rotor_faults: bool = False,
     without: list[str] | None = None,
     out: Path = Path("results/diagnose"),
@@ -49,7 +49,7 @@ def diagnose(
             console.print(f"{flight.what} ({flight.source})\nKnown before the diagnosis:")
             for why in (*(known.why for known in flight.known), flight.unknown):
                 console.print(f"  * {why}")
-            read = read_flights([flight.log], Reading(vehicle=flight.vehicle))
+            read = read_flights([flight.log], LogOptions(vehicle=flight.vehicle))
             result = _diagnose(read, [flight.log], without, out)
         result["known"] = confronted(flight, result["effects"])
         show_page(out / "report.html", not no_open)
@@ -66,8 +66,8 @@ def diagnose(
 
 
 def confronted(example: "Example", effects: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Say which effects that are known were found, by name or as what cannot be told from one, and
-    which others were named; return the former. Effects are as ``report.json`` names them.
+    """Print the known effects found, by name or as one not told apart, and the others named; return
+    the former. Effects are as ``report.json`` names them.
     """
     rows, others = [], [str(effect["name"]) for effect in effects]
     for known in example.known:
@@ -94,9 +94,9 @@ def _diagnose(
     """Find the effects that a vehicle's model lacks; write the report.
 
     Args:
-        read: flights and their vehicle; those after the paths' own are test flights.
-        paths: of the logs to which effects are fitted.
-        without: effects that are left out of the library.
+        read: flights and their vehicle; flights after the paths' own are test flights.
+        paths: paths of the logs for the fit.
+        without: effects left out of the library.
         out: folder for the report.
     """
     from ..identification.diagnosis import diagnose as run
@@ -150,7 +150,7 @@ def _show(found: "Diagnosis") -> None:
 def _with_rotor_faults(
     found: "Diagnosis", paths: Sequence[Path], flights: "Sequence[FlightLog]"
 ) -> "Diagnosis":
-    """Add whether a rotor lost thrust during a flight, for the logs that can show it."""
+    """Add losses of a rotor's thrust during a flight, for logs fit to show one."""
     from ..identification.comparison.fault_channels import read_channels
     from ..identification.comparison.fault_detection import find_fault
     from ..identification.comparison.words import fault_data
@@ -166,7 +166,7 @@ def _with_rotor_faults(
     return replace(found, rotor_faults=tuple(faults), notes=(*found.notes, *notes))
 
 
-def _rotor_faults(logs: Sequence[Path], reading: Reading, out: Path) -> dict[str, Any]:
+def _rotor_faults(logs: Sequence[Path], reading: LogOptions, out: Path) -> dict[str, Any]:
     """Look for rotors that lost thrust during flights; write rotor_faults.json and a picture."""
     from ..dynamics.vehicle_file import load_vehicle
     from ..identification.comparison.fault_channels import read_channels

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import InputError
 from ..runtime.extras import need
-from .flight_logs import AS_THEY_ARE, Reading, log_notes, read_flights
+from .flight_logs import AS_THEY_ARE, LogOptions, log_notes, read_flights
 from .terminal import (
     console,
     film_kinds,
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from ..estimator.consistency import Consistency
     from ..identification.logs.flight_log import FlightLog
 
-# endings of the wrench's file, with the library that writes it and the extra that brings it
+# endings of the wrench's file, with their library and its extra
 _TRACKS: dict[str, tuple[str, str] | None] = {
     ".csv": None,
     ".mcap": ("rosbags", "logs"),
     ".rrd": ("rerun", "rerun"),
 }
-# what innovations that agree within a second say, of a given and of a fitted tuning
+# sentences for innovations in agreement within a second, of a given and of a fitted tuning
 _TOO_SLOW = (
     "warning: innovations agree with each other within a second: the wrench changes faster than "
     "the tuning says. It is late, and its deviations are too small. Leave out --no-tune and "
@@ -43,7 +43,7 @@ _TOO_SLOW = (
 
 def estimate(
     log: Path,
-    reading: Reading = AS_THEY_ARE,
+    reading: LogOptions = AS_THEY_ARE,
     smooth: bool | None = None,
     gate: float | None = None,
     tune: bool | None = None,
@@ -85,7 +85,7 @@ def estimate(
     if needed := _TRACKS[track.suffix]:
         need(*needed, f"--out {out}")
     folder = results_folder(track.parent)
-    begin = f"{track.stem}." if track == out else ""  # of the names of what lies beside it
+    begin = f"{track.stem}." if track == out else ""  # part of the names of the files beside
     run.record = folder / f"{begin}run.json"
     if smooth is None:
         smooth = (flight.gyro is None) == (flight.accelerometer is None)
@@ -155,8 +155,8 @@ def estimate(
 def _tuned(
     flight: "FlightLog", model: "Vehicle", given: "UKFTuning | None", wanted: bool
 ) -> "tuple[NoiseFit | None, Consistency | None, str]":
-    """Return the fitted tuning, if that is wanted and can be had; what the innovations say of the
-    tuning that is used, if there are enough; and a sentence on both.
+    """Return the fitted tuning, if wanted and possible; the innovations' judgement of the tuning in
+    use, if there are enough; and a sentence on both.
     """
     from ..identification.wrench_series import consistency_with_log, tune_to_log
 

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from ..runtime.errors import InputError
-from .flight_logs import AS_THEY_ARE, Reading
+from .flight_logs import AS_THEY_ARE, LogOptions
 from .terminal import command_line, console, note, results_folder, say, show_table, working
 
 _MOST_ROWS = 20  # of the table in the terminal
@@ -13,7 +13,7 @@ _MOST_ROWS = 20  # of the table in the terminal
 def fleet(
     logs: list[Path],
     manifest: Path | None = None,
-    reading: Reading = AS_THEY_ARE,
+    reading: LogOptions = AS_THEY_ARE,
     without: list[str] | None = None,
     cluster: str | None = None,
     jobs: int | None = None,

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..runtime.errors import InputError
-from .flight_logs import Reading, log_notes, read_logs
+from .flight_logs import LogOptions, log_notes, read_logs
 from .terminal import console, result_file, run, say, show_table, working
 
 _WINDOW = re.compile(r"(.+):(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?)")
@@ -65,7 +65,7 @@ def identify(
     if not common[0] < common[1]:
         raise InputError(f"--to {end:g}: expected a time after --from {begin:g}")
     parts = [parse_window(text) for text in (*logs, *(test or ()))]
-    flights = read_logs([path for path, _ in parts], Reading(reader, map, piece))
+    flights = read_logs([path for path, _ in parts], LogOptions(reader, map, piece))
     flights, unseen = flights[: len(logs)], flights[len(logs) :]
     windows = [w if math.isfinite(w[1]) else common for _, w in parts]
     with working("identifying") as progress:

@@ -11,7 +11,7 @@ from rich.live import Live
 
 from ..runtime.errors import InputError
 from ..runtime.interrupts import INTERRUPTED, TERMINATED, taken, terminable
-from .flight_logs import Reading
+from .flight_logs import LogOptions
 from .terminal import console, errors, gate_of, note, run, working
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ def live(
             raise InputError("--diagnose-after: nothing was recorded to diagnose")
         from .diagnosing import diagnose
 
-        result["diagnosis"] = diagnose([recorder.path], reading=Reading(vehicle=flown), out=out)
+        result["diagnosis"] = diagnose([recorder.path], reading=LogOptions(vehicle=flown), out=out)
     if interrupted:
         run.code = TERMINATED if terminated() else INTERRUPTED
     return result

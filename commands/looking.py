@@ -1,4 +1,4 @@
-"""All that a log allows, in one go: ``windwrench LOG``."""
+"""All results of a log, in one go: ``windwrench LOG``."""
 
 import shlex
 from collections.abc import Callable, Mapping
@@ -8,7 +8,7 @@ from typing import Any
 
 from ..runtime.errors import InputError, UnreadLogError
 from ..runtime.page_files import write_text
-from .flight_logs import AS_THEY_ARE, Reading
+from .flight_logs import AS_THEY_ARE, LogOptions
 from .terminal import (
     command_line,
     console,
@@ -32,7 +32,7 @@ def is_path(word: str) -> bool:
 
 def look(
     log: Path,
-    reading: Reading = AS_THEY_ARE,
+    reading: LogOptions = AS_THEY_ARE,
     no_open: bool = False,
     out: Path = Path("results/log"),
 ) -> dict[str, Any]:
@@ -103,8 +103,8 @@ def look(
     return {**results, "sentence": sentence, "page": page}
 
 
-def _typed(command: str, log: Path, reading: Reading) -> str:
-    """Return what a user types for one step alone."""
+def _typed(command: str, log: Path, reading: LogOptions) -> str:
+    """Return the command line of one step alone."""
     given = vars(reading).items()
     options = [str(x) for name, value in given if value is not None for x in (f"--{name}", value)]
     return shlex.join(["windwrench", command, str(log), *options])
@@ -116,7 +116,7 @@ def _tell(step: Any) -> None:
 
 
 def _what_it_holds(found: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return what ``check`` found as sentences."""
+    """Return the result of ``check`` as sentences."""
     read = f"{found['samples']} rows, {found['seconds']:.1f} s, read by {found['read_by']}."
     rates = (f"{name} {c['rate_hz']:.3g} Hz" for name, c in found["channels"].items())
     doubts = len(found["doubts"])
@@ -132,8 +132,8 @@ def _what_acts(result: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _what_lacks(result: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the first sentence of a diagnosis, and what is left of the force: in that sentence
-    where it has no number of its own, else as a further one.
+    """Return the first sentence of a diagnosis, and the rest of the force: within a sentence
+    without a number of its own, else as a further one.
     """
     headline, error = result["headline"], result["error"]
     before, after = (1e3 * error[when]["force_rms_N"] for when in ("before", "after"))

@@ -1,4 +1,6 @@
-"""The tuning of a filter as a YAML file: what ``estimate`` writes, it and ``live`` take."""
+"""The tuning of a filter as a YAML file: written by ``estimate``, read by ``estimate`` and
+``live``.
+"""
 
 from pathlib import Path
 
@@ -12,7 +14,7 @@ from ..runtime.yaml_file import read_yaml
 
 
 def save_tuning(tuning: UKFTuning, period: float, path: Path) -> None:
-    """Write a tuning of steps of ``period`` s to a YAML file, as that of 5 ms.
+    """Write a tuning of steps of ``period`` s to a YAML file, for steps of 5 ms.
 
     Raises:
         InputError: the file cannot be written.
@@ -22,8 +24,8 @@ def save_tuning(tuning: UKFTuning, period: float, path: Path) -> None:
 
 
 def load_tuning(path: Path, period: float = PERIOD) -> UKFTuning:
-    """Return the tuning of a YAML file, whose fields are those of ``UKFTuning`` for steps of 5 ms,
-    for steps of ``period`` s.
+    """Return the tuning of a YAML file for steps of ``period`` s. Its fields are ``UKFTuning``'s
+    for steps of 5 ms.
 
     Raises:
         InputError: the file cannot be read, or a field is unknown or out of range.

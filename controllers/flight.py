@@ -91,8 +91,8 @@ def reset_flight(c: np.void) -> None:
 
 @compiled
 def move_setpoint(c: Record, position: Array, dt: float) -> None:
-    """Move the set point with its own velocity for ``dt`` s; on an axis where it runs too far ahead
-    it waits.
+    """Move the set point with its own velocity for ``dt`` s; too far ahead on an axis, the set
+    point waits there.
     """
     for i in range(3):
         step = dt * c.setpoint[3 + i]
@@ -104,21 +104,21 @@ def move_setpoint(c: Record, position: Array, dt: float) -> None:
 
 @compiled
 def _wanted(c: Record, x: Array, dt: float, i: int) -> float:
-    """Return the acceleration, m/s2, that the rotors must make along an axis of the world."""
+    """Return the rotors' acceleration, m/s2, along an axis of the world."""
     s = c.setpoint
     error = s[i] - x[i]
     c.sum[i] = min(max(c.sum[i] + dt * error, -2.0), 2.0)
     wanted = (
         s[6 + i] + c.position * error + c.velocity * (s[3 + i] - x[7 + i]) + c.integral * c.sum[i]
     )
-    # what the model's effects push, the rotors need not
+    # the model's effects take their part from the rotors
     left: float = wanted - c.foreseen[i] / c.body.mass
     return left
 
 
 @compiled
 def fly(c: Record, x: Array, dt: float) -> None:
-    """Write the rotor speeds (4,) rad/s that steer the estimated state ``x`` to the set point into
+    """Write the rotor speeds (4,) rad/s from the estimated state ``x`` to the set point into
     ``c.command``.
 
     ``x`` is laid out as in ``estimator.estimate``: position 0-2, quaternion 3-6, velocity 7-9, body
@@ -154,7 +154,7 @@ def fly(c: Record, x: Array, dt: float) -> None:
     J = c.body.inertia
     hx, hy, hz = product(J, wx, wy, wz)
     tx, ty, tz = product(J, alpha_x, alpha_y, alpha_z)
-    # what a declared centre of mass off the rotors' centre makes of the thrust is balanced here
+    # here the thrust's torque about a declared centre of mass off the rotors' centre is balanced
     tx = tx + wy * hz - wz * hy - c.foreseen[3] + c.body.com[1] * thrust
     ty = ty + wz * hx - wx * hz - c.foreseen[4] - c.body.com[0] * thrust
     tz = tz + wx * hy - wy * hx - c.foreseen[5]

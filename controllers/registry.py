@@ -1,5 +1,5 @@
-"""The controllers of each task by their names: designed laws, the gains found for them by search
-(``tuned.yaml`` says for which scenario and how), and the trained policies that come with the kit.
+"""The controllers of each task by their names: designed laws, their gains from a search (with
+scenario and command in ``tuned.yaml``), and the kit's trained policies.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ STANDARD_SCENARIO = "base"  # of the gains of a law that is called no more than 
 
 
 class Controller(Protocol):
-    """From an observation to a command; ``info`` is the environment's, for those that may see the
+    """From an observation to a command; ``info`` is the environment's, for controllers that see the
     truth.
 
-    One that also has ``brief(briefing)`` is told what its vehicle, its sensors and the fan are
-    (``controllers.briefing.Briefing``) before ``reset``, which one without a memory may lack.
+    A method ``brief(briefing)`` gets vehicle, sensors and fan (``controllers.briefing.Briefing``)
+    before ``reset``. A controller without a memory needs no ``reset``.
     """
 
     def reset(self) -> None:
@@ -49,8 +49,8 @@ Laws = dict[str, Callable[..., Any]]
 
 @cache
 def tuned_gains(task: str = STANDARD_TASK) -> dict[str, dict[str, Any]]:
-    """Return what is known of a task's gains: law, of FanTracking also scenario, and then ``gains``
-    and how they were found.
+    """Return a task's tuned gains: law, of FanTracking also scenario, and then ``gains`` and how
+    they were found.
     """
     sections: dict[str, dict[str, dict[str, Any]]] = read_yaml(
         Path(__file__).with_name("tuned.yaml"), "tuned gains"
@@ -114,8 +114,8 @@ _AS = {"WindTrajectory": "WindHover"}
 
 
 def make_controller(name: str, task: str = STANDARD_TASK) -> Any:
-    """Return a new ``Controller`` of a task by its name; where the name of a law of another task
-    than FanTracking has gains that were found, the law has these.
+    """Return a new ``Controller`` of a task by its name. In tasks other than FanTracking a law has
+    its tuned gains, where there are some.
 
     Raises:
         InputError: no task or no controller has this name.
@@ -133,8 +133,8 @@ def make_controller(name: str, task: str = STANDARD_TASK) -> Any:
 
 @cache
 def shipped_policies(task: str = STANDARD_TASK) -> dict[str, Path]:
-    """Return the file of each policy of a task that this installation has, sorted by name. A wheel
-    has one seed of each kind, a checkout all.
+    """Return the file of each installed policy of a task, sorted by name. A wheel has one seed of
+    each kind, a checkout all.
     """
     folder = Path(str(resources.files(__package__))).parent / "training" / "policies"
     start = "" if task == STANDARD_TASK else f"{task}-"

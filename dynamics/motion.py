@@ -1,6 +1,6 @@
 """How a quadrotor moves: the prediction model of McKinnon and Schoellig, (2)-(5) and (11)-(14).
 
-Zero-order hold: attitude, thrust, torque and wrench are those of the start of the step.
+Zero-order hold: attitude, thrust, torque and wrench are taken at the start of the step.
 """
 
 import math
@@ -84,9 +84,7 @@ def angular_acceleration_of(
     torque: tuple[float, float, float],
     effects: tuple[float, ...],
 ) -> tuple[float, float, float]:
-    """Return the angular acceleration, rad/s2, body: (12). The arguments are those of
-    ``accelerations_of``.
-    """
+    """Return the angular acceleration, rad/s2, body: (12). Arguments as of ``accelerations_of``."""
     wx, wy, wz = omega
     t0, t1, t2 = torque
     hx = b[0] * wx + b[1] * wy + b[2] * wz
@@ -114,7 +112,7 @@ def acceleration_of(
     effects: tuple[float, ...],
 ) -> tuple[float, float, float]:
     """Return the acceleration of the geometric centre, m/s2, world: (4), and its acceleration about
-    the centre of mass. ``turning`` is the angular acceleration; the others are those of
+    the centre of mass. ``turning`` is the angular acceleration; the others as of
     ``accelerations_of``.
     """
     wx, wy, wz = omega
@@ -182,7 +180,7 @@ def accelerations(
     )
 
 
-# rad: a step that turns the body further carries its angular momentum by the exact rotation
+# rad: beyond, a step carries the angular momentum by the exact rotation
 LONG_TURN = 0.25
 
 
@@ -190,13 +188,13 @@ LONG_TURN = 0.25
 def gyroscopic_rest(
     inertia: Array, inverse: Array, wx: float, wy: float, wz: float, square: float, dt: float
 ) -> tuple[float, float, float]:
-    """Return the angular acceleration, rad/s2, body, that (12) lacks of the exact turn of the
-    angular momentum, ``square`` being that of the step's angle.
+    """Return the angular acceleration, rad/s2, body, missing in (12) against the exact turn of the
+    angular momentum; ``square`` is the squared angle of the step.
 
-    (12) takes ``-omega x J omega`` of the step's start for all of it: explicit Euler, which adds
-    energy in each step, and without bound where a step turns far. In the body frame the momentum
-    of a free body turns by ``exp(-[omega dt]x)``, which keeps its length. Below ``LONG_TURN``,
-    where the two agree within a few percent of the gyroscopic term, (12) stands as printed.
+    (12) takes ``-omega x J omega`` at the step's start for the whole step: explicit Euler. Euler
+    adds energy in each step, and without bound in long turns. In the body frame the momentum of a
+    free body turns by ``exp(-[omega dt]x)``, at a constant length. Below ``LONG_TURN``, where the
+    two agree within a few percent of the gyroscopic term, (12) stands as printed.
     """
     hx = inertia[0, 0] * wx + inertia[0, 1] * wy + inertia[0, 2] * wz
     hy = inertia[1, 0] * wx + inertia[1, 1] * wy + inertia[1, 2] * wz
@@ -235,7 +233,7 @@ def effect_wrench(
     """Write the summed wrench (6,) of the effects into ``out``: force in the world, torque in the
     body frame.
 
-    ``state`` (STATE_SIZE,) is scratch but for the rotors' acceleration, which must be there.
+    ``state`` (STATE_SIZE,) is scratch but for the rotors' acceleration, an input.
     """
     fill_state(body, position, rotation, velocity, omega, rotor_speeds, wind, voltage, time, state)
     for i in range(6):

@@ -5,10 +5,12 @@ paper.
 import csv
 import io
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from functools import partial
 from importlib import import_module
+from multiprocessing.managers import DictProxy, SyncManager
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,7 @@ from ..runtime.page_files import write_figure, write_json, write_text
 from ..runtime.plain_values import plain
 from ..runtime.provenance import commit, made_by
 from ..runtime.regular_files import read_json
-from ..runtime.workers import every, shared_dict
+from ..runtime.workers import SPAWNED, end_with_parent, every, interrupts_blocked
 from . import NAMES
 from .result import Columns, Result, template
 
@@ -62,13 +64,25 @@ def reproduce(
     wanted = numbers_of_seeds(names, seeds)
     done = {name: is_done(folder, name, count) for name, count in wanted.items()}
     pending = [name for name in names if not done[name]]
-    with shared_dict({name: float(done[name]) for name in names}) as shares:
+    with _shared_dict({name: float(done[name]) for name in names}) as shares:
         work = partial(_run_and_write, seeds=wanted, folder=folder, shares=shares)
         jobs = min(jobs or os.cpu_count() or 1, max(len(pending), 1))
         for _ in every(work, pending, jobs, idle=lambda: report(dict(shares))):
             pass
         report(dict(shares))
     return {name: name in pending for name in names}
+
+
+@contextmanager
+def _shared_dict(values: Mapping[str, Any]) -> Iterator["DictProxy[str, Any]"]:
+    """Give a dictionary that workers can change too; its ``copy`` is of one instant."""
+    manager = SyncManager(ctx=SPAWNED)
+    with interrupts_blocked():
+        manager.start(end_with_parent)
+    try:
+        yield manager.dict(dict(values))
+    finally:
+        manager.shutdown()
 
 
 def _module(name: str) -> Any:

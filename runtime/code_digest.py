@@ -17,9 +17,9 @@ def code_digest(
     """Return a digest (16 hexadecimal digits) of the package's code.
 
     Args:
-        rooms: folders of the package, taken with all that lies in them.
+        rooms: folders of the package, with all files in them.
         files: more files.
-        without: folders that are left out of the rooms.
+        without: folders left out of the rooms.
 
     All paths are below the package's folder, with ``/``; give tuples.
     """

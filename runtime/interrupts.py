@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from types import FrameType
 
 INTERRUPTED, TERMINATED = 130, 143  # exit codes
-_AGAIN = 0.02  # s until an interrupt that was lost comes again
-# what ``sys.argv`` begins with while ``python -m`` looks for the package, and as a program
+_AGAIN = 0.02  # s until a lost interrupt comes again
+# first words of ``sys.argv``: while ``python -m`` looks for the package, and as a program
 _COMMAND = ("-m", "windwrench", "windwrench.exe", "windwrench-script.py")
 
 
@@ -24,9 +24,9 @@ def is_command() -> bool:
 def leaving_at_once(active: bool = True) -> Iterator[None]:
     """Have an interrupt end the process at once while the block imports something.
 
-    Nothing is done yet, so nothing is lost; an exception raised within an import may be taken for
-    one of its own, and comes with many lines at best. Where someone else answers interrupts, or
-    this is not the main thread, nothing changes.
+    Nothing is done yet, so nothing is lost. An import may take the exception for one of its own,
+    and prints many lines at best. Another handler of interrupts stays as it is, as do other threads
+    than the main one.
     """
     ours = active and threading.current_thread() is threading.main_thread()
     if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -40,12 +40,12 @@ def leaving_at_once(active: bool = True) -> Iterator[None]:
 
 
 class _Interrupt(KeyboardInterrupt):
-    """An interrupt that comes again where something loses it: callbacks of Python's own do, as
-    every import has them, and modules in C that import others, as MuJoCo's.
+    """An interrupt, raised again where the first is lost: in callbacks of Python's own, as in every
+    import, and in modules in C with imports of their own, as MuJoCo's.
     """
 
-    taken = True  # by who answers it, or no command runs
-    number = signal.SIGINT  # of the signal that it came by
+    taken = True  # an answer came, or no command runs
+    number = signal.SIGINT  # signal of the interrupt
 
     def __del__(self) -> None:
         if not self.taken:
@@ -63,15 +63,15 @@ def _interrupt(number: int) -> None:
 
 
 def taken() -> None:
-    """Say that an interrupt has its answer, and does not come again."""
+    """Note the answer to an interrupt: it does not come again."""
     _Interrupt.taken = True
 
 
 @contextmanager
 def noted() -> Iterator[Callable[[], bool]]:
-    """Give a function that says whether an interrupt came in the block, and is its answer.
+    """Give a function that answers an interrupt in the block, and returns whether one came.
 
-    One that comes within the import of a module in C may end as an error of that import.
+    An interrupt within the import of a module in C may end as an import error.
     """
     came: list[int] = []
     told = sys.unraisablehook
@@ -101,9 +101,9 @@ def noted() -> Iterator[Callable[[], bool]]:
 
 @contextmanager
 def terminable() -> Iterator[Callable[[], bool]]:
-    """Have a termination interrupt the block as Ctrl-C does, and give a function that says whether
-    one came. Whatever started the command may have it ignore interrupts, as a shell script does
-    behind ``&``: a termination is answered all the same.
+    """Have a termination interrupt the block as Ctrl-C does, and give a function that returns
+    whether one came. The parent process may have the command ignore interrupts, as a shell script
+    does behind ``&``: a termination is answered all the same.
     """
     came: list[int] = []
 
@@ -124,10 +124,10 @@ def terminable() -> Iterator[Callable[[], bool]]:
 
 
 def forget() -> None:
-    """Have Python end with the exit code that it is given: where an interrupt ended the execution
-    of a text, as namedtuples and data classes do, it would kill itself in the end.
+    """Have Python end with the given exit code. After an interrupt during the execution of a text,
+    as by namedtuples and data classes, Python would kill itself in the end.
     """
-    exec("")  # nothing, but Python forgets what ended the last
+    exec("")  # no code, but Python forgets the end of the last text
 
 
 def _leave(_signal: int, _frame: FrameType | None) -> None:

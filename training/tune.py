@@ -24,7 +24,7 @@ _PRUNE_AFTER = 10  # episodes
 
 
 def check_request(task: str, law: str, scenario: str, trials: int, episodes: int) -> None:
-    """Check what ``tune`` is asked for.
+    """Check a request to ``tune``.
 
     Raises:
         InputError: an unknown task, law or scenario, no trials, or too many episodes.
@@ -42,8 +42,8 @@ def check_request(task: str, law: str, scenario: str, trials: int, episodes: int
 
 
 def first_gains(task: str, law: str) -> dict[str, float]:
-    """Return the gains with which a search begins: those of ``STARTS``, or the law's defaults,
-    limited to the ranges.
+    """Return the first gains of a search: from ``STARTS``, or the law's defaults, limited to the
+    ranges.
     """
     defaults = {**vars(TASKS[task].laws[law]()), **STARTS.get(law, {})}
     ranges = RANGES[task][law].items()
@@ -64,10 +64,10 @@ def tune(
 
     Args:
         law: a key of ``RANGES[task]``.
-        scenario: of the task; of FanTracking also a tier.
-        trials: gains tried; the first are those of ``first_gains``.
+        scenario: one of the task's; for FanTracking also a tier.
+        trials: number of gains tried, ``first_gains`` first.
         episodes: validation episodes of each; a trial far behind is given up after ten.
-        seed: of the search.
+        seed: the search's.
         advance: called with the number of trials done.
         task: one of ``evaluation.tasks.TASKS``.
 
@@ -125,7 +125,7 @@ def tune(
 
 
 def keep_gains(found: dict[str, Any], path: Path, command: str) -> None:
-    """Write what a search found into a file of tuned gains, in place of the entry for this law and
+    """Write a search's gains into a file of tuned gains. They replace the entry for this law and
     scenario of FanTracking, or for this law of another task.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Parts that several effect models share, on the pointers that a model is given."""
+"""Shared parts of effect models, on the pointers given to a model."""
 
 import math
 from typing import Any
@@ -18,8 +18,7 @@ from .base import (
 )
 
 _SPACING = 0.0045  # s, least time between two kept entries of a delay line
-# the longest of three steps between entries over the shortest, up to which a cubic is drawn through
-# all four
+# largest ratio of the longest of three steps to the shortest, for a cubic through all four
 _EVEN = 2.5
 
 # An array of a C function, in the layout of base.py
@@ -28,7 +27,9 @@ Pointer = Any
 
 @compiled
 def rotor_place(vehicle: Pointer, i: int, central: float) -> tuple[float, float, float]:
-    """Return where rotor ``i`` stands, m from the geometric centre; ``central`` draws it there."""
+    """Return the place of rotor ``i``, m from the geometric centre; ``central`` draws it to the
+    centre.
+    """
     share, at = 1.0 - central, ROTOR_POSITION + 3 * i
     return share * vehicle[at], share * vehicle[at + 1], share * vehicle[at + 2]
 
@@ -95,8 +96,8 @@ def add_force_at(
 def lift_near_plane(
     c: Pointer, vehicle: Pointer, state: Pointer, wrench: Pointer, height: float, side: float
 ) -> None:
-    """Add the thrust that rotors gain near a level plane at ``height`` m, with ``c`` (2,) its
-    strength and ``central``; ``side`` is +1 where they are above the plane and -1 below.
+    """Add the thrust gained by rotors near a level plane at ``height`` m. ``c`` (2,) are strength
+    and ``central``; ``side`` is +1 above the plane and -1 below.
     """
     scale = c[0] * (0.25 * vehicle[ROTOR_RADIUS]) ** 2
     total = 0.0
@@ -134,14 +135,14 @@ def turn_attitude(sample: Pointer, rx: float, ry: float, rz: float) -> None:
 def delay(
     memory: Pointer, width: int, capacity: int, wanted: float, values: Pointer, at: int
 ) -> None:
-    """Replace ``width`` numbers of ``values`` from ``at`` on by what they were ``wanted`` s ago.
+    """Replace ``width`` numbers of ``values`` from ``at`` on by their values ``wanted`` s ago.
 
-    ``memory`` is the delay line: how many entries there are, the time since the last was added (the
-    caller adds to it), and the entries, each an age and its numbers, the newest first. Between
-    entries runs the cubic through the nearest four, within their range: a line between two would
-    damp noise by how far from either it is, and the delay that fits a noisy log best would be the
-    one that damps most. Where the four are not about evenly apart a line must do; before the oldest
-    it holds. A line that is fed faster than 200 Hz keeps no more than 200 entries a second.
+    ``memory`` is the delay line: the number of entries, the time since the last new one (summed by
+        the caller), and the entries, newest first. An entry is an age and its numbers. Between
+        entries runs the cubic through the nearest four, within their range. A line between two
+        would damp noise by its distance from both. The best fit of a noisy log would be the delay
+        with most damping. Four unevenly spaced entries get a line; before the oldest the value is
+        held. A delay line fed faster than 200 Hz keeps at most 200 entries a second.
     """
     size = width + 1
     count = int(memory[0])
