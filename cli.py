@@ -101,7 +101,6 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
 )
 # what an option of a command was called before: it is taken, and not shown
 _EARLIER: dict[str, dict[str, str]] = {
-    "estimate": {"film": "gif", "from": "film-from"},
     "live": {"view": "browser"},
 }
 for command in (look, warm):

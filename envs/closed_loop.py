@@ -135,7 +135,7 @@ class Stage:
             loop.command[0] *= 0.9
 
     stages = [Stage("offset", offset, before="estimate"), Stage("weaken", weaken, before="actuate")]
-    env = gym.make("windwrench/FanTracking-v0", stages=stages)
+    env = gym.make("windwrench/FanTracking-v1", stages=stages)
     ```
 
     A force of one's own is added to ``loop.applied`` (6,) before ``actuate``.

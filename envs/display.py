@@ -80,6 +80,6 @@ def need_display() -> None:
                     return
             why = f"GLFW finds none at {', '.join(named)}"
     raise InputError(
-        f"render: no window without a display ({why}); expected render_mode='rgb_array', --gif or "
-        f"--video on a machine without one"
+        f"render: no window without a display ({why}); expected render_mode='rgb_array' or "
+        f"--gif on a machine without one"
     )

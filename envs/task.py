@@ -103,13 +103,11 @@ class Task(gym.Env[Frame, Frame], ABC):
         truth: the true vehicle, before ``effects``; default: as declared.
         settings: of the plant: motor lag, unmodelled disturbance, delays, losses.
         estimator: ``"ukf"``, or ``"constant-gain"``: the filter's converged gain, which is faster.
-        normalize: whether observations, and actions in m/s2, are divided by fixed scales; default:
-            from version 1 on.
+        normalize: whether observations, and actions in m/s2, are divided by fixed scales; the id
+            ``-v1`` says True where nothing is said.
         width: of a picture, in pixels.
         height: likewise.
         stages: of a user's own, in the pipeline of a tick: ``windwrench.envs.Stage``.
-        version: of the task. From 1 on ``info`` has, in SI units, the frame ``observation`` and the
-            ``command`` that was flown.
 
     Raises:
         InputError: an argument that names what does not exist.
@@ -141,11 +139,10 @@ class Task(gym.Env[Frame, Frame], ABC):
         truth: str | Vehicle | None = None,
         settings: PlantSettings | None = None,
         estimator: str = "ukf",
-        normalize: bool | None = None,
+        normalize: bool = False,
         width: int = 640,
         height: int = 480,
         stages: Sequence[Stage] = (),
-        version: int = 0,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(
@@ -153,8 +150,6 @@ class Task(gym.Env[Frame, Frame], ABC):
             )
         if render_mode == "human":
             need_display()
-        self.version = version
-        normalize = version > 0 if normalize is None else normalize
         if not isinstance(normalize, bool | np.bool_):
             raise InputError(f"{self.name}: normalize must be True or False, got {normalize!r}")
         if estimator not in ESTIMATORS:
@@ -345,9 +340,8 @@ class Task(gym.Env[Frame, Frame], ABC):
         for name in self.values.names or ():
             value = self._table[name][0]
             found[name] = value.copy() if value.ndim else value.item()
-        if self.version > 0:
-            found["observation"] = self._frames[0].copy()
-            found["command"] = self._episodes.commands[0].copy()
+        found["observation"] = self._frames[0].copy()
+        found["command"] = self._episodes.commands[0].copy()
         return found | {self.label: self.drawn_label}
 
     def _truth(self) -> dict[str, Any]:
