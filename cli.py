@@ -101,7 +101,6 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
 )
 # earlier names of commands' options: taken, and not shown
 _EARLIER: dict[str, dict[str, str]] = {
-    "estimate": {"film": "gif", "from": "film-from"},
     "live": {"view": "browser"},
 }
 for command in (look, warm):

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..evaluation.leaderboard import Standing
 
 # of a narrow terminal
-_SHOWN = ("scenario", "law", "RMSE", "median", "lost", "score", "wins", "against", "to the")
+_SHOWN = ("scenario", "law", "RMSE", "median", "terminated", "score", "wins", "against", "to the")
 
 
 @expensive

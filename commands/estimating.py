@@ -8,7 +8,6 @@ from ..runtime.extras import need
 from .flight_logs import AS_THEY_ARE, LogOptions, log_notes, read_flights
 from .terminal import (
     console,
-    film_kinds,
     gate_of,
     note,
     result_file,
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
 _TRACKS: dict[str, tuple[str, str] | None] = {
     ".csv": None,
     ".mcap": ("rosbags", "logs"),
-    ".rrd": ("rerun", "rerun"),
 }
 # sentences for innovations in agreement within a second, of a given and of a fitted tuning
 _TOO_SLOW = (
@@ -48,18 +46,11 @@ def estimate(
     gate: float | None = None,
     tune: bool | None = None,
     tuning: Path | None = None,
-    video: bool = False,
-    gif: bool = False,
-    rrd: bool = False,
-    view: bool = False,
-    film_from: float = 0.0,
-    film_seconds: float = 30.0,
     out: Path = Path("results/estimate"),
 ) -> dict[str, Any]:
-    """Estimate the wrench on a logged flight. Write wrench.csv and a picture, and a film of the
-    flight on request.
+    """Estimate the wrench on a logged flight. Write wrench.csv and a picture.
 
-    Example: windwrench estimate flight.csv --vehicle crazyflie --gif
+    Example: windwrench estimate flight.csv --vehicle crazyflie
     """
     import numpy as np
 
@@ -74,13 +65,10 @@ def estimate(
         write_wrench,
     )
     from ..identification.wrench_track import write_mcap
-    from .log_film import draw_film, flight_of, shown_rows
     from .tuning_file import load_tuning, save_tuning
 
     level = gate_of(gate)
-    kinds = film_kinds(view, video, gif)
     (flight,), model = read_flights([log], reading)
-    rows = shown_rows(flight, log, film_from, film_seconds) if kinds or view else None
     track = result_file(out, "wrench.csv", _TRACKS)
     if needed := _TRACKS[track.suffix]:
         need(*needed, f"--out {out}")
@@ -96,19 +84,11 @@ def estimate(
         series = estimate_log(flight, model, fit.tuning if fit else given, progress, smooth, level)
     if track.suffix == ".csv":
         write_wrench(series, track)
-    elif track.suffix == ".mcap":
+    else:
         write_mcap(series, track)
-    recordings = [track] * (track.suffix == ".rrd") + [folder / "film.rrd"] * rrd
-    for path in recordings:
-        from ..envs.rerun_export import write_rrd
-
-        write_rrd(flight_of(flight, series), model, path)
     written = [track, plot_wrench(series, flight, track.with_suffix(".png"))]
-    written += [folder / f"{begin}tuning.yaml", *(p for p in recordings if p != track)]
+    written.append(folder / f"{begin}tuning.yaml")
     save_tuning(series.tuning, flight.period, written[2])
-    if rows is not None:
-        title, whole = f"{flight.name}: {model.name}", flight_of(flight, series)
-        written += draw_film(title, model, whole, rows, folder, kinds, view)
     log_notes(series.notes)
     seconds = float(flight.t[-1] - flight.t[0])
     console.print(f"{flight.name}: {len(flight.t)} samples, {seconds:.1f} s, vehicle {model.name}")

@@ -107,20 +107,6 @@ def gate_of(gate: float | None) -> float | None:
     return gate or None
 
 
-def film_kinds(view: bool, video: bool, gif: bool) -> list[str]:
-    """Return the wanted kinds of films, ``mp4`` and ``gif``.
-
-    Raises:
-        InputError: beside a window.
-    """
-    kinds = [kind for kind, wanted in (("mp4", video), ("gif", gif)) if wanted]
-    if view and kinds:
-        raise InputError(
-            "--view shows the flight in a window; expected it without --video and --gif"
-        )
-    return kinds
-
-
 def result_file(out: Path, usual: str, endings: Collection[str] = ()) -> Path:
     """Return the main result's file: ``--out`` itself with one of the ``endings``, or any where
     none is given; else the ``usual`` name in the folder ``--out``.

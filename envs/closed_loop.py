@@ -63,7 +63,6 @@ from .plant import (
     reset_plant,
     sense,
 )
-from .suspended_load import SuspendedLoad, hang, pull, set_down
 from .untimed import Untimed
 from .wind.field import Calls, Sum, Wind, add_winds
 
@@ -135,7 +134,7 @@ class Stage:
             loop.command[0] *= 0.9
 
     stages = [Stage("offset", offset, before="estimate"), Stage("weaken", weaken, before="actuate")]
-    env = gym.make("windwrench/FanTracking-v0", stages=stages)
+    env = gym.make("windwrench/FanTracking-v1", stages=stages)
     ```
 
     A force of one's own is added to ``loop.applied`` (6,) before ``actuate``.
@@ -329,7 +328,6 @@ class ClosedLoop:
         fan: the jet, and the drag of the vehicle; None: still air without drag.
         settings: of the plant.
         gains: of the flight loop.
-        load: a body that ``hang_load`` hangs on; default: none.
         drawn: whether the world has what is there for the eye alone.
         estimator: one of ``ESTIMATORS``.
         accelerometer: standard deviation in m/s2 of its noise, a tick, and of its bias. None: there
@@ -367,7 +365,6 @@ class ClosedLoop:
         fan: Fan | None = None,
         settings: PlantSettings | None = None,
         gains: FlightGains | None = None,
-        load: SuspendedLoad | None = None,
         drawn: bool = False,
         estimator: str = "ukf",
         accelerometer: tuple[float, float] | None = None,
@@ -378,8 +375,8 @@ class ClosedLoop:
             raise unknown_name("estimator", estimator, ESTIMATORS)
         self.true = declared if true is None else true
         plant, self._body = plant_record(self.true, settings or PlantSettings())
-        self.model, self.data = load_world(self._body, load, drawn)
-        self.load, self.own_stages = load, tuple(stages)
+        self.model, self.data = self._make_world(drawn)
+        self.own_stages = tuple(stages)
         self.record = np.zeros(1, dtype=LOOP)
         loop = self.record[0]
         loop["plant"] = plant[0]
@@ -404,6 +401,9 @@ class ClosedLoop:
         self._settled = 0  # ticks before the episode
         self._carried = tuple(self.__dict__)  # by a copy, which lays the rest over it
         self._bind()
+
+    def _make_world(self, drawn: bool) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        return load_world(self._body, drawn)
 
     def _bind(self) -> None:
         """Lay what Python reads and writes over the record and MuJoCo's data, and find compiled
@@ -531,8 +531,6 @@ class ClosedLoop:
         sense(self.record[0:1]["plant"][0], self.motion[0], noise)
         self.ukf.reset(self.sample[4:7], self.sample[7:11])
         loop["filter"] = self.ukf.record[0]
-        if self.load is not None:
-            set_down(self.model, self.data, self.load)
         mujoco.mj_forward(self.model, self.data)
 
     def settle(self, rng: np.random.Generator, ticks: int, fan_path: Array | None = None) -> None:
@@ -545,24 +543,6 @@ class ClosedLoop:
         """
         self.record[0]["ticks"], self._settled = -ticks, ticks
         self.run(rng.standard_normal((ticks, self.noise_size)), fan_path)
-
-    def hang_load(self) -> None:
-        """Hang the load on: at rest below its anchor on the taut thread.
-
-        Raises:
-            InputError: this loop was made without a load.
-        """
-        if self.load is None:
-            raise InputError(
-                "ClosedLoop: there is no load to hang on; give one with load=SuspendedLoad(...)"
-            )
-        hang(self.model, self.data, self.load)
-
-    def load_pull(self) -> Array:
-        """Return the true force (N) and torque (Nm) about the centre of mass, (6,) world, of a load
-        on the vehicle.
-        """
-        return pull(self.data, self._body.com)
 
     def run(self, noise: Array, fan_path: Array | None = None) -> None:
         """Run one tick for each row of ``noise``.

@@ -163,7 +163,7 @@ class FanTrackingEnv(FanTask):
     The pose is the position since the start x, y, z (m), the velocity along y (m/s), the x and y of the body's z axis
     (its tilt), yaw less 180 degrees (rad), and the last command. Before the start the history is as at the start.
 
-    In v1, and with ``normalize=True``, each number is divided by a fixed scale, so that it is about 1 in flight:
+    With ``normalize=True`` each number is divided by a fixed scale, so that it is about 1 in flight:
     force 0.5 N, torque 0.03 Nm, velocity 0.5 m/s, command 1 m/s, position 1 m, tilt 0.1, yaw 0.2 rad.
     The action needs no scale: it lies between -1 and 1 as it is.
 
@@ -188,7 +188,7 @@ class FanTrackingEnv(FanTask):
     ## Arguments
 
     ```python
-    gym.make("windwrench/FanTracking-v0", scenario="base", render_mode=None)
+    gym.make("windwrench/FanTracking-v1", scenario="base", normalize=True, render_mode=None)
     ```
 
     | Parameter     | Default      | Description                                                               |
@@ -204,8 +204,8 @@ class FanTrackingEnv(FanTask):
 
     ## Version history
 
-    * v1: ``normalize=True`` by default; ``info`` has ``observation`` and ``command`` in SI units.
-    * v0: initial version.
+    * v1: ``normalize``, True by default; ``info`` has ``observation`` and ``command`` in SI units.
+    * v0: v1 with ``normalize=False``, as an alias until 3.0.
     """  # noqa: E501
 
     name = "FanTracking"

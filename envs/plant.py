@@ -6,8 +6,10 @@ integrates the rigid body in two steps.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib import resources
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -32,7 +34,6 @@ from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
 from ..runtime.vector_lanes import any_of, choose
 from .fan import STATIONS, gust, jet_wrench
-from .suspended_load import SuspendedLoad, add_load
 
 TICK = 0.005  # s
 SUBSTEPS = 2
@@ -187,13 +188,15 @@ def is_a_body(inertia: Array) -> bool:
 
 
 def load_world(
-    vehicle: Vehicle, load: SuspendedLoad | None = None, drawn: bool = True
+    vehicle: Vehicle, drawn: bool = True, add: Callable[[Any], None] | None = None
 ) -> tuple["mujoco.MjModel", "mujoco.MjData"]:
-    """Return MuJoCo's model and data of the world with a vehicle whose body effects are applied,
-    and a load for it.
+    """Return MuJoCo's model and data of the world with a vehicle after its body effects.
 
-    One that is not ``drawn`` has nothing that is there for the eye alone: it moves as the other
-    does, bit for bit, and a fifth faster.
+    Args:
+        vehicle: with its body effects applied.
+        drawn: whether the world has its parts for the eye alone. Without them the vehicle moves
+            alike, bit for bit, a fifth faster.
+        add: adds constrained bodies to the world before it is compiled; default: none.
 
     Raises:
         InputError: no body has the vehicle's inertia.
@@ -215,14 +218,14 @@ def load_world(
     # body's origin
     body = spec.body("vehicle")
     body.mass, body.inertia, body.ipos, body.iquat = vehicle.mass, moments, vehicle.com, quaternion
-    if load is not None:
-        add_load(spec, load)
+    if add is not None:
+        add(spec)
     spec.compiler.discardvisual = not drawn
     if not drawn:
         for part in (*spec.cameras, *spec.lights, spec.body("fan")):
             spec.delete(part)
     model = spec.compile()
-    if load is None:  # whose thread is the world's one constraint, and could have a spring
+    if add is None:  # no other constraint or spring
         flags = mujoco.mjtDisableBit
         model.opt.disableflags |= (
             int(flags.mjDSBL_CONSTRAINT) | int(flags.mjDSBL_SPRING) | int(flags.mjDSBL_DAMPER)

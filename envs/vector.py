@@ -113,8 +113,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         """Entries of ``infos``, as views."""
         env = self.envs[0]
         values: Infos = {name: self._table[name] for name in env.values.names or ()}
-        if env.version > 0:
-            values |= {"observation": self._whole, "command": self._episodes.commands}
+        values |= {"observation": self._whole, "command": self._episodes.commands}
         return values | {env.label: self._labels}
 
     def __getstate__(self) -> dict[str, Any]:

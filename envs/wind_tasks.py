@@ -146,7 +146,7 @@ class WindHoverEnv(Task):
     ## Arguments
 
     ```python
-    gym.make("windwrench/WindHover-v0", scenario="base", render_mode=None)
+    gym.make("windwrench/WindHover-v1", scenario="base", normalize=True, render_mode=None)
     ```
 
     | Parameter     | Default      | Description                                                          |
@@ -160,8 +160,8 @@ class WindHoverEnv(Task):
 
     ## Version history
 
-    * v1: ``normalize=True`` by default; ``info`` has ``observation`` and ``command`` in SI units.
-    * v0: initial version.
+    * v1: ``normalize``, True by default; ``info`` has ``observation`` and ``command`` in SI units.
+    * v0: v1 with ``normalize=False``, as an alias until 3.0.
     """  # noqa: E501
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 25}  # noqa: RUF012
@@ -252,13 +252,13 @@ class WindTrajectoryEnv(WindHoverEnv):
     the agent sees its velocity and acceleration.
 
     ```python
-    gym.make("windwrench/WindTrajectory-v0", scenario="base", render_mode=None)
+    gym.make("windwrench/WindTrajectory-v1", scenario="base", normalize=True, render_mode=None)
     ```
 
     ## Version history
 
-    * v1: ``normalize=True`` by default; ``info`` has ``observation`` and ``command`` in SI units.
-    * v0: initial version.
+    * v1: ``normalize``, True by default; ``info`` has ``observation`` and ``command`` in SI units.
+    * v0: v1 with ``normalize=False``, as an alias until 3.0.
     """
 
     name = "WindTrajectory"

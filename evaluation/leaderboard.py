@@ -192,8 +192,8 @@ def summary(rows: Sequence[Standing]) -> str:
         better = [row for row in judged if row.change_over_best < 0]
         worse = [row for row in judged if row.change_over_best > 0]
         lines.append(
-            f"* **{scenario}**, {some[0].episodes} episodes each. Lost: {told}. Against the best "
-            f"designed law there, `{some[0].best_law}`: clearly worse {_listed(worse)}; clearly "
+            f"* **{scenario}**, {some[0].episodes} episodes each. Terminated: {told}. Against the "
+            f"best designed law there, `{some[0].best_law}`: clearly worse {_listed(worse)}; clearly "
             f"better {_listed(better)}."
         )
     return "\n".join(lines) + "\n" if lines else ""
@@ -230,7 +230,7 @@ def table(rows: Sequence[Standing]) -> dict[str, list[str]]:
             "policies": "-" if designed else str(row.policies),
             "RMSE (m), 95 %": f"{row.rmse_m:.3f} ({low:.3f}-{high:.3f})",
             "median": f"{row.median_rmse_m:.3f}",
-            "lost": _lost(row),
+            "terminated": _lost(row),
             "score": f"{row.score:.2f}",
             "wins": f"{100 * row.wins_over_rival:.0f} %",
             "P": f"{row.improvement_over_rival:.2f}",

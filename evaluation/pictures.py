@@ -43,7 +43,7 @@ def draw_episode(episode: Episode, title: str, path: Path) -> None:
     )
     figure = new_figure(7.0)
     top, *others = figure.subplots(4, 1, sharex=True, height_ratios=[2, 1, 1, 1])
-    end = "lost" if episode.lost else "never lost"
+    end = "terminated" if episode.lost else "not terminated"
     told = f" ({episode.motion}, seed {episode.seed})"
     top.set_title(f"{title}: RMSE {episode.rmse:.3f} m, {end}{told}")
     if episode.in_jet:
@@ -104,7 +104,7 @@ def draw_leaderboard(rows: Sequence[Standing], results: Results, path: Path) -> 
             left.scatter(values, i + jitter, s=11, color=colour, alpha=0.4, lw=0)
             left.plot(row.rmse_ci95_m, [i, i], color=BLACK, lw=2.2, solid_capstyle="butt", zorder=4)
             left.plot(row.rmse_m, i, "o", color=colour, mec=BLACK, ms=8, zorder=5)
-            lost = f", {100 * row.lost_fraction:.1f} % lost" if row.lost_fraction else ""
+            lost = f", {100 * row.lost_fraction:.1f} % terminated" if row.lost_fraction else ""
             left.annotate(
                 f"{row.rmse_m:.3f} m{lost}",
                 (1.01, i),

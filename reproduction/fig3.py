@@ -19,11 +19,11 @@ from scipy.optimize import linear_sum_assignment
 from ..dynamics.vehicle import Vehicle
 from ..dynamics.vehicle_file import load_vehicle
 from ..envs.plant import PlantSettings
-from ..envs.suspended_load import SuspendedLoad
 from ..runtime.drawing import BLACK, GREY, PALE, SERIES, new_figure, styled
 from ..runtime.errors import InputError
 from .hanging_mass import CALM, CENTRE_LOAD, FORCE, ROTOR_LOAD, TORQUE, hover
 from .result import Progress, Result, compared, table
+from .suspended_load import SuspendedLoad
 
 TITLE = "Fig. 3: calibration with a known mass"
 SEEDS = 2

@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 
 from ..controllers.flight import FlightGains
 from ..dynamics.vehicle import Vehicle
-from ..envs.closed_loop import ClosedLoop
 from ..envs.plant import NOISE, TICK, PlantSettings
-from ..envs.suspended_load import SuspendedLoad
 from ..estimator.estimate import FORCE as FORCE_STATE
 from ..estimator.estimate import TORQUE as TORQUE_STATE
 from ..estimator.tuning import UKFTuning
 from ..runtime.errors import InputError
+from .suspended_load import LoadedLoop, SuspendedLoad
 
 Array = NDArray[np.float64]
 
@@ -90,7 +89,7 @@ def hover(
         InputError: the vehicle fell.
     """
     tuning = UKFTuning.for_vehicle(vehicle, TICK, rise_time)
-    loop = ClosedLoop(vehicle, tuning=tuning, settings=settings, gains=GAINS, load=load)
+    loop = LoadedLoop(vehicle, tuning=tuning, settings=settings, gains=GAINS, load=load)
     rng = np.random.default_rng(seed)
     loop.reset(rng, _START)
     count, hang_tick = round(seconds / TICK / every), round(hang_at / TICK / every)

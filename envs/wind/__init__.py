@@ -12,7 +12,6 @@ from .adapters import (
     WindDrag,
     blow_crazyflow,
     blow_pybullet_drones,
-    isaac_lab_multirotor_type,
     pyflyt_wind_type,
 )
 from .field import CompiledWind, Sum, Wind, winds_of
@@ -37,7 +36,6 @@ __all__ = [
     "WindDrag",
     "blow_crazyflow",
     "blow_pybullet_drones",
-    "isaac_lab_multirotor_type",
     "low_altitude",
     "on_grid",
     "pyflyt_wind_type",

@@ -139,28 +139,3 @@ def blow_pybullet_drones(env: Any, drag: WindDrag) -> None:
         place = -1, f, at, pybullet.WORLD_FRAME, env.CLIENT
         pybullet.applyExternalForce(body, *place)
         pybullet.applyExternalTorque(body, -1, t, pybullet.WORLD_FRAME, env.CLIENT)
-
-
-def isaac_lab_multirotor_type(drag: WindDrag, clock: Callable[[], float]) -> type:
-    """Return a ``MultirotorCfg.class_type`` of Isaac Lab that flies in the wind; ``clock`` returns
-    the time in s, as ``lambda: sim.current_time``.
-
-    **Never run in Isaac Lab**: written by the documentation of 2.3.2, tested with a stand-in.
-    """
-    from isaaclab_contrib.assets import Multirotor
-
-    class WindyMultirotor(Multirotor):  # type: ignore[misc]
-        def _combine_thrusts(self) -> None:
-            super()._combine_thrusts()
-            data = self.data
-            moving = data.root_pos_w, data.root_quat_w, data.root_lin_vel_w, data.root_ang_vel_w
-            place, quaternion, velocity, rate = (
-                part.cpu().numpy().astype(np.float64) for part in moving
-            )
-            rotation = Rotation.from_quat(quaternion, scalar_first=True)
-            wrench = drag.wrench(clock(), place, rotation, velocity, rate)
-            targets = self._internal_force_target_sim, self._internal_torque_target_sim
-            for target, world in zip(targets, wrench, strict=True):
-                target[:, 0] += target.new_tensor(rotation.inv().apply(world))
-
-    return WindyMultirotor

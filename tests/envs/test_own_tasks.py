@@ -110,8 +110,7 @@ class Wide(WindHoverEnv):
 
 @pytest.mark.parametrize("plant", ["mujoco", "lanes"])
 def test_hooks_and_numbers_of_a_user_s_own_hold_in_many_as_in_a_single_one(plant):
-    given = {"version": 1, "normalize": False}
-    single, many = Wide(**given), make_vector(Wide, 2, plant=plant, **given)
+    single, many = Wide(), make_vector(Wide, 2, plant=plant)
     frame, _ = single.reset(seed=4)
     frames, infos = many.reset(seed=4)
     assert infos["trajectory"].tolist() == ["higher"] * 2

@@ -1,4 +1,4 @@
-"""The plant against the mechanics of a rigid body, what it senses, and a load that hangs on it."""
+"""The plant against the mechanics of a rigid body, and its sensing."""
 
 import math
 from dataclasses import replace
@@ -25,7 +25,6 @@ from windwrench.envs.plant import (
     sense,
 )
 from windwrench.envs.recording import TRAJECTORIES, record_flight
-from windwrench.envs.suspended_load import SuspendedLoad
 
 QUIET = PlantSettings(
     disturbance_force=0.0, disturbance_torque=0.0, motor_lag=0.0, sensor_noise=False
@@ -212,42 +211,3 @@ def test_every_preset_holds_its_place(vehicle):
     columns = record_flight(load_vehicle(vehicle), (), "hover", 8.0, 0)
     error = columns["position"][800:] - [0, 0, 1.2]
     assert np.sqrt(np.mean(np.sum(error**2, axis=1))) < 0.05
-
-
-STILL = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0, sensor_noise=False)
-LOAD = SuspendedLoad(anchor=(0.1, -0.05, -0.02), length=0.2)
-
-
-def _hung(load, seconds):
-    loop = ClosedLoop(VEHICLE, settings=STILL, load=load)
-    loop.reset(np.random.default_rng(0), np.array([0.0, 0.0, 1.5]))
-    loop.hang_load()
-    loop.run(np.zeros((round(seconds * 200), NOISE)))
-    return loop
-
-
-def test_a_load_at_rest_pulls_with_its_weight():
-    loop = _hung(LOAD, 40.0)
-    weight = LOAD.mass * 9.81
-    expected = [0, 0, -weight, 0.05 * weight, 0.1 * weight, 0]
-    np.testing.assert_allclose(loop.load_pull(), expected, atol=0.01 * weight)
-    stretch = loop.data.tendon("thread").length[0] - LOAD.length
-    assert 0.0 < stretch < 1e-3
-
-
-def test_the_load_does_not_touch_the_vehicle_before_it_is_hung_on():
-    flown = []
-    for load in (None, LOAD):
-        loop = ClosedLoop(VEHICLE, load=load)
-        rng = np.random.default_rng(3)
-        loop.reset(rng, np.array([0.0, 0.0, 1.5]))
-        loop.run(rng.standard_normal((400, NOISE)))
-        flown.append(np.concatenate([loop.state[:19], loop.position, loop.quaternion]))
-    np.testing.assert_array_equal(flown[0], flown[1])
-
-
-def test_reset_takes_the_load_off():
-    loop = _hung(LOAD, 1.0)
-    loop.reset(np.random.default_rng(0), np.array([0.0, 0.0, 1.5]))
-    loop.run(np.zeros((200, NOISE)))
-    np.testing.assert_array_equal(loop.load_pull(), 0.0)

@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from tests.support.vector_flights import TASKS, fly, fly_alone, make
+from tests.support.vector_flights import TASKS, fly, fly_alone, make, make_single
 from windwrench.dynamics import load_vehicle
 from windwrench.envs import SCENARIOS, FanTrackingEnv, Stage
 from windwrench.envs.closed_loop import STAGES, ClosedLoop
@@ -15,7 +15,7 @@ from windwrench.envs.wind_scenarios import WIND_SCENARIOS
 
 
 def alone(name, **given):
-    return fly_alone(gym.make(f"windwrench/{name}-v0", **given), seed=3)
+    return fly_alone(make_single(name, **given), seed=3)
 
 
 @pytest.mark.parametrize("name", TASKS)
@@ -32,7 +32,7 @@ def test_so_it_flies_in_a_vector_of_environments():
         loop.applied[2] = -0.2
 
     given = {"stages": [Stage("push", push, before="actuate")]}
-    single = [lambda: gym.make("windwrench/FanTracking-v0", **given)] * 2
+    single = [lambda: make_single(**given)] * 2
     many = fly(make(2, **given), 4)
     np.testing.assert_array_equal(many, fly(gym.vector.SyncVectorEnv(single), 4))
     assert not np.array_equal(many, fly(make(2), 4))

@@ -106,7 +106,7 @@ def test_a_lost_vehicle_ends_the_episode():
     assert info["lost"]
 
 
-NAME = "windwrench/FanTracking-v0"
+NAME = "windwrench/FanTracking-v1"
 
 
 def test_stable_baselines_checker_finds_nothing():
@@ -115,14 +115,13 @@ def test_stable_baselines_checker_finds_nothing():
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        warnings.filterwarnings("ignore", ".*-v0 is out of date", DeprecationWarning)
         checker.check_env(gym.make(NAME), warn=True)
 
 
 def test_the_name_with_its_module_makes_it_without_an_import_from_any_folder(tmp_path):
     code = (
         "import gymnasium as gym, sys\n"
-        "env = gym.make('windwrench:windwrench/FanTracking-v0')\n"
+        "env = gym.make('windwrench:windwrench/FanTracking-v1')\n"
         "print(env.reset(seed=1)[0].shape)"
     )
     done = subprocess.run(

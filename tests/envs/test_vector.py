@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from tests.support.vector_flights import TASKS, fly, make
+from tests.support.vector_flights import TASKS, fly, make, make_single
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.envs.closed_loop import ClosedLoop
@@ -109,7 +109,7 @@ def test_mujoco_s_clock_is_a_user_s_again_after_a_flight():
 @pytest.mark.parametrize("scenario", ["base", "varied"])
 def test_side_by_side_is_single_bit_for_bit_and_lanes_to_rounding(task, scenario):
     many = fly(make(3, "mujoco", task, scenario=scenario), 6)
-    alone = [lambda: gym.make(f"windwrench/{task}-v0", scenario=scenario)] * 3
+    alone = [lambda: make_single(task, scenario=scenario)] * 3
     np.testing.assert_array_equal(fly(gym.vector.SyncVectorEnv(alone), 6), many)
     difference = np.abs(fly(make(3, "lanes", task, scenario=scenario), 6) - many)
     size = alone[0]().observation_space.shape[0]  # of a frame, which is of single precision

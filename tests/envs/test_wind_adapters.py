@@ -16,7 +16,6 @@ from windwrench.envs.wind import (
     WindDrag,
     blow_crazyflow,
     blow_pybullet_drones,
-    isaac_lab_multirotor_type,
     pyflyt_wind_type,
 )
 
@@ -138,32 +137,3 @@ def test_pybullet_drones_get_force_and_torque(monkeypatch):
     env.PYB_STEPS_PER_CTRL, env.CTRL_FREQ = 5, 48
     with pytest.raises(InputError, match="expected ctrl_freq equal to pyb_freq, got 48 and 240 Hz"):
         blow_pybullet_drones(env, drag)
-
-
-def test_isaac_lab_adds_the_wind_to_the_thrust(monkeypatch):
-    torch = pytest.importorskip("torch", reason="pip install 'windwrench[rl]'")
-
-    class Multirotor:
-        def __init__(self):
-            self._internal_force_target_sim = torch.zeros(2, 5, 3)
-            self._internal_torque_target_sim = torch.zeros(2, 5, 3)
-            quaternion = ROTATION.as_quat(scalar_first=True)
-            names = "root_pos_w", "root_quat_w", "root_lin_vel_w", "root_ang_vel_w"
-            values = PLACE, quaternion, VELOCITY, RATE
-            self.data = SimpleNamespace(
-                **dict(zip(names, map(torch.as_tensor, values), strict=True))
-            )
-
-        def _combine_thrusts(self):
-            self._internal_force_target_sim[:, 0, 2] = 7.0
-
-    for name in ("isaaclab_contrib", "isaaclab_contrib.assets"):
-        monkeypatch.setitem(sys.modules, name, ModuleType(name))
-    sys.modules["isaaclab_contrib.assets"].Multirotor = Multirotor
-    robot = isaac_lab_multirotor_type(WindDrag(Sheared(), ARM, DRAG), lambda: 0.5)()
-    robot._combine_thrusts()
-    force, torque = (ROTATION.inv().apply(part) for part in expected(0.5))
-    seen = robot._internal_force_target_sim, robot._internal_torque_target_sim
-    for target, wanted in zip(seen, (force + np.array([0, 0, 7.0]), torque), strict=True):
-        np.testing.assert_allclose(target[:, 0], wanted, rtol=1e-5, atol=1e-6)
-        assert not target[:, 1:].any()

@@ -116,7 +116,7 @@ def test_the_file_has_the_documented_keys_and_pages_have_losses(task, tmp_path, 
     draw_leaderboard(rows, results, tmp_path / "a.png")
     assert (tmp_path / "a.png").stat().st_size > 10_000
     table = markdown(rows).splitlines()
-    assert "| lost |" in table[0]
+    assert "| terminated |" in table[0]
     assert ("to the limit" in table[0]) == (task == "FanTracking")
     assert len(table) == 2 + len(shown(rows))
     assert len({line.count("|") for line in table}) == 1
@@ -166,10 +166,10 @@ def test_policies_of_a_kind_stand_together_and_their_losses_show(tmp_path):
     assert {row.controller for row in shown(rows)} == {"gru", "pid", "pid-force"}
     assert "8.3 % (most 25.0 %)" in markdown(rows)
     told = summary(rows)
-    assert "Lost: `gru` 8.3 % (most 25.0 %); `pid-force`, `pid` none." in told
+    assert "Terminated: `gru` 8.3 % (most 25.0 %); `pid-force`, `pid` none." in told
     assert re.search(r"`pid-force`: clearly worse none; clearly better `gru` -\d+ %", told)
     nothing = [replace(row, lost_fraction=0.0, most_lost_fraction=0.0) for row in rows]
-    assert "Lost: nothing." in summary(nothing)
+    assert "Terminated: nothing." in summary(nothing)
     draw_leaderboard(rows, results, tmp_path / "a.png")
 
 

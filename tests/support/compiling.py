@@ -36,7 +36,7 @@ def compile_environments():
 
 
 def step_one(name, **given):
-    env = gym.make(f"windwrench/{name}-v0", **given)
+    env = gym.make(f"windwrench/{name}-v1", **given)
     env.reset(seed=0)
     env.step(np.zeros(env.action_space.shape, dtype=np.float32))
     env.close()
@@ -44,7 +44,7 @@ def step_one(name, **given):
 
 def step_many(**given):
     envs = gym.make_vec(
-        "windwrench/FanTracking-v0",
+        "windwrench/FanTracking-v1",
         num_envs=9,
         vectorization_mode="vector_entry_point",
         **given,

@@ -8,11 +8,15 @@ it) and the thread's limit is off.
 
 import math
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from ..dynamics.motion import Array
+from ..envs.closed_loop import ClosedLoop
+from ..envs.plant import load_world
 from ..runtime.errors import InputError
 
 _NAME = "load"
@@ -121,3 +125,46 @@ def pull(data: "mujoco.MjData", com: Array) -> Array:
     rotation = data.body("vehicle").xmat.reshape(3, 3)
     torque = rotation @ data.qfrc_constraint[3:6] - np.cross(rotation @ com, force)
     return np.concatenate([force, torque])
+
+
+class LoadedLoop(ClosedLoop):
+    """A closed loop with a load, which ``hang_load`` hangs on; None: no load.
+
+    Args:
+        *shared: as of ``ClosedLoop``.
+        load: the body and its thread.
+        **named: as of ``ClosedLoop``.
+    """
+
+    def __init__(self, *shared: Any, load: SuspendedLoad | None, **named: Any) -> None:
+        self.load = load
+        super().__init__(*shared, **named)
+
+    def _make_world(self, drawn: bool) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        add = None if self.load is None else partial(add_load, load=self.load)
+        return load_world(self._body, drawn, add)
+
+    def reset(self, *shared: Any, **named: Any) -> None:
+        """Hover as ``ClosedLoop`` does, with the load set down."""
+        super().reset(*shared, **named)
+        if self.load is not None:
+            set_down(self.model, self.data, self.load)
+            mujoco.mj_forward(self.model, self.data)
+
+    def hang_load(self) -> None:
+        """Hang the load on: at rest below its anchor on the taut thread.
+
+        Raises:
+            InputError: this loop was made without a load.
+        """
+        if self.load is None:
+            raise InputError(
+                "ClosedLoop: there is no load to hang on; give one with load=SuspendedLoad(...)"
+            )
+        hang(self.model, self.data, self.load)
+
+    def load_pull(self) -> Array:
+        """Return the true force (N) and torque (Nm) about the centre of mass, (6,) world, of a load
+        on the vehicle.
+        """
+        return pull(self.data, self._body.com)
