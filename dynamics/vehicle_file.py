@@ -32,18 +32,18 @@ def preset_names() -> list[str]:
     )
 
 
-def named_vehicle(name: str, log: object, otherwise: str = "") -> Vehicle:
+def named_vehicle(name: str, log: object) -> Vehicle:
     """Return the preset that a log names.
 
     Raises:
-        InputError: there is none; ``otherwise`` names further ways to say which vehicle flew.
+        InputError: there is none.
     """
     if name not in preset_names():
         unknown = f"names the vehicle {name}, which does not come with the kit"
         what = unknown if name else "the log does not name its vehicle"
         raise InputError(
             f"{log}: {what}; expected --vehicle {', '.join(preset_names())} or the path of a YAML "
-            f"file{otherwise}"
+            "file"
         )
     return load_vehicle(name)
 
