@@ -15,7 +15,6 @@ from .commands.demo import demo
 from .commands.diagnosing import diagnose
 from .commands.estimating import estimate
 from .commands.exporting import export_c
-from .commands.fleets import fleet
 from .commands.flying import fly, record
 from .commands.identifying import identify
 from .commands.learning import train
@@ -93,7 +92,6 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
     compare,
     live,
     identify,
-    fleet,
     export_c,
     record,
     reproduce,

@@ -32,18 +32,18 @@ def preset_names() -> list[str]:
     )
 
 
-def named_vehicle(name: str, log: object, otherwise: str = "") -> Vehicle:
+def named_vehicle(name: str, log: object) -> Vehicle:
     """Return the preset named by a log.
 
     Raises:
-        InputError: no such preset; ``otherwise`` names further ways to give the vehicle.
+        InputError: no such preset.
     """
     if name not in preset_names():
         unknown = f"names the vehicle {name}, which does not come with the kit"
         what = unknown if name else "the log does not name its vehicle"
         raise InputError(
             f"{log}: {what}; expected --vehicle {', '.join(preset_names())} or the path of a YAML "
-            f"file{otherwise}"
+            "file"
         )
     return load_vehicle(name)
 

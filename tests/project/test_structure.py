@@ -39,7 +39,6 @@ STOREYS = (
     {"prediction"},
     {"comparison", "vehicle_fit", "diagnosis"},
     {"report", "wrench_track"},
-    {"fleet"},
 )
 STOREY = {room: height for height, rooms in enumerate(STOREYS) for room in rooms}
 TORCH = {"torch", "stable_baselines3", "sb3_contrib"}
