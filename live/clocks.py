@@ -17,7 +17,7 @@ was, once enough messages agree.
 from collections import deque
 
 from .clock_line import ClockLine
-from .messages import SECOND, Sample
+from .messages import SECOND, Measurement
 from .tallies import Tallies
 
 # s: clocks of two kinds of messages that read so much alike are one; far above transport's delays,
@@ -43,7 +43,7 @@ class _Clock:
         self.shift = shift  # ns, from stamps to the stream's time
         self.newest, self.newest_arrival = stamp, arrival
         self.line = ClockLine(arrival, stamp, horizon)
-        self.odd: list[Sample] = []  # messages whose stamps would be a jump
+        self.odd: list[Measurement] = []  # messages whose stamps would be a jump
 
 
 class Clocks:
@@ -85,7 +85,7 @@ class Clocks:
         rate = None if self.line is None else self.line.mean_rate
         return None if rate is None else 1e6 * (rate - 1.0)
 
-    def time(self, sample: Sample) -> float | None:
+    def time(self, sample: Measurement) -> float | None:
         """Return when a message was measured, s of the stream's time; None where it is left out."""
         self._awake += min(max(sample.arrival - self._latest, 0), _SILENCE)
         self._latest = max(sample.arrival, self._latest)
@@ -113,7 +113,7 @@ class Clocks:
             stamp = reference.line.stamp_of(clock.line.arrival_of(stamp))
         return 1e-9 * (stamp + reference.shift)
 
-    def _unstamped(self, sample: Sample) -> float | None:
+    def _unstamped(self, sample: Measurement) -> float | None:
         """Return the time of a message without a stamp; None where no clock is known yet."""
         arrival = sample.arrival
         if not self._clocks:
@@ -148,7 +148,7 @@ class Clocks:
         self._clocks.append(_Clock(shift, stamp, arrival, self._horizon))
         return self._clocks[-1]
 
-    def _goes_on(self, clock: _Clock, sample: Sample, stamp: int) -> bool:
+    def _goes_on(self, clock: _Clock, sample: Measurement, stamp: int) -> bool:
         """Return whether a stamp is taken: none is that would be a jump, until enough agree."""
         arrival, odd = sample.arrival, clock.odd
         passed = max(arrival - clock.newest_arrival, 0) * max(clock.line.rate, 1.0)

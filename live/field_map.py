@@ -3,8 +3,7 @@
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -22,16 +21,11 @@ from ..identification.logs.log_map import (
     load_map,
 )
 from ..identification.logs.magnitudes import Magnitudes
-from ..identification.logs.mapped_log import fitted, with_range
-from ..runtime.errors import InputError
-from .messages import SECOND, Array, Malformed, Sample
+from ..identification.logs.mapped_log import with_range
+from .messages import SECOND, Array, Malformed, Measurement
 
 _OUTSIDE = 0.01  # of a command's range, beyond which it is none of that range
 _LARGEST = Magnitudes().largest
-_OWN = (
-    "expected this kit's columns t, px, py, pz, qw, qx, qy, qz, omega1 ... omega4 (or cmd1 ... "
-    "cmd4), or --map, a file that says what the fields mean"
-)
 _FIELDS = {"rotors": "rotor_speeds", "commands": "command"}  # of a sample; others as the section
 
 
@@ -45,63 +39,51 @@ class FieldMap:
     """
 
     def __init__(self, log_map: LogMap | None, vehicle: Vehicle, where: str) -> None:
-        given = log_map or load_map(OWN_MAP)
-        if log_map is None and given.position is not None and given.attitude is not None:
-            given = replace(  # the filter needs a pose
-                given,
-                position=replace(given.position, optional=False),
-                attitude=replace(given.attitude, optional=False),
-            )
-        self.map, self.where = with_range(given, vehicle, where), where
+        self.map = with_range(log_map or load_map(OWN_MAP), vehicle, where)
         self._rows = 0
         self._sections = {name: self.map.ways(name) for name in self.map.sections}
         self._clocks = self.map.ways("time")
 
-    def check(self, names: Sequence[str]) -> None:
-        """Check that the fields of all messages are there.
-
-        Raises:
-            InputError: one is missing.
-        """
-        try:
-            fitted(names, self.where, self.map, None, "")
-        except InputError as error:
-            raise InputError(f"{error}; {_OWN}" if self.map.is_own else str(error)) from error
-
-    def sample(self, kind: str, fields: Mapping[str, Any], arrival: int) -> Sample:
-        """Return what a message holds.
+    def sample(self, fields: Mapping[str, Any], arrival: int) -> Measurement:
+        """Return the measurement in a message.
 
         Args:
-            kind: of message.
-            fields: by name: numbers; None, NaN or nothing where there is none.
-            arrival: ns, when it came.
+            fields: numbers by name; None, NaN or no entry: not measured.
+            arrival: of the message, ns.
 
         Raises:
-            Malformed: a part of it is there by halves, or is no number that a flight has.
+            Malformed: a quantity is incomplete, none is there, or a number is none of a flight.
         """
-        found = Sample(kind, self._stamp(fields), arrival)
+        sample = Measurement("row", self._stamp(fields), arrival)
         for section, parts in self._sections.items():
             for part in parts:
                 values = _values(part, section, fields)
                 if values is not None:
-                    self._take(found, section, part, values)
+                    self._take(sample, section, part, values)
                     break
-        if (found.position is None) != (found.quaternion is None):
-            missing = "attitude" if found.quaternion is None else "position"
+        if (sample.position is None) != (sample.quaternion is None):
+            missing = "attitude" if sample.quaternion is None else "position"
             raise Malformed(f"a pose without {missing}")
         poses = self._sections.get("position", ())
-        named = any(name in fields for part in poses for name in part.columns)
-        found.whole = found.has_motors and (found.has_pose or named)  # named: the pose was lost
-        return found
+        named = any(name in fields for part in poses for name in part.columns)  # a lost pose
+        sample.whole = sample.has_motors and (sample.has_pose or named)
+        if not sample.whole:
+            sample.kind = _kind(sample)
+        if not sample.kind:
+            raise Malformed(
+                f"none of the fields that are looked for; found {', '.join(fields)[:200]}; "
+                "expected such as px, omega1, gx, vbat, or those of --map"
+            )
+        return sample
 
-    def _take(self, found: Sample, section: str, part: Columns, values: Array) -> None:
+    def _take(self, sample: Measurement, section: str, part: Columns, values: Array) -> None:
         """Put a section's numbers (k,) into a sample, in the kit's units and axes."""
         if isinstance(part, Attitude):
-            found.quaternion = self._attitude(part, values)
+            sample.quaternion = self._attitude(part, values)
             return
         kit = in_kit_units(self.map, section, part, values[None])[0]
         if section == "battery":
-            found.voltage = float(kit[0]) if kit[0] > 0.0 else None
+            sample.voltage = float(kit[0]) if kit[0] > 0.0 else None
             return
         if section == "rotors":
             kit = np.abs(kit)
@@ -113,7 +95,7 @@ class FieldMap:
                     f"{high:g}"
                 )
             kit = np.clip(kit, 0.0, 1.0)
-        setattr(found, _FIELDS.get(section, section), kit)
+        setattr(sample, _FIELDS.get(section, section), kit)
 
     def _stamp(self, fields: Mapping[str, Any]) -> int | None:
         """Return the time of a message, ns; None: it has no such field."""
@@ -141,6 +123,17 @@ class FieldMap:
                 )
             quaternion = quaternion / length
         return np.asarray(in_kit_axes(self.map, part, quaternion)[0])
+
+
+def _kind(sample: Measurement) -> str:
+    """Return the names of the parts of a row; empty: there is none."""
+    parts = {
+        "pose": sample.has_pose,
+        "motors": sample.has_motors,
+        "imu": sample.has_imu,
+        "battery": sample.voltage is not None,
+    }
+    return "+".join(name for name, there in parts.items() if there)
 
 
 def _values(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | None:

@@ -1,8 +1,8 @@
-"""What comes from a vehicle, and the rows that are made of it.
+"""Messages of a vehicle, and the rows of a flight made from them.
 
-A source gives ``Sample``: what one message holds, in this kit's frames and units, with the time at
-which it was measured on the sender's clock and that at which it arrived here. A ``Row`` is what the
-filter and the recording take: a row of a flight log, on the stream's own time.
+A source returns a ``Measurement``: the quantities in one message in this kit's frames and units,
+the sender's time of measurement, and the time of arrival. The filter and the recording take a
+``Row``: a row of a flight log, in the stream's own time.
 """
 
 from dataclasses import dataclass, field, fields
@@ -59,7 +59,7 @@ QUANTITIES = tuple(one.name for one in fields(Measured))
 
 
 @dataclass(slots=True)
-class Sample(Measured):
+class Measurement(Measured):
     """One message."""
 
     kind: str  # of message: those of one kind come from one clock

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..dynamics.vehicle import Vehicle
 from ..runtime.errors import InputError
-from .messages import Array, Row, Sample
+from .messages import Array, Measurement, Row
 from .tallies import Tallies
 
 _KEPT = 1.0  # s of rotor speeds that are kept; poses come much sooner
@@ -39,7 +39,7 @@ class Joiner:
         self._first_command: float | None = None  # s
         self._last_row = -np.inf
 
-    def take(self, sample: Sample, t: float) -> Row | None:
+    def take(self, sample: Measurement, t: float) -> Row | None:
         """Return the row that a message of time ``t``, s, completes, or None.
 
         Raises:
@@ -68,7 +68,7 @@ class Joiner:
             known |= {"position": None, "quaternion": None}
         return Row(t, sample.arrival, commanded=commanded, stamp=sample.stamp, **known)
 
-    def _take_motors(self, sample: Sample, t: float) -> bool:
+    def _take_motors(self, sample: Measurement, t: float) -> bool:
         """Keep rotor speeds; return whether they are those that commands give."""
         if sample.rotor_speeds is not None:
             if not self._measured:

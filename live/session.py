@@ -17,7 +17,7 @@ from typing import Any
 from ..runtime.errors import InputError
 from .clocks import Clocks
 from .filtering import LiveFilter, LiveSettings, Output
-from .messages import SECOND, Row, Sample
+from .messages import SECOND, Measurement, Row
 from .outlets import WAITING, Outlet
 from .rows import Joiner
 from .sources.base import Source
@@ -126,7 +126,7 @@ class Session:
 
     def _once(self) -> bool:
         """Deal with what has come; return whether there may be more."""
-        samples: list[Sample] | None = []
+        samples: list[Measurement] | None = []
         failures = self.tallies.counts["not read"]
         with self.tallies.spared("not read", self.source.name):
             samples = self.source.receive(_POLL)
@@ -159,7 +159,7 @@ class Session:
             raise self._nothing(f"within {wait:g} s")
         return True
 
-    def take(self, sample: Sample) -> None:
+    def take(self, sample: Measurement) -> None:
         """Deal with one message."""
         self.tallies.rates[sample.kind].add(sample.arrival)
         late = self.tallies.counts["too late"]
@@ -167,7 +167,7 @@ class Session:
         if sample.has_pose:
             self.watch.count(max(self.tallies.counts["too late"] - late, 0))
 
-    def _estimate(self, sample: Sample) -> None:
+    def _estimate(self, sample: Measurement) -> None:
         t = self.clocks.time(sample)
         row = None if t is None else self._joiner.take(sample, t)
         if row is None:

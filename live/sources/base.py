@@ -9,9 +9,8 @@ from urllib.parse import parse_qsl, urlsplit
 from ...dynamics.vehicle import Vehicle
 from ...identification.logs.log_map import LogMap
 from ...runtime.errors import InputError
-from ...runtime.extras import need
 from ..filtering import Output
-from ..messages import Malformed, Sample
+from ..messages import Malformed, Measurement
 from ..tallies import Tallies
 
 # s for which a file waits for those who take its estimates: someone leafs through them, or a disk
@@ -21,7 +20,6 @@ Found = TypeVar("Found")
 _RESTARTED = 1_000  # messages; a count that falls by more has begun again
 _NONE_GOOD = 100  # malformed messages without a good one that say the stream is of another kind
 _TOLD = 3  # malformed messages that are told; all are counted
-LARGEST_SHARE = 1.5  # motor commands that none exceeds are shares of the full one
 _MOST_LOST = 1_000_000  # messages; a count that rises by more is another
 
 
@@ -40,7 +38,6 @@ class Source(ABC):
 
     kind = ""  # with which an address begins
     options: tuple[str, ...] = ()  # of an address
-    library = ""  # that the extra of the kind's name brings
     paced = True  # messages arrive at the vehicle's own pace
     patience = 0.0  # s for which what is not paced waits for those who take the estimates
     strict = False  # where nothing but malformed messages comes, the stream is of another kind
@@ -51,8 +48,6 @@ class Source(ABC):
     def __init__(
         self, text: str, vehicle: Vehicle, tallies: Tallies, log_map: LogMap | None = None
     ) -> None:
-        if self.library:
-            need(self.library, self.kind)
         self.name = text  # for people
         self.address = read_address(text, self.kind, self.options)
         self.vehicle, self.tallies, self.log_map = vehicle, tallies, log_map
@@ -87,16 +82,16 @@ class Source(ABC):
             InputError: what comes is none of this source's messages.
         """
 
-    def decode(self, message: Any, arrival: int) -> Sample | None:
+    def decode(self, message: Any, arrival: int) -> Measurement | None:
         """Return what a message holds, or None.
 
         Raises:
             Malformed: it says nothing.
         """
-        found: Sample = message
+        found: Measurement = message
         return found
 
-    def receive(self, timeout: float) -> list[Sample] | None:
+    def receive(self, timeout: float) -> list[Measurement] | None:
         """Return what the messages hold that have come; None: the stream has ended.
 
         Raises:

@@ -24,8 +24,9 @@ import importlib
 import time
 from typing import Any
 
+from ...runtime.extras import need
 from ..filtering import Output
-from ..messages import SECOND, Malformed, Sample
+from ..messages import SECOND, Malformed, Measurement
 from .base import Source
 from .esc_status import add_esc_status
 from .links import make_link, sender_name
@@ -52,11 +53,10 @@ _WANTED = (
 class Mavlink(Source):
     """Messages of an autopilot."""
 
-    kind, options = "mavlink", ("baud", "rate", "pose")
-
-    library, answers = "pymavlink", True
+    kind, options, answers = "mavlink", ("baud", "rate", "pose"), True
 
     def _prepare(self) -> None:
+        need("pymavlink", "mavlink")
         self.link = make_link(self.address, _BAUD)
         self._rate = self.address.number("rate", 0.0)
         self._reader = MessageReader(self.vehicle, self.address.choice("pose", ("", *POSES)))
@@ -88,7 +88,7 @@ class Mavlink(Source):
         messages = self.unless_malformed(self._mav.parse_buffer, data) if data else None
         return [(message, arrival) for message in messages or ()]
 
-    def decode(self, message: Any, arrival: int) -> Sample | None:
+    def decode(self, message: Any, arrival: int) -> Measurement | None:
         """Return what a message of the autopilot holds, or None."""
         kind = message.get_type()
         if kind == "BAD_DATA":

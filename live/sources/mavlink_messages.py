@@ -10,11 +10,12 @@ from scipy.spatial.transform import Rotation
 from ...dynamics.vehicle import Vehicle
 from ...identification.logs.flight_log import NORM_TOLERANCE
 from ...identification.logs.rotor_orders import ORDERS
-from ..messages import Array, Malformed, Sample
-from .base import LARGEST_SHARE, unwrapped
+from ..messages import Array, Malformed, Measurement
+from .base import unwrapped
 
 HALF_TURN = np.array([1.0, -1.0, -1.0])  # of a vector
 _ORDER = [motor - 1 for motor in ORDERS["px4-x"]]
+_LARGEST_SHARE = 1.5  # of full command; larger commands are pulses
 _RPM = math.pi / 30.0  # rad/s
 _Z_DOWN = (1, 20)  # MAV_FRAME_LOCAL_NED, MAV_FRAME_LOCAL_FRD
 _GYRO, _ACCELEROMETER = 0b111000, 0b111  # bits of HIGHRES_IMU's fields_updated
@@ -43,7 +44,7 @@ class MessageReader:
         self.seen: set[str] = set()  # kinds of messages
         self._servo_time: int | None = None  # us, of the newest
         # each puts what a message holds into a sample, and returns whether it is to be used
-        self._readers: dict[str, Callable[[Any, Sample], bool]] = {
+        self._readers: dict[str, Callable[[Any, Measurement], bool]] = {
             "ODOMETRY": self._odometry,
             "ATT_POS_MOCAP": lambda m, sample: self._pose(m, sample, m.q),
             "VISION_POSITION_ESTIMATE": self._vision,
@@ -63,7 +64,7 @@ class MessageReader:
         self.seen.add(kind)
         return kind in self._readers
 
-    def read(self, message: Any, arrival: int) -> Sample | None:
+    def read(self, message: Any, arrival: int) -> Measurement | None:
         """Return what a message that arrived at ``arrival`` ns holds, or None.
 
         Raises:
@@ -74,7 +75,7 @@ class MessageReader:
         if reader is None:
             return None
         stamps = [ns * getattr(message, name) for name, ns in _STAMPS if hasattr(message, name)]
-        sample = Sample(kind, stamps[0] if stamps else None, arrival)
+        sample = Measurement(kind, stamps[0] if stamps else None, arrival)
         if not reader(message, sample):
             return None
         if not all(np.isfinite(part).all() for part in sample.measured.values()):
@@ -90,7 +91,7 @@ class MessageReader:
             self._forced = min(self._poses, key=POSES.index)
         return kind == self._forced
 
-    def _pose(self, m: Any, sample: Sample, quaternion: Any) -> bool:
+    def _pose(self, m: Any, sample: Measurement, quaternion: Any) -> bool:
         """Take a pose of north, east, down, if its kind is read."""
         if not self._chosen(sample.kind, sample.arrival):
             return False
@@ -104,16 +105,16 @@ class MessageReader:
         sample.quaternion = turn / length * np.append(1.0, HALF_TURN)
         return True
 
-    def _odometry(self, m: Any, sample: Sample) -> bool:
+    def _odometry(self, m: Any, sample: Measurement) -> bool:
         if m.frame_id not in _Z_DOWN:
             raise Malformed("an unknown frame")
         return self._pose(m, sample, m.q)
 
-    def _vision(self, m: Any, sample: Sample) -> bool:
+    def _vision(self, m: Any, sample: Measurement) -> bool:
         turn = Rotation.from_euler("ZYX", (m.yaw, m.pitch, m.roll))
         return self._pose(m, sample, turn.as_quat(scalar_first=True))
 
-    def _local_position(self, m: Any, sample: Sample) -> bool:
+    def _local_position(self, m: Any, sample: Measurement) -> bool:
         if self._attitude is None or sample.stamp is None:
             return False
         at, quaternion, rates = self._attitude
@@ -123,7 +124,7 @@ class MessageReader:
         turn = Rotation.from_quat(quaternion, scalar_first=True) * Rotation.from_rotvec(rates * age)
         return self._pose(m, sample, turn.as_quat(scalar_first=True))
 
-    def _take_attitude(self, m: Any, sample: Sample) -> bool:
+    def _take_attitude(self, m: Any, sample: Measurement) -> bool:
         """Keep an attitude for the positions that come without one."""
         quaternion = np.array([m.q1, m.q2, m.q3, m.q4], dtype=np.float64)
         rates = np.array([m.rollspeed, m.pitchspeed, m.yawspeed], dtype=np.float64)
@@ -134,40 +135,40 @@ class MessageReader:
             self._attitude = sample.stamp, quaternion, rates
         return False
 
-    def _imu(self, m: Any, sample: Sample) -> bool:
+    def _imu(self, m: Any, sample: Measurement) -> bool:
         if m.fields_updated & _GYRO:
             sample.gyro = np.array([m.xgyro, m.ygyro, m.zgyro], dtype=np.float64) * HALF_TURN
         if m.fields_updated & _ACCELEROMETER:
             sample.accelerometer = np.array([m.xacc, m.yacc, m.zacc], dtype=np.float64) * HALF_TURN
         return True
 
-    def _rpm(self, m: Any, sample: Sample) -> bool:
+    def _rpm(self, m: Any, sample: Measurement) -> bool:
         if getattr(m, "index", 0) != 0 or not any(m.rpm):  # of other ESCs, or of none
             return False
         sample.rotor_speeds = _motors(m.rpm) * _RPM
         return True
 
-    def _servo_outputs(self, m: Any, sample: Sample) -> bool:
+    def _servo_outputs(self, m: Any, sample: Measurement) -> bool:
         if m.port != 0:
             return False
         self._servo_time = unwrapped(m.time_usec, self._servo_time or m.time_usec, WRAP)
         sample.stamp = 1000 * self._servo_time
         return self._command(sample, (m.servo1_raw, m.servo2_raw, m.servo3_raw, m.servo4_raw))
 
-    def _command(self, sample: Sample, values: Any) -> bool:
+    def _command(self, sample: Measurement, values: Any) -> bool:
         raw, curve = _motors(values), self._vehicle.motor_curve
         low, high = (0.0, 1.0) if curve is None else curve.command
-        if high <= LARGEST_SHARE < float(np.max(raw)):
+        if high <= _LARGEST_SHARE < float(np.max(raw)):
             low, high = _PULSES
         sample.command = np.clip((raw - low) / (high - low), 0.0, 1.0)
         return True
 
-    def _battery(self, m: Any, sample: Sample) -> bool:
+    def _battery(self, m: Any, sample: Measurement) -> bool:
         cells = [v for v in m.voltages if 0 < v < _MISSING_CELL]
         sample.voltage = 1e-3 * sum(cells)
         return bool(cells) and m.id == 0
 
-    def _system_status(self, m: Any, sample: Sample) -> bool:
+    def _system_status(self, m: Any, sample: Measurement) -> bool:
         sample.voltage = 1e-3 * m.voltage_battery
         return 0 < m.voltage_battery < _MISSING_CELL and "BATTERY_STATUS" not in self.seen
 

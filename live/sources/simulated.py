@@ -15,7 +15,7 @@ from ...envs.fan_tracking import DECISION_TICKS, FanTrackingEnv
 from ...envs.plant import NOISE, TICK
 from ...envs.scenarios import SCENARIOS, draw_fan_path, find_scenario
 from ...runtime.errors import InputError
-from ..messages import SECOND, Array, Sample
+from ..messages import SECOND, Array, Measurement
 from .base import WAITS, Source
 
 _AT_ONCE = 0.05  # s of flight that are made up for at once, at most
@@ -53,7 +53,7 @@ class Simulated(Source):
         self._loop = task.loop
         self._begun = time.monotonic_ns()  # when tick 0 was due
 
-    def read(self, timeout: float) -> list[tuple[Sample, int]] | None:
+    def read(self, timeout: float) -> list[tuple[Measurement, int]] | None:
         """Fly as far as time has passed; return what was measured."""
         now = time.monotonic_ns()
         if self._speed == 0.0:
@@ -70,7 +70,7 @@ class Simulated(Source):
         due = min(due, max(1, round(_AT_ONCE * max(self._speed, 1.0) / TICK)))
         return [self._tick() for _ in range(due)]
 
-    def _tick(self) -> tuple[Sample, int]:
+    def _tick(self) -> tuple[Measurement, int]:
         """Fly one tick; return the pose that it samples, the rotor speeds then, and when it was."""
         loop, arrival = self._loop, time.monotonic_ns()
         phase = self._ticks % DECISION_TICKS
@@ -89,7 +89,7 @@ class Simulated(Source):
         if self.vehicle.omega_lsb > 0:
             speeds = self.vehicle.omega_lsb * np.round(speeds / self.vehicle.omega_lsb)
         seen, battery = loop.seen, loop.battery
-        sample = Sample(
+        sample = Measurement(
             "row",
             round(self._ticks * TICK * SECOND),
             arrival,
