@@ -1,5 +1,5 @@
-"""What the fields of a message mean, by the same map as the columns of a log
-(``identification.logs.log_map``): one message is a table of one row.
+"""Messages by a map of their fields (``identification.logs.log_map``), as the columns of a log: one
+message is a table of one row.
 """
 
 import math
@@ -24,18 +24,21 @@ from ..identification.logs.magnitudes import Magnitudes
 from ..identification.logs.mapped_log import with_range
 from .messages import SECOND, Array, Malformed, Measurement
 
-_OUTSIDE = 0.01  # of a command's range, beyond which it is none of that range
+_OUTSIDE = 0.01  # of a command's range: its tolerance
 _LARGEST = Magnitudes().largest
-_FIELDS = {"rotors": "rotor_speeds", "commands": "command"}  # of a sample; others as the section
+_FIELDS = {
+    "rotors": "rotor_speeds",
+    "commands": "command",
+}  # others: as the section
 
 
 class FieldMap:
-    """From a message's fields to what it holds.
+    """From a message's fields to a measurement.
 
     Args:
-        log_map: what the fields mean; None: they are this kit's columns.
-        vehicle: whose motor curve states the range of commands that the map does not.
-        where: they come from, for errors.
+        log_map: meaning of the fields; None: this kit's columns.
+        vehicle: its motor curve states the range of commands where the map states none.
+        where: origin of the fields, for errors.
     """
 
     def __init__(self, log_map: LogMap | None, vehicle: Vehicle, where: str) -> None:
@@ -98,7 +101,7 @@ class FieldMap:
         setattr(sample, _FIELDS.get(section, section), kit)
 
     def _stamp(self, fields: Mapping[str, Any]) -> int | None:
-        """Return the time of a message, ns; None: it has no such field."""
+        """Return the time of a message, ns; None: no such field."""
         clock = next((c for c in self._clocks if c.column in fields), self.map.time)
         if not clock.column:
             self._rows += 1
@@ -137,7 +140,7 @@ def _kind(sample: Measurement) -> str:
 
 
 def _values(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | None:
-    """Return a section's numbers, with signs and scale; None where it has none."""
+    """Return a section's numbers, with signs and scale; None: it has none."""
     given: list[Any] = [fields.get(name) for name in part.columns]
     if all(type(x) is float and abs(x) <= _LARGEST for x in given):  # nearly always, and quick
         return scaled(part, np.array(given))
@@ -158,7 +161,7 @@ def _values(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | N
 
 
 def _number(name: str, fields: Mapping[str, Any]) -> float:
-    """Return a field, or the constant that its name stands for; NaN: there is none."""
+    """Return a field, or the constant in its name; NaN: there is none."""
     fixed = constant(name)
     value = fields.get(name) if fixed is None else fixed
     if value is None:

@@ -117,7 +117,7 @@ class UdpJson(JsonSource):
         return True
 
     def send(self, output: Output) -> None:
-        """Send the estimate to the sender that is listened to, if it wants to know."""
+        """Send the estimate to the last sender, if wanted."""
         if self.answers:
             self.link.write(json.dumps(as_fields(output)).encode())
 

@@ -1,4 +1,4 @@
-"""From what a user names to a source."""
+"""From an address to a source."""
 
 import importlib
 
@@ -8,18 +8,18 @@ from ...runtime.errors import InputError, unknown_name
 from ..tallies import Tallies
 from .base import Source
 
-# by kind: the module, which is loaded when it is needed, its class, and how it is named
+# by kind: the module, loaded on demand, its class, and the form of the address
 SOURCES = {
     "sim": ("simulated", "Simulated", "sim:SCENARIO"),
     "-": ("json_messages", "JsonLines", "- (lines of JSON on standard input)"),
     "udp-json": ("json_messages", "UdpJson", "udp-json://HOST:PORT"),
     "mavlink": ("mavlink", "Mavlink", "mavlink:udp://HOST:PORT or mavlink:/dev/ttyUSB0"),
 }
-MAPPED = ("-", "udp-json")  # kinds whose fields a map can name
+MAPPED = ("-", "udp-json")  # kinds with a map of fields
 
 
 def kind_of(text: str) -> str:
-    """Return which kind of source a user names.
+    """Return the kind of source in an address.
 
     Raises:
         InputError: there is no such kind.
@@ -33,10 +33,10 @@ def kind_of(text: str) -> str:
 
 
 def make_source(text: str, vehicle: Vehicle, log_map: LogMap | None, tallies: Tallies) -> Source:
-    """Return the source that a user names; it is not opened yet.
+    """Return the source of an address, not yet open.
 
     Raises:
-        InputError: there is no such source, an option of it is wrong, or it takes no map.
+        InputError: there is no such source, an option is wrong, or the source takes no map.
     """
     kind = kind_of(text)
     if log_map is not None and kind not in MAPPED:

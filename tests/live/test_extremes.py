@@ -114,7 +114,10 @@ def test_json(count):
 )
 def test_a_datagram_that_costs_much_is_malformed(data):
     stream = Attacked("udp-json://:9")
-    stream.source.link, stream.source._understood = SimpleNamespace(read=lambda _: data), True
+    stream.source.link, stream.source._understood = (
+        SimpleNamespace(read=lambda _: data, sender=""),
+        True,
+    )
     stream.session._once()
     assert stream.source.tallies.counts == {"malformed": 64}
     (said,) = stream.said()
