@@ -67,8 +67,8 @@ class Tallies:
     Names of ``counts`` for messages: ``doubled`` (the same again), ``late`` (fused at an earlier
     time), ``too late`` (older than the horizon: left out), ``lost`` (missing in the sender's own
     count), ``malformed``, ``other senders`` (a second sender of the same quantity), ``clock
-    jumps``, ``implausible times``, ``waiting`` (poses before any rotor speeds). For the source: ``stops``
-    (it was silent and came back). For the filter: ``refused`` (poses gated as outliers).
+    jumps``, ``implausible times``, ``waiting`` (poses before any rotor speeds). For the source:
+    ``stops`` (silent for a while). For the filter: ``refused`` (poses gated as outliers).
 
     For failures of this kit or its libraries: ``not decoded`` (messages), ``not read`` (reads of
     the link), ``not estimated`` (rows). For items not taken: ``not sent`` (by the link), ``not
