@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 _PAGES = 5.0  # a second
 _NOT_WRITTEN = 2  # exit code
-_SIMULATED = "ardrone2"  # that flies in a simulation where nothing else is said
+_SIMULATED = "ardrone2"  # default vehicle of a simulation
 
 
 def live(
@@ -78,7 +78,7 @@ def live(
         telling = Outlet[Output](
             Lines(sys.stdout),
             tallies,
-            # who alone read the estimates has enough of them
+            # the only reader of the estimates is gone
             failed=lambda: None if stream.answers or recorder or browser else session.stop(),
         )
     session = Session(stream, settings, recording, telling)
@@ -110,7 +110,7 @@ def live(
 
 
 def _watch(session: "Session") -> bool:
-    """Show a stream until it ends; return whether the user ended it.
+    """Show a stream until its end; return whether the user ended the stream.
 
     Raises:
         InputError: as ``Session.run``.
@@ -150,14 +150,14 @@ def _noise(session: "Session") -> dict[str, float] | None:
 
 
 def _say(session: "Session") -> None:
-    """Say what is new to its user, of a link or a failure."""
+    """Print new lines on links and failures."""
     for line in session.tallies.news():
         style = "yellow" if line.startswith("warning") else "dim"
         errors.print(line, style=style, markup=False, soft_wrap=True)
 
 
 def _summary(session: "Session") -> dict[str, Any]:
-    """Say what came and what became of it; return it."""
+    """Print and return the counts, rates and means of the stream."""
     import numpy as np
 
     from ..live.terminal_page import counts_words, tuning_words

@@ -48,7 +48,7 @@ class _Terminal(Console):
             yield Segment(text if control else printable(text), style, control)
 
 
-# without emoji and markup: an address such as crazyflie:radio://0/80 is no picture of a radio, and
+# without emoji and markup: an address such as mavlink:radio://0/80 is no picture of a radio, and
 # columns such as [x, y, z] are no style
 console = _Terminal(emoji=False, markup=False)
 errors = _Terminal(stderr=True, emoji=False, markup=False)

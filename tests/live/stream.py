@@ -1,9 +1,13 @@
 """Flights as streams: messages by arrival, with the faults that links have."""
 
+import json
+import os
 import socket
 import threading
+from contextlib import contextmanager, suppress
 from functools import cache
 from types import SimpleNamespace
+from unittest import mock
 
 import numpy as np
 
@@ -45,11 +49,27 @@ def as_objects(flown):
     ]
 
 
-def as_csv(flown):
-    objects = as_objects(flown)
-    lines = [",".join(objects[0])]
-    lines += [",".join(repr(value) for value in one.values()) for one in objects]
-    return "\n".join(lines) + "\n"
+def as_lines(flown):
+    return "".join(json.dumps(one) + "\n" for one in as_objects(flown))
+
+
+@contextmanager
+def standard_input(text, pieces=1):
+    """Standard input is a pipe with a text, written in pieces."""
+    data = text.encode() if isinstance(text, str) else text
+    size = max(-(-len(data) // pieces), 1)
+    read, write = os.pipe()
+
+    def feed():
+        with suppress(BrokenPipeError), os.fdopen(write, "wb", 0) as file:
+            for i in range(0, len(data), size):
+                file.write(data[i : i + size])
+
+    feeder = threading.Thread(target=feed)
+    feeder.start()
+    with os.fdopen(read) as file, mock.patch("sys.stdin", file):
+        yield
+    feeder.join()
 
 
 def wrench_of(outputs):
@@ -107,14 +127,10 @@ class Pipeline:
 class Running:
     """A session of a source, in a thread of its own."""
 
-    def __init__(
-        self, text, vehicle=VEHICLE, log_map=None, descriptor=None, kept=None, record=None,
-        **settings
-    ):  # fmt: skip
+    def __init__(self, text, vehicle=VEHICLE, log_map=None, kept=None, record=None, **settings):
         self.tallies, self.kept, self.failed = Tallies(), kept or Kept(), []
         self.outputs = self.kept.items
         self.source = make_source(text, vehicle, log_map, self.tallies)
-        self.source.descriptor = descriptor  # of a table
         self.session = Session(
             self.source,
             LiveSettings(**{"wait": 0.0} | settings),

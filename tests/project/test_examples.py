@@ -1,14 +1,18 @@
 """The example scripts and the notebooks do what they say, each script in a short version."""
 
 import importlib
+import json
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.live.stream import flight, standard_input
+from tests.support.fake_vehicles import install_cflib, install_rclpy
 from tests.support.own_effects import joined
 from tests.support.paths import ROOT
+from windwrench.cli import app
 from windwrench.dynamics import effects as library
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
@@ -90,6 +94,36 @@ def test_a_coefficient_is_regressed_on_the_time_of_flights(example, tmp_path, ca
     empty.mkdir()
     with pytest.raises(SystemExit, match="0 flights name rotor_drag"):
         regress(empty, "ardrone2", "rotor_drag", "kdx")
+
+
+def estimated(capsys, *words):
+    """What live says of the lines that a script has printed."""
+    with standard_input(capsys.readouterr().out):
+        app(["live", "-", *words, "--json"], standalone_mode=False)
+    found = json.loads(capsys.readouterr().out)["result"]
+    found["counts"].pop("stops", None)  # of a busy machine
+    return found
+
+
+def test_a_crazyflies_log_is_estimated(example, monkeypatch, capsys):
+    install_cflib(monkeypatch, flight(6.0, "gentle", "crazyflie"))
+    example("live_crazyflie").main("radio://0/80/2M")
+    found = estimated(capsys, "--vehicle", "crazyflie", "--map", "cflib")
+    assert (found["estimates"], found["counts"], found["messages"]) == (601, {}, {"row": 601})
+    assert found["seconds"] == pytest.approx(6.0)
+    weight = 9.81 * 0.03
+    assert np.abs(found["force_mean_N"]).max() < 0.03 * weight  # its weak turbulence apart
+
+
+def test_topics_of_ros_2_are_estimated(example, monkeypatch, capsys):
+    install_rclpy(monkeypatch, flight())
+    example("live_ros2").main("/p", "/m")
+    found = estimated(capsys, "--vehicle", "ardrone2")
+    assert found["messages"] == {"motors": 1601, "pose": 1601}
+    assert found["counts"].keys() <= {"waiting"}
+    assert found["estimates"] >= 1599
+    difference = found["force_mean_N"] - flight()["force"].mean(axis=0)
+    assert np.abs(difference).max() < 0.1
 
 
 NOTEBOOKS = FOLDER / "notebooks"
