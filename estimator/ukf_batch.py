@@ -91,8 +91,8 @@ class WrenchUKFBatch:
     """``WrenchUKF`` for ``count`` vehicles: the same numbers, bit for bit, for all of them in one
     call.
 
-    Filters of one vehicle without declared effects cost less than half of what a single one does in
-    a compiled loop, others as much (``python -m windwrench.speed`` prints it).
+    Filters of one vehicle without declared effects cost less than half of a single one in a
+    compiled loop, others as much (``python -m evidence.speed`` prints both).
 
     Args:
         vehicles: the declared vehicle of all, or a sequence of ``count``.
@@ -211,7 +211,7 @@ class WrenchUKFBatch:
 
     @property
     def estimate(self) -> WrenchEstimate:
-        """What the filters believe now."""
+        """The estimates now."""
         numbers, variances = self._now
         return WrenchEstimate(numbers.copy(), partial(np.sqrt, variances))
 

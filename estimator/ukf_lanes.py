@@ -2,8 +2,8 @@
 (``runtime.vector_lanes``).
 
 Filters of one vehicle without effects, as many as there are lanes, make a block. Between steps a
-block is its estimates and covariances; what it works on in a step lies in one record for all
-blocks, so that a few hundred filters stay in a core's cache.
+block is its estimates and covariances. The scratch of a step lies in one record for all blocks, so
+that a few hundred filters stay in a core's cache.
 """
 
 import math
@@ -56,8 +56,8 @@ def _check(f: Record) -> None:
 
 @compiled
 def write_variances(f: Record, out: Array) -> None:
-    """Write the variances (18,) of the error state into ``out``, with what refused and unlikely
-    poses add; of a single filter or of a block in hand.
+    """Write the variances (18,) of the error state, widened by refused and unlikely poses, into
+    ``out``; of a single filter or of a block in hand.
     """
     m = f.poses
     doubted = (m.phase > BELIEVING) | (m.strain > _STRAINED) | (m.astray > 0.0)
