@@ -356,11 +356,33 @@ _STRAINED = 0.01  # of a variance: less is not told
 
 @compiled
 def _add_doubt(record: Record, variances: Array) -> None:
-    """Add to an estimate's variances (18,) what refused and unlikely poses add."""
+    """Widen an estimate's variances (18,) by refused and unlikely poses."""
     f = record[0]
     doubted_variance(f, f.mean)
     for i in range(N):
         variances[i] += f.poses.strain * variances[i] + f.mean[i]
+
+
+@compiled
+def write_variances(f: Record, out: Array) -> None:
+    """Write the variances (18,) of the error state, widened by refused and unlikely poses, into
+    ``out``; of a single filter or of a block in hand.
+    """
+    m = f.poses
+    doubted = (m.phase > BELIEVING) | (m.strain > _STRAINED) | (m.astray > 0.0)
+    for i in range(N):
+        out[i] = f.P[i, i]
+    if any_of(doubted):
+        _add_doubt((f,), out)
+        for i in range(N):
+            out[i] = choose(doubted, out[i], f.P[i, i])
+
+
+@compiled
+def write_numbers(f: Record, out: Array) -> None:
+    """Write an estimate's numbers, without the covariance, into ``out``."""
+    out[:STATE_SIZE], out[MODEL], out[EXCESS] = f.x, f.model, f.excess
+    out[STATUS], out[RESTARTS] = f.status, f.restarts
 
 
 @compiled
@@ -387,13 +409,9 @@ def make_calls(
             used = step(f, f.z, call.parts, call.dt, call.voltage)
         if used < 0:
             return k
-        numbers[row, :STATE_SIZE], numbers[row, MODEL], loads[row] = f.x, f.model, f.load
-        numbers[row, STATUS], numbers[row, RESTARTS] = f.status, f.restarts
-        numbers[row, EXCESS] = f.excess
-        std[row] = np.diag(f.P)
-        m = f.poses
-        if m.phase > BELIEVING or m.strain > _STRAINED or m.astray > 0.0:
-            _add_doubt(record, std[row])
+        write_numbers(f, numbers[row])
+        write_variances(f, std[row])
+        loads[row] = f.load
         std[row] = np.sqrt(std[row])
     return len(calls)
 
