@@ -23,13 +23,7 @@ from scipy.stats import chi2
 
 from windwrench.dynamics import Vehicle, load_vehicle
 from windwrench.envs.recording import draw_trajectory
-from windwrench.estimator import (
-    ConstantGainFilter,
-    UKFTuning,
-    WrenchEKF,
-    WrenchEstimate,
-    WrenchUKF,
-)
+from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchEstimate, WrenchUKF
 from windwrench.evidence.runner import start
 from windwrench.runtime.errors import unknown_name
 
@@ -84,7 +78,7 @@ def quantised(rng: np.random.Generator, true: Array) -> Array:
     return STEP * np.round((true + rng.standard_normal(true.shape)) / STEP) - true
 
 
-FILTERS = {"ukf": WrenchUKF, "ekf": WrenchEKF, "constant-gain": ConstantGainFilter}
+FILTERS = {"ukf": WrenchUKF, "constant-gain": ConstantGainFilter}
 FLOWN = dict.fromkeys(("crazyflie@100", "crazyflie@200", "ardrone2@200", "hummingbird@100"))
 NOISES = {f"x{size:g}": normal(size) for size in (1.0, 1.5, 2.0, 3.0)}
 EVENTS = {"nothing": 0.0, "gap": 1.0, "jump": 0.0, "tilt": 0.7}  # s

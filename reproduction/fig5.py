@@ -19,8 +19,9 @@ import numpy as np
 from matplotlib.figure import Figure, SubFigure
 
 from ..envs.plant import TICK
-from ..estimator import UKFTuning, WrenchEKF, WrenchUKF
+from ..estimator import UKFTuning, WrenchUKF
 from ..runtime.drawing import ESTIMATE, HELD_OUT, SERIES, new_figure, only_ticks, styled
+from .ekf import WrenchEKF
 from .fig5_estimators import ERRORS, UKF_TUNED, score, states_of, tune
 from .fig5_flights import FLIGHTS, NOISES, PLANTS, Array, Flight, fly, vehicle_at
 from .observer import NonlinearObserver, ObserverTuning

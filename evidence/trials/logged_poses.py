@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfilt, sosfiltfilt
 
 from windwrench.dynamics.vehicle import Vehicle
-from windwrench.estimator import UKFTuning, WrenchEKF
+from windwrench.estimator import UKFTuning
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.smoothing import continuous
+from windwrench.reproduction import WrenchEKF
 
 Array = NDArray[np.float64]
 Filter = Callable[[FlightLog, Vehicle], FlightLog]

@@ -19,7 +19,7 @@ from ... import __version__
 from ...dynamics.effects import get
 from ...dynamics.effects.base import PARAMETERS, ROTORS_SIZE, STATE_SIZE, Effect
 from ...dynamics.vehicle import Vehicle
-from ...estimator import ConstantGainFilter, Recovery, UKFTuning, WrenchEKF, WrenchUKF
+from ...estimator import ConstantGainFilter, Recovery, UKFTuning, WrenchUKF
 from ...estimator.constant_gain import _LONGEST_GAP, _NEAR
 from ...estimator.error_state import LARGEST_MRP_VARIANCE
 from ...estimator.filter_record import AGREEING, N
@@ -37,7 +37,6 @@ from .policies import tracker_policy
 
 _FILTERS: dict[str, tuple[type[WrenchUKF], str]] = {
     "constant-gain": (ConstantGainFilter, "The filter with a constant gain"),
-    "ekf": (WrenchEKF, "The extended Kalman filter"),
     "ukf": (WrenchUKF, "The unscented Kalman filter"),
 }
 ESTIMATORS = tuple(_FILTERS)
@@ -72,7 +71,7 @@ class Exported:
 
 def export_c(
     vehicle: Vehicle,
-    estimator: str = "ekf",
+    estimator: str = "ukf",
     rate: float | None = None,
     rise_time: float = 1.0,
     gate: float | None = 0.9999,
@@ -195,7 +194,7 @@ def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], list[Effect]
             raise InputError(
                 f"{vehicle.name}: effects: {effect.name} cannot be exported: it {error}; declare "
                 "the vehicle without it (--effects none: without any), or estimate in Python, where"
-                " ekf, ukf and constant-gain take every effect. C has "
+                " ukf and constant-gain take every effect. C has "
                 f"{', '.join(exportable_effects())}"
             ) from None
         models[effect.name] = code

@@ -9,11 +9,11 @@ import numpy as np
 from ...dynamics.motion import rotor_wrench
 from ...dynamics.rotation import attitude_error, normalise
 from ...estimator.bias_states import bound_biases
-from ...estimator.ekf import model_jacobian
 from ...estimator.error_state import bound_variance, displace, error_from, fold
 from ...estimator.filter_record import FILTER, IMU, N, fields_between, propagate
 from ...estimator.hover_covariance import heading, turn_vectors, turn_world
 from ...estimator.imu import _believed, expected_imu
+from ...estimator.linear_model import model_jacobian
 from ...estimator.model_uncertainty import follow_loads
 from ...estimator.recovery import (
     MEMORY,

@@ -11,10 +11,10 @@ from tests.support.exported_c.hostile import KINDS, befall
 from tests.support.parameters import mostly_slow
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.rotation import quaternion_multiply
-from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchEKF, WrenchUKF
+from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF
 
 VEHICLES = {name: load_vehicle(name) for name in ("ardrone2", "crazyflie", "hummingbird")}
-FILTERS = {"ukf": WrenchUKF, "ekf": WrenchEKF, "constant gain": ConstantGainFilter}
+FILTERS = {"ukf": WrenchUKF, "constant gain": ConstantGainFilter}
 HEIGHT = 1.2  # m
 FORCE = 0.1  # of the weight, upwards: what the rotors need not carry
 RISE = 1.0  # s, of the default tuning
@@ -162,7 +162,6 @@ SPINS = (
 )
 STARTS = ((np.pi / 2, 0.999), (3.0, None), (np.pi, 0.999))
 SLOW = (("crazyflie", 0.1), ("ardrone2", 0.05))
-KALMAN = ("ukf", "ekf")
 LIVES = (
     *(
         (vehicle, kind, dt, gate, fault)
@@ -172,11 +171,10 @@ LIVES = (
         for fault in POSES
     ),
     *(
-        ("crazyflie" if fault[1] % 400 else "ardrone2", kind, 0.005, 0.9999, fault, 0.0, True)
-        for kind in KALMAN
+        ("crazyflie" if fault[1] % 400 else "ardrone2", "ukf", 0.005, 0.9999, fault, 0.0, True)
         for fault in BESIDE_AN_IMU
     ),
-    *(("crazyflie", kind, 0.01, gate, None, turn) for kind in KALMAN for turn, gate in STARTS),
+    *(("crazyflie", "ukf", 0.01, gate, None, turn) for turn, gate in STARTS),
     *(
         (vehicle, kind, dt, 0.999, fault, 3.0)
         for vehicle, dt in SLOW
@@ -244,8 +242,7 @@ def test_a_bias_stays_within_its_bound():
 @pytest.mark.parametrize(
     "burst", ["one offset", "one after another", "each its own", "upside down"]
 )
-@pytest.mark.parametrize("kind", KALMAN)
-def test_a_burst_of_bad_poses_costs_what_a_gap_costs(kind, burst):
+def test_a_burst_of_bad_poses_costs_what_a_gap_costs(burst):
     """Half a second of poses 10 cm off, while a force that the filter does not foresee sets in:
     none is believed, and those that are back are, at once, though they are far from what is
     expected.
@@ -262,7 +259,7 @@ def test_a_burst_of_bad_poses_costs_what_a_gap_costs(kind, burst):
     away = 0.1 * away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
     said, force = {}, {}
     for bad in (False, True):
-        estimator = FILTERS[kind](vehicle, period=dt, gate=0.9999)
+        estimator = WrenchUKF(vehicle, period=dt, gate=0.9999)
         estimator.reset(poses[0], STILL)
         statuses, forces = [], []
         for k, pose in enumerate(poses):
@@ -301,13 +298,12 @@ def test_poses_of_a_blurred_clock_are_not_held_out(late, seed):
     assert 0 < said.count("rejected") <= 1.2 * hit
 
 
-@pytest.mark.parametrize("kind", KALMAN)
-def test_an_attitude_alone_does_not_end_the_doubt_of_a_position(kind):
+def test_an_attitude_alone_does_not_end_the_doubt_of_a_position():
     """The first pose after half a second is off and likely, so it is believed; those that follow
     have jumped then, until they have lasted. Attitudes without a position come between them.
     """
     vehicle, rng, dt = VEHICLES["ardrone2"], np.random.default_rng(0), 0.005
-    estimator = FILTERS[kind](vehicle, period=dt, gate=0.999)
+    estimator = WrenchUKF(vehicle, period=dt, gate=0.999)
     estimator.reset([0, 0, 1], STILL)
     speeds, q, said = np.full(4, vehicle.hover_rate), STILL, []
     for k in range(700):
@@ -339,15 +335,14 @@ def test_a_doubted_wrench_may_be_none_at_all():
     assert np.sqrt(e.covariance[17, 17]) > abs(e.force[2]) > 0.9 * vehicle.weight
 
 
-@pytest.mark.parametrize("kind", KALMAN)
-def test_rates_do_not_run_away_where_positions_alone_are_measured(kind):
+def test_rates_do_not_run_away_where_positions_alone_are_measured():
     """A hover that is lost and found by two poses, and then by its positions: they tell neither an
     attitude nor a rate, of which nothing is known but the prior's 10 rad/s.
     """
     vehicle, most = VEHICLES["crazyflie"], []
     for seed in range(5):
         rng = np.random.default_rng(seed)
-        estimator = FILTERS[kind](vehicle, period=0.02, gate=0.9999)
+        estimator = WrenchUKF(vehicle, period=0.02, gate=0.9999)
         estimator.reset([0.0, 0.0, 1.0], STILL)
         for k in range(177):
             position = np.array([0.0, 0.0, 1.0]) + 0.001 * rng.standard_normal(3)
@@ -448,13 +443,12 @@ def test_a_restart_does_not_bring_the_next(kind, gate):
     assert np.sqrt(np.mean(np.sum(np.square(force), axis=1))) < 0.05 * VEHICLES["crazyflie"].weight
 
 
-@pytest.mark.parametrize("kind", KALMAN)
-def test_a_gust_is_no_noise(kind):
+def test_a_gust_is_no_noise():
     """Half a weight that sets in at once moves the innovations for a second, and hardly what poses
     add to each other.
     """
     vehicle, rng, dt = VEHICLES["ardrone2"], np.random.default_rng(1), 0.005
-    estimator, scales = FILTERS[kind](vehicle, period=dt), []
+    estimator, scales = WrenchUKF(vehicle, period=dt), []
     estimator.reset([0.0, 0.0, HEIGHT], STILL)
     for k in range(1000):
         t = dt * max(0, k - 400)

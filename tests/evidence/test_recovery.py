@@ -36,7 +36,7 @@ def test_rotors_fly_the_path_under_the_wrench(flown):
     """A filter that sees each pose without noise finds the wrench to a percent."""
     flight = exact_flight(flown, 8.0)
     quaternion = flight.attitude.as_quat(scalar_first=True)
-    said = estimated("ekf", flight, flight.position.copy(), quaternion)
+    said = estimated("ukf", flight, flight.position.copy(), quaternion)
     z, error = missed(flight, said)
     settled = slice(flight.row(6.0), None)
     assert error[settled].max() < 0.01
@@ -76,8 +76,8 @@ def test_what_happens_to_poses_happens_to_them_alone():
             )
 
 
-def test_there_are_576_and_each_word_chooses():
-    assert len(named(AXES, "")) == 576
+def test_there_are_384_and_each_word_chooses():
+    assert len(named(AXES, "")) == 384
     assert len(named(AXES, "gap ukf")) == 48
     assert named(AXES, "ukf ardrone2@200 x2 tilt no-gate") == [
         ("ukf", "ardrone2@200", "x2", "tilt", "no-gate")
@@ -134,7 +134,7 @@ def test_wrong_attitudes_are_got_over_without_a_gate():
 
 
 def test_a_filter_that_knows_the_noise_is_told_it():
-    words = ("ekf", "crazyflie@100", "x3", "nothing", "no-gate")
+    words = ("ukf", "crazyflie@100", "x3", "nothing", "no-gate")
     told, learned = fly_combination(words, told=True).error, fly_combination(words).error
     assert 0.8 * learned < told < learned  # what is learned of the noise is nearly as good
 
@@ -159,6 +159,6 @@ def test_a_rate_lies_within_its_interval():
 
 
 def test_quiet_flights_are_counted(capsys):
-    quiet_flights("ekf crazyflie@50 x1", 1)
+    quiet_flights("ukf crazyflie@50 x1", 1)
     said = capsys.readouterr().out
     assert "all                   0 restarts in 0.050 h: 0.0 an hour (0.0 to 73.8)" in said

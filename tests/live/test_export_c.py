@@ -60,9 +60,8 @@ def assert_same(worst):
 
 
 FLOWN = [
-    *((e, n) for e in ESTIMATORS for n in FLIGHTS if e == "ekf" or "brisk" in n or "effects" in n),
+    *((e, n) for e in ESTIMATORS for n in FLIGHTS if e == "ukf" or "brisk" in n or "effects" in n),
     ("constant-gain", "crazyflie, 50 poses a second"),
-    ("ukf", "crazyflie, 50 poses a second"),
 ]
 
 
@@ -70,8 +69,7 @@ FLOWN = [
     ("estimator", "name", "gate", "imu"),
     [
         *((estimator, name, 0.9999, False) for estimator, name in FLOWN),
-        ("ekf", "crazyflie, brisk", None, False),
-        ("ekf", TURNING, 0.9999, True),
+        ("ukf", "crazyflie, brisk", None, False),
         ("ukf", TURNING, 0.9999, True),
     ],
 )
@@ -96,8 +94,8 @@ SUFFERED = ("world_tilt:ax=0.03,ay=-0.05", "marker_offset:mx=0.03,mz=0.05", "att
     ("estimator", "effects", "part", "size"),
     [
         ("constant-gain", SUFFERED, "position", 0.02),
-        ("ekf", SUFFERED, "position", 0.02),
-        ("ekf", ("battery_sag:n=1.7",), "force", 0.2),
+        ("ukf", SUFFERED, "position", 0.02),
+        ("ukf", ("battery_sag:n=1.7",), "force", 0.2),
     ],
 )
 def test_c_undoes_what_is_declared_of_pose_and_battery(estimator, effects, part, size, tmp_path):
@@ -118,10 +116,10 @@ def test_c_undoes_what_is_declared_of_pose_and_battery(estimator, effects, part,
 HOSTILE = [
     ("constant-gain", None, False, "double"),
     ("constant-gain", 0.9999, False, "single"),
-    ("ekf", None, False, "single"),
-    ("ekf", 0.9999, True, "double"),
     ("ukf", None, True, "single"),
+    ("ukf", None, False, "single"),
     ("ukf", 0.9999, False, "double"),
+    ("ukf", 0.9999, True, "double"),
 ]
 ROUNDING = {"single": 0.05, "double": 1e-6}  # of a standard deviation
 OTHERS = [(*given, *(ROUNDING.keys() - {precision})) for *given, precision in HOSTILE]
@@ -184,37 +182,34 @@ def test_compilers_find_nothing_to_say(estimator, tmp_path):
     model = load_vehicle("ardrone2")
     effects = ("rotor_drag", "motor_lag", "ground_effect", "com_offset", "attitude_gain")
     model = declaring(model, *effects)
-    names = {"ekf": "sac-0", "ukf": "tracker", "constant-gain": "lead"}
-    policy = exportable_policy(names[estimator])
     few = model.with_effects(model.effects[0])
-    for number, exported in enumerate(
-        (
-            export_c(model, estimator, policy=policy),
-            export_c(few, estimator, gate=None, policy=policy, precision="double"),
-        )
-    ):
-        folder = write(exported, tmp_path / str(number))
-        run(compiler, *STRICT, "-fsyntax-only", "windwrench_filter.c", "main.c", cwd=folder)
+    names = {"ukf": ("tracker", "sac-0"), "constant-gain": ("lead",)}
+    for name in names[estimator]:
+        policy = exportable_policy(name)
+        for precision, exported in (
+            ("single", export_c(model, estimator, policy=policy)),
+            ("double", export_c(few, estimator, gate=None, policy=policy, precision="double")),
+        ):
+            folder = write(exported, tmp_path / f"{name}-{precision}")
+            run(compiler, *STRICT, "-fsyntax-only", "windwrench_filter.c", "main.c", cwd=folder)
 
 
 def test_only_the_allowed_functions_of_libm_are_called(tmp_path):
     needs("nm")
     model = declaring(load_vehicle("ardrone2"), *exportable_effects())
     allowed = {*(f"{name}f" for name in FUNCTIONS), "memcpy", "memset"}
-    for estimator in ("ekf", "ukf"):
-        exported = export_c(model, estimator, policy=exportable_policy("sac-0"))
-        folder = write(exported, tmp_path / estimator)
-        # a compiler that optimises may make one call of two (sincosf), or none
-        plain = ("-std=c99", "-O0", "-fno-stack-protector", "-c")
-        run("gcc", *plain, "windwrench_filter.c", cwd=folder)
-        called = run("nm", "-u", "windwrench_filter.o", cwd=folder).split()[1::2]
-        assert set(called) - {"_GLOBAL_OFFSET_TABLE_"} <= allowed
+    folder = write(export_c(model, policy=exportable_policy("sac-0")), tmp_path)
+    # a compiler that optimises may make one call of two (sincosf), or none
+    plain = ("-std=c99", "-O0", "-fno-stack-protector", "-c")
+    run("gcc", *plain, "windwrench_filter.c", cwd=folder)
+    called = run("nm", "-u", "windwrench_filter.o", cwd=folder).split()[1::2]
+    assert set(called) - {"_GLOBAL_OFFSET_TABLE_"} <= allowed
 
 
 @pytest.mark.parametrize(
     ("estimator", "steps"),
     [
-        *(("constant-gain", 5_000), ("ekf", 5_000), ("ukf", 3_000)),
+        *(("constant-gain", 5_000), ("ukf", 3_000)),
         *(pytest.param(e, 1_000_000, marks=pytest.mark.slow) for e in ESTIMATORS),
     ],
 )
@@ -242,7 +237,7 @@ def test_effects_in_c_are_those_in_python(tmp_path):
     names = [n for n in exportable_effects() if get(n).kind != "body"]
     assert {"rotor_drag", "body_drag", "inflow_thrust", "motor_lag", "ground_effect"} <= set(names)
     model = declaring(model, *names)
-    folder = write(export_c(model, "ekf"), tmp_path)
+    folder = write(export_c(model, "ukf"), tmp_path)
     # its functions are the file's own: here they are called from outside
     text = (folder / "windwrench_filter.c").read_text()
     (folder / "effects.c").write_text(text.replace("static void effect_", "void effect_"))
@@ -324,7 +319,6 @@ def test_on_a_cortex_m4_it_says_the_same_within_its_limits(tmp_path):
     flown = flight(TURNING, 150, faults=False)
     for estimator, ram, instructions in (
         ("constant-gain", 1_152, 8_400),
-        ("ekf", 16_384, 168_000),
         ("ukf", 16_384, 168_000),
     ):
         exported = export_c(vehicle_of(TURNING), estimator)

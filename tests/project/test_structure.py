@@ -20,7 +20,7 @@ FLOORS = (
     {"estimator", "controllers"},
     {"envs", "identification"},
     {"evaluation", "live"},
-    {"training", "reproduction", "speed", "demo"},
+    {"training", "reproduction", "demo"},
     {"evidence"},
     {"cli", "commands", "__main__"},
 )

@@ -1,26 +1,15 @@
-"""The wrench filter's plain relative: an error-state extended Kalman filter on the same model.
+"""The model (2)-(5), (11)-(14), linearised at an estimate.
 
-State, noise, measurement and tuning are those of ``ukf.py``; only the prediction of the covariance
-differs: it is ``F P F' + B Q B'`` with the Jacobian F of the model (2)-(5), (11)-(14) at the
-estimate. The attitude error is a world-frame MRP rho, on the left of the attitude: R_true = exp([4
-rho]x) R for small errors.
+The filter with a constant gain carries its covariance by the derivatives at hover. The unscented
+filter in C needs the derivatives at the estimate, for the linear part of its covariance.
 """
 
 import math
 
-from numba import carray
-
 from ..dynamics.model import apply_effects
-from ..runtime.addresses import pointer_to
 from ..runtime.compiled import Record, compiled
-from .bias_states import carry_with_jacobian
-from .covariance import add_noise, carry_by_jacobian
-from .error_state import symmetrise
 from .estimate import NIS, Array
-from .filter_record import FILTER, N, drive, propagate
-from .model_uncertainty import follow_loads
-from .recovery import after_prediction
-from .ukf import WrenchUKF, step_by, step_with_biases_by
+from .filter_record import N
 
 # steps of the difference quotients of an effect's wrench; single precision needs larger ones
 EFFECT_TURN = 1e-6  # rad
@@ -46,7 +35,7 @@ def _add_effect_jacobian(f: Record, A: Array) -> None:
     force, rows 9-11 of ``A``, and of the torque, ``f.torques``; overwrites ``f.rotation`` and
     ``f.effect_wrench``.
 
-    By central differences: an effect model is a black box behind an address.
+    Central differences: an effect model is a black box behind an address.
     """
     x, point, turned, R, change = f.x, f.point, f.rotation, f.centre_rotation, f.innovation
     for n in range(12):
@@ -114,9 +103,9 @@ def acceleration_jacobian(f: Record, A: Array, effects: bool) -> None:
     """Write the derivatives of the accelerations at ``f.x`` by the error state into ``A`` (12, 18),
     rows 3-5 and 9-11; those of declared effects where ``effects`` says so.
 
-    Rows 3-5 are the angular acceleration (body), rows 9-11 that of the geometric centre (world):
-    (4), (12). Expects ``f.rotation``, ``f.acceleration`` and ``f.effect_wrench`` of the estimate,
-    as ``propagate`` leaves them.
+    Rows 3-5 are the angular acceleration (body), rows 9-11 the geometric centre's (world): (4),
+    (12). Expects ``f.rotation``, ``f.acceleration`` and ``f.effect_wrench`` of the estimate, as
+    ``propagate`` leaves them.
     """
     R, x, B, J, inverse = f.centre_rotation, f.x, f.torques, f.body.inertia, f.body.inverse_inertia
     tau, omega = x[13:16], x[10:13]
@@ -166,8 +155,8 @@ def model_jacobian(f: Record, dt: float, A: Array, effects: bool) -> None:
     """Write the first 12 rows of ``F - 1`` into ``A`` (12, 18); the rows of torque and force would
     be zero.
 
-    F is the derivative of the error state after ``dt`` s by that before, at the estimate ``f.x``.
-    Expects what ``drive`` and ``propagate`` leave behind.
+    F is the derivative of the error state after ``dt`` s by the one before, at the estimate
+    ``f.x``. Call ``drive`` and ``propagate`` before.
     """
     for i in range(12):
         for j in range(N):
@@ -196,44 +185,3 @@ def model_jacobian(f: Record, dt: float, A: Array, effects: bool) -> None:
             A[9 + i, j] *= dt
             A[6 + i, j] = 0.5 * dt * A[9 + i, j]
         A[6 + i, 9 + i] += dt
-
-
-@compiled
-def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
-    """Carry the filter ``dt`` s ahead at rotor speeds (4,) rad/s."""
-    x, P, A, G = f.x, f.P, f.S, f.H
-    drive(f, rotor_speeds, dt, voltage)
-    propagate(f, x, dt, f.centre)
-    follow_loads(f, f.rotation, dt)
-    model_jacobian(f, dt, A, True)
-    carry_by_jacobian(P, A, G)
-    add_noise(f, f.centre_rotation, dt)
-    symmetrise(P)
-    x[:NIS], x[NIS] = f.centre[:NIS], math.nan
-    after_prediction(f, dt)
-    f.time += dt
-
-
-@compiled
-def _step_with_biases_at(address: int, parts: int, dt: float, voltage: float) -> int:
-    f = carray(pointer_to(address), 1, FILTER)[0]
-    return step_with_biases_by(f, parts, dt, voltage, predict, carry_with_jacobian)
-
-
-@compiled
-def _step_at(address: int, parts: int, dt: float, voltage: float) -> int:
-    f = carray(pointer_to(address), 1, FILTER)[0]
-    return step_by(f, f.z, parts, dt, voltage, predict)
-
-
-class WrenchEKF(WrenchUKF):
-    """Extended Kalman filter for the external force and torque on a quadrotor: ``WrenchUKF``,
-    linearised.
-
-    It is made and used like ``WrenchUKF`` and shares all of it but the prediction of the
-    covariance. Where the attitude is well known the two agree closely; it serves as a check of the
-    other, and where a step must cost less.
-    """
-
-    _step_at = staticmethod(_step_at)
-    _step_with_biases_at = staticmethod(_step_with_biases_at)
