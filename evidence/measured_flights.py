@@ -35,7 +35,7 @@ from windwrench.identification.comparison.trim import Trim, carrying, trim_of, t
 from windwrench.identification.comparison.words import fault_data
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.commanded_rotors import in_flight
-from windwrench.identification.diagnosis.regression import Flights
+from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.findings import Diagnosis
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log
@@ -198,7 +198,7 @@ def swing(log: FlightLog, diagnosis: Diagnosis) -> dict[str, list[float]] | None
     if found is None or "payload_position" not in log.extra:
         return None
     bare = replace(diagnosis.declared, effects=())
-    flights = Flights([log], bare)
+    flights = RegressedFlights([log], bare)
     setting = {e.name: dict(e.coefficients) for e in diagnosis.amended.effects}
     law = flights.residual(
         {k: v for k, v in setting.items() if k != "slung_payload"}

@@ -16,7 +16,7 @@ from tests.support.flown import without_pose
 from windwrench.dynamics import EffectSetting, Vehicle, load_vehicle
 from windwrench.evidence.trials.practice_flights import fly_practice, practise
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.diagnosis.regression import Flights, held_out
+from windwrench.identification.diagnosis.regression import RegressedFlights, held_out
 from windwrench.identification.diagnosis.settings import DiagnosisSettings
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log
@@ -305,7 +305,7 @@ def test_no_flight_keeps_step_with_what_is_held_out():
     for period in range(2, 14):
         share = np.bincount(number % period, held) / np.bincount(number % period)
         assert np.all((share > 0.05) & (share < 0.5)), period
-    flights = Flights([fly()], VEHICLE)
+    flights = RegressedFlights([fly()], VEHICLE)
     assert np.array_equal(flights.fit_rows, flights.block % 4 != held_out(flights.block))
 
 
