@@ -1,10 +1,10 @@
-"""Which columns of a table are which part of a flight: what their numbers obey counts for more than
-their names, which may be anyone's.
+"""The parts of a flight among a table's columns: numbers that obey physics count for more than
+names.
 
 A quaternion has length 1. An accelerometer reads gravity, 9.81 m/s2 or 1 g. The horizontal
 acceleration of a position follows the tilt, in whatever frames, and a gyro the turns of the pose.
-Rotors or commands are four columns of one size that move together with the specific force. Columns
-whose names say nothing are looked at by threes and fours that stand side by side.
+Rotors or commands are four columns of one size, correlated with the specific force. Columns without
+telling names are tried by adjacent threes and fours.
 """
 
 import re
@@ -19,25 +19,25 @@ from .magnitudes import likely_unit
 from .table import Array, finite_rows
 
 _FOURS = (("1", "2", "3", "4"), ("0", "1", "2", "3"))
-_TRIPLES = (("x", "y", "z"), ("roll", "pitch", "yaw"))  # of which no column is another group's
+_TRIPLES = (("x", "y", "z"), ("roll", "pitch", "yaw"))  # their columns are no other group's
 
 
 @dataclass(frozen=True)
 class PartSettings:
-    """When numbers speak for a part, and what that counts beside a name (4 for the likeliest)."""
+    """When numbers speak for a part, and their score beside a name's (4 for the likeliest)."""
 
-    numbers: float = 4.0  # what numbers that obey the part's physics count
+    numbers: float = 4.0  # score of numbers by the part's physics
     certain: float = 2.0  # lead over the next candidate
-    length: tuple[float, float] = (2e-3, 0.02)  # error of a quaternion's: median, and of 98 %
-    window: float = 0.2  # s, over which rates are taken
-    rows: int = 20_000  # in the middle of the flight that are looked at, at most
-    samples: int = 4000  # of them that are compared, at most
-    levels: int = 10  # that a switch may take
-    fewest: int = 30  # that decide something
-    follows: float = 0.7  # correlation from which on one follows the other
+    length: tuple[float, float] = (2e-3, 0.02)  # of a quaternion: median error, and of 98 %
+    window: float = 0.2  # s, of the window for rates
+    rows: int = 20_000  # at most, from the middle of the flight
+    samples: int = 4000  # at most, of the rows compared
+    levels: int = 10  # of a switch, at most
+    fewest: int = 30  # for a decision
+    follows: float = 0.7  # correlation of a signal with its driver
     alike: float = 1.6  # ratio of medians of four rotors
     felt: float = 0.5  # correlation of rotors with the specific force
-    shown: int = 4  # candidates that a map lists
+    shown: int = 4  # candidates in a map
 
 
 PARTS = PartSettings()
@@ -49,10 +49,10 @@ def correlation(x: Array, y: Array) -> float:
 
 
 class Numbers:
-    """What the numbers of columns obey.
+    """Tests of columns' numbers against physics.
 
     Args:
-        t: (N,) s; NaN in rows that are not looked at.
+        t: (N,) s; NaN in rows left out.
         data: columns (N,) by name.
     """
 
@@ -61,17 +61,15 @@ class Numbers:
         self.order = order[max(0, (len(order) - PARTS.rows) // 2) :][: PARTS.rows]
         self.t = t[self.order]
         count = min(PARTS.samples, len(self.t))
-        # times (n,) in s at which motors are compared
+        # times (n,) in s of comparisons of motors
         self.clock = self.t[np.linspace(0, len(self.t) - 1, count).astype(int)]
         self.data = {name: x for name, x in data.items() if np.isfinite(x[self.order]).any()}
         self._rows: dict[tuple[str, ...], tuple[Array, Array]] = {}
-        self.attitude: Sequence[
-            str
-        ] = ()  # a quaternion, whose tilt a position's acceleration follows
-        self.felt: list[Array] = []  # what may be the specific force, at ``self.clock``
+        self.attitude: Sequence[str] = ()  # a quaternion, whose tilt drives the position
+        self.felt: list[Array] = []  # likely specific forces, at ``self.clock``
 
     def rows(self, columns: Sequence[str]) -> tuple[Array, Array]:
-        """Return the times (n,) and values (n, k) of the rows in which columns are all there."""
+        """Return the times (n,) and values (n, k) of the rows with all columns."""
         if (key := tuple(columns)) not in self._rows:
             values = np.column_stack([self.data[name][self.order] for name in columns])
             there = finite_rows(values)
@@ -102,7 +100,7 @@ class Numbers:
             return 0.0, ""
         x = self.some(columns)
         length = np.linalg.norm(x, axis=1)
-        there = length > 0.5  # zeros stand for one that is not there
+        there = length > 0.5  # zeros stand for a missing quaternion
         off = np.abs(length[there] - 1.0)
         if len(off) < max(2, 0.5 * len(x)) or np.median(off) >= PARTS.length[0]:
             return -np.inf, ""
@@ -110,20 +108,18 @@ class Numbers:
         return (1.0 if is_one else -np.inf), "their length is 1"
 
     def gravity(self, columns: Sequence[str]) -> tuple[float, str]:
-        """Return 1 where three columns have the size of gravity, or less where it does not lie
-        along the third.
-        """
+        """Return 1 where gravity lies along the third of three columns, 0.8 along another."""
         x = self.some(columns)
         length = np.linalg.norm(x, axis=1)
         size, middle = float(np.median(length)), np.abs(np.median(x, axis=0))
         unit, is_gravity = likely_unit("accelerometer", size)
         if not is_gravity or np.std(length) < 1e-6 * size or middle.max() < 0.8 * size:
-            return 0.0, ""  # another size, a direction, or all that turns
+            return 0.0, ""  # another size, a direction, or a turning vector
         return (1.0 if middle.argmax() == 2 else 0.8), f"their size is gravity's, in {unit}"
 
     def follows_tilt(self, columns: Sequence[str]) -> tuple[float, str]:
-        """Return how the second difference of two of three columns follows the tilt, at most 1; 0
-        where it does not.
+        """Return the correlation of two of three columns' second differences with the tilt; 0 where
+        there is little.
         """
         if not self.attitude:
             return 0.0, ""
@@ -151,7 +147,7 @@ class Numbers:
         return float(together), "they move together with the specific force"
 
     def feel(self, accelerometer: Sequence[str], position: Sequence[str]) -> None:
-        """Keep what may be the specific force: an accelerometer's size, else accelerations."""
+        """Keep likely specific forces: an accelerometer's size, else accelerations."""
         if accelerometer:
             self.felt = [np.linalg.norm(self.between(self.clock, accelerometer), axis=1)]
         elif position:
@@ -159,8 +155,8 @@ class Numbers:
             self.felt = [*force, *-force]
 
     def elasticity(self, values: Array) -> float:
-        """Return by which power of four motors' mean (N, 4) the specific force grows: 2 of rotor
-        speeds, more of pulses that stand on an offset. NaN where the flight does not show it.
+        """Return the power of four motors' mean (N, 4) by which the specific force grows: 2 of
+        rotor speeds, more of pulses on an offset. NaN: the flight does not show the power.
         """
         if len(self.felt) != 1:
             return np.nan
@@ -176,7 +172,7 @@ class Numbers:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """Columns that may be a part of a flight."""
+    """Columns of a possible part of a flight."""
 
     group: Group
     score: float
@@ -198,7 +194,7 @@ def _named(group: Group, part: str = "") -> bool:
 
 
 def named_columns(names: Sequence[Name]) -> set[str]:
-    """Return the columns whose names speak for a part."""
+    """Return the columns with a part's name."""
     endings = [e for ways in WORDS["parts"].values() for way in ways for e in way["endings"]]
     groups = [group for ending in endings for group in groups_of(names, ending) if _named(group)]
     alone = [name.column for part in ("time", "battery") for name in named_alone(names, part)]
@@ -214,11 +210,11 @@ def candidates(
     """Return the candidates of a part by their names and numbers, the likeliest first.
 
     Args:
-        part: of a flight.
-        names: of columns that are free; those without numbers are no part's.
+        part: a section of a log map, or ``motors``.
+        names: free columns; a column without numbers is no part's.
         numbers: of columns.
-        judge: returns how well columns obey the part's physics, from 0 to 1, and in words; minus
-            infinite where they contradict it.
+        judge: returns how well columns obey the part's physics, from 0 to 1 (minus infinite: they
+            contradict the part), and in words.
     """
     names = [name for name in names if name.column in numbers.data]
     named = {column for way in _TRIPLES for g in groups_of(names, way) for column in g.columns}
@@ -240,7 +236,7 @@ def candidates(
         wanted, width = WORDS["not_measured"], 4 if part in ("attitude", "motors") else 3
         loose = [n for n in names if n.column not in named and numbers.varies(n.column)]
         measured = tuple(name.column for name in loose if not re.search(wanted, name.base))
-        for i in range(len(measured) - width + 1):  # those that stand beside one another
+        for i in range(len(measured) - width + 1):  # adjacent columns
             ways.append((Group(measured[i : i + width], ""), 0.0, ""))
     found: dict[tuple[str, ...], Candidate] = {}
     for group, score, why in ways:

@@ -4,15 +4,15 @@ rule.
 Three balances hold in any flight, whatever small effects a vehicle's model lacks:
 
 * the specific force points along the thrust axis: ``f_h = f_z d_h / d_z`` with ``f = a + g e3`` and
-  the body's z axis ``d``;
-* its vertical part follows the rotors' thrust: ``f_z = T d_z / m``;
+  the body's z axis ``d``.
+* its vertical part follows the rotors' thrust: ``f_z = T d_z / m``.
 * the rotors turn the body: ``J alpha + omega x J omega = tau``; without a vehicle, rotors on one
-  side turn it over to the other.
+  side turn the body to the other.
 
 Each balance leaves a share of the motion's variance unexplained, and shares make a likelihood: with
 Gaussian residuals of unknown size, ``log L = -n/2 sum(log share)``. Undeclared effects last, so a
 flight counts for few independent samples ``n``. A hover tells nothing: all shares are near 1. The
-likeliest reading is taken, less what it must make up for being less usual.
+likeliest reading is taken, after a penalty on unusual ones.
 """
 
 import math
@@ -47,33 +47,33 @@ class EvidenceSettings:
     """Filters, and when a reading is certain."""
 
     # Hz, of the angular acceleration: from, to, and to of yaw, where rotors do least. Below, steady
-    # moments of the air are larger than what turns the body; above, noise of the pose is
+    # moments of the air are larger than the torques of turning; above, the pose's noise is
     turn_hz: tuple[float, float, float] = (1.0, 4.0, 3.0)
-    rate_hz: float = 20.0  # of the samples compared
-    most: int = 2000  # of them; of longer flights every second one, or third ...
-    period: float = 0.005  # s, the shortest of the clock of the filters
-    edge: float = 0.3  # s at either end of a piece, where filters start
-    gap: float = 0.1  # s (or 3.5 periods) without a sample, which end a piece
+    rate_hz: float = 20.0  # rate of the samples compared
+    most: int = 2000  # samples; of longer flights every second one, or third ...
+    period: float = 0.005  # s, the shortest of the filters' clock
+    edge: float = 0.3  # s at either end of a piece, for the filters' start
+    gap: float = 0.1  # s (or 3.5 periods) without a sample end a piece
     shortest: float = 3.0  # s of a piece
-    fewest: int = 60  # samples in flight that decide something
+    fewest: int = 60  # samples in flight for a decision
 
-    # what undeclared effects may make of a gain and of a delay (s)
+    # gains and delays (s) by undeclared effects
     force_gain: tuple[float, float] = (0.6, 1.6)
     torque_gain: tuple[float, float] = (0.4, 2.5)  # and of thrust in commands
     most_thrust: float = 1.5  # of its 99th percentile: more is a wrong reading of a sensor
     delays: tuple[float, ...] = tuple(0.02 * k for k in range(-5, 13))
-    # s by which rotors may come late against the motion on one clock: motors, radio and filters
-    # make them up to 0.22 s early on measured flights; the most that is looked for, and its steps
+    # s, delays of rotors against the motion on one clock: motors, radio and filters make rotors up
+    # to 0.22 s early on measured flights. Then the longest delay searched, and the search's step
     near: tuple[float, float] = (-0.25, 0.1)
     far: float = 5.0
     step: float = 0.02
 
-    samples: float = 20.0  # independent samples of one component that a flight counts for, at most
-    least_share: float = 0.01  # a smaller share says no more: no model is better
-    most_share: float = 2.0  # a larger share says no more
-    fallen: float = 60.0  # log-likelihood ratio that a flight must make up for lying on its side
-    below: float = 3.0  # the same for a flight below its origin
-    good: float = 0.5  # share up to which a reading is believed, and from which on it is not
+    samples: float = 20.0  # independent samples of one component in a flight, at most
+    least_share: float = 0.01  # smaller shares count the same: no model is better
+    most_share: float = 2.0  # larger shares count the same
+    fallen: float = 60.0  # log-likelihood ratio against a flight on its side
+    below: float = 3.0  # the same against a flight below its origin
+    good: float = 0.5  # share: a reading below is believed
     good_torque: float = 0.65  # the same of torques without a vehicle
     certain: float = 3.4  # log-likelihood ratio over the next best: 30 to 1
     # rad/s of roll and pitch in the band of turning: in hovers (0.03 in a simulated one) rotors
@@ -94,10 +94,10 @@ def likelihood(left: Sequence[float]) -> float:
 
 
 def shares(total: Array, power: Array, cross: Array, gain: ArrayLike) -> Array:
-    """Return the shares of variances ``total`` (...) that signals of variance ``power`` and
-    covariance ``cross`` leave, times a gain in range: ``gain`` (2, ...).
+    """Return the shares of variances ``total`` (...) left by signals of variance ``power`` and
+    covariance ``cross``, times a gain in range: ``gain`` (2, ...).
     """
-    with np.errstate(divide="ignore", invalid="ignore"):  # of a variance of zero all is left
+    with np.errstate(divide="ignore", invalid="ignore"):  # all of a zero variance is left
         factor = np.clip(cross / power, *np.asarray(gain))
         left = np.minimum(
             1.0 - factor * (2.0 * cross - factor * power) / total, EVIDENCE.most_share
@@ -107,12 +107,12 @@ def shares(total: Array, power: Array, cross: Array, gain: ArrayLike) -> Array:
 
 @dataclass(frozen=True)
 class Fit:
-    """Shares of variance that a reading leaves unexplained, and its score."""
+    """Unexplained shares of variance by a reading, and its score."""
 
     reading: Any  # a Reading, or a SensorReading
-    horizontal: float  # of the horizontal specific force, or of what the sensor measures
-    torques: tuple[float, ...]  # about x, y and, with a vehicle, z
-    score: float  # log-likelihood less what the reading must make up for being less usual
+    horizontal: float  # share of the horizontal specific force, or of the sensor's vector
+    torques: tuple[float, ...]  # shares about x, y and, with a vehicle, z
+    score: float  # log-likelihood less the penalty on an unusual reading
 
     @property
     def torque(self) -> float:
@@ -130,8 +130,8 @@ class _Piece:
     compared: Rows
 
     def even(self, t: Array, values: Array) -> Array:
-        """Return columns (m, k) on the piece's clock, also of rows between those of the piece; NaN
-        where there are none.
+        """Return columns (m, k) on the piece's clock, also from rows between the piece's own; NaN:
+        there are none.
         """
         inside = slice(self.rows[0], self.rows[-1] + 1)
         x, at = values[inside], t[inside]
@@ -155,11 +155,11 @@ class Evidence:
 
     Args:
         t: (N,) s.
-        thrusts: (N, 4) of the rotors' columns, in any unit that grows with thrust.
+        thrusts: (N, 4) of the rotors' columns, in any unit growing with thrust.
         position: (N, 3) in the columns' unit; None: unknown.
         attitude: (N, 4) or (N, 3) as in the columns; None: unknown.
-        gyro: (N, 3) rad/s, in the kit's body axes, where no attitude tells turns.
-        along: (N,) m/s2, specific force along the body's z axis, where no pose tells it.
+        gyro: (N, 3) rad/s, in the kit's body axes, without an attitude.
+        along: (N,) m/s2, specific force along the body's z axis, without a pose.
         vehicle: as declared; ``thrusts`` are squared rotor speeds then. None: unknown.
     """
 
@@ -176,7 +176,7 @@ class Evidence:
         self._t, self._position, self._attitude = t, position, attitude
         self._gyro, self._along = gyro, along
         self._k, self._inertia, self._mixing = np.ones(4), np.eye(3), _SIDES
-        self._gains = EVIDENCE.torque_gain, (0.0, np.inf)  # of thrust and of torques
+        self._gains = EVIDENCE.torque_gain, (0.0, np.inf)  # gains of thrust and of torques
         if vehicle is not None:
             self._k, self._inertia, self._mixing = vehicle.k, vehicle.inertia, vehicle.mixing[1:]
             self._gains = EVIDENCE.force_gain, EVIDENCE.torque_gain
@@ -188,14 +188,14 @@ class Evidence:
         there = np.isfinite(t) & np.all([finite_rows(x) for x in moving], axis=0)
         self._pieces = self._cut(np.flatnonzero(there))
         self.has_pose = attitude is not None
-        # whether the flight is long enough to decide something
+        # whether the flight is long enough for a decision
         self.enough = sum(len(p.compared) for p in self._pieces) >= EVIDENCE.fewest
         self._motion, self._delayed = lru_cache(self._moving), lru_cache(2)(self._pushes)
         self._moved = lru_cache(2)(self._balances)
 
     @classmethod
     def of_log(cls, log: FlightLog, vehicle: Vehicle, by_imu: bool = False) -> "Evidence":
-        """Return the evidence of a log: of its pose, or of its IMU."""
+        """Return the evidence of a log: by its pose, or by its IMU."""
         squares = np.square(log.rotor_speeds)
         if by_imu:
             assert log.accelerometer is not None
@@ -207,7 +207,7 @@ class Evidence:
         return cls(log.t, squares, position, quaternion, vehicle=vehicle)
 
     def _cut(self, rows: Rows) -> list[_Piece]:
-        """Return the pieces in which the motion is known, and of each which samples fly."""
+        """Return the pieces of known motion, each with its samples in flight."""
         if len(rows) < 2:
             return []
         step = median_step(self._t[rows])
@@ -250,7 +250,7 @@ class Evidence:
 
     @cached_property
     def _middle(self) -> Array:
-        """Median position (3,) in the columns' world and unit; zero where it is unknown."""
+        """Median position (3,) in the columns' world and unit; zero: unknown."""
         if self._position is None:
             return np.zeros(3)
         rows = np.concatenate([p.rows for p in self._pieces])
@@ -258,9 +258,9 @@ class Evidence:
 
     @cached_property
     def _driving(self) -> list[Array]:
-        """Thrusts of each piece (m, 10): of four rotors in the band of roll and pitch, in that of
-        yaw, and of all together, low-passed and as they are, in m/s2; their median in flight is
-        gravity.
+        """Thrusts of each piece (m, 10): four in the band of roll and pitch, four in the band of
+        yaw, and the total, low-passed and raw. The total is in m/s2, with gravity as its median in
+        flight.
         """
         thrusts = [p.even(self._t, self._thrusts) for p in self._pieces]
         each = list(zip(thrusts, self._pieces, strict=True))
@@ -273,8 +273,9 @@ class Evidence:
         return out
 
     def _pushes(self, *delays: float) -> tuple[Array, Array]:
-        """Return which samples compared less each delay (d, n) lie within their piece (1, or 0),
-        and the first thrusts (d, 9, n) of ``_driving`` there less their means; zero elsewhere.
+        """Return whether the samples compared, less each delay (d, n), lie within their piece (1,
+        or 0), and thrusts. The thrusts (d, 9, n) are the first nine of ``_driving``, less their
+        means; zero elsewhere.
         """
         there, out = [], []
         for x, p in zip(self._driving, self._pieces, strict=True):
@@ -288,8 +289,8 @@ class Evidence:
         return within, np.swapaxes(within[..., None] * (thrusts - means), 1, 2)
 
     def _turned(self, reading: Reading) -> Iterator[tuple[Array, Array]]:
-        """Yield the rotations (m, 3, 3), zero where no attitude is known, and the angular velocity
-        (m, 3) of each piece by the way in which a reading turns columns into rotations.
+        """Yield each piece's rotations (m, 3, 3), zero without an attitude, and angular velocity
+        (m, 3), by a reading.
         """
         quaternion = None
         if self._attitude is not None:
@@ -306,9 +307,9 @@ class Evidence:
                 yield turning(q, p.period)
 
     def _moving(self, *attitude: Any) -> tuple[Array, Array]:
-        """Return what moves the body by one way to turn columns into rotations: specific thrust
-        times the body's axes (n, 3, 3) in m/s2, in the world; and, in two bands, angular
-        velocity, angular acceleration and products of the angular velocity (n, 2, 15).
+        """Return thrust and turns by one reading of the attitude. Thrust is specific, times the
+        body's axes (n, 3, 3), in m/s2, in the world. Turns in two bands (n, 2, 15) are angular
+        velocity, angular acceleration and products of the angular velocity.
         """
         axes, turns = [], []
         turned = self._turned(Reading(*attitude))
@@ -320,9 +321,9 @@ class Evidence:
         return np.concatenate(axes).reshape(-1, 3, 3), np.concatenate(turns)
 
     def _needed(self, along: Array, reading: Reading) -> Array:
-        """Return the force ``along`` the thrust axis (n,) above the torques in Nm that the motion
-        needs, in the band of turning (4, n), less their means; without a vehicle, the angular
-        acceleration in place of torques.
+        """Return the force ``along`` the thrust axis (n,) above the torques in Nm of the motion, in
+        the band of turning (4, n), less their means. Without a vehicle, angular accelerations stand
+        for torques.
         """
         # a pseudovector: a mirrored body frame turns its sign as well
         body = reading.frames.body
@@ -335,9 +336,8 @@ class Evidence:
         return needed
 
     def _balances(self, *moves: Any) -> tuple[float, float, Array]:
-        """Return what a reading's motion says whatever the rotors: the share of the horizontal
-        force that is left, the log-likelihood ratio that a flight must make up for its place, and
-        the force along the thrust axis in m/s2 above the torques (``_needed``).
+        """Return the terms of a reading without rotors. They are the unexplained share of the
+        horizontal force, the penalty on the flight's place (log-likelihood ratio), and ``_needed``.
         """
         reading = Reading(*moves)
         if self._attitude is None:
@@ -382,12 +382,12 @@ class Evidence:
         return Fit(reading, horizontal, tuple(others), score)
 
     def late(self) -> float:
-        """Return by how many s the rotors' columns come late against the motion, as declared; 0
-        where they do not, or where the flight does not tell.
+        """Return the delay in s of the rotors' columns against the motion, as declared; 0: none, or
+        unknown.
 
-        In the band of turning the force along the thrust axis follows the thrust, and what turns
-        the body the torques. Their signs are correlated over all lags: one landing outweighs a
-        flight otherwise. By chance a correlation has the variance of Bartlett's formula.
+        In the band of turning the force along the thrust axis follows the thrust, and angular
+        acceleration the torques. Their signs are correlated over all lags: one landing outweighs a
+        flight otherwise. The variance of a chance correlation is by Bartlett's formula.
         """
         mixing = np.vstack([self._k, self._mixing])
         sums, chance = np.zeros(1), np.full(4, 1e-300)
@@ -426,7 +426,7 @@ class Ranking:
     """Fits of readings, the likeliest first."""
 
     ranked: Sequence[Fit]
-    left: str = "horizontal acceleration is left by the tilt"  # of what a reading leaves a share
+    left: str = "horizontal acceleration is left by the tilt"  # words for the unexplained share
 
     @classmethod
     def of(cls, evidence: Evidence, readings: Sequence[Reading], torques: bool = True) -> "Ranking":
@@ -439,7 +439,7 @@ class Ranking:
 
     @property
     def best(self) -> Any:
-        """The reading that is taken."""
+        """The likeliest reading."""
         return self.ranked[0].reading
 
     @property
@@ -449,7 +449,7 @@ class Ranking:
 
     def other(self, name: str) -> tuple[object, float]:
         """Return the next best value of a property, and the log-likelihood ratio of the best over
-        that value (0 where the flight tells nothing, infinite where there is no other value).
+        the next. The ratio is 0 where the flight tells nothing, infinite without another value.
         """
         tells = self.fit.horizontal <= EVIDENCE.good
         for fit in self.ranked:
@@ -471,8 +471,8 @@ class Ranking:
 
 
 def departures(evidence: Evidence) -> list[Reading]:
-    """Return the readings that explain a log where the log as declared does not: none, one, or
-    several that fit alike.
+    """Return the readings that explain a log better than its declaration: none, one, or several
+    equally good.
     """
     if evidence.enough and (late := evidence.late()):
         return [Reading(late=late)]
