@@ -29,7 +29,7 @@ BODY_TURNS: dict[str, Array] = {"flu": np.eye(3), "frd": _HALF_TURN, "y_up": _Y_
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class ChannelGroup:
     """Columns with one clock; rows in the order of time."""
 
     t: Array  # (N,) s
@@ -56,7 +56,7 @@ class Samples:
         """Return whether a section's columns are there."""
         return part.topic in ("", self.topic) and set(part.named) <= set(self.columns)
 
-    def cut(self, keep: slice | Mask | Rows) -> "Samples":
+    def cut(self, keep: slice | Mask | Rows) -> "ChannelGroup":
         """Return some of the rows; itself where a mask keeps all, since an hour takes 120 MB."""
         if isinstance(keep, np.ndarray) and keep.dtype == np.bool_ and keep.all():
             return self
@@ -119,25 +119,19 @@ def in_kit_axes(log_map: LogMap, part: Attitude, attitude: Array) -> Array:
     return np.asarray(turn.as_quat(scalar_first=True))
 
 
-@dataclass(frozen=True)
-class ClockSettings:
-    """When a clock is rolled over, reset or late."""
-
-    rollover: float = 2.0**32 * 1e-6  # s, of a counter of 32 bits of microseconds
-    jitter: float = 1.0  # s, of the stamps at both ends of a rollover
-    reset: float = 1.0  # s, the least step back of a restart; late rows are late by less
-    window: int = 5  # stamps, whose median is compared; one decides nothing
-    hole: float = 1.5  # median steps: the least hole that a late row fills
-    alone: float = 100.0  # median steps, and at least ``jitter``: a lone first or last stamp
-    # this far off all others is wrong
-
-
-CLOCK = ClockSettings()
+# When a clock is rolled over, reset or late.
+ROLLOVER = 2.0**32 * 1e-6  # s, of a counter of 32 bits of microseconds
+_JITTER = 1.0  # s, of the stamps at both ends of a rollover
+_RESET = 1.0  # s, the least step back of a restart; late rows are late by less
+_WINDOW = 5  # stamps, whose median is compared; one decides nothing
+_HOLE = 1.5  # median steps: the least hole that a late row fills
+_ALONE = 100.0  # median steps, and at least ``jitter``: a lone first or last stamp
+# this far off all others is wrong
 
 
 def on_one_clock(
-    path: Path, recorded: Sequence[Samples], piece: int | None = None
-) -> tuple[list[Samples], list[str]]:
+    path: Path, recorded: Sequence[ChannelGroup], piece: int | None = None
+) -> tuple[list[ChannelGroup], list[str]]:
     """Return groups of columns with times that increase strictly, and notes.
 
     Args:
@@ -148,11 +142,11 @@ def on_one_clock(
     Raises:
         InputError: there is no such piece.
     """
-    groups: list[Samples] = []
+    groups: list[ChannelGroup] = []
     notes: list[str] = []
     for samples in recorded:
-        over = np.cumsum(np.abs(np.diff(samples.t, prepend=np.nan) + CLOCK.rollover) < CLOCK.jitter)
-        groups.append(replace(samples, t=samples.t + CLOCK.rollover * over))
+        over = np.cumsum(np.abs(np.diff(samples.t, prepend=np.nan) + ROLLOVER) < _JITTER)
+        groups.append(replace(samples, t=samples.t + ROLLOVER * over))
         if over.any():
             notes.append("the clock of 32 bits rolled over in the log; later times go on behind it")
     groups, said = _of_piece(path, groups, piece)
@@ -173,8 +167,8 @@ def on_one_clock(
 
 
 def _of_piece(
-    path: Path, groups: list[Samples], piece: int | None
-) -> tuple[list[Samples], list[str]]:
+    path: Path, groups: list[ChannelGroup], piece: int | None
+) -> tuple[list[ChannelGroup], list[str]]:
     """Return each group's rows of one piece, and a note on the number of pieces.
 
     A group with another number of pieces was not written in each of them. Such a group stays whole,
@@ -220,10 +214,10 @@ def _resets(t: Array) -> Rows:
     back.
     """
     found: list[int] = []
-    for i in np.flatnonzero(np.diff(t) < -CLOCK.reset) + 1:
-        before, after = t[max(i - CLOCK.window, 0) : i], t[i : i + CLOCK.window]
-        enough = min(len(before), len(after)) >= min(CLOCK.window, 3)
-        if enough and float(np.median(after)) < float(np.median(before)) - CLOCK.reset:
+    for i in np.flatnonzero(np.diff(t) < -_RESET) + 1:
+        before, after = t[max(i - _WINDOW, 0) : i], t[i : i + _WINDOW]
+        enough = min(len(before), len(after)) >= min(_WINDOW, 3)
+        if enough and float(np.median(after)) < float(np.median(before)) - _RESET:
             found.append(int(i))
     return np.array(found, dtype=np.intp)
 
@@ -238,7 +232,7 @@ def in_order(t: Array) -> tuple[Rows, int]:
     rows: Rows = np.arange(len(t)) if increases else _longest_increase(t)
     if len(rows) > 3:  # a first or a last one far off all others is left out
         steps = np.diff(t[rows])
-        far = max(CLOCK.alone * float(np.median(steps)), CLOCK.jitter)
+        far = max(_ALONE * float(np.median(steps)), _JITTER)
         rows = rows[int(steps[0] > far) : len(rows) - int(steps[-1] > far)]
     if increases:
         return rows, 0
@@ -247,7 +241,7 @@ def in_order(t: Array) -> tuple[Rows, int]:
     steps = np.diff(t[rows])
     if not len(steps):
         return rows, 0
-    hole = CLOCK.hole * float(np.median(steps))
+    hole = _HOLE * float(np.median(steps))
     late = np.flatnonzero(others & (t > t[rows[0]]) & (t < t[rows[-1]]))
     late = late[np.unique(t[late], return_index=True)[1]]
     after = np.searchsorted(t[rows], t[late])

@@ -22,25 +22,19 @@ _FOURS = (("1", "2", "3", "4"), ("0", "1", "2", "3"))
 _TRIPLES = (("x", "y", "z"), ("roll", "pitch", "yaw"))  # their columns are no other group's
 
 
-@dataclass(frozen=True)
-class PartSettings:
-    """When numbers speak for a part, and their score beside a name's (4 for the likeliest)."""
-
-    numbers: float = 4.0  # score of numbers by the part's physics
-    certain: float = 2.0  # lead over the next candidate
-    length: tuple[float, float] = (2e-3, 0.02)  # of a quaternion: median error, and of 98 %
-    window: float = 0.2  # s, of the window for rates
-    rows: int = 20_000  # at most, from the middle of the flight
-    samples: int = 4000  # at most, of the rows compared
-    levels: int = 10  # of a switch, at most
-    fewest: int = 30  # for a decision
-    follows: float = 0.7  # correlation of a signal with its driver
-    alike: float = 1.6  # ratio of medians of four rotors
-    felt: float = 0.5  # correlation of rotors with the specific force
-    shown: int = 4  # candidates in a map
-
-
-PARTS = PartSettings()
+# When numbers speak for a part, and their score beside a name's (4 for the likeliest).
+_NUMBERS = 4.0  # score of numbers by the part's physics
+CERTAIN_LEAD = 2.0  # lead over the next candidate
+_LENGTH_ERROR = (2e-3, 0.02)  # of a quaternion: median error, and of 98 %
+_WINDOW = 0.2  # s, of the window for rates
+_MOST_ROWS = 20_000  # at most, from the middle of the flight
+_MOST_SAMPLES = 4000  # at most, of the rows compared
+_LEVELS = 10  # of a switch, at most
+_FEWEST = 30  # for a decision
+_FOLLOWS = 0.7  # correlation of a signal with its driver
+_ALIKE = 1.6  # ratio of medians of four rotors
+_FELT = 0.5  # correlation of rotors with the specific force
+SHOWN = 4  # candidates in a map
 
 
 def correlation(x: Array, y: Array) -> float:
@@ -58,9 +52,9 @@ class Numbers:
 
     def __init__(self, t: Array, data: Mapping[str, Array]) -> None:
         order = np.argsort(t, kind="stable")[: int(np.isfinite(t).sum())]
-        self.order = order[max(0, (len(order) - PARTS.rows) // 2) :][: PARTS.rows]
+        self.order = order[max(0, (len(order) - _MOST_ROWS) // 2) :][:_MOST_ROWS]
         self.t = t[self.order]
-        count = min(PARTS.samples, len(self.t))
+        count = min(_MOST_SAMPLES, len(self.t))
         # times (n,) in s of comparisons of motors
         self.clock = self.t[np.linspace(0, len(self.t) - 1, count).astype(int)]
         self.data = {name: x for name, x in data.items() if np.isfinite(x[self.order]).any()}
@@ -79,7 +73,7 @@ class Numbers:
     def some(self, columns: Sequence[str]) -> Array:
         """Return values (n, k) of some rows, spread over all."""
         values = self.rows(columns)[1]
-        return values[:: max(1, len(values) // PARTS.samples)]
+        return values[:: max(1, len(values) // _MOST_SAMPLES)]
 
     def between(self, t: Array, columns: Sequence[str]) -> Array:
         """Return values (n, k) at times (n,), of lines between the rows."""
@@ -90,7 +84,7 @@ class Numbers:
 
     def varies(self, column: str) -> bool:
         """Return whether a column takes more than a few values: no counter's and no switch's."""
-        return column in self.data and len(np.unique(self.some([column]))) > PARTS.levels
+        return column in self.data and len(np.unique(self.some([column]))) > _LEVELS
 
     def quaternion(self, columns: Sequence[str]) -> tuple[float, str]:
         """Return 1 where columns may be an attitude: three angles are 0, for nothing shows them;
@@ -102,9 +96,9 @@ class Numbers:
         length = np.linalg.norm(x, axis=1)
         there = length > 0.5  # zeros stand for a missing quaternion
         off = np.abs(length[there] - 1.0)
-        if len(off) < max(2, 0.5 * len(x)) or np.median(off) >= PARTS.length[0]:
+        if len(off) < max(2, 0.5 * len(x)) or np.median(off) >= _LENGTH_ERROR[0]:
             return -np.inf, ""
-        is_one = np.quantile(off, 0.98) < PARTS.length[1]
+        is_one = np.quantile(off, 0.98) < _LENGTH_ERROR[1]
         return (1.0 if is_one else -np.inf), "their length is 1"
 
     def gravity(self, columns: Sequence[str]) -> tuple[float, str]:
@@ -123,27 +117,27 @@ class Numbers:
         """
         if not self.attitude:
             return 0.0, ""
-        every = slice(None, None, max(1, len(self.rows(self.attitude)[0]) // PARTS.samples))
+        every = slice(None, None, max(1, len(self.rows(self.attitude)[0]) // _MOST_SAMPLES))
         times, attitude = (x[every] for x in self.rows(self.attitude))
-        if min(len(times), len(self.rows(columns)[0])) < PARTS.fewest:
+        if min(len(times), len(self.rows(columns)[0])) < _FEWEST:
             return 0.0, ""
-        force, best = second_difference(times, PARTS.window, *self.rows(columns)).T, 0.0
+        force, best = second_difference(times, _WINDOW, *self.rows(columns)).T, 0.0
         for w, x, y, z in (attitude.T, attitude[:, [3, 0, 1, 2]].T):
             for sign in (1.0, -1.0):
                 tilt = x * z + sign * w * y, y * z - sign * w * x
                 found = [abs(correlation(f, d)) for f, d in zip(force, tilt, strict=False)]
                 best = max(best, min(found))
-        return (best if best > PARTS.follows else 0.0), "their acceleration follows the tilt"
+        return (best if best > _FOLLOWS else 0.0), "their acceleration follows the tilt"
 
     def moves_together(self, columns: Sequence[str]) -> tuple[float, str]:
         """Return 1 where four columns are of one size and move with the specific force."""
         x = self.some(columns)
         x = x[np.any(x != 0.0, axis=1)]
-        if len(x) < PARTS.fewest or np.mean(x < 0.0) > 0.01 or not np.all(np.ptp(x, axis=0) > 0.0):
+        if len(x) < _FEWEST or np.mean(x < 0.0) > 0.01 or not np.all(np.ptp(x, axis=0) > 0.0):
             return 0.0, ""
         middle, total = np.median(x, axis=0), self.between(self.clock, columns).sum(axis=1)
-        together = middle.min() * PARTS.alike >= middle.max() > 0.0
-        together &= any(correlation(total, felt) > PARTS.felt for felt in self.felt)
+        together = middle.min() * _ALIKE >= middle.max() > 0.0
+        together &= any(correlation(total, felt) > _FELT for felt in self.felt)
         return float(together), "they move together with the specific force"
 
     def feel(self, accelerometer: Sequence[str], position: Sequence[str]) -> None:
@@ -151,7 +145,7 @@ class Numbers:
         if accelerometer:
             self.felt = [np.linalg.norm(self.between(self.clock, accelerometer), axis=1)]
         elif position:
-            force = second_difference(self.clock, PARTS.window, *self.rows(position)).T
+            force = second_difference(self.clock, _WINDOW, *self.rows(position)).T
             self.felt = [*force, *-force]
 
     def elasticity(self, values: Array) -> float:
@@ -165,13 +159,13 @@ class Numbers:
         mean = np.interp(self.clock, self.t[good], total[good])
         there = (mean > 0.5 * np.median(mean)) & (self.felt[0] > 0.3 * np.median(self.felt[0]))
         x, y = np.log(mean[there]), np.log(self.felt[0][there])
-        if len(x) < PARTS.fewest or correlation(x, y) < 0.85:
+        if len(x) < _FEWEST or correlation(x, y) < 0.85:
             return np.nan
         return float(np.std(y) / np.std(x))
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class ColumnCandidate:
     """Columns of a possible part of a flight."""
 
     group: Group
@@ -206,7 +200,7 @@ def candidates(
     names: Sequence[Name],
     numbers: Numbers,
     judge: Callable[[Sequence[str]], tuple[float, str]],
-) -> list[Candidate]:
+) -> list[ColumnCandidate]:
     """Return the candidates of a part by their names and numbers, the likeliest first.
 
     Args:
@@ -225,7 +219,7 @@ def candidates(
         for group in (group for endings in way["endings"] for group in groups_of(names, endings)):
             places = (i for i, word in enumerate(way["words"]) if re.fullmatch(word, group.key))
             if (i := next(places, None)) is not None:
-                by_name = PARTS.numbers - 0.3 * i - 0.5 * number
+                by_name = _NUMBERS - 0.3 * i - 0.5 * number
                 ways.append((group, by_name, "by the columns' names"))
             elif commanded or _named(group, part):
                 continue
@@ -238,13 +232,13 @@ def candidates(
         measured = tuple(name.column for name in loose if not re.search(wanted, name.base))
         for i in range(len(measured) - width + 1):  # adjacent columns
             ways.append((Group(measured[i : i + width], ""), 0.0, ""))
-    found: dict[tuple[str, ...], Candidate] = {}
+    found: dict[tuple[str, ...], ColumnCandidate] = {}
     for group, score, why in ways:
         there = len(numbers.rows(group.columns)[0]) > 0
         strength, told = judge(group.columns) if there else (0.0, "")
-        whole = Candidate(
+        whole = ColumnCandidate(
             group,
-            score + PARTS.numbers * strength,
+            score + _NUMBERS * strength,
             "; ".join(filter(None, (why, told if strength else ""))),
         )
         before = found.get(group.columns)

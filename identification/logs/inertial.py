@@ -9,7 +9,7 @@ is left to show the accelerometer.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,27 +17,20 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation, Slerp
 
 from ..motion.smoothing import resampled, second_difference
-from .evidence import EVIDENCE, likelihood
+from .evidence import GOOD, likelihood
 from .flight_log import ACCELEROMETER, GYRO, FlightLog
 from .magnitudes import MAGNITUDES
 from .readings import ACCELEROMETER_READINGS, AS_DECLARED, GYRO_READINGS, OTHER, SensorReading
 from .table import Array, finite_rows
 
-
-@dataclass(frozen=True)
-class InertialSettings:
-    """How inertial sensors are compared."""
-
-    window: float = 0.2  # s: 5 mm of pose noise make 0.3 m/s2 over it
-    step: float = 0.05  # s between two comparisons
-    gap: float = 0.1  # s without a sample; no comparison across
-    fewest: int = 10  # comparisons for a decision
-    samples: int = 20  # of pose and of sensor, at least
-    still: float = 0.1  # rad/s: the rate of a standing vehicle by pose noise
-    moving: float = 0.5  # m/s2 of horizontal acceleration, far above pose noise
-
-
-INERTIAL = InertialSettings()
+# How inertial sensors are compared.
+_WINDOW = 0.2  # s: 5 mm of pose noise make 0.3 m/s2 over it
+_STEP = 0.05  # s between two comparisons
+_GAP = 0.1  # s without a sample; no comparison across
+_FEWEST = 10  # comparisons for a decision
+LEAST_SAMPLES = 20  # of pose and of sensor, at least
+_STILL = 0.1  # rad/s: the rate of a standing vehicle by pose noise
+_MOVING = 0.5  # m/s2 of horizontal acceleration, far above pose noise
 _BY_GRAVITY = [reading for reading in ACCELEROMETER_READINGS if not reading.lacks_gravity]
 
 
@@ -89,7 +82,7 @@ def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, tu
 
 def is_stuck(measured: Array) -> bool:
     """Return whether the readings (N, 3) of a sensor are all the same."""
-    return len(measured) >= INERTIAL.samples and bool(np.all(np.ptp(measured, axis=0) == 0.0))
+    return len(measured) >= LEAST_SAMPLES and bool(np.all(np.ptp(measured, axis=0) == 0.0))
 
 
 def sensor_doubt(
@@ -102,11 +95,11 @@ def sensor_doubt(
         readings: the other ones.
         otherwise: words for a sensor without an explanation.
     """
-    if shares is None or shares[0] <= EVIDENCE.good:
+    if shares is None or shares[0] <= GOOD:
         return ""
     declared, *others = (likelihood([share] * 3) for share in shares)
     best = max(others)
-    if min(shares[1:]) > EVIDENCE.good or best - declared < OTHER:
+    if min(shares[1:]) > GOOD or best - declared < OTHER:
         return otherwise
     alike = [r.says for score, r in zip(others, readings, strict=True) if score > best - 1.0]
     return "; or ".join(alike[:3])
@@ -128,14 +121,14 @@ def gyro_shares(
     read = np.isfinite(t) & finite_rows(gyro)
     t, gyro = t[read], gyro[read]
     begins = _windows(pose_times, t, before=0.0)
-    if len(begins) < INERTIAL.fewest:
+    if len(begins) < _FEWEST:
         return None
-    at, ends = Slerp(pose_times, attitude), begins + INERTIAL.window
-    turned = (at(begins).inv() * at(ends)).as_rotvec() / INERTIAL.window
+    at, ends = Slerp(pose_times, attitude), begins + _WINDOW
+    turned = (at(begins).inv() * at(ends)).as_rotvec() / _WINDOW
     sum_of = cumulative_trapezoid(gyro, t, axis=0, initial=0.0)
-    mean = (resampled(ends, t, sum_of) - resampled(begins, t, sum_of)) / INERTIAL.window
+    mean = (resampled(ends, t, sum_of) - resampled(begins, t, sum_of)) / _WINDOW
     motion, seen = turned - np.median(turned, axis=0), mean - np.median(mean, axis=0)  # a bias
-    size = _middle(motion) + INERTIAL.still**2
+    size = _middle(motion) + _STILL**2
     return [_middle(motion - seen @ turn.T) / size for turn in turns]
 
 
@@ -154,8 +147,8 @@ def _force_shares(
     Gravity hides the axes: along z both look alike. The horizontal acceleration of the position
     tells them.
     """
-    middles = _windows(pose_times, t, before=INERTIAL.window)
-    if len(middles) < INERTIAL.fewest:
+    middles = _windows(pose_times, t, before=_WINDOW)
+    if len(middles) < _FEWEST:
         return None, None
     inside = (t >= pose_times[0]) & (t <= pose_times[-1])
     body = Slerp(pose_times, attitude)(np.clip(t, pose_times[0], pose_times[-1]))
@@ -165,18 +158,18 @@ def _force_shares(
         sums, times = force[inside], t[inside]
         for _ in range(2):
             sums = cumulative_trapezoid(sums, times, axis=0, initial=0.0)
-        return second_difference(middles, INERTIAL.window, times, sums) / INERTIAL.window**2
+        return second_difference(middles, _WINDOW, times, sums) / _WINDOW**2
 
     up, turned = np.zeros(3), None
-    needed = second_difference(middles, INERTIAL.window, pose_times, position) / INERTIAL.window**2
-    moves = np.linalg.norm(needed[:, :2], axis=1) > INERTIAL.moving
-    if np.count_nonzero(moves) >= INERTIAL.fewest:
+    needed = second_difference(middles, _WINDOW, pose_times, position) / _WINDOW**2
+    moves = np.linalg.norm(needed[:, :2], axis=1) > _MOVING
+    if np.count_nonzero(moves) >= _FEWEST:
         in_body, in_world = (
             _middle((needed - mean(x))[moves, :2]) / _middle(needed[moves, :2])
             for x in (body.apply(measured), measured)
         )
         lead = likelihood([in_world] * 2) - likelihood([in_body] * 2)
-        if in_world <= EVIDENCE.good and lead >= OTHER:
+        if in_world <= GOOD and lead >= OTHER:
             up[2] = gravity if np.median(measured[inside, 2]) < 0.5 * gravity else 0.0
             turned = measured = body.inv().apply(measured + up)
     up[2] = gravity
@@ -220,16 +213,16 @@ def _windows(pose_times: Array, sensor_times: Array, before: float) -> Array:
     """Return times (n,) in s without a gap of pose or sensor, from ``before`` earlier to a window
     later.
     """
-    if min(len(pose_times), len(sensor_times)) < INERTIAL.samples:
+    if min(len(pose_times), len(sensor_times)) < LEAST_SAMPLES:
         return np.empty(0)
     first = max(pose_times[0], sensor_times[0]) + before
-    last = min(pose_times[-1], sensor_times[-1]) - INERTIAL.window
+    last = min(pose_times[-1], sensor_times[-1]) - _WINDOW
     if last <= first:
         return np.empty(0)
-    count = min(int((last - first) / INERTIAL.step), 100_000)
+    count = min(int((last - first) / _STEP), 100_000)
     times: Array = np.linspace(first, last, count + 1)
     for clock in (pose_times, sensor_times):
-        gaps = np.flatnonzero(np.diff(clock) > INERTIAL.gap)
-        begun = np.searchsorted(clock[gaps], times + INERTIAL.window)
+        gaps = np.flatnonzero(np.diff(clock) > _GAP)
+        begun = np.searchsorted(clock[gaps], times + _WINDOW)
         times = times[begun == np.searchsorted(clock[gaps + 1], times - before, "right")]
     return times

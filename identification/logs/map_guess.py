@@ -23,8 +23,8 @@ from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS
 from .channels import BODY_TURNS
 from .column_names import WORDS, Group, Name, named_alone, take_apart
-from .column_parts import PARTS, Candidate, Numbers, candidates, named_columns
-from .evidence import EVIDENCE, Evidence, Fit, Ranking, likelihood
+from .column_parts import CERTAIN_LEAD, SHOWN, ColumnCandidate, Numbers, candidates, named_columns
+from .evidence import GOOD, GOOD_TORQUE, TURNING_RATE, Evidence, Fit, RankedFits, likelihood
 from .excerpt import LONGEST
 from .inertial import gyro_shares
 from .log_map import (
@@ -152,11 +152,11 @@ class _Guessing:
         self.sections: dict[str, Any] = {}
         self.time_columns: tuple[str, ...] = ()
         self.reasons: list[Reason] = []
-        self.ranked: dict[str, list[Candidate]] = {}  # of each part
+        self.ranked: dict[str, list[ColumnCandidate]] = {}  # of each part
         self.parts: dict[str, Group] = {}  # the first of the candidates, if likely
         self.unnamed: set[str] = set()  # sections without telling names
         self.further: dict[str, str] = {}  # words on more than four motors, by part
-        self.ranking: Ranking | None = None  # of the pose
+        self.ranking: RankedFits | None = None  # of the pose
         names = take_apart(table.header, table.units)
         self.data = _numbers_of(table, names)
         self.clock = _time_column(names, self.data)
@@ -199,10 +199,10 @@ class _Guessing:
         self.free = [name for name in self.free if name.column not in group.columns]
         if part != "commands" and not ranked[0].why.startswith("by"):
             self.unnamed.add(part)
-        likely = [c for c in ranked if c.score > max(0.0, ranked[0].score - PARTS.certain)]
+        likely = [c for c in ranked if c.score > max(0.0, ranked[0].score - CERTAIN_LEAD)]
         if part in _EXAMPLES and (len(likely) > 1 or part in self.unnamed):
             field = "order" if len(group.columns) == 4 else "columns"
-            self.say(part, field, False, "; or ".join(map(str, likely[: PARTS.shown])))
+            self.say(part, field, False, "; or ".join(map(str, likely[:SHOWN])))
         return group
 
     def values(self, part: str) -> Array:
@@ -214,7 +214,7 @@ class _Guessing:
         out = []
 
         def lack(part: str, section: str, why: str, field: str = "columns") -> None:
-            found = self.ranked.get(part, [])[: PARTS.shown]
+            found = self.ranked.get(part, [])[:SHOWN]
             out.append(Reason(section, field, False, why, tuple(map(str, found))))
 
         if self.clock is None:
@@ -306,7 +306,7 @@ class _Guessing:
         motors = [self.values(part) for part in _MOTORS if part in self.parts]
         thrusts = np.square(motors[0]) if motors else np.ones((len(self.t), 4))
         evidence = Evidence(self.t, thrusts, self.values("position"), attitude)
-        self.ranking = ranking = Ranking.of(evidence, readings, torques=False)
+        self.ranking = ranking = RankedFits.of(evidence, readings, torques=False)
         best = ranking.best
         length = self.unit("position", place.unit, ranking.says("length"))
         fields = [("world", "", "world"), ("body", "", "body"), ("attitude", "sense", "sense")]
@@ -348,7 +348,7 @@ class _Guessing:
         if self.ranking is None:
             self.sections["body"] = axes
 
-    def gyro_fits(self, columns: Sequence[str], unit: str = "") -> Ranking | None:
+    def gyro_fits(self, columns: Sequence[str], unit: str = "") -> RankedFits | None:
         """Return fits of columns to the pose's turns, by each unit and body axes; None: no pose, or
         too short a pose. Another unit than a named one has a penalty.
         """
@@ -365,7 +365,7 @@ class _Guessing:
             for way, left in zip(_GYROS, shares, strict=False)
         ]
         ranked = sorted(fits, key=lambda fit: -fit.score)
-        return Ranking(ranked, "attitude's rate is left unexplained") if fits else None
+        return RankedFits(ranked, "attitude's rate is left unexplained") if fits else None
 
     def turns_alike(self, columns: Sequence[str]) -> tuple[float, str]:
         """Return the share of the pose's turns in three columns, at most 1; 0 where they turn
@@ -373,7 +373,7 @@ class _Guessing:
         """
         ranking = self.gyro_fits(columns)
         left = 1.0 if ranking is None else ranking.fit.horizontal
-        return (1.0 - left if left <= EVIDENCE.good else 0.0), "they turn as the attitude does"
+        return (1.0 - left if left <= GOOD else 0.0), "they turn as the attitude does"
 
     def gyro(self, group: Group) -> None:
         """Find unit and axes of the gyro: from the pose's turns, or from size and accelerometer."""
@@ -442,7 +442,7 @@ class _Guessing:
         if evidence is None or not evidence.enough:
             return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
         ways = [replace(best, rotors=(a, b, c, d)) for a, b, c, d in permutations(ROTORS)]
-        ranking = Ranking.of(evidence, ways)
+        ranking = RankedFits.of(evidence, ways)
         left, lead = ranking.fit.torque, ranking.other("rotors")[1]
         order = ranking.best.motors
         names = order_names(order)
@@ -450,8 +450,8 @@ class _Guessing:
             f"{names[0] if names else order_words(order)}: {left:.0%} of the angular acceleration "
             f"is left, and the next best is less likely by a log-likelihood ratio of {lead:.3g}"
         )
-        turns = evidence.turns(best) >= EVIDENCE.turning
-        if left <= EVIDENCE.good_torque and ranking.certain("rotors") and turns:
+        turns = evidence.turns(best) >= TURNING_RATE
+        if left <= GOOD_TORQUE and ranking.certain("rotors") and turns:
             return order, True, why
         if names and left <= 0.9 and lead >= 1.0:
             return order, False, why

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from .channels import Samples, in_kit_axes, in_kit_units, on_one_clock, quaternions
+from .channels import ChannelGroup, in_kit_axes, in_kit_units, on_one_clock, quaternions
 from .commanded_speeds import flown_vehicle
 from .flight_log import NORM_TOLERANCE, VEHICLE, FlightLog
 from .log_map import (
@@ -75,7 +75,7 @@ def map_table(
     vehicle = flown_vehicle(vehicle, log_map.vehicle)
     log_map = fitted(table.header, table.path, log_map, vehicle, reader)
     columns = table.read(log_map.wanted)
-    if log_map.is_own and rows_apart(Samples(np.arange(float(table.rows)), columns), log_map):
+    if log_map.is_own and rows_apart(ChannelGroup(np.arange(float(table.rows)), columns), log_map):
         log_map = replace(log_map, rows="mixed")
     notes = [*table.notes, *log_map.notes, *([log_map.time.note] if log_map.time.note else [])]
     if not log_map.is_own or log_map.rows == "mixed":
@@ -90,7 +90,7 @@ def map_table(
 
 def recording_of(
     path: Path,
-    recorded: Sequence[Samples],
+    recorded: Sequence[ChannelGroup],
     log_map: LogMap,
     reader: str,
     notes: Sequence[str],
@@ -174,7 +174,7 @@ def recording_of(
 
 
 def _pose(
-    path: Path, log_map: LogMap, samples: Samples, turned: Samples | None
+    path: Path, log_map: LogMap, samples: ChannelGroup, turned: ChannelGroup | None
 ) -> tuple[Stream, list[str]]:
     """Return positions in m and attitudes (N, 7) in the kit's frames, NaN where there is none, and
     notes.
@@ -250,7 +250,7 @@ def _pose(
     return Stream(place.label, t, pose), notes
 
 
-def _kept_rows(samples: Samples, log_map: LogMap, part: Columns) -> Mask:
+def _kept_rows(samples: ChannelGroup, log_map: LogMap, part: Columns) -> Mask:
     """Return the rows (N,) of a group for a section's stream: all messages. In a table with
     channels in rows of their own, the section's rows; else the rows with a position or an inertial
     sensor's sample. All rows stay where most have a position: the others lost the position.
@@ -358,7 +358,9 @@ def with_range(log_map: LogMap, vehicle: Vehicle | None, where: str) -> LogMap:
     return replace(log_map, commands=replace(commands, range=curve.command))
 
 
-def chosen(recorded: Sequence[Samples], log_map: LogMap) -> tuple[LogMap, dict[str, Samples]]:
+def chosen(
+    recorded: Sequence[ChannelGroup], log_map: LogMap
+) -> tuple[LogMap, dict[str, ChannelGroup]]:
     """Return a map with one way to fill each section, and the columns' groups. The first way with
     columns and measurements is taken; a position together with its attitude. Optional sections
     without columns are left out.
@@ -385,7 +387,7 @@ def chosen(recorded: Sequence[Samples], log_map: LogMap) -> tuple[LogMap, dict[s
     ), samples
 
 
-def _is_measured(section: str, way: Columns, samples: Samples, rows: str) -> bool:
+def _is_measured(section: str, way: Columns, samples: ChannelGroup, rows: str) -> bool:
     """Return whether a section's columns hold measurements: turning rotors, a voltage, a changing
     position (of any but ``messages``), or two samples of others.
     """

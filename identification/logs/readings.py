@@ -95,7 +95,7 @@ ACCELEROMETER_READINGS = tuple(_sensor(**stated) for stated in _STATED["accelero
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class ColumnReading:
     """One way to read a flight's columns."""
 
     order: str = "wxyz"  # of a quaternion's columns
@@ -214,7 +214,7 @@ def _combined(matrix: Array, columns: Sequence[str]) -> str:
     return f"({', '.join(rows)})"
 
 
-def _quaternion(reading: Reading) -> str:
+def _quaternion(reading: ColumnReading) -> str:
     """Return in words the kit's quaternion of the columns qw, qx, qy, qz."""
     frames = reading.frames
     mirror = np.linalg.det(frames.world)  # the body's too: a mirrored rotation is one again
@@ -226,18 +226,23 @@ def _quaternion(reading: Reading) -> str:
     return text if abs(first) > 0.9 else f"0.7071 {text}"
 
 
-DECLARED = Reading()
+DECLARED = ColumnReading()
 # penalties in log-likelihood ratios: the declared reading is right far more often, and there are
 # some 60 different time offsets
 OTHER, OFFSET = 8.0, 12.0
 
 
-def _each(**aspects: Sequence[Any]) -> list[Reading]:
+def _each(**aspects: Sequence[Any]) -> list[ColumnReading]:
     """Return the readings of all combinations of aspects."""
-    return [Reading(**dict(zip(aspects, each, strict=True))) for each in product(*aspects.values())]
+    return [
+        ColumnReading(**dict(zip(aspects, each, strict=True)))
+        for each in product(*aspects.values())
+    ]
 
 
-def _weighed(found: Sequence[Reading], least: float, world: str = "enu") -> list[Reading]:
+def _weighed(
+    found: Sequence[ColumnReading], least: float, world: str = "enu"
+) -> list[ColumnReading]:
     """Return readings with a penalty of ``least``, and 1 for each less usual convention.
 
     Args:
@@ -260,7 +265,7 @@ def _weighed(found: Sequence[Reading], least: float, world: str = "enu") -> list
     ]
 
 
-def log_readings(has_pose: bool) -> list[Reading]:
+def log_readings(has_pose: bool) -> list[ColumnReading]:
     """Return the readings of the kit's own columns, the one as declared first.
 
     Args:
@@ -269,7 +274,7 @@ def log_readings(has_pose: bool) -> list[Reading]:
     others = _each(gyro=GYRO_READINGS)
     if has_pose:
         others = _each(order=("wxyz", "xyzw", "zwxy"), sense=SENSES, frames=_USUAL_FRAMES)[1:]
-        others.append(Reading(sense="world_to_body", frames=_frames(**_STATED["mirrored"])))
+        others.append(ColumnReading(sense="world_to_body", frames=_frames(**_STATED["mirrored"])))
         others += _each(frames=_POSITIONS) + _each(length=("cm", "mm"))
     others += _each(mirrored=(False, True), rotors=tuple(permutations(ROTORS)))[1:]
     return [DECLARED, *_weighed(others, OTHER)]
@@ -277,7 +282,7 @@ def log_readings(has_pose: bool) -> list[Reading]:
 
 def table_readings(
     orders: Sequence[str], units: Sequence[str], length: str, hint: str
-) -> list[Reading]:
+) -> list[ColumnReading]:
     """Return the readings of a table's pose within a map's words.
 
     Args:
@@ -297,7 +302,7 @@ def table_readings(
     ]
 
 
-def rotations(columns: Array, reading: Reading) -> tuple[Mask, Rotation]:
+def rotations(columns: Array, reading: ColumnReading) -> tuple[Mask, Rotation]:
     """Return the rows (N,) with an attitude, and their rotations by a reading, body to world in the
     kit's frames.
     """
@@ -306,7 +311,7 @@ def rotations(columns: Array, reading: Reading) -> tuple[Mask, Rotation]:
     return good, Rotation.from_matrix(frames.world @ rotation.as_matrix() @ frames.body)
 
 
-def as_written(columns: Array, reading: Reading) -> tuple[Mask, Rotation]:
+def as_written(columns: Array, reading: ColumnReading) -> tuple[Mask, Rotation]:
     """Return the same, body to world, in the columns' own frames."""
     part = reading.part()
     good = finite_rows(columns)

@@ -27,9 +27,9 @@ from .evidence import Evidence, departures
 from .excerpt import excerpt
 from .flight_log import FlightLog
 from .flight_phases import carrying, flying
-from .inertial import INERTIAL, gravity_doubt, is_stuck
+from .inertial import LEAST_SAMPLES, gravity_doubt, is_stuck
 from .magnitudes import MAGNITUDES, rotor_doubt, thrust_by_weight, time_doubt, within
-from .readings import Reading
+from .readings import ColumnReading
 from .streams import MOTOR_RATES
 from .table import Array, Mask, median_step
 
@@ -132,7 +132,7 @@ def screen_log(
         hear(_new_poses(log, same))
         log = replace(log, valid=log.valid & ~same)
     hear(stuck_channels(log, vehicle))
-    others: list[Reading] = []
+    others: list[ColumnReading] = []
     if by_imu or pose_pieces(log):
         evidence = Evidence.of_log(excerpt([log])[0], vehicle, by_imu)
         others = departures(evidence)[:3]
@@ -231,7 +231,7 @@ def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
     assert log.gyro is not None
     assert log.accelerometer is not None
     rows = np.flatnonzero(np.isfinite(log.gyro[:, 0]) & np.isfinite(log.accelerometer[:, 0]))
-    if len(rows) < INERTIAL.samples:
+    if len(rows) < LEAST_SAMPLES:
         yield Refused(
             f"ax, ay, az and gx, gy, gz are read together in {len(rows)} row(s); expected them in "
             "the same rows, and a whole flight"

@@ -307,22 +307,16 @@ class MotorRates:
 MOTOR_RATES = MotorRates()
 
 
-@dataclass(frozen=True)
-class SourceRateSettings:
-    """When values repeat because nothing was measured, and not because they were rounded."""
-
-    # share of the median spacing of changes: rounded values change at any spacing, held ones at
-    # their own
-    least_spacing: float = 0.6
-    least_rows: float = 2.0  # median spacing in rows; below, each row is a sample
-    early: float = 0.05  # quantile of spacings compared with the median
-    # share of the RMS distance from the line between both neighbours: on the line
-    on_line: float = 1e-3
-    most_corners: float = 2 / 3  # of the rows; with more no two corners can be told apart
-    least_changes: int = 8  # for a spacing
-
-
-SOURCE_RATE = SourceRateSettings()
+# When values repeat because nothing was measured, and not because they were rounded.
+# share of the median spacing of changes: rounded values change at any spacing, held ones at
+# their own
+_LEAST_SPACING = 0.6
+_LEAST_ROWS = 2.0  # median spacing in rows; below, each row is a sample
+_EARLY = 0.05  # quantile of spacings compared with the median
+# share of the RMS distance from the line between both neighbours: on the line
+_ON_LINE = 1e-3
+_MOST_CORNERS = 2 / 3  # of the rows; with more no two corners can be told apart
+_LEAST_CHANGES = 8  # for a spacing
 
 
 def source_rate(t: Array, values: Array) -> float:
@@ -367,18 +361,18 @@ def _corners(t: Array, values: Array) -> Rows:
     off += values[:-2]
     np.abs(np.subtract(values[1:-1], off, out=off), out=off)
     rms = np.sqrt(np.mean(np.square(off), axis=0))
-    is_corner = (off > SOURCE_RATE.on_line * rms).any(axis=1)
-    if np.mean(is_corner) > SOURCE_RATE.most_corners:
+    is_corner = (off > _ON_LINE * rms).any(axis=1)
+    if np.mean(is_corner) > _MOST_CORNERS:
         return np.empty(0, dtype=np.intp)
     return np.flatnonzero(is_corner & ~np.append(False, is_corner[:-1]))
 
 
 def _spacing(events: Rows) -> float:
     """Return the usual number of rows between regular events; else 1."""
-    use, spacing = SOURCE_RATE, np.diff(events)
-    if len(spacing) < use.least_changes:
+    spacing = np.diff(events)
+    if len(spacing) < _LEAST_CHANGES:
         return 1.0
     median = float(np.median(spacing))
-    beat = float(np.quantile(spacing, use.early)) >= use.least_spacing * median
-    usual = spacing[spacing < median / use.least_spacing]  # no gap
-    return float(np.mean(usual)) if beat and median >= use.least_rows else 1.0
+    beat = float(np.quantile(spacing, _EARLY)) >= _LEAST_SPACING * median
+    usual = spacing[spacing < median / _LEAST_SPACING]  # no gap
+    return float(np.mean(usual)) if beat and median >= _LEAST_ROWS else 1.0

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...runtime.errors import InputError
-from .channels import Samples
+from .channels import ChannelGroup
 from .log_map import UNITS, Columns, LogMap
 from .table import Array, Mask, Rows, Table
 
@@ -28,7 +28,7 @@ _FEWEST = 10  # samples of a channel to decide on its rows
 
 def rows_of(
     table: Table, columns: Mapping[str, Array], log_map: LogMap
-) -> tuple[Samples, list[str]]:
+) -> tuple[ChannelGroup, list[str]]:
     """Return the map's columns, as written, and notes.
 
     Raises:
@@ -44,8 +44,8 @@ def rows_of(
     if not clock.column:
         t = rows / clock.rate_hz + (clock.offset or 0.0)
         notes.append(f"time: rows at {clock.rate_hz:g} Hz, as the map says")
-        return Samples(t, columns, table=table, rows=rows), notes
-    samples = Samples(clock.raw(columns), columns, table=table, rows=rows)
+        return ChannelGroup(t, columns, table=table, rows=rows), notes
+    samples = ChannelGroup(clock.raw(columns), columns, table=table, rows=rows)
     if is_whole:
         _refuse(samples, clock.column, samples.t, ~np.isfinite(samples.t))
     samples = samples.cut(np.isfinite(samples.t))
@@ -96,7 +96,9 @@ def rows_of(
     return samples, notes
 
 
-def _refuse(samples: Samples, name: str, column: Array, bad: Mask, expected: str = _FINITE) -> None:
+def _refuse(
+    samples: ChannelGroup, name: str, column: Array, bad: Mask, expected: str = _FINITE
+) -> None:
     """Raise InputError at the first ``bad`` (N,) value of a column (N,)."""
     if bad.any():
         i = int(np.argmax(bad))
@@ -107,7 +109,7 @@ def _refuse(samples: Samples, name: str, column: Array, bad: Mask, expected: str
         raise InputError(f"{where} is {found}; expected {expected}")
 
 
-def _check_whole(samples: Samples, log_map: LogMap) -> None:
+def _check_whole(samples: ChannelGroup, log_map: LogMap) -> None:
     """Raise InputError at a row with a part of a pose, or of a sensor's three values, or without
     another number. ``check_rows`` checks gaps of motors and of the voltage.
     """
@@ -128,7 +130,7 @@ def _check_whole(samples: Samples, log_map: LogMap) -> None:
     check([name for name in others if name not in pose], True, _FINITE)
 
 
-def rows_apart(samples: Samples, log_map: LogMap) -> bool:
+def rows_apart(samples: ChannelGroup, log_map: LogMap) -> bool:
     """Return whether channels stand in rows of their own: another channel prefers the rows without
     a position (without a gyro's sample, in a log of no pose). After the loss of a pose, the others
     are in all rows alike.
@@ -148,7 +150,7 @@ def rows_apart(samples: Samples, log_map: LogMap) -> bool:
     )
 
 
-def check_rows(samples: Samples, log_map: LogMap) -> list[str]:
+def check_rows(samples: ChannelGroup, log_map: LogMap) -> list[str]:
     """Return notes on the gaps of motors, of a true wrench, and of whole rows' voltage.
 
     Args:
@@ -191,7 +193,7 @@ def check_rows(samples: Samples, log_map: LogMap) -> list[str]:
     return notes
 
 
-def _longest_gap(samples: Samples, name: str, column: Array) -> float:
+def _longest_gap(samples: ChannelGroup, name: str, column: Array) -> float:
     """Return the longest time step of a column's (N,) values, in s.
 
     Raises:

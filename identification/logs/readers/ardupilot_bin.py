@@ -35,7 +35,7 @@ from ....runtime.compiled import compiled
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
-from ..channels import Samples, in_order
+from ..channels import ChannelGroup, in_order
 from ..flight_log import FlightLog
 from ..log_map import Commands, LogMap, shipped_map, stated
 from ..mapped_log import recording_of
@@ -124,7 +124,7 @@ def _times(messages: Messages) -> Array:
     return 1e-3 * messages.get("TimeMS", np.empty(0))
 
 
-def _samples(name: str, messages: Messages, columns: set[str]) -> Samples | None:
+def _samples(name: str, messages: Messages, columns: set[str]) -> ChannelGroup | None:
     """Return some columns of a type's messages, of the first core, sensor or battery; None: less
     than two messages. Places become north, east, down in m from the first.
     """
@@ -141,7 +141,7 @@ def _samples(name: str, messages: Messages, columns: set[str]) -> Samples | None
         east = (east - east[0]) * np.cos(np.radians(north[0]))
         found |= {"N": _EARTH * np.radians(north - north[0]), "E": _EARTH * np.radians(east)}
         found["D"] = -altitude
-    return Samples(t, found, name)
+    return ChannelGroup(t, found, name)
 
 
 def _texts(messages: Messages, column: str) -> list[str]:
@@ -237,7 +237,7 @@ def _with_parameters(
     return replace(log_map, commands=commands).with_order(order), [*log_map.notes, note]
 
 
-def _telemetry(messages: Messages, parameters: Parameters) -> tuple[list[Samples], list[str]]:
+def _telemetry(messages: Messages, parameters: Parameters) -> tuple[list[ChannelGroup], list[str]]:
     """Return the ESCs' reports of motors 1 to 4, at the times of the first ESC, and notes."""
     if not {"Instance", "RPM", "TimeUS"} <= set(messages):
         return [], []
@@ -254,7 +254,7 @@ def _telemetry(messages: Messages, parameters: Parameters) -> tuple[list[Samples
     t = each[0].t
     columns = {f"RPM {motor}": stream.at(t)[:, 0] for motor, stream in enumerate(each, 1)}
     poles = parameters.get("SERVO_BLH_POLES", 14.0)
-    return [Samples(t, columns, "ESC")], [
+    return [ChannelGroup(t, columns, "ESC")], [
         f"rotor speeds: measured by the ESCs (ESC), with {poles:g} magnet poles as ArduPilot took "
         "them"
     ]

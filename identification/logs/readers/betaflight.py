@@ -32,7 +32,7 @@ from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
-from ..channels import Samples, check_piece
+from ..channels import ChannelGroup, check_piece
 from ..flight_log import FlightLog
 from ..log_map import shipped_map
 from ..mapped_log import recording_of
@@ -184,7 +184,7 @@ def _log(
                 f"{name}: {volts:.4g} V is more than a vehicle's battery has: taken as a tenth, as "
                 "blackbox_decode writes logs of Betaflight before 4.3"
             )
-    samples = [Samples(t, fields)]
+    samples = [ChannelGroup(t, fields)]
     return recording_of(path, samples, log_map, reader, said, piece).log(vehicle)
 
 

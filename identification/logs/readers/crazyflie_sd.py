@@ -29,7 +29,7 @@ from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
-from ..channels import Samples
+from ..channels import ChannelGroup
 from ..flight_log import FlightLog
 from ..log_map import load_map
 from ..mapped_log import chosen, recording_of
@@ -71,14 +71,14 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
             f"the file is damaged or was cut {end} bytes from its start ({len(data) - end} bytes "
             "are left); what stands before was used"
         )
-    events: list[Samples] = []
+    events: list[ChannelGroup] = []
     for rows in found:
         if len(rows) < 2:
             continue
         t = _TIMES[version][1] * rows["time"].astype(np.float64)
         with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
             columns = {name: rows[name].astype(np.float64) for name in (rows.dtype.names or ())[2:]}
-        events.append(Samples(t, columns))
+        events.append(ChannelGroup(t, columns))
     if not events:
         raise InputError(f"{path}: no event twice; expected at least two samples")
     first = min(float(samples.t[0]) for samples in events)

@@ -32,7 +32,7 @@ from ....runtime.errors import InputError
 from ....runtime.extras import need
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import check_regular, open_regular
-from ..channels import Samples
+from ..channels import ChannelGroup
 from ..flight_log import FlightLog
 from ..log_map import shipped_map, stated
 from ..mapped_log import recording_of
@@ -187,7 +187,7 @@ def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bo
     return topics, parameters, is_damaged
 
 
-def _samples(topic: str, fields: Fields, outputs: Outputs) -> Iterator[Samples]:
+def _samples(topic: str, fields: Fields, outputs: Outputs) -> Iterator[ChannelGroup]:
     """Yield the columns of a topic's instance, as the map names them: none of an unused topic; two
     groups of an inertial sensor, for the times of gyro and accelerometer.
     """
@@ -202,7 +202,7 @@ def _samples(topic: str, fields: Fields, outputs: Outputs) -> Iterator[Samples]:
     columns = {name: x for name, x in fields.items() if "timestamp" not in name}
     if topic == "actuator_outputs":
         columns = shares_of_outputs(columns, outputs)
-    yield Samples(t, unified(topic, columns), topic)
+    yield ChannelGroup(t, unified(topic, columns), topic)
 
 
 def unified(topic: str, fields: Fields) -> dict[str, Array]:
@@ -240,7 +240,7 @@ def unified(topic: str, fields: Fields) -> dict[str, Array]:
     return columns
 
 
-def _sensor(topic: str, t: Array, fields: Fields, field: str, gained: str) -> Samples:
+def _sensor(topic: str, t: Array, fields: Fields, field: str, gained: str) -> ChannelGroup:
     """Return a gyro or an accelerometer at its own times, as far as the topic has it."""
     source = field if topic == "sensor_combined" else gained
     names = {f"{field}[{i}]": f"{source}[{i}]" for i in range(3)}
@@ -252,7 +252,7 @@ def _sensor(topic: str, t: Array, fields: Fields, field: str, gained: str) -> Sa
     late = fields.get("accelerometer_timestamp_relative", np.zeros(len(t)))
     if field == "accelerometer_m_s2" and np.all(np.abs(late) < 1e6):
         t = t + _MICROSECOND * late
-    return Samples(t, found, topic)
+    return ChannelGroup(t, found, topic)
 
 
 class TooMuchError(Exception):

@@ -198,7 +198,7 @@ def stamp(message: Any) -> int:
     return _MICROSECOND * sampled if sampled < _LATEST // _MICROSECOND else 0
 
 
-class Fields:
+class MessageFields:
     """The numbers of a map in a topic's messages; whole arrays.
 
     Args:

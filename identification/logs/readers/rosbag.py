@@ -49,11 +49,11 @@ from ....runtime.extras import need
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import check_regular, open_regular
 from ....runtime.yaml_file import read_yaml
-from ..channels import Samples
+from ..channels import ChannelGroup
 from ..flight_log import FlightLog
 from ..mapped_log import recording_of
 from ..table import Array, one_line
-from .ros_topics import Fields, definitions, map_of, stamp
+from .ros_topics import MessageFields, definitions, map_of, stamp
 
 WHAT = "a ROS bag (ROS 1, SQLite or MCAP)"
 SUFFIXES = (".bag", ".db3", ".mcap")
@@ -93,7 +93,7 @@ def read(
         for topic in sorted(log_map.topics - {""}):
             held = {name: part for name, part in log_map.sections.items() if part.topic == topic}
             wanted = dict.fromkeys(name for part in held.values() for name in part.named)
-            fields = Fields(f"{path}: topic {topic}", types[topic], wanted)
+            fields = MessageFields(f"{path}: topic {topic}", types[topic], wanted)
             try:
                 times, columns, doubt = _decoded_topic(fields, messages(topic))
             except InputError as error:
@@ -109,7 +109,7 @@ def read(
         raise InputError(f"{path}: {notes[-1]}")
     origin = min(int(times[0]) for times, _, _ in decoded)
     recorded = [
-        Samples(_NANOSECOND * (times - origin).astype(float), columns, name)
+        ChannelGroup(_NANOSECOND * (times - origin).astype(float), columns, name)
         for times, columns, name in decoded
     ]
     return recording_of(path, recorded, log_map, "rosbag", notes, piece).log(vehicle)
@@ -228,7 +228,7 @@ def _decoded(raw: Any, kind: str, stores: list[Any], ros1: bool) -> Any:
 
 
 def _decoded_topic(
-    fields: Fields, messages: Iterator[tuple[int, Any]]
+    fields: MessageFields, messages: Iterator[tuple[int, Any]]
 ) -> tuple[NDArray[np.int64], dict[str, Array], str]:
     """Return times (N,) in ns and columns (N,) of a topic by name, and a doubt on its time stamps.
 
