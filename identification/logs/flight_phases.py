@@ -12,43 +12,42 @@ from .table import Array, Mask, finite_rows
 
 GROUND, TAKE_OFF, FLIGHT, LANDING = "ground", "take-off", "flight", "landing"
 
-_TURNING = 0.1  # of the weight: less thrust is a rotor at rest
+_TURNING = 0.1  # share of the weight: less thrust is a rotor at rest
 _CLEARANCE = 0.05  # m above the place of rest: the vehicle is off the ground
 _WELL_ABOVE = 0.2  # of the typical height
 _CLIMB = 0.1  # m/s: slower is not climbing or sinking
-_CLIMB_WINDOW = 0.25  # s, either side, over which the mean climb rate is taken
+_CLIMB_WINDOW = 0.25  # s, either side, of the mean climb rate
 _MOVES = 0.1  # m of way: a vehicle at rest moves by less, whatever the noise of its pose
-_DROVE = 2.0, 0.003  # m of way, over which the height of what flies changes by more than this
+_DROVE = 2.0, 0.003  # m of way, and m of height: a flight over this way changes its height by more
 _TURNS = 0.03  # rad/s, of means over _MEAN: a vehicle at rest turns by less, whatever its vibration
 _MEAN = 0.2  # s
 
 
 def flying(total: Array) -> Mask:
-    """Return at which samples (N,) the rotors carry a vehicle, by their thrust (N,) in any unit:
-    above half of the level that a tenth of the samples exceed.
+    """Return the samples (N,) with enough thrust (N,), in any unit, to carry a vehicle: more than
+    half of the 90th percentile.
     """
     return total > 0.5 * np.quantile(total, 0.9)
 
 
 def usual_thrust(total: Array) -> float:
-    """Return the median thrust of rotors that turn, by their thrust (N,) in any unit; infinite
-    where none does.
+    """Return the median thrust of turning rotors, by their thrust (N,) in any unit; infinite: none
+    turns.
     """
     turning = total[total > 0.3 * np.quantile(total, 0.95)]
     return float(np.median(turning)) if turning.size else np.inf
 
 
 def carrying(total: Array) -> Mask:
-    """Return at which samples (N,) the rotors carry a vehicle that hovers most of the time, by
-    their thrust (N,) in any unit: above half of the usual one.
+    """Return the samples (N,) with enough thrust (N,), in any unit, to carry a mostly hovering
+    vehicle: more than half of the usual thrust.
     """
     return total > 0.5 * usual_thrust(total)
 
 
 def flew(log: FlightLog) -> tuple[str, str]:
-    """Return whether a log shows that its vehicle flew, and by what: "no" where the motors never
-    turn, "not shown" where what was measured is that of a vehicle on the ground, "unknown" where
-    nothing was measured that tells.
+    """Return whether a log's vehicle flew, and why: "no" where the motors never turn, "not shown"
+    where the vehicle may stand or drive on the ground, "unknown" without measured motion.
     """
     if log.has_rotor_speeds:
         total = np.square(log.rotor_speeds).sum(axis=1)
@@ -86,24 +85,24 @@ class Phase(NamedTuple):
 
 
 def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle) -> list[Phase]:
-    """Return the phases of a flight in order of time; together they cover it.
+    """Return the phases of a flight in order of time; without gaps.
 
-    A log that begins (or ends) with its rotors turning begins (or ends) in flight. Take-off lasts
-    from leaving the ground until the first climb ends, landing from the start of the last descent
-    until touching the ground.
+    A log beginning (or ending) with turning rotors begins (or ends) in flight. Take-off lasts from
+    leaving the ground until the first climb ends, landing from the start of the last descent until
+    touching the ground.
 
     Args:
         t: (N,) s.
         height: (N,) m.
         rotor_speeds: (N, 4) rad/s.
-        vehicle: the vehicle that flew.
+        vehicle: the vehicle.
     """
     at_rest = np.square(rotor_speeds) @ vehicle.k < _TURNING * vehicle.weight
     if at_rest.all():
         return [Phase(GROUND, float(t[0]), float(t[-1]))]
     turning = np.flatnonzero(~at_rest)
     on, off, last = int(turning[0]), int(turning[-1]), len(t) - 1
-    starts, lands = on > 0, off < last  # whether the log shows it
+    starts, lands = on > 0, off < last  # whether the log shows take-off and landing
     before = float(np.median(height[:on])) if starts else -np.inf
     after = float(np.median(height[off + 1 :])) if lands else -np.inf
     clear = height > max(before, after) + _CLEARANCE
@@ -111,7 +110,7 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
     if not clear.any():  # the rotors turned, but the vehicle never left the ground
         return [Phase(GROUND, float(t[0]), float(t[-1]))]
 
-    # well above the ground, so that a bounce on landing is no flight
+    # well above the ground: a bounce on landing is no flight
     typical = float(np.median(height[clear]))
     window = _CLIMB_WINDOW
     climb = (np.interp(t + window, t, height) - np.interp(t - window, t, height)) / (2 * window)

@@ -1,7 +1,7 @@
-"""Orders in which vehicles number their motors, by name.
+"""Vehicles' orders of motors, by name.
 
-An order says which motor each of the kit's rotors is: 1 front-left, 2 rear-left, 3 rear-right,
-4 front-right. ``column_words.yaml`` states them and their sources.
+An order gives the motor of each of the kit's rotors: 1 front-left, 2 rear-left, 3 rear-right, 4
+front-right. ``column_words.yaml`` states them and their sources.
 """
 
 from ...runtime.errors import InputError, unknown_name
@@ -9,7 +9,7 @@ from .column_names import WORDS
 
 Order = tuple[int, int, int, int]
 
-PLACES = ("front-left", "rear-left", "rear-right", "front-right")  # of the kit's rotors 1 to 4
+PLACES = ("front-left", "rear-left", "rear-right", "front-right")  # of rotors 1 to 4
 
 ORDERS: dict[str, Order] = {
     name: (a, b, c, d) for name, (a, b, c, d) in WORDS["rotor_orders"].items()
@@ -17,7 +17,7 @@ ORDERS: dict[str, Order] = {
 
 
 def rotor_order(value: object) -> Order:
-    """Return which motor, from 1, each of the kit's rotors is.
+    """Return the motor, from 1, of each of the kit's rotors.
 
     Args:
         value: a name of ``ORDERS``, or the four motors' numbers, front-left first.
@@ -45,5 +45,5 @@ def order_words(order: Order) -> str:
 
 
 def order_names(order: tuple[int, ...]) -> list[str]:
-    """Return the names of an order; none where it has none."""
+    """Return the names of an order, if any."""
     return [name for name, known in ORDERS.items() if known == order]

@@ -2,8 +2,8 @@
 the header, a line of units behind it, lists in fields, whose items are columns ``name[0]`` ...
 
 The layout is found in the first lines. Each separator and each way to write decimals is tried. The
-right one makes the most numbers of a line, in the longest run of lines that have as many fields as
-one another. That run is the table, and the line of names before it is its header. The rows are then
+right layout makes the most numbers of a line, in the longest run of lines with equally many fields.
+This run is the table, and the line of names before the run is its header. The rows are then
 counted, and the columns asked for are turned into numbers a block of lines at a time.
 """
 
@@ -31,17 +31,17 @@ from ...runtime.regular_files import open_regular
 from .column_names import is_unit
 from .table import WHAT, Array, Table
 
-# what people write for a value that is not there
+# people's words for a missing value
 MISSING_WORDS = frozenset({"na", "n/a", "null", "none", "nil", "-", "--", "?"})
 
 _SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "white space"}
 _LATIN = "windwrench-latin-1"  # name of an error handler
 _BUFFER = 2**18  # bytes unpacked at a time
-_UNUSED = 2**21  # packed bytes, of which a line may come yet
+_UNUSED = 2**21  # packed bytes without a line yet
 _DAY_0 = date(1970, 1, 1).toordinal()
 _BLOCK = 200  # lines turned into numbers at a time; their texts stay in the cache of the processor
-_LOOKED_AT = 2**18  # characters in which the layout is found
-_LINES = 600  # of them; what Betaflight's decoder writes before the header has 150
+_LOOKED_AT = 2**18  # characters for finding the layout
+_LINES = 600  # lines, at most; Betaflight's decoder writes 150 before the header
 _BETWEEN = 5  # lines between header and first row, at most
 _FEWEST = 2  # columns of a table
 _LIST = re.compile(  # between separators: numbers in brackets, or nothing
@@ -63,7 +63,7 @@ _DECIMAL_COMMA = (
 
 
 def _items(field: str) -> list[str]:
-    """Return the items of a list as people write it, between commas, semicolons or spaces."""
+    """Return the items of a list, between commas, semicolons or spaces."""
     return re.sub(r"[\[\](),;]", " ", field).split()
 
 
@@ -88,15 +88,15 @@ class TextLayout:
 
     separator: str = ","  # " ": any white space
     decimal: str = "."  # or ","
-    lists: tuple[tuple[int, int], ...] = ()  # fields (from 0) that hold lists, and their lengths
+    lists: tuple[tuple[int, int], ...] = ()  # fields (from 0) of lists, and their lengths
 
     def fields(self, line: str) -> list[str]:
         """Return the fields of a line without the space around them, as ``split``."""
         return list(map(str.strip, self.split(line)))
 
     def split(self, line: str) -> list[str]:
-        """Return the fields of a line, an item of a list each; none where its quotation marks are
-        not those of CSV.
+        """Return the fields of a line, an item of a list each; empty for quotation marks against
+        CSV.
         """
         if self.separator == " ":
             return line.split()
@@ -126,8 +126,8 @@ class TextLayout:
         return names
 
     def number(self, field: str) -> float | None:
-        """Return the number in a field, the seconds of a date or a time of day, NaN where it is
-        empty, None where it holds something else.
+        """Return the number in a field, or the seconds of a date or a time of day; NaN: empty,
+        None: something else.
         """
         if not field or field.lower() in MISSING_WORDS:
             return math.nan
@@ -139,7 +139,7 @@ class TextLayout:
             return _seconds(field) if ":" in field else None
 
     def is_blank(self, line: str) -> bool:
-        """Return whether a line has no field that holds anything."""
+        """Return whether all fields of a line are empty."""
         return not line.strip().strip(f'{self.separator} "')
 
 
@@ -211,7 +211,7 @@ def open_text(path: Path) -> Table:
 
 
 def _lists(layout: TextLayout, lines: Sequence[str]) -> tuple[tuple[int, int], ...]:
-    """Return which fields (from 0) of rows hold lists, and how long the first that has items is."""
+    """Return the fields (from 0) of lists, and the length of each field's first list with items."""
     found: dict[int, int] = {}
     for line in lines if layout.separator != " " else ():
         for i, field in enumerate(layout.fields(_LIST.sub(r'"\1"', line))):
@@ -221,7 +221,7 @@ def _lists(layout: TextLayout, lines: Sequence[str]) -> tuple[tuple[int, int], .
 
 
 def _latin(error: UnicodeError) -> tuple[str, int]:
-    """Return bytes that are not UTF-8 as the Latin-1 of old programs."""
+    """Return bytes outside UTF-8 as the Latin-1 of old programs."""
     assert isinstance(error, UnicodeDecodeError)
     return error.object[error.start : error.end].decode("latin-1"), error.end
 
@@ -230,13 +230,13 @@ codecs.register_error(_LATIN, _latin)
 
 
 class _Packed:
-    """The bytes of a gzip file, of which no more are read than characters came of them: a million
-    empty parts would take as long as a table.
+    """The bytes of a gzip file; no more are read than characters were unpacked: a million empty
+    parts would take as long as a table.
     """
 
     def __init__(self, file: BinaryIO, path: Path) -> None:
         self._file, self._path, self._size = file, path, 0
-        self.unpacked = 0  # characters that came
+        self.unpacked = 0  # characters so far
 
     def read(self, size: int) -> bytes:
         """Return the next bytes.
@@ -274,7 +274,7 @@ def _lines(path: Path) -> Iterator[str]:
                 packed.unpacked = size
                 if "\0" in line:
                     raise InputError(f"{path}: not a text file (it holds zero bytes); expected CSV")
-                # asked before it is said: a table may have millions of lines
+                # checked first: a table may have millions of lines
                 if len(line) > LIMITS.table_line or size > LIMITS.table_text or number > most:
                     check_count(path, len(line), LIMITS.table_line, f"in line {number}")
                     check_count(path, size, LIMITS.table_text, "characters of text")
@@ -287,8 +287,8 @@ def _lines(path: Path) -> Iterator[str]:
 
 
 def _layout(path: Path, head: list[str]) -> tuple[TextLayout, int]:
-    """Return the layout that makes the most numbers of the first lines, and the line (from 0) of
-    the first row that is full of them.
+    """Return the layout with the most numbers in the first lines, and the line (from 0) of the
+    first row full of numbers.
 
     Raises:
         InputError: none makes a table of them.
@@ -338,10 +338,10 @@ def _counts(layout: TextLayout, fields: Sequence[str]) -> tuple[int, int]:
 
 
 def _header(path: Path, head: list[str], layout: TextLayout, full: int) -> tuple[int | None, int]:
-    """Return the line (from 0) of the header, None where there is none, and that of the first row.
+    """Return the lines (from 0) of the header, if any, and of the first row.
 
-    The header is the nearest line before the first row that has a name for nearly every column.
-    Rows before the first one that is ``full`` of numbers have empty fields.
+    The header is the nearest line before the first row with a name for nearly every column. Rows
+    before the first ``full`` one have empty fields.
 
     Raises:
         InputError: the rows have twice as many fields as a line of names before them.
@@ -400,7 +400,7 @@ def _fill(
         if layout.decimal == ",":
             texts = "\n".join(texts).translate(_POINTS).split("\n")
         with suppress(ValueError):
-            if is_plain:  # as Python reads numbers, which is quick
+            if is_plain:  # Python's own numbers are quick
                 values[:] = [float(text or "nan") for text in texts]
                 continue
         texts = [text.strip() for text in columns[column]]

@@ -1,6 +1,6 @@
-"""Which topics of a bag, or of a live source, hold the sections of a log map, by the rules that
-``rosbag`` states; and their messages as columns: numbers by the paths of their fields, such as
-``pose.position.x``, ``data[0]`` or ``esc[0].esc_rpm``.
+"""Topics of a bag for the sections of a log map, by the rules of ``rosbag``; and their messages as
+columns: numbers by the paths of their fields, such as ``pose.position.x``, ``data[0]`` or
+``esc[0].esc_rpm``.
 """
 
 import re
@@ -18,14 +18,14 @@ from ..table import Array
 from .px4_ulog import unified
 
 SECTIONS = ("position", "attitude", "rotors", "commands", "battery", "accelerometer", "gyro")
-# sections that stand in the messages of another, where a map does not say in which
+# sections in the messages of another, without a topic of their own
 BESIDE = {"attitude": "position", "gyro": "accelerometer"}
 MOTORS = ("rotors", "commands")
 _SECOND = 10**9  # ns
 _MICROSECOND = 1000  # ns
 _LATEST = 2**63  # ns
 _PX4 = "px4_msgs/msg/"
-_SHOWN = 30  # fields that an error lists
+_SHOWN = 30  # fields in an error
 
 
 def map_of(
@@ -34,14 +34,14 @@ def map_of(
     """Return the log map of topics, and notes.
 
     Args:
-        types: of the topics' messages, by their names.
-        given: what a map file says; a section's topic and columns may be left out.
+        types: types of the topics' messages, by topic.
+        given: content of a map file; a section's topic and columns may be left out.
         source: the bag or the live source, for errors.
         where: the map file, for errors.
 
     Raises:
-        InputError: the map says something that is not known; a section that is needed is missing or
-            ambiguous; or a topic cannot hold its section.
+        InputError: the map has an unknown field; a needed section is missing or ambiguous; or a
+            topic cannot hold its section.
     """
     found: dict[str, Any] = {}
     refused: dict[str, str] = {}
@@ -91,7 +91,7 @@ def map_of(
 
 
 def _topic_of(section: object) -> str | None:
-    """Return the topic that a section states."""
+    """Return a section's topic."""
     topic = section.get("topic") if isinstance(section, Mapping) else None
     return None if topic is None else str(topic)
 
@@ -99,7 +99,7 @@ def _topic_of(section: object) -> str | None:
 def _usual(
     types: Mapping[str, str], section: str, said: Mapping[str, Any], topic: str, where: str
 ) -> dict[str, Any]:
-    """Return what messages of a topic say of a section without a map.
+    """Return a section of a topic's messages by their type alone.
 
     Raises:
         InputError: the topic is not there, cannot hold the section, or has no unit.
@@ -126,11 +126,11 @@ def _usual(
 def _chosen(
     types: Mapping[str, str], section: str, said: Mapping[str, Any], where: str
 ) -> tuple[str | None, str]:
-    """Return the topic of a section, the only one that may hold it or that which its name tells,
-    and how it was chosen; None: there is none.
+    """Return the topic of a section, the only possible one or the one by name, and a note on the
+    choice; None: there is none.
 
     Raises:
-        InputError: several may hold it.
+        InputError: several topics are possible.
     """
 
     def named_by(topic: str, words: str) -> bool:
@@ -158,8 +158,8 @@ def _chosen(
 
 
 def _missing(types: Mapping[str, str], section: str, where: str) -> str:
-    """Return what is wrong with topics without rotor speeds and commands, or without a pose and
-    inertial sensors.
+    """Return words on topics without rotor speeds and commands, or without a pose and inertial
+    sensors.
     """
     topics = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(types.items())) or "none"
     names = MOTORS if section == "rotors" else (section,)
@@ -179,8 +179,8 @@ def _missing(types: Mapping[str, str], section: str, where: str) -> str:
 
 
 def definitions() -> list[dict[str, str]]:
-    """Return the definitions of the types that rosbags does not know, in several variants: the
-    newest of each comes first.
+    """Return definitions for rosbags' unknown types, in several variants: the newest of each comes
+    first.
     """
     known: dict[str, list[str]] = stated("ros")["definitions"]
     return [
@@ -190,9 +190,7 @@ def definitions() -> list[dict[str, str]]:
 
 
 def stamp(message: Any) -> int:
-    """Return when a message's sample was taken, in ns of whatever clock its sender has; 0: it does
-    not say.
-    """
+    """Return the time of a message's sample, in ns of its sender's clock; 0: unknown."""
     header = getattr(message, "header", None)
     if header is not None:
         return min(int(header.stamp.sec) * _SECOND + int(header.stamp.nanosec), _LATEST - 1)
@@ -200,8 +198,8 @@ def stamp(message: Any) -> int:
     return _MICROSECOND * sampled if sampled < _LATEST // _MICROSECOND else 0
 
 
-class Fields:
-    """The numbers in a topic's messages that a map asks for; of an array all that it holds.
+class MessageFields:
+    """The numbers of a map in a topic's messages; whole arrays.
 
     Args:
         where: the topic, for errors.
@@ -218,7 +216,8 @@ class Fields:
         """Return the numbers (K,) of a message.
 
         Raises:
-            InputError: it has more than ``FileLimits.log_fields``, or less than the first one.
+            InputError: the message has more than ``FileLimits.log_fields``, or less than the first
+                one.
         """
         if not self._names:
             found = list(islice(_paths(message), LIMITS.log_fields + 1))
@@ -239,7 +238,7 @@ class Fields:
         """Return the columns (N,) of messages' numbers (N, K), by name.
 
         Raises:
-            InputError: one that is wanted is not among them.
+            InputError: a wanted column is missing.
         """
         found = dict(zip(self._names, rows.T, strict=True))
         if self._kind.startswith(_PX4):
@@ -258,7 +257,7 @@ class Fields:
 
 
 def array_of(path: str) -> str:
-    """Return a field's path without the numbers of its elements: what all elements share."""
+    """Return a field's path without the numbers of its elements: the same for all elements."""
     return re.sub(r"\[\d+\]", "[]", path)
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from tests.support.dataflash_writer import dataflash, imu, parm, rcou
 from windwrench.dynamics import InputError
-from windwrench.identification.logs.channels import CLOCK, Samples, in_order, on_one_clock
+from windwrench.identification.logs.channels import ROLLOVER, ChannelGroup, in_order, on_one_clock
 from windwrench.identification.logs.reading import read_log
 
 T = 0.02 * np.arange(600)
@@ -48,8 +48,8 @@ def test_rows_that_were_written_late_are_sorted_in():
 
 
 def test_a_clock_of_32_bits_goes_on_after_its_rollover():
-    t = np.mod(T + CLOCK.rollover - 5.0, CLOCK.rollover)
-    (found,), notes = on_one_clock("log", [Samples(t, {"x": T})])
+    t = np.mod(T + ROLLOVER - 5.0, ROLLOVER)
+    (found,), notes = on_one_clock("log", [ChannelGroup(t, {"x": T})])
     np.testing.assert_allclose(np.diff(found.t), 0.02, atol=1e-9)
     assert any("rolled over" in note for note in notes)
 
