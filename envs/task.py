@@ -23,7 +23,7 @@ from ..dynamics.rotation import quaternion_to_matrix
 from ..dynamics.vehicle import EffectSetting, Mocap, Vehicle
 from ..dynamics.vehicle_file import load_vehicle
 from ..estimator.tuning import UKFTuning
-from ..runtime.compiled import compiled, specialised
+from ..runtime.compiled import Record, compiled, specialised
 from ..runtime.errors import InputError, unknown_name
 from .closed_loop import ESTIMATORS, REFERENCE_SIZE, ClosedLoop, Stage, is_healthy
 from .display import modes_shown, need_display
@@ -65,6 +65,43 @@ def is_flying(state: Array, position: Array, velocity: Array) -> bool:
     """Return whether a vehicle still flies: finite, no faster than one can be, and upright."""
     tilted = position[4] * position[4] + position[5] * position[5]
     return is_healthy(state, velocity) and 1.0 - 2.0 * tilted >= UPRIGHT
+
+
+@compiled
+def vehicle_of(motion: Motion, n: int) -> tuple[Array, Array, Array, Array]:
+    """Return pose (7,), velocity (6,), true wrench (6,) and a copy of the estimate (20,) of vehicle
+    ``n``.
+    """
+    lanes = motion.state.shape[2]
+    b, lane = n // lanes, n % lanes
+    estimate = motion.state[b, :, lane].copy()
+    return (
+        motion.position[b, :, lane],
+        motion.velocity[b, :, lane],
+        motion.wrench[b, :, lane],
+        estimate,
+    )
+
+
+@compiled
+def note(
+    value: Record, episodes: Episodes, n: int, wrench: Array, square: float, change: float
+) -> None:
+    """Write the common values of episode ``n``: time, true wrench (6,), and rewards.
+
+    Args:
+        value: row of the task's table.
+        episodes: all episodes.
+        n: an episode.
+        wrench: N and Nm, world.
+        square: of the error over the task's tracking width.
+        change: reward for the change of the command.
+    """
+    value.time = episodes.ticks[n] * TICK
+    for i in range(3):
+        value.force[i], value.torque[i] = wrench[i], wrench[3 + i]
+    value.reward_tracking = 1.0 / (1.0 + square)
+    value.reward_change = change
 
 
 def true_motion(

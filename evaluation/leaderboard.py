@@ -193,8 +193,8 @@ def summary(rows: Sequence[Standing]) -> str:
         worse = [row for row in judged if row.change_over_best > 0]
         lines.append(
             f"* **{scenario}**, {some[0].episodes} episodes each. Terminated: {told}. Against the "
-            f"best designed law there, `{some[0].best_law}`: clearly worse {_listed(worse)}; clearly "
-            f"better {_listed(better)}."
+            f"best designed law there, `{some[0].best_law}`: clearly worse {_listed(worse)}; "
+            f"clearly better {_listed(better)}."
         )
     return "\n".join(lines) + "\n" if lines else ""
 

@@ -13,7 +13,7 @@ from tests.support.vector_flights import TASKS, fly, make, make_single
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.envs.closed_loop import ClosedLoop
-from windwrench.envs.lanes.flight import LOOPS, Blocks, fly_freely
+from windwrench.envs.lanes.flight import LOOPS, LoopBlocks, fly_freely
 from windwrench.envs.plant import SUBSTEPS, TICK, PlantSettings, load_world
 from windwrench.envs.scenarios import SCENARIOS
 from windwrench.runtime.vector_lanes import WIDTH
@@ -166,7 +166,7 @@ def test_a_body_that_tumbles_moves_as_in_mujoco():
     """Centre of mass off the centre, inertia with products, another turn in each lane."""
     inertia = np.array([[2.2, 0.3, -0.2], [0.3, 3.0, 0.1], [-0.2, 0.1, 4.0]]) * 1e-3
     vehicle = replace(load_vehicle("ardrone2"), inertia=inertia, com=np.array([0.02, -0.03, 0.01]))
-    blocks = Blocks(1, ClosedLoop(vehicle))
+    blocks = LoopBlocks(1, ClosedLoop(vehicle))
     rng = np.random.default_rng(0)
     start, wrench = rng.normal(0, 5, (6, WIDTH)), rng.normal(0, 0.02, (6, WIDTH))
     blocks.loops["qpos"][0], blocks.loops["qpos"][0, 3] = 0.0, 1.0
