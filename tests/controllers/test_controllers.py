@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from windwrench.controllers import CONTROLLERS, AdmittancePID, make_controller
@@ -60,7 +61,7 @@ def test_the_flight_loop_turns_against_a_steady_torque(law):
     ahead, *_, action = (law(hovering(TORQUE=[0.01, 0.02, 0.03])) for _ in range(101))
     inertia = load_vehicle("ardrone2").inertia
     cancels = 9.81 / 110.0 * np.array([-0.02 / inertia[1, 1], 0.01 / inertia[0, 0], 0.0])
-    np.testing.assert_allclose(action, cancels, atol=1e-6)
+    assert_allclose(action, cancels, atol=1e-6)
     assert ahead[0] < action[0]  # a torque that grows is met before it is seen in full
 
 
@@ -109,9 +110,9 @@ def test_the_torque_is_answered_before_anything_has_moved():
     assert y < -0.05
     assert abs(z) < 1e-6
     fed = PIDWithWrench(tilt=10.0, tilt_lead=0.1)
-    np.testing.assert_allclose(fed(felt), [-0.2, -0.2, 0.0], atol=1e-6)
+    assert_allclose(fed(felt), [-0.2, -0.2, 0.0], atol=1e-6)
     expected = -10.0 * (0.03 + 0.1 * 0.01 / WIND_PERIOD)
-    np.testing.assert_allclose(fed(hovering(TORQUE=[-0.02, 0.03, 0.0]))[0], expected, rtol=1e-5)
+    assert_allclose(fed(hovering(TORQUE=[-0.02, 0.03, 0.0]))[0], expected, rtol=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -134,7 +135,7 @@ def test_what_lasts_longer_is_answered_by_more(felt, axes, time, other):
     assert (answer(**{time: 4.0 * getattr(LQG, time)}) > 1.01 * usual).all()
     assert (answer(**{time: 0.25 * getattr(LQG, time)}) < 0.97 * usual).all()
     for share in (0.25, 4.0):
-        np.testing.assert_allclose(answer(**{other: share * getattr(LQG, other)}), usual, rtol=5e-3)
+        assert_allclose(answer(**{other: share * getattr(LQG, other)}), usual, rtol=5e-3)
 
 
 VEHICLE = load_vehicle("ardrone2")
@@ -206,7 +207,7 @@ def test_a_steady_turn_about_the_vertical_costs_a_tilted_vehicle_the_gyroscopic_
     tilted["setpoint"][9] = turning["setpoint"][9] = 0.7
     turning["setpoint"][10] = 1.5
     more = flown(turning, q, rate)[1] - flown(tilted, q)[1]
-    np.testing.assert_allclose(more, np.cross(rate, VEHICLE.inertia @ rate), atol=1e-12)
+    assert_allclose(more, np.cross(rate, VEHICLE.inertia @ rate), atol=1e-12)
 
 
 @pytest.mark.parametrize("period", [WIND_PERIOD, DECISION_PERIOD])
@@ -214,7 +215,7 @@ def test_what_an_oracle_expects_of_a_disturbance_is_its_mean_over_each_decision(
     t = np.arange(0.0, 12 * period, period / 200) + period / 400
     means = np.exp(-t / DISTURBANCE_TIME).reshape(12, 200).mean(axis=1)
     wrench = np.array([0.2, -0.01])
-    np.testing.assert_allclose(lasting(wrench, 12, period), np.outer(means, wrench), rtol=4e-3)
+    assert_allclose(lasting(wrench, 12, period), np.outer(means, wrench), rtol=4e-3)
 
 
 def test_a_moving_set_point_waits_for_the_vehicle():
@@ -243,7 +244,7 @@ def test_a_set_point_beyond_the_leash_still_comes_back(velocity, vehicle, there)
     expected = np.concatenate([there, c["setpoint"][3:]])
     for _ in range(200):
         move_setpoint(c, np.array(vehicle), 0.005)
-    np.testing.assert_allclose(c["setpoint"], expected, atol=1e-12)
+    assert_allclose(c["setpoint"], expected, atol=1e-12)
 
 
 def test_a_vehicle_held_for_long_is_not_thrown_on():
@@ -260,7 +261,7 @@ def test_a_vehicle_held_for_long_is_not_thrown_on():
     for _ in range(60 * 200):
         fly(c, x, 0.005)
     x[2], c["setpoint"][9] = 1.0, 0.0
-    np.testing.assert_allclose(pushed(), [2.0, 4.0], rtol=1e-9)
+    assert_allclose(pushed(), [2.0, 4.0], rtol=1e-9)
     x[2], highest = 0.0, 0.0
     for _ in range(10 * 200):
         x[9] += 0.005 * pushed()[0]
