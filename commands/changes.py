@@ -88,14 +88,14 @@ def _each_against(words: Sequence[str], valued: Collection[str]) -> Iterator[str
     """Yield the words with ``--against`` before each log of its list; ``valued`` options have a
     value.
     """
-    found, in_list, option = False, False, ""
+    has_logs, in_list, option = False, False, ""
     for word in words:
         if option:  # its value
-            in_list, option = found and option == _AGAINST, ""
+            in_list, option = has_logs and option == _AGAINST, ""
         elif word.startswith("-"):
             in_list, option = False, word if word in valued else ""
         elif in_list:
             yield _AGAINST
         else:
-            found = True
+            has_logs = True
         yield word

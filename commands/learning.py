@@ -99,12 +99,12 @@ def _tune(given: dict[str, Any], scenario: str, seed: int, out: Path) -> dict[st
         out, task=task, controller=law, scenario=scenario, trials=trials, episodes=episodes
     )
     with working(f"{law}, {scenario}", trials) as progress:
-        found = tune(law, scenario, trials, episodes, seed, progress, task)
-    keep_gains(found, folder / "tuned.yaml", command_line())
-    gains = ", ".join(f"{name} {value:.3g}" for name, value in found["gains"].items())
+        result = tune(law, scenario, trials, episodes, seed, progress, task)
+    keep_gains(result, folder / "tuned.yaml", command_line())
+    gains = ", ".join(f"{name} {value:.3g}" for name, value in result["gains"].items())
     console.print(
-        f"{law} on {scenario}: {gains}: {found['rmse_m']:.3f} m over {episodes} validation "
-        f"episodes (first gains: {found['default_rmse_m']:.3f} m)",
+        f"{law} on {scenario}: {gains}: {result['rmse_m']:.3f} m over {episodes} validation "
+        f"episodes (first gains: {result['default_rmse_m']:.3f} m)",
     )
     say(folder / "tuned.yaml")
-    return found
+    return result

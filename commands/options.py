@@ -21,11 +21,11 @@ def _described(command: str, name: str) -> dict[str, Any]:
     """Return the entry of an option in ``options.yaml``: the command's own words before the common
     ones.
     """
-    found: dict[str, Any] = {}
+    entry: dict[str, Any] = {}
     for section in ("common", command):
         said = _OPTIONS.get(section, {}).get(name, {})
-        found |= {"help": said} if isinstance(said, str) else said
-    return found
+        entry |= {"help": said} if isinstance(said, str) else said
+    return entry
 
 
 def declared(command: str, name: str, kind: Any) -> Any:
@@ -70,8 +70,8 @@ def names_of(sources: str | list[str]) -> list[str]:
     for source in [sources] if isinstance(sources, str) else sources:
         module, colon, attribute = source.partition(":")
         if colon:
-            found = getattr(import_module(f"..{module}", __package__), attribute)
-            names += found() if callable(found) else found
+            offered = getattr(import_module(f"..{module}", __package__), attribute)
+            names += offered() if callable(offered) else offered
         else:
             names.append(source)
     return names

@@ -32,8 +32,8 @@ def load_tuning(path: Path, period: float = PERIOD) -> UKFTuning:
     """
     data = read_yaml(path, "a tuning file")
     if not isinstance(data, dict) or not data:
-        found = type(data).__name__
-        raise InputError(f"{path}: expected a mapping of fields such as force_walk, got {found}")
+        kind = type(data).__name__
+        raise InputError(f"{path}: expected a mapping of fields such as force_walk, got {kind}")
     fields = UKFTuning.__dataclass_fields__
     for name in data:
         if name not in fields:

@@ -91,8 +91,8 @@ def reset_flight(c: np.void) -> None:
 
 @compiled
 def move_setpoint(c: Record, position: Array, dt: float) -> None:
-    """Move the set point with its own velocity for ``dt`` s; too far ahead on an axis, the set
-    point waits there.
+    """Move the set point with its own velocity for ``dt`` s; on an axis where it runs too far ahead
+    it waits.
     """
     for i in range(3):
         step = dt * c.setpoint[3 + i]
@@ -104,7 +104,7 @@ def move_setpoint(c: Record, position: Array, dt: float) -> None:
 
 @compiled
 def _wanted(c: Record, x: Array, dt: float, i: int) -> float:
-    """Return the rotors' acceleration, m/s2, along an axis of the world."""
+    """Return the acceleration, m/s2, that the rotors must make along an axis of the world."""
     s = c.setpoint
     error = s[i] - x[i]
     c.sum[i] = min(max(c.sum[i] + dt * error, -2.0), 2.0)
@@ -118,7 +118,7 @@ def _wanted(c: Record, x: Array, dt: float, i: int) -> float:
 
 @compiled
 def fly(c: Record, x: Array, dt: float) -> None:
-    """Write the rotor speeds (4,) rad/s from the estimated state ``x`` to the set point into
+    """Write the rotor speeds (4,) rad/s that steer the estimated state ``x`` to the set point into
     ``c.command``.
 
     ``x`` is laid out as in ``estimator.estimate``: position 0-2, quaternion 3-6, velocity 7-9, body

@@ -28,8 +28,8 @@ _ROUNDS = 2  # of Newton's method: one is exact where the delivered speed is lin
 
 @compiled
 def foresee(c: Record, model: Record, x: Array) -> None:
-    """Write the wrench of the model's effects, balanced by the rotors, into ``c.foreseen`` (6,):
-    force in the world, torque in the body frame.
+    """Write the wrench of the model's effects that the rotors have to balance into ``c.foreseen``
+    (6,): force in the world, torque in the body frame.
 
     The wrench is taken at the set point's position and velocity, without body rates. So does
     flatness-based control of vehicles with drag (Faessler, Franchi and Scaramuzza, RA-L 3(2),
@@ -61,8 +61,8 @@ def foresee(c: Record, model: Record, x: Array) -> None:
 
 @compiled
 def _delivered(c: Record, model: Record, commands: Array) -> None:
-    """Write the delivered rotor speeds after the horizon at held commands into ``c.rotors``; the
-    model's own memory stays unchanged.
+    """Write what the rotors deliver after the horizon at held commands into ``c.rotors``; the
+    model's own memory stays as it is.
     """
     count = model.rotor_count
     for i in range(count):
@@ -84,7 +84,7 @@ def _delivered(c: Record, model: Record, commands: Array) -> None:
 
 @compiled
 def through_the_rotors(c: Record, model: Record) -> None:
-    """Turn ``c.command``, the wanted rotor speeds (4,) rad/s, into commands for them."""
+    """Turn ``c.command``, the wanted rotor speeds (4,) rad/s, into commands that deliver them."""
     for i in range(4):
         c.wanted[i] = c.command[i]
     if model.rotor_count == 0:

@@ -201,13 +201,13 @@ class Oracle(_PreviewLaw):
         """Return the models with the set point's velocity as input, and the fan's motion as the
         last disturbance.
         """
-        found = []
+        models = []
         for axis in axis_models(vehicle):
             A, B, D = axis.with_set_point().held(DECISION_PERIOD)
             fan = np.zeros((len(A), 1))
             fan[[PLACE, -1]] = -1.0
-            found.append((A, B, np.hstack([D, fan])))
-        return found
+            models.append((A, B, np.hstack([D, fan])))
+        return models
 
     def _look(self, o: Wide, info: Mapping[str, Any]) -> tuple[list[Wide], list[Wide]]:
         own = info["place"]

@@ -57,17 +57,17 @@ def tuned_gains(task: str = STANDARD_TASK) -> dict[str, dict[str, Any]]:
     )
     if task != STANDARD_TASK:
         return sections.get(task, {})
-    return {law: found for law, found in sections.items() if law in LAWS}
+    return {law: entries for law, entries in sections.items() if law in LAWS}
 
 
 def _tuned() -> Laws:
     """Return ``LAW-tuned`` (for the scenario base) and ``LAW-tuned-SCENARIO`` of FanTracking."""
     return {
         f"{law}-tuned" + ("" if scenario == STANDARD_SCENARIO else f"-{scenario}"): partial(
-            LAWS[law], **found["gains"]
+            LAWS[law], **entry["gains"]
         )
         for law, scenarios in tuned_gains().items()
-        for scenario, found in scenarios.items()
+        for scenario, entry in scenarios.items()
     }
 
 
@@ -127,8 +127,8 @@ def make_controller(name: str, task: str = STANDARD_TASK) -> Any:
         raise unknown_name("controller", name, laws)
     if task == STANDARD_TASK:
         return laws[name]()
-    found = tuned_gains(task).get(name) or tuned_gains(_AS.get(task, task)).get(name, {})
-    return laws[name](**found.get("gains", {}))
+    entry = tuned_gains(task).get(name) or tuned_gains(_AS.get(task, task)).get(name, {})
+    return laws[name](**entry.get("gains", {}))
 
 
 @cache
@@ -138,6 +138,6 @@ def shipped_policies(task: str = STANDARD_TASK) -> dict[str, Path]:
     """
     folder = Path(str(resources.files(__package__))).parent / "training" / "policies"
     start = "" if task == STANDARD_TASK else f"{task}-"
-    found = (folder / "tasks" if start else folder).glob(f"{start}*.npz")
-    kept = (path for path in found if path.with_suffix(".json").exists())
+    files = (folder / "tasks" if start else folder).glob(f"{start}*.npz")
+    kept = (path for path in files if path.with_suffix(".json").exists())
     return {path.stem.removeprefix(start): path for path in sorted(kept)}

@@ -116,9 +116,9 @@ class _Network:
             shapes |= {f"weight{i}": (rows, below), f"bias{i}": (rows,)}
             below = rows
         for part, shape in shapes.items():
-            found = weights[part].shape if part in weights else "none"
-            if found != shape:
-                raise InputError(f"{name}: {part} must have the shape {shape}, got {found}")
+            actual = weights[part].shape if part in weights else "none"
+            if actual != shape:
+                raise InputError(f"{name}: {part} must have the shape {shape}, got {actual}")
         self.size = below  # of the action
 
     def reset(self) -> None:

@@ -149,10 +149,10 @@ class INDI(WindLaw):
     Tal and Karaman, *Accurate tracking of aggressive quadrotor trajectories using incremental
     nonlinear dynamic inversion and differential flatness*, IEEE TCST 29(3), 2021, the incremental
     law of linear acceleration: ``(tau b_z)_c = (tau b_z)_f + a_c - a_f``. The commanded specific
-        thrust is the present one plus the missing acceleration. Both pass the same Butterworth
-        low-pass of second order, as of Smeur, Chu and de Croon (JGCD 39(3), 2016). With the flight
-        loop's command as ``a_c`` this adds ``-(a_f - (tau b_z)_f + g)``: the low-passed difference
-        of accelerometer and rotor model.
+    thrust is the present one plus the missing acceleration. Both pass the same Butterworth low-pass
+    of second order, as of Smeur, Chu and de Croon (JGCD 39(3), 2016). With the flight loop's
+    command as ``a_c`` this adds ``-(a_f - (tau b_z)_f + g)``: the low-passed difference of
+    accelerometer and rotor model.
 
     The paper's law of angular acceleration, ``mu_c = mu_f + J (alpha_c - alpha_f)``, takes the
     rotors' unexplained torque from the command. Here the wrench filter estimates this torque, and

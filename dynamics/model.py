@@ -116,7 +116,9 @@ def reset_model(record: np.void) -> None:
 
 @compiled
 def drive(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
-    """Compute the delivered rotor speeds over a step of ``dt`` s from the logged ones (4,) rad/s."""
+    """Work out what the rotors deliver over a step of ``dt`` s at the logged rotor
+    speeds (4,) rad/s.
+    """
     f.voltage = voltage
     for i in range(4):
         f.rotors[i] = rotor_speeds[i]
@@ -146,7 +148,7 @@ def drive(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
 def apply_effects(
     f: Record, position: Array, rotation: Array, velocity: Array, omega: Array
 ) -> None:
-    """Write the sum of the wrench effects at a state into ``f.effect_wrench``.
+    """Write what the wrench effects say at a state into ``f.effect_wrench``.
 
     The first call after ``drive`` also carries the effects' own states over the step: made at the
     state itself, not at a sigma point.

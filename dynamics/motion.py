@@ -84,7 +84,9 @@ def angular_acceleration_of(
     torque: tuple[float, float, float],
     effects: tuple[float, ...],
 ) -> tuple[float, float, float]:
-    """Return the angular acceleration, rad/s2, body: (12). Arguments as of ``accelerations_of``."""
+    """Return the angular acceleration, rad/s2, body: (12). The arguments are those of
+    ``accelerations_of``.
+    """
     wx, wy, wz = omega
     t0, t1, t2 = torque
     hx = b[0] * wx + b[1] * wy + b[2] * wz
@@ -112,7 +114,7 @@ def acceleration_of(
     effects: tuple[float, ...],
 ) -> tuple[float, float, float]:
     """Return the acceleration of the geometric centre, m/s2, world: (4), and its acceleration about
-    the centre of mass. ``turning`` is the angular acceleration; the others as of
+    the centre of mass. ``turning`` is the angular acceleration; the others are those of
     ``accelerations_of``.
     """
     wx, wy, wz = omega
@@ -188,8 +190,8 @@ LONG_TURN = 0.25
 def gyroscopic_rest(
     inertia: Array, inverse: Array, wx: float, wy: float, wz: float, square: float, dt: float
 ) -> tuple[float, float, float]:
-    """Return the angular acceleration, rad/s2, body, missing in (12) against the exact turn of the
-    angular momentum; ``square`` is the squared angle of the step.
+    """Return the angular acceleration, rad/s2, body, that (12) lacks of the exact turn of the
+    angular momentum, ``square`` being that of the step's angle.
 
     (12) takes ``-omega x J omega`` at the step's start for the whole step: explicit Euler. Euler
     adds energy in each step, and without bound in long turns. In the body frame the momentum of a

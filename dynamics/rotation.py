@@ -38,8 +38,8 @@ def product_of(
 
 @compiled_inline
 def matrix_of_numbers(w: float, x: float, y: float, z: float) -> Numbers:
-    """Return the nine numbers, row by row, of the matrix from body to world coordinates: (7) with
-    ``+2 q0 [qv]x``.
+    """Return the nine numbers, row by row, of the matrix that takes body to world coordinates: (7)
+    with ``+2 q0 [qv]x``.
     """
     return (
         1.0 - 2.0 * (y * y + z * z),
@@ -76,7 +76,7 @@ def quaternion_of_mrp(r0: float, r1: float, r2: float) -> Numbers:
 def mrp_between(
     a0: float, a1: float, a2: float, a3: float, b0: float, b1: float, b2: float, b3: float
 ) -> Numbers:
-    """Return the world-frame MRP from the quaternion b to a: ``a * conj(b)``, (25)."""
+    """Return the world-frame MRP that takes the quaternion b to a: ``a * conj(b)``, (25)."""
     w = a0 * b0 + a1 * b1 + a2 * b2 + a3 * b3
     sign = choose(w >= 0.0, 1.0, -1.0)
     scale = sign / (1.0 + sign * w)
@@ -89,8 +89,8 @@ def mrp_between(
 
 @compiled_inline
 def turn_of_step(square: float, half: float) -> Numbers:
-    """Return the cosine of half a turn, and its sine over the rate. Inputs: the square of half the
-    angle, and half the time step, s: (13) for small angles.
+    """Return the cosine of half a turn, and its sine over the rate, from the square of half the
+    angle and half the time step, s: (13) for small angles.
 
     The series to the last digit of a double: three times as fast as the functions, and safe at
     zero.
@@ -106,7 +106,7 @@ def turn_of_step(square: float, half: float) -> Numbers:
 
 @compiled_inline
 def large_turn_of_step(square: float, half: float, cosine: float, scale: float) -> Numbers:
-    """Return the same for any angle; ``cosine`` and ``scale`` as of ``turn_of_step``."""
+    """Return the same for any angle; ``cosine`` and ``scale`` are those of ``turn_of_step``."""
     large = square >= 0.01
     if any_of(large):
         angle = math.sqrt(square)
@@ -130,14 +130,16 @@ def turned_by(
 
 @compiled
 def quaternion_multiply(a: Array, b: Array, out: Array) -> None:
-    """Write the Hamilton product ``a * b`` of two quaternions (4,) into ``out``, a third array."""
+    """Write the Hamilton product ``a * b`` of two quaternions (4,) into ``out``, which must be
+    neither of them.
+    """
     out[0], out[1], out[2], out[3] = product_of(a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3])
 
 
 @compiled
 def quaternion_to_matrix(q: Array, out: Array) -> None:
-    """Write the matrix (3, 3) from body to world coordinates into ``out``: (7) with ``+2 q0
-    [qv]x``.
+    """Write the matrix (3, 3) that takes body to world coordinates into ``out``: (7) with
+    ``+2 q0 [qv]x``.
     """
     R = matrix_of_numbers(q[0], q[1], q[2], q[3])
     out[0, 0], out[0, 1], out[0, 2] = R[0], R[1], R[2]
@@ -164,8 +166,8 @@ def quaternion_from_mrp(rho: Array, out: Array) -> None:
 
 @compiled
 def attitude_error(q: Array, reference: Array, out: Array) -> None:
-    """Write the world-frame MRP (3,) from ``reference`` to ``q`` into ``out``: ``q *
-    conj(reference)``, (16), (25).
+    """Write the world-frame MRP (3,) that takes ``reference`` to ``q`` into ``out``:
+    ``q * conj(reference)``, (16), (25).
 
     A quaternion and its negative are one attitude: the MRP never exceeds 1 in length, half a turn.
     """

@@ -82,7 +82,7 @@ def pointer_to(_typing_context: Any, address: Any) -> Any:
 
 @compiled
 def numbers_at(address: int, shape: Any) -> Array:
-    """Return the array of 64-bit floats of a shape, a tuple, at ``address``; its owner keeps the
-    memory alive.
+    """Return the array of 64-bit floats of a shape, a tuple, that lies at ``address``; whoever owns
+    it keeps it alive.
     """
     return carray(pointer_to(address), shape, np.float64)  # type: ignore[no-any-return]

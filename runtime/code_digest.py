@@ -20,12 +20,12 @@ def code_digest(rooms: Sequence[str], files: Iterable[str] = ()) -> str:
 
     All paths are below the package's folder, with ``/``; give tuples.
     """
-    found = {f"{_ROOT}/{name}" for name in files}
+    sources = {f"{_ROOT}/{name}" for name in files}
     for room in rooms:
         for folder, _, names in os.walk(f"{_ROOT}/{room}"):
-            found |= {f"{folder}/{name}" for name in names if name.endswith(_SOURCES)}
+            sources |= {f"{folder}/{name}" for name in names if name.endswith(_SOURCES)}
     digest = hashlib.sha256()
-    for path in sorted(found):
+    for path in sorted(sources):
         digest.update(path.removeprefix(f"{_ROOT}/").encode())
         with open(path, "rb") as source:  # pathlib takes three times as long
             digest.update(source.read())

@@ -116,19 +116,19 @@ def numbers(*shape: int) -> PlainValidator:
 
 def _one_line(error: ValidationError, form: type, data: Any, where: str) -> InputError:
     """Return the one line for an error: unknown keys come first, then missing ones."""
-    found = error.errors(include_url=False)
-    for one in found:
+    problems = error.errors(include_url=False)
+    for one in problems:
         if one["type"] in ("unexpected_keyword_argument", "extra_forbidden"):
             *above, key = one["loc"]
             place = ": ".join([where, *_words(above, data)])
             return unknown_name("key", str(key), _names(_form_at(form, above)), place)
-    missing = [one for one in found if one["type"] in ("missing", "missing_argument")]
+    missing = [one for one in problems if one["type"] in ("missing", "missing_argument")]
     if missing:
         section = missing[0]["loc"][:-1]
         names = [str(one["loc"][-1]) for one in missing if one["loc"][:-1] == section]
         place = ": ".join([where, *_words(section, data)])
         return InputError(f"{place}: missing field(s) {', '.join(names)}")
-    one = found[0]
+    one = problems[0]
     key = ".".join(_words(one["loc"], data))
     if one["type"] == "dataclass_type":
         known = ", ".join(sorted(_names(_form_at(form, one["loc"]))))
@@ -154,7 +154,7 @@ def _words(location: Any, data: Any) -> list[str]:
     """Return the names on the way to a value. An entry of a list has its own name, or else its
     number from 1.
     """
-    found = []
+    names = []
     for part in location:
         try:
             data = data[part]
@@ -162,10 +162,10 @@ def _words(location: Any, data: Any) -> list[str]:
             data = None
         if isinstance(part, int):
             named = data.get("name") if isinstance(data, Mapping) else None
-            found.append(str(named or f"entry {part + 1}"))
+            names.append(str(named or f"entry {part + 1}"))
         else:
-            found.append(str(part))
-    return found
+            names.append(str(part))
+    return names
 
 
 def _form_at(form: Any, location: Any) -> Any:

@@ -6,8 +6,10 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from types import FrameType
+
+Handler = Callable[[int, FrameType | None], object]
 
 INTERRUPTED, TERMINATED = 130, 143  # exit codes
 _AGAIN = 0.02  # s until a lost interrupt comes again
@@ -21,6 +23,25 @@ def is_command() -> bool:
 
 
 @contextmanager
+def _answering(
+    number: signal.Signals, usual: "Handler | signal.Handlers", answer: Handler
+) -> Iterator[bool]:
+    """Have ``answer`` handle a signal in the block, and give whether it does: not where the usual
+    handler is replaced already, nor in another thread than the main one.
+    """
+    ours = (
+        threading.current_thread() is threading.main_thread() and signal.getsignal(number) is usual
+    )
+    if ours:
+        signal.signal(number, answer)
+    try:
+        yield ours
+    finally:
+        if ours:
+            signal.signal(number, usual)
+
+
+@contextmanager
 def leaving_at_once(active: bool = True) -> Iterator[None]:
     """Have an interrupt end the process at once while the block imports something.
 
@@ -28,15 +49,9 @@ def leaving_at_once(active: bool = True) -> Iterator[None]:
     and prints many lines at best. Another handler of interrupts stays as it is, as do other threads
     than the main one.
     """
-    ours = active and threading.current_thread() is threading.main_thread()
-    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+    usual = signal.default_int_handler
+    with _answering(signal.SIGINT, usual, _leave) if active else nullcontext():
         yield
-        return
-    signal.signal(signal.SIGINT, _leave)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 class _Interrupt(KeyboardInterrupt):
@@ -84,19 +99,14 @@ def noted() -> Iterator[Callable[[], bool]]:
         taken()
         return bool(came)
 
-    usual = threading.current_thread() is threading.main_thread() and (
-        signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    )
-    if usual:
-        signal.signal(signal.SIGINT, note)
-        sys.unraisablehook = lambda lost: lost.exc_type is _Interrupt or told(lost)
-    try:
-        yield answer
-    finally:
-        taken()
-        if usual:
+    with _answering(signal.SIGINT, signal.default_int_handler, note) as ours:
+        if ours:
+            sys.unraisablehook = lambda lost: lost.exc_type is _Interrupt or told(lost)
+        try:
+            yield answer
+        finally:
+            taken()
             sys.unraisablehook = told
-            signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @contextmanager
@@ -111,16 +121,8 @@ def terminable() -> Iterator[Callable[[], bool]]:
         came.append(number)
         _interrupt(number)
 
-    usual = threading.current_thread() is threading.main_thread() and (
-        signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
-    )
-    if usual:
-        signal.signal(signal.SIGTERM, end)
-    try:
+    with _answering(signal.SIGTERM, signal.SIG_DFL, end):
         yield lambda: bool(came)
-    finally:
-        if usual:
-            signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def forget() -> None:

@@ -127,6 +127,6 @@ def _is_writable(path: Path, mode: int = 0o777) -> bool:
 
 def _is_private(path: Path) -> bool:
     """Return whether nobody else can have put machine code there: all users may write beside it."""
-    found = path.lstat()
-    mine = stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid()
-    return mine and not found.st_mode & 0o022
+    status = path.lstat()
+    mine = stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid()
+    return mine and not status.st_mode & 0o022

@@ -19,11 +19,11 @@ _PACKAGES = (
 
 def package_versions() -> dict[str, str]:
     """Return the versions of the installed packages behind a result."""
-    found = {}
+    versions = {}
     for name in _PACKAGES:
         with suppress(metadata.PackageNotFoundError):
-            found[name] = metadata.version(name)
-    return found
+            versions[name] = metadata.version(name)
+    return versions
 
 
 @cache

@@ -55,11 +55,11 @@ def check_regular(path: Path, what: str, most: int | None = None) -> None:
         InputError: the file does not exist, is of another kind, or is larger.
     """
     with _reading(path, what):
-        found = path.stat()
-    _check_kind(path, found.st_mode, what)
-    if most is not None and found.st_size > most:
+        status = path.stat()
+    _check_kind(path, status.st_mode, what)
+    if most is not None and status.st_size > most:
         raise InputError(
-            f"{path}: more than {most} bytes ({found.st_size}); expected {what}, no larger"
+            f"{path}: more than {most} bytes ({status.st_size}); expected {what}, no larger"
         )
 
 

@@ -215,11 +215,11 @@ for _question, _sign, _least in ((all_of, "==", -1), (any_of, "!=", 0)):
 
 
 def first_column(numbers: Any, i: int) -> int:
-    """Return the first computed column in row ``i`` of a symmetric sum, of the size of ``numbers``
-    (n, n).
+    """Return the column from which on row ``i`` of a symmetric sum, of the size of ``numbers``
+    (n, n), is worked out.
 
     With single numbers whole rows are computed, good for a vector unit. Lanes fill the unit anyway;
-        below the diagonal are the numbers from above, bit for bit.
+    below the diagonal are the numbers from above, bit for bit.
     """
     return 0
 
@@ -228,8 +228,8 @@ _BEYOND = 1 << 62  # a constant: compilers see then: no row of single numbers li
 
 
 def first_below(numbers: Any, i: int) -> int:
-    """Return the first row for copies of row ``i`` in column ``i``; with single numbers beyond the
-    last.
+    """Return the row from which on what was worked out in row ``i`` is to be put into column ``i``
+    as well; with single numbers beyond the last.
     """
     return _BEYOND
 
@@ -262,8 +262,8 @@ def lanes_by(singly: Callable[..., Any], lanes: Callable[..., Any]) -> Callable[
 
 
 def corners(table: Any, i: Any, j: Any) -> Any:
-    """Return the entries of ``table`` (n, m), contiguous, at (i, j), (i, j + 1), (i + 1, j) and (i
-    + 1, j + 1). The indices are whole numbers as floats, each lane's own, inside the table.
+    """Return what stands in ``table`` (n, m), contiguous, at (i, j), (i, j + 1), (i + 1, j) and
+    (i + 1, j + 1); i and j are whole numbers as floats, each lane's own, and inside of it.
     """
     k, m = int(i), int(j)
     return table[k, m], table[k, m + 1], table[k + 1, m], table[k + 1, m + 1]

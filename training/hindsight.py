@@ -67,11 +67,11 @@ def _models(oracle: WindOracle, late: float) -> list[tuple[Array, ...]]:
     """Return for each axis A (n, n) and B (n,) of a decision with commands ``late`` by so many s,
     and the gains of ``preview``.
     """
-    found: list[tuple[Array, ...]] = []
+    models: list[tuple[Array, ...]] = []
     for axis in axis_models(oracle.vehicle, lag=MOTOR_LAG + late):
         A, B, _ = axis.held(WIND_PERIOD)
-        found.append((A, B[:, 0], *preview(A, B, np.eye(len(A)), oracle.effort, AHEAD)))
-    return found
+        models.append((A, B[:, 0], *preview(A, B, np.eye(len(A)), oracle.effort, AHEAD)))
+    return models
 
 
 class WindLesson:

@@ -49,16 +49,16 @@ def progress_from(data: Any, path: Path) -> Progress:
         InputError: the file holds something else.
     """
     try:
-        found = checked(Progress, data, str(path))
+        progress = checked(Progress, data, str(path))
     except InputError:
-        found = None
-    counts = {len(found.steps), len(found.rmse_m), len(found.lost)} if found else ()
-    if found is None or len(counts) > 1 or not -1 <= found.best < len(found.steps):
+        progress = None
+    counts = {len(progress.steps), len(progress.rmse_m), len(progress.lost)} if progress else ()
+    if progress is None or len(counts) > 1 or not -1 <= progress.best < len(progress.steps):
         raise InputError(
             f"{path}: does not hold the progress of a training "
             f"({', '.join(f.name for f in fields(Progress))}); delete {path.parent} to start anew"
         )
-    return found
+    return progress
 
 
 def read_progress(folder: Path) -> Progress | None:

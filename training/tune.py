@@ -124,7 +124,7 @@ def tune(
     }
 
 
-def keep_gains(found: dict[str, Any], path: Path, command: str) -> None:
+def keep_gains(result: dict[str, Any], path: Path, command: str) -> None:
     """Write a search's gains into a file of tuned gains. They replace the entry for this law and
     scenario of FanTracking, or for this law of another task.
 
@@ -138,11 +138,11 @@ def keep_gains(found: dict[str, Any], path: Path, command: str) -> None:
             raise InputError(
                 f"{path}: expected laws, scenarios and their gains, as in controllers/tuned.yaml"
             )
-    places = ("law", "scenario") if found["task"] == STANDARD_TASK else ("task", "law")
-    rounded = {name: float(f"{value:.4g}") for name, value in found["gains"].items()}
-    kept.setdefault(found[places[0]], {})[found[places[1]]] = {
+    places = ("law", "scenario") if result["task"] == STANDARD_TASK else ("task", "law")
+    rounded = {name: float(f"{value:.4g}") for name, value in result["gains"].items()}
+    kept.setdefault(result[places[0]], {})[result[places[1]]] = {
         "gains": rounded,
-        **{k: v for k, v in found.items() if k not in ("gains", "task", "law", places[1])},
+        **{k: v for k, v in result.items() if k not in ("gains", "task", "law", places[1])},
         "command": command,
     }
     write_text(yaml.safe_dump(kept, sort_keys=False, width=120), path)

@@ -21,11 +21,10 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
     """An SB3 ``VecEnv`` over a Gymnasium vector environment of fan-tracking environments.
 
     Each environment on its own: at an episode's end, ``infos[i]["terminal_observation"]`` holds its
-        last features, and ``infos[i]["TimeLimit.truncated"]`` is True where only the clock ended
-        the episode. The returned observation is the first of the next episode. Every episode's seed
-        is given
-    by ``seed_of``. ``episode`` (n,) holds the numbers of the episodes in flight: set to those of
-    another run, ``reset`` goes on with the episodes that follow.
+    last features, and ``infos[i]["TimeLimit.truncated"]`` is True where only the clock ended the
+    episode. The returned observation is the first of the next episode. Every episode's seed is
+    given by ``seed_of``. ``episode`` (n,) holds the numbers of the episodes in flight: set to those
+    of another run, ``reset`` goes on with the episodes that follow.
 
     Args:
         envs: of FanTracking.

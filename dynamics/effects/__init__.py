@@ -84,7 +84,7 @@ def _files() -> dict[str, Path]:
 
 @cache
 def _files_in(folders: tuple[str, ...]) -> dict[str, Path]:
-    found = {path.stem: path for path in _effects_in(Path(__file__).parent)}
+    files = {path.stem: path for path in _effects_in(Path(__file__).parent)}
     for folder in map(Path, folders):
         if not folder.is_dir():
             raise InputError(
@@ -92,12 +92,12 @@ def _files_in(folders: tuple[str, ...]) -> dict[str, Path]:
                 f"{os.pathsep} between them"
             )
         for path in _effects_in(folder.resolve()):
-            if found.setdefault(path.stem, path) != path:
+            if files.setdefault(path.stem, path) != path:
                 raise InputError(
-                    f"{path}: an effect {path.stem} is there already ({found[path.stem]}); "
+                    f"{path}: an effect {path.stem} is there already ({files[path.stem]}); "
                     f"expected another name"
                 )
-    return found
+    return files
 
 
 @cache

@@ -45,8 +45,8 @@ def _ask(address: int, c: Array, vehicle: Array, third: Array, fourth: Array) ->
 def add_wrenches(
     models: np.ndarray, coefficients: Array, vehicle: Array, state: Array, wrench: Array
 ) -> None:
-    """Add the wrenches of all wrench effects at ``state`` to ``wrench`` (6,): force in the world,
-    torque in the body frame.
+    """Add what every wrench effect says at ``state`` to ``wrench`` (6,): force in the world, torque
+    in the body frame.
     """
     for i in range(len(models)):
         _ask(models[i], coefficients[i], vehicle, state, wrench)
@@ -62,7 +62,7 @@ def deliver(
     voltage: float,
     rotors: Array,
 ) -> None:
-    """Rewrite the rotor speeds ``rotors[:4]`` (rad/s) to the delivered ones.
+    """Rewrite the rotor speeds ``rotors[:4]`` (rad/s) to those that the rotors really deliver.
 
     ``rotors`` is (ROTORS_SIZE,) with its time filled in.
     """
@@ -76,7 +76,9 @@ def deliver(
 def advance(
     hooks: np.ndarray, coefficients: Array, vehicle: Array, state: Array, rotors: Array
 ) -> None:
-    """Carry the own states of the wrench effects on by ``rotors[STEP]`` s in a filled ``state``."""
+    """Carry the own states of the wrench effects on by ``rotors[STEP]`` s in a ``state`` that is
+    filled in.
+    """
     for i in range(len(hooks)):
         if hooks[i] != 0:
             _ask(hooks[i], coefficients[i], vehicle, state, rotors)

@@ -41,7 +41,7 @@ class Role(StrEnum):
     on the part.
 
     A role is a contract: the effect has, first of all and in this order, coefficients with the
-        units behind the role's word. *Relative* ones are of unit 1.
+    units behind the role's word. *Relative* ones are of unit 1.
     """
 
     units: tuple[str, ...]

@@ -27,9 +27,7 @@ Pointer = Any
 
 @compiled
 def rotor_place(vehicle: Pointer, i: int, central: float) -> tuple[float, float, float]:
-    """Return the place of rotor ``i``, m from the geometric centre; ``central`` draws it to the
-    centre.
-    """
+    """Return where rotor ``i`` stands, m from the geometric centre; ``central`` draws it there."""
     share, at = 1.0 - central, ROTOR_POSITION + 3 * i
     return share * vehicle[at], share * vehicle[at + 1], share * vehicle[at + 2]
 
@@ -96,8 +94,8 @@ def add_force_at(
 def lift_near_plane(
     c: Pointer, vehicle: Pointer, state: Pointer, wrench: Pointer, height: float, side: float
 ) -> None:
-    """Add the thrust gained by rotors near a level plane at ``height`` m. ``c`` (2,) are strength
-    and ``central``; ``side`` is +1 above the plane and -1 below.
+    """Add the thrust that rotors gain near a level plane at ``height`` m, with ``c`` (2,) its
+    strength and ``central``; ``side`` is +1 where they are above the plane and -1 below.
     """
     scale = c[0] * (0.25 * vehicle[ROTOR_RADIUS]) ** 2
     total = 0.0
@@ -135,14 +133,14 @@ def turn_attitude(sample: Pointer, rx: float, ry: float, rz: float) -> None:
 def delay(
     memory: Pointer, width: int, capacity: int, wanted: float, values: Pointer, at: int
 ) -> None:
-    """Replace ``width`` numbers of ``values`` from ``at`` on by their values ``wanted`` s ago.
+    """Replace ``width`` numbers of ``values`` from ``at`` on by what they were ``wanted`` s ago.
 
     ``memory`` is the delay line: the number of entries, the time since the last new one (summed by
-        the caller), and the entries, newest first. An entry is an age and its numbers. Between
-        entries runs the cubic through the nearest four, within their range. A line between two
-        would damp noise by its distance from both. The best fit of a noisy log would be the delay
-        with most damping. Four unevenly spaced entries get a line; before the oldest the value is
-        held. A delay line fed faster than 200 Hz keeps at most 200 entries a second.
+    the caller), and the entries, newest first. An entry is an age and its numbers. Between entries
+    runs the cubic through the nearest four, within their range. A line between two would damp noise
+    by its distance from both. The best fit of a noisy log would be the delay with most damping.
+    Four unevenly spaced entries get a line; before the oldest the value is held. A delay line fed
+    faster than 200 Hz keeps at most 200 entries a second.
     """
     size = width + 1
     count = int(memory[0])
