@@ -26,7 +26,7 @@ place of one states alternatives: the first is taken with columns in the log, an
   euler (order of the turns, each about the axis moved by the turn before: zyx is yaw, pitch, roll)
   and unit (deg, rad). A column ``=0`` stands for an angle outside the table. sense: body_to_world
   or world_to_body. of: topics of its positions (default: all)
-* ``rotors``: measured speeds: columns, order (a name of ``rotor_orders`` or four motors' numbers:
+* ``rotors``: measured speeds: columns, order (a name of ``what_flew`` or four motors' numbers:
   at front-left, rear-left, rear-right, front-right), unit (rad/s, rpm, Hz, eRPM with pole_pairs)
 * ``commands``: columns, order, unit (us, normalised, duty, percent, dshot, counts), range (counts
   of no and of full command), clip (true: a command beyond the range is set to its end); assumed of
@@ -64,8 +64,8 @@ from ...runtime.errors import InputError, unknown_name
 from ...runtime.forms import STRICT, Number, Positive, checked, expected
 from ...runtime.yaml_file import read_yaml
 from .column_names import WORDS, unit_spelled
-from .rotor_orders import ORDERS, Order, rotor_order
 from .table import Array
+from .what_flew import ORDERS, Order, rotor_order
 
 MAPS = Path(__file__).parent / "maps"  # the kit's own maps
 OWN_MAP = "windwrench"  # of this kit's own columns
@@ -350,8 +350,16 @@ class LogMap:
 
 
 SECTIONS = (
-    *("position", "attitude", "rotors", "commands", "wrench", "battery"),
-    *("accelerometer", "gyro", "force", "torque"),
+    "position",
+    "attitude",
+    "rotors",
+    "commands",
+    "wrench",
+    "battery",
+    "accelerometer",
+    "gyro",
+    "force",
+    "torque",
 )
 _FIELDS = [field.name for field in fields(LogMap) if field.name not in ("name", "alternatives")]
 

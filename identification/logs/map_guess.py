@@ -42,9 +42,8 @@ from .log_map import (
 )
 from .magnitudes import MAGNITUDES, likely_unit, motor_unit, within
 from .readings import DECLARED, OTHER, ROTORS, SensorReading, rotations, table_readings
-from .rotor_orders import ORDERS, Order, order_names, order_words
 from .table import Array, Table
-from .what_flew import more_rotors
+from .what_flew import ORDERS, Order, more_rotors, order_names, order_words
 
 _Choice = tuple[str, bool, str]  # value, whether it is certain, and why
 _G = UNITS["accelerometer"]["g"]
@@ -230,7 +229,7 @@ class _Guessing:
                     lack(part, part, why)
             for part in half:  # for a person to complete
                 columns, unit = self.parts[part].columns, self.parts[part].unit
-                most = float(np.max(np.abs(self.numbers.some(columns)), initial=0.0))
+                most = np.max(np.abs(self.numbers.some(columns)), initial=0.0)
                 made: Columns = Columns(columns, unit or "m")
                 if part == "attitude":
                     euler = "zyx" if len(columns) == 3 else ""
@@ -417,7 +416,7 @@ class _Guessing:
             pairs = 7 if unit == "eRPM" else 1
             self.sections[kind] = Rotors(group.columns, unit, order=order, pole_pairs=pairs)
             return
-        high = float(np.nanmax(values, initial=0.0))
+        high = np.nanmax(values, initial=0.0)
         counts = next((float(2**bits - 1) for bits in (8, 10, 11, 12) if high < 2**bits), 65535.0)
         limits = COMMAND_UNITS[unit] or (0.0, counts)
         if unit in ("us", "counts", "dshot"):

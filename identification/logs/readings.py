@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 from ...runtime.yaml_file import read_yaml
 from .channels import quaternions, scaled
 from .log_map import SENSES, UNITS, Attitude
-from .rotor_orders import ORDERS, Order, order_names
 from .table import Array, Mask, finite_rows
+from .what_flew import ORDERS, Order, order_names
 
 _I = np.eye(3)
 _STATED: dict[str, Any] = read_yaml(Path(__file__).with_name("conventions.yaml"), "conventions")
@@ -120,8 +120,9 @@ class ColumnReading:
         """Return the map's section for an attitude in some columns."""
         signs = (1, self.pitch_sign, 1) if self.pitch_sign < 0 else ()
         unit = self.unit if self.euler else ""
-        order, euler, sense = self.order, self.euler, self.sense
-        return Attitude(columns, unit, signs=signs, order=order, euler=euler, sense=sense)
+        return Attitude(
+            columns, unit, signs=signs, order=self.order, euler=self.euler, sense=self.sense
+        )
 
     @property
     def moves(self) -> tuple[Any, ...]:

@@ -178,7 +178,7 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
     if not np.isfinite(most):
         yield Refused(f"omega1..omega4 are beyond all rotors; expected {hover}")
     for i, column in enumerate(speeds[thrust > 0.3 * most].T):
-        if float(np.max(column)) <= 0.0:
+        if np.max(column) <= 0.0:
             yield Refused(f"omega{i + 1} {zero}; {all_four}")
     ratio = thrust_by_weight(speeds, vehicle)
     if doubt := rotor_doubt(ratio, vehicle):
@@ -246,7 +246,7 @@ def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
             f"{rate:.3g} IMU readings a second and no pose as fast; expected at least "
             f"{_LEAST_IMU_HZ:g}: a quadrotor turns within a tenth of a second"
         )
-    there = sum(float(log.t[piece[-1]] - log.t[piece[0]]) for piece in inertial_pieces(log))
+    there = sum(log.t[piece[-1]] - log.t[piece[0]] for piece in inertial_pieces(log))
     if there < least - 1e-9:
         yield Needed(
             f"{there:.3g} s of unbroken gyro and accelerometer; expected at least {least:g} s of "
@@ -281,8 +281,8 @@ def _new_poses(log: FlightLog, same: Mask) -> Findings:
 def _uneven_steps(log: FlightLog) -> Findings:
     """Check for even steps of the clock."""
     step = np.diff(log.t)
-    median = float(np.median(step))
-    uneven = float(np.mean((step < _UNEVEN[0] * median) | (step > _UNEVEN[1] * median)))
+    median = np.median(step)
+    uneven = np.mean((step < _UNEVEN[0] * median) | (step > _UNEVEN[1] * median))
     words = f"{100 * uneven:.0f} % of them far from the median of {median:.3g} s"
     if uneven > _UNEVEN_SHARE:
         yield Refused(
@@ -304,13 +304,13 @@ def _steps(log: FlightLog) -> Findings:
     far, turned = way > _LEAP[0] + _LEAP[1] * step, angle > _TURN[0] + _TURN[1] * step
     leaps = far | turned
     if leaps.any():
-        first = int(np.argmax(leaps))
+        first = np.argmax(leaps)
         what = f"{way[first]:.3g} m" if far[first] else f"{np.degrees(angle[first]):.0f} degrees"
         units = ": are px, py, pz in metres?" if far.mean() > 0.05 else ""
         kind = Refused if leaps.mean() > _MOST_LEAPS else Fault
         yield kind(
             f"the pose leaps by {what} within {step[first]:.3g} s at t = {t[first + 1]:.6g} s, "
-            f"which no quadrotor flies ({int(leaps.sum())} such step(s)){units}; expected poses of "
+            f"which no quadrotor flies ({leaps.sum()} such step(s)){units}; expected poses of "
             "one vehicle on one clock: leave the bad rows' pose empty, or cut the log there"
         )
     # two poses as if no time had passed, by velocities over 10 poses on each side
@@ -321,9 +321,9 @@ def _steps(log: FlightLog) -> Findings:
             continue
         before = (position[i] - position[a]) / (t[i] - t[a])
         after = (position[b] - position[i + 1]) / (t[b] - t[i + 1])
-        speed = min(float(np.linalg.norm(before)), float(np.linalg.norm(after)))
-        is_alike = float(np.linalg.norm(after - before)) < 0.15 * speed + 0.05 and angle[i] < 0.05
-        if speed > _MOVING and is_alike and way[i] < _SAME * speed * 0.5 * float(step[i]):
+        speed = min(np.linalg.norm(before), np.linalg.norm(after))
+        is_alike = np.linalg.norm(after - before) < 0.15 * speed + 0.05 and angle[i] < 0.05
+        if speed > _MOVING and is_alike and way[i] < _SAME * speed * 0.5 * step[i]:
             yield Fault(
                 f"column t jumps by {step[i]:.3g} s at t = {t[i]:.6g} s, but the pose goes on from "
                 f"where it was ({1e3 * way[i]:.0f} mm on at {speed:.2g} m/s); expected one clock "
@@ -340,8 +340,10 @@ def _length(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
     step = np.where(carrying(thrust), step, 0.0)
     pieces = pose_pieces(log)
     left = sum(float(step[piece[0] : piece[-1] + 1].sum()) for piece in pieces)
-    whole, runs = float(step.sum()), len(runs_of(~log.valid))
-    lost = f"the pose is lost in {runs} run(s), {int(np.sum(~log.valid))} of {len(log.t)} rows; "
+    whole, runs = step.sum(), len(runs_of(~log.valid))
+    lost = (
+        f"the pose is lost in {runs} run(s), {np.count_nonzero(~log.valid)} of {len(log.t)} rows; "
+    )
     words = f"{lost if runs else ''}{left:.3g} of {whole:.3g} s of flight lie in unbroken runs of "
     words += f"poses of more than {SHORTEST_PIECE:g} s"
     if not pieces or left < least - 1e-9:

@@ -301,7 +301,7 @@ def _layout(path: Path, head: list[str]) -> tuple[TextLayout, int]:
         if separator in there and (decimal == "." or (separator != "," and "," in there))
     ]
     scores = [_score(head, layout) for layout in layouts]
-    best = int(np.argmax([round(score, 9) for score, _ in scores]))
+    best = np.argmax([round(score, 9) for score, _ in scores])
     if scores[best][0]:
         return layouts[best], scores[best][1]
     if not any(head):
@@ -326,9 +326,9 @@ def _score(head: list[str], layout: TextLayout) -> tuple[float, int]:
     if width < _FEWEST:
         return 0.0, 0
     whole = sum(1 for line in head[tail[0][0] :] if line.strip())
-    most = max(k for _, n, k in tail if n == width)
-    start = next(i for i, n, k in rows if n >= 0.8 * width and k >= 0.5 * most)
-    return sum(k for _, n, k in tail if n == width) / whole, start
+    counts = [k for _, n, k in tail if n == width]
+    start = next(i for i, n, k in rows if n >= 0.8 * width and k >= 0.5 * max(counts))
+    return sum(counts) / whole, start
 
 
 def _counts(layout: TextLayout, fields: Sequence[str]) -> tuple[int, int]:

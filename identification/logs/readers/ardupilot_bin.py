@@ -39,10 +39,18 @@ from ..channels import ChannelGroup, in_order
 from ..flight_log import FlightLog
 from ..log_map import Commands, LogMap, shipped_map, stated
 from ..mapped_log import recording_of
-from ..rotor_orders import ORDERS, Order, order_words
 from ..streams import MOST_VOLTS, Stream
 from ..table import Array
-from ..what_flew import PLUS, UNSTATED, WhatFlew, order_by_places, slots_of_motors
+from ..what_flew import (
+    ORDERS,
+    PLUS,
+    UNSTATED,
+    Order,
+    WhatFlew,
+    order_by_places,
+    order_words,
+    slots_of_motors,
+)
 
 Bytes = NDArray[np.uint8]
 Parameters = Mapping[str, float]
@@ -101,7 +109,7 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
     letter = next((x for x in ("Ch", "Chan") if pulses is not None and f"{x}1" in pulses), "C")
     log_map, notes = _with_parameters(path, log_map, parameters, vehicle, letter)
     volts = messages.get("CURR", {}).get("Volt")
-    if volts is not None and float(np.median(volts)) > MOST_VOLTS:
+    if volts is not None and np.median(volts) > MOST_VOLTS:
         messages["CURR"]["Volt"] = 0.01 * volts
         notes.append("CURR: hundredths of a volt, as Copter before 3.4 logged them")
     telemetry, telemetry_notes = _telemetry(messages.pop("ESC", {}), parameters)

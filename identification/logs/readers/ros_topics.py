@@ -36,7 +36,7 @@ def map_of(
     Args:
         types: types of the topics' messages, by topic.
         given: content of a map file; a section's topic and columns may be left out.
-        source: the bag or the live source, for errors.
+        source: the bag, for errors.
         where: the map file, for errors.
 
     Raises:
@@ -270,9 +270,8 @@ def _paths(value: Any, path: str = "") -> Iterator[str]:
     elif hasattr(value, "__len__"):
         for i, item in enumerate(value):
             yield from _paths(item, f"{path}[{i}]")
-    else:  # a message, of rosbags or of rclpy
-        names = getattr(value, "__dataclass_fields__", None) or value.get_fields_and_field_types()
-        for name in names:
+    else:  # a message
+        for name in value.__dataclass_fields__:
             yield from _paths(getattr(value, name), f"{path}.{name}" if path else name)
 
 
