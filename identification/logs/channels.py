@@ -215,13 +215,13 @@ def _resets(t: Array) -> Rows:
     """Return the first sample of each piece but the first: where the clock goes back, and stays
     back.
     """
-    found: list[int] = []
+    resets: list[int] = []
     for i in np.flatnonzero(np.diff(t) < -_RESET) + 1:
         before, after = t[max(i - _WINDOW, 0) : i], t[i : i + _WINDOW]
         enough = min(len(before), len(after)) >= min(_WINDOW, 3)
         if enough and np.median(after) < np.median(before) - _RESET:
-            found.append(int(i))
-    return np.array(found, dtype=np.intp)
+            resets.append(int(i))
+    return np.array(resets, dtype=np.intp)
 
 
 def in_order(t: Array) -> tuple[Rows, int]:

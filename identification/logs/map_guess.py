@@ -104,13 +104,15 @@ def guess_map(table: Table, vehicle: Vehicle | None = None) -> Guess:
     """
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # empty or absurd columns
-        found = _Guessing(table, vehicle)
-        missing = tuple(found.missing())
-    parts = [part for part in found.sections.values() if isinstance(part, Columns)]
-    used = {*found.time_columns, *(c for part in parts for c in part.columns)}
+        guessing = _Guessing(table, vehicle)
+        missing = tuple(guessing.missing())
+    parts = [part for part in guessing.sections.values() if isinstance(part, Columns)]
+    used = {*guessing.time_columns, *(c for part in parts for c in part.columns)}
     unused = tuple(column for column in table.header if column not in used)
-    found.sections.setdefault("time", TimeColumn(UNKNOWN))
-    return Guess(LogMap(**found.sections, name="guess"), tuple(found.reasons), unused, missing)
+    guessing.sections.setdefault("time", TimeColumn(UNKNOWN))
+    return Guess(
+        LogMap(**guessing.sections, name="guess"), tuple(guessing.reasons), unused, missing
+    )
 
 
 def _numbers_of(table: Table, names: Sequence[Name]) -> dict[str, Array]:
@@ -213,8 +215,8 @@ class _Guessing:
         out = []
 
         def lack(part: str, section: str, why: str, field: str = "columns") -> None:
-            found = self.ranked.get(part, [])[:SHOWN]
-            out.append(Reason(section, field, False, why, tuple(map(str, found))))
+            ranked = self.ranked.get(part, [])[:SHOWN]
+            out.append(Reason(section, field, False, why, tuple(map(str, ranked))))
 
         if self.clock is None:
             why = "no column looks like a time; expected one such as t, time or timestamp"
@@ -283,8 +285,8 @@ class _Guessing:
         t = np.asarray((raw - raw[np.isfinite(raw)][0]) * UNITS["time"][unit])
         middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
         t[~(np.abs(t - middle) <= 0.5 * LONGEST)] = np.nan
-        self.sections["time"] = found = TimeColumn(clock.column, unit, nanoseconds)
-        self.time_columns = found.named
+        self.sections["time"] = column = TimeColumn(clock.column, unit, nanoseconds)
+        self.time_columns = column.named
         return t
 
     def pose(self, place: Group, group: Group) -> None:

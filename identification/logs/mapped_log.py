@@ -329,8 +329,10 @@ def fitted(
             hint = f" (like {' or '.join(lower[x] for x in near)})" if near else ""
             words.append(f"{name!r} of {section}{hint}")
         more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
-        found = ", ".join(names[:_SHOWN]) + (", ..." if names[_SHOWN:] else "")
-        raise InputError(f"{where} does not fit: no column {', '.join(words)}{more}; found {found}")
+        listed = ", ".join(names[:_SHOWN]) + (", ..." if names[_SHOWN:] else "")
+        raise InputError(
+            f"{where} does not fit: no column {', '.join(words)}{more}; found {listed}"
+        )
     log_map = log_map.with_ways(fitting)
     check_whole(log_map, f"{where} does not fit")
     extra = {name: part for name, part in log_map.extra.items() if set(part.named) <= header}

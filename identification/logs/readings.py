@@ -242,12 +242,12 @@ def _each(**aspects: Sequence[Any]) -> list[ColumnReading]:
 
 
 def _weighed(
-    found: Sequence[ColumnReading], least: float, world: str = "enu"
+    readings: Sequence[ColumnReading], least: float, world: str = "enu"
 ) -> list[ColumnReading]:
     """Return readings with a penalty of ``least``, and 1 for each less usual convention.
 
     Args:
-        found: the readings.
+        readings: the readings.
         least: log-likelihood ratio.
         world: the usual one.
     """
@@ -262,7 +262,7 @@ def _weighed(
             + (r.world != world)
             + r.frames.unusual,
         )
-        for r in found
+        for r in readings
     ]
 
 
@@ -296,10 +296,10 @@ def table_readings(
     if not orders:
         attitudes = {"euler": ("zyx", "xyz"), "unit": units, "pitch_sign": (1, -1)}
     lengths = ("ft",) if length == "ft" else ("m", "cm", "mm")
-    found = _each(**attitudes, sense=SENSES, frames=MAP_FRAMES, length=lengths)
+    readings = _each(**attitudes, sense=SENSES, frames=MAP_FRAMES, length=lengths)
     return [
         replace(r, unlikely=r.unlikely + OTHER * (length in lengths and r.length != length))
-        for r in _weighed(found, 0.0, hint or "enu")
+        for r in _weighed(readings, 0.0, hint or "enu")
     ]
 
 

@@ -205,15 +205,15 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
     most = _most_rad_s(log, vehicle)
     if (above := np.argwhere(speeds > most)).size:
         row, rotor = above[0]
-        found = (
+        racing = (
             f"omega{rotor + 1} reads {speeds[row, rotor]:.4g} rad/s at t = {log.t[row]:.6g} s "
             f"({len(above)} such value(s)), faster than {vehicle.name} turns its rotors; expected "
             f"at most {most:.4g} rad/s"
         )
         if (speeds > most).all(axis=0).any():
-            yield Refused(found)
-        yield Needed(found)
-        yield Fault(f"{found}. They were interpolated")
+            yield Refused(racing)
+        yield Needed(racing)
+        yield Fault(f"{racing}. They were interpolated")
 
 
 def _most_rad_s(log: FlightLog, vehicle: Vehicle) -> float:
@@ -392,9 +392,9 @@ def _still(name: str, t: Array, rows: Mask, channel: Array, sisters: Array, name
         lasts = t[end - 1] - t[first] >= _STILL
         if lasts and np.min(changes[end - 1] - changes[first]) < _SISTERS_CHANGE:
             still[first:end] = False
-    if found := _stretches(still, t, _STILL):
+    if stretches := _stretches(still, t, _STILL):
         wrong = "what depends on it there is wrong if its sensor hung"
-        yield Note(f"warning: {name} stands still for {found} while {names} change: {wrong}")
+        yield Note(f"warning: {name} stands still for {stretches} while {names} change: {wrong}")
 
 
 def _stretches(rows: Mask, t: Array, least: float) -> str:
@@ -402,8 +402,8 @@ def _stretches(rows: Mask, t: Array, least: float) -> str:
     words, or nothing.
     """
     runs = [(float(t[end - 1] - t[first]), float(t[first])) for first, end in runs_of(rows)]
-    found = [run for run in runs if run[0] >= least]
-    if not found:
+    long_runs = [run for run in runs if run[0] >= least]
+    if not long_runs:
         return ""
-    seconds, begin = max(found, key=lambda run: run[0])
-    return f"{seconds:.3g} s from t = {begin:.6g} s ({len(found)} such stretch(es))"
+    seconds, begin = max(long_runs, key=lambda run: run[0])
+    return f"{seconds:.3g} s from t = {begin:.6g} s ({len(long_runs)} such stretch(es))"

@@ -72,8 +72,8 @@ class Stream:
 
 def readable(stream: Stream | None) -> Stream | None:
     """Return the finite samples (N, K); None: fewer than two."""
-    found = None if stream is None else stream.whole()
-    return None if found is None or len(found.t) < 2 else found
+    finite = None if stream is None else stream.whole()
+    return None if finite is None or len(finite.t) < 2 else finite
 
 
 def slerp(t: Array, attitude: Stream, longest: float = np.inf) -> Array:
@@ -326,8 +326,8 @@ def source_rate(t: Array, values: Array) -> float:
         t: (N,) s, increasing.
         values: (N, K); a row with NaN is no sample.
     """
-    found = Stream("", t, values).whole()
-    t, values = found.t, found.values
+    finite = Stream("", t, values).whole()
+    t, values = finite.t, finite.values
     if len(t) < 2:
         return 0.0
     changes = np.flatnonzero(np.any(np.diff(values, axis=0) != 0.0, axis=1))

@@ -103,10 +103,10 @@ def _refuse(
     if bad.any():
         i = int(np.argmax(bad))
         value = f"{column[i]:g}"
-        found = {"nan": "empty or NaN", "inf": "infinite", "-inf": "infinite"}.get(value, value)
+        words = {"nan": "empty or NaN", "inf": "infinite", "-inf": "infinite"}.get(value, value)
         assert samples.table is not None
         where = f"{samples.table.path}: column {name}, {samples.place(i)}"
-        raise InputError(f"{where} is {found}; expected {expected}")
+        raise InputError(f"{where} is {words}; expected {expected}")
 
 
 def _check_whole(samples: ChannelGroup, log_map: LogMap) -> None:

@@ -124,8 +124,8 @@ def more_rotors(
     turning = [*columns]
     others = source.numeric or source.header if isinstance(source, Table) else [*source]
     for name in _numbered_on(columns, others):
-        found = source.read([*columns, name]) if isinstance(source, Table) else source
-        rows = np.column_stack([found[column] for column in (*columns, name)])
+        data = source.read([*columns, name]) if isinstance(source, Table) else source
+        rows = np.column_stack([data[column] for column in (*columns, name)])
         rows = rows[finite_rows(rows)]
         if len(rows) < _FEWEST or np.ptp(rows[:, 4]) == 0.0:
             continue
@@ -143,9 +143,9 @@ def more_rotors(
 
 def _numbered_on(columns: Sequence[str], others: Sequence[str]) -> list[str]:
     """Return the other columns with the next numbers up in the four columns' names."""
-    for found in zip(*(re.finditer(r"\d+", name) for name in columns), strict=False):
-        if len({match[0] for match in found}) == len(columns):
-            first, last = found[0], max(int(match[0]) for match in found)
+    for numbers in zip(*(re.finditer(r"\d+", name) for name in columns), strict=False):
+        if len({match[0] for match in numbers}) == len(columns):
+            first, last = numbers[0], max(int(match[0]) for match in numbers)
             before, behind = first.string[: first.start()], first.string[first.end() :]
             following = (f"{before}{n:0{len(first[0])}d}{behind}" for n in range(last + 1, 16))
             return list(takewhile(others.__contains__, following))
@@ -174,8 +174,8 @@ def order_by_places(
     motors = np.arctan2(*np.array(places, dtype=np.float64).T[::-1])
     wanted = np.arctan2(*np.array(rotors, dtype=np.float64).T[::-1])
     off = np.abs(np.angle(np.exp(1j * (wanted[:, None] - motors))))
-    found = [int(i) for i in np.argmin(off, axis=1)]
-    if sorted(found) != [0, 1, 2, 3] or off.min(axis=1).max() > _APART:
+    nearest = [int(i) for i in np.argmin(off, axis=1)]
+    if sorted(nearest) != [0, 1, 2, 3] or off.min(axis=1).max() > _APART:
         return None
-    first, second, third, fourth = (i + 1 for i in found)
+    first, second, third, fourth = (i + 1 for i in nearest)
     return first, second, third, fourth

@@ -293,8 +293,8 @@ def _layout(path: Path, headers: Mapping[str, str], names: list[str]) -> Layout:
         raise InputError(f"{path}: no field loopIteration, which its predictors count on")
 
     def number(text: str, default: int) -> int:
-        found = whole_number(text, -999_999_999, 999_999_999)
-        return default if found is None else found
+        stated = whole_number(text, -999_999_999, 999_999_999)
+        return default if stated is None else stated
 
     top, _, bottom = headers.get("P interval", "1/1").rpartition("/")
     every = headers.get("I interval", "32")

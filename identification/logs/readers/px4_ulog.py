@@ -243,15 +243,15 @@ def _sensor(topic: str, t: Array, fields: Fields, field: str, gained: str) -> Ch
     """Return a gyro or an accelerometer at its own times, as far as the topic has it."""
     source = field if topic == "sensor_combined" else gained
     names = {f"{field}[{i}]": f"{source}[{i}]" for i in range(3)}
-    found = {name: fields[stored] for name, stored in names.items() if stored in fields}
+    axes = {name: fields[stored] for name, stored in names.items() if stored in fields}
     if source == gained and f"{gained}_dt" in fields:
         span = _MICROSECOND * fields[f"{gained}_dt"]
-        found = {n: column / np.where(span > 0.0, span, np.nan) for n, column in found.items()}
+        axes = {n: column / np.where(span > 0.0, span, np.nan) for n, column in axes.items()}
         t = t - 0.5 * span
     late = fields.get("accelerometer_timestamp_relative", np.zeros(len(t)))
     if field == "accelerometer_m_s2" and np.all(np.abs(late) < 1e6):
         t = t + _MICROSECOND * late
-    return ChannelGroup(t, found, topic)
+    return ChannelGroup(t, axes, topic)
 
 
 class TooMuchError(Exception):
@@ -381,8 +381,8 @@ def outputs_of(path: Path, sent: Sequence[Fields], parameters: Parameters) -> Ou
     bank, slots = "MAIN", [0, 1, 2, 3]
     for name, prefix in reversed(_BANKS.items()):  # the first of several
         functions = [int(parameters.get(f"{prefix}{i + 1}", 0.0)) for i in range(_OUTPUTS)]
-        if found := slots_of_motors(functions, _MOTOR1):
-            bank, slots = name, found
+        if of_bank := slots_of_motors(functions, _MOTOR1):
+            bank, slots = name, of_bank
     each = (_of_motors(fields, slots) for fields in sent)
     motors = next((motors for motors in each if motors is not None), np.zeros((0, 4)))
     most = np.nanmax(motors) if np.isfinite(motors).any() else 0.0
