@@ -82,12 +82,14 @@ def in_kit_units(log_map: LogMap, section: str, part: Columns, values: Array) ->
     axes and order of rotors; commands as 0 to 1.
     """
     unit = UNITS.get(section, {}).get(part.unit, 1.0)
+    if isinstance(part, Rotors | Commands):
+        values = values[:, np.subtract(part.order, 1)]
     if isinstance(part, Rotors):
-        return values[:, [m - 1 for m in part.order]] * (unit / part.pole_pairs)
+        return values * (unit / part.pole_pairs)
     if isinstance(part, Commands):
         assert part.range is not None
         low, high = part.range
-        return (values[:, [m - 1 for m in part.order]] - low) / (high - low)
+        return (values - low) / (high - low)
     if isinstance(part, Battery):
         return values * unit * part.cells
     if isinstance(part, Sensor):
@@ -186,10 +188,10 @@ def _of_piece(
     ]
     both = list(zip(groups, parts, strict=True))
     seconds = [
-        max(float(np.ptp(samples.t[part[i]])) for samples, part in both if part is not None)
+        max(np.ptp(samples.t[part[i]]) for samples, part in both if part is not None)
         for i in range(many)
     ]
-    chosen = int(np.argmax(seconds)) if piece is None else piece - 1
+    chosen = np.argmax(seconds) if piece is None else piece - 1
     lengths = ", ".join(f"{x:.3g}" for x in seconds)
     why, how = ("the longest, ", "; --piece reads another") if piece is None else ("", "")
     note = (
@@ -213,13 +215,13 @@ def _resets(t: Array) -> Rows:
     """Return the first sample of each piece but the first: where the clock goes back, and stays
     back.
     """
-    found: list[int] = []
+    resets: list[int] = []
     for i in np.flatnonzero(np.diff(t) < -_RESET) + 1:
         before, after = t[max(i - _WINDOW, 0) : i], t[i : i + _WINDOW]
         enough = min(len(before), len(after)) >= min(_WINDOW, 3)
-        if enough and float(np.median(after)) < float(np.median(before)) - _RESET:
-            found.append(int(i))
-    return np.array(found, dtype=np.intp)
+        if enough and np.median(after) < np.median(before) - _RESET:
+            resets.append(int(i))
+    return np.array(resets, dtype=np.intp)
 
 
 def in_order(t: Array) -> tuple[Rows, int]:
@@ -232,7 +234,7 @@ def in_order(t: Array) -> tuple[Rows, int]:
     rows: Rows = np.arange(len(t)) if increases else _longest_increase(t)
     if len(rows) > 3:  # a first or a last one far off all others is left out
         steps = np.diff(t[rows])
-        far = max(_ALONE * float(np.median(steps)), _JITTER)
+        far = max(_ALONE * np.median(steps), _JITTER)
         rows = rows[int(steps[0] > far) : len(rows) - int(steps[-1] > far)]
     if increases:
         return rows, 0
@@ -241,7 +243,7 @@ def in_order(t: Array) -> tuple[Rows, int]:
     steps = np.diff(t[rows])
     if not len(steps):
         return rows, 0
-    hole = _HOLE * float(np.median(steps))
+    hole = _HOLE * np.median(steps)
     late = np.flatnonzero(others & (t > t[rows[0]]) & (t < t[rows[-1]]))
     late = late[np.unique(t[late], return_index=True)[1]]
     after = np.searchsorted(t[rows], t[late])

@@ -58,10 +58,10 @@ def take_apart(header: Sequence[str], units: Sequence[str] = ()) -> list[Name]:
     out = []
     for i, column in enumerate(header):
         text, unit = column.strip(), ""
-        found = _BRACKETS.search(text) or _ENDING.search(text)
-        if found and found.start() > 0:
-            unit = _UNITS.get(found[1].lower(), "")
-            text = text[: found.start()]
+        ending = _BRACKETS.search(text) or _ENDING.search(text)
+        if ending and ending.start() > 0:
+            unit = _UNITS.get(ending[1].lower(), "")
+            text = text[: ending.start()]
         if not unit and i < len(units):
             unit = _UNITS.get(_bare(units[i]), "")
         base = re.sub(r"[^0-9a-zA-Z]+", "_", text).strip("_").lower()
@@ -83,7 +83,7 @@ def groups_of(names: Iterable[Name], endings: Sequence[str]) -> list[Group]:
     """Return the groups of columns whose names differ in one of ``endings`` alone, in the order of
     the endings. An ending stands at the end, at the beginning, or between other words.
     """
-    found: dict[tuple[str, bool], dict[str, Name]] = {}
+    families: dict[tuple[str, bool], dict[str, Name]] = {}
     names = list(names)
     bases = {name.base for name in names}
     before = "(?<!\\d)" if endings[0].isdigit() else "_"
@@ -98,9 +98,9 @@ def groups_of(names: Iterable[Name], endings: Sequence[str]) -> list[Group]:
                     continue
                 if key[-1:].isdigit() and behind and endings[0].isdigit():
                     continue
-                found.setdefault((key.strip("_"), behind), {}).setdefault(ending, name)
+                families.setdefault((key.strip("_"), behind), {}).setdefault(ending, name)
     out = []
-    for (key, _), members in found.items():
+    for (key, _), members in families.items():
         more = "3" if endings[-1] == "2" else "0" if endings[0] == "1" else ""
         if more and {key + more, f"{key}_{more}"} & bases:
             continue  # three of four, or four of five

@@ -125,8 +125,8 @@ class Numbers:
         for w, x, y, z in (attitude.T, attitude[:, [3, 0, 1, 2]].T):
             for sign in (1.0, -1.0):
                 tilt = x * z + sign * w * y, y * z - sign * w * x
-                found = [abs(correlation(f, d)) for f, d in zip(force, tilt, strict=False)]
-                best = max(best, min(found))
+                correlations = [abs(correlation(f, d)) for f, d in zip(force, tilt, strict=False)]
+                best = max(best, min(correlations))
         return (best if best > _FOLLOWS else 0.0), "their acceleration follows the tilt"
 
     def moves_together(self, columns: Sequence[str]) -> tuple[float, str]:
@@ -232,7 +232,7 @@ def candidates(
         measured = tuple(name.column for name in loose if not re.search(wanted, name.base))
         for i in range(len(measured) - width + 1):  # adjacent columns
             ways.append((Group(measured[i : i + width], ""), 0.0, ""))
-    found: dict[tuple[str, ...], ColumnCandidate] = {}
+    likeliest: dict[tuple[str, ...], ColumnCandidate] = {}
     for group, score, why in ways:
         there = len(numbers.rows(group.columns)[0]) > 0
         strength, told = judge(group.columns) if there else (0.0, "")
@@ -241,7 +241,7 @@ def candidates(
             score + _NUMBERS * strength,
             "; ".join(filter(None, (why, told if strength else ""))),
         )
-        before = found.get(group.columns)
+        before = likeliest.get(group.columns)
         if whole.why and strength >= 0.0 and (before is None or before.score < whole.score):
-            found[group.columns] = whole
-    return sorted(found.values(), key=lambda candidate: -candidate.score)
+            likeliest[group.columns] = whole
+    return sorted(likeliest.values(), key=lambda candidate: -candidate.score)

@@ -52,9 +52,8 @@ def with_commanded_speeds(
     if log.command is None or log.has_rotor_speeds:
         return log
     speeds, notes = _speeds(log, log.command, vehicle, model or Commands(()))
-    if speeds is None:
-        return replace(log, notes=(*log.notes, *notes))
-    return replace(log, rotor_speeds=speeds, commanded=True, notes=(*log.notes, *notes))
+    log = replace(log, notes=(*log.notes, *notes))
+    return log if speeds is None else replace(log, rotor_speeds=speeds, commanded=True)
 
 
 def _speeds(
@@ -88,7 +87,7 @@ def _speeds(
             "battery's voltage. A constant factor on thrust and the mass cannot be found from this "
             "log"
         ]
-        saturated = float(np.mean(command.max(axis=1) >= _SATURATED))
+        saturated = np.mean(command.max(axis=1) >= _SATURATED)
         if saturated > 0.0:
             notes.append(f"a motor is at full command in {100.0 * saturated:.1f} % of the samples")
         return np.sqrt(np.where(command > 0.0, np.maximum(thrust, 0.0), 0.0) / vehicle.k), notes
@@ -141,7 +140,7 @@ def speeds_of_wrench(wrench: Array, vehicle: Vehicle) -> tuple[Array, list[str]]
         "What the firmware's thrust curve, the battery and the motors made of the command is not "
         "in the log; a constant factor on thrust remains unknown"
     ]
-    clipped = int(np.sum(np.any((square < 0.0) | (square > limit), axis=1)))
+    clipped = np.count_nonzero(np.any((square < 0.0) | (square > limit), axis=1))
     if clipped:
         notes.append(
             f"the commands of {clipped} sample(s) were out of the rotors' reach and were clipped"

@@ -173,7 +173,7 @@ class Evidence:
             self._gains = _FORCE_GAIN, _TORQUE_GAIN
         self._thrusts = thrusts
         if np.isfinite(thrusts).any():
-            most = _MOST_THRUST * float(np.nanquantile(thrusts, 0.99))
+            most = _MOST_THRUST * np.nanquantile(thrusts, 0.99)
             self._thrusts = np.minimum(thrusts, most)
         moving = [x for x in (position, attitude, gyro) if x is not None]
         there = np.isfinite(t) & np.all([finite_rows(x) for x in moving], axis=0)
@@ -256,7 +256,7 @@ class Evidence:
         thrusts = [p.even(self._t, self._thrusts) for p in self._pieces]
         each = list(zip(thrusts, self._pieces, strict=True))
         totals = np.concatenate([(x @ self._k)[p.compared] for x, p in each])
-        scale = _G / max(float(np.median(totals)), 1e-300)
+        scale = _G / max(np.median(totals), 1e-300)
         out = []
         for x, p in each:
             total = scale * (x @ self._k)
@@ -402,7 +402,7 @@ class Evidence:
         squares = 0.5 * np.square(sums) / chance
         follows = np.sum(squares * (sums > 0.0), axis=1)
         is_near = (lags >= _NEAR[0]) & (lags <= _NEAR[1])
-        best = int(np.argmax(np.where(is_near, 0.0, follows)))
+        best = np.argmax(np.where(is_near, 0.0, follows))
         lead = follows[best] - np.max(np.sum(squares, axis=1)[is_near])
         return float(lags[best]) if lead > OFFSET else 0.0
 

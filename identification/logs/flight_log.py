@@ -104,8 +104,7 @@ class FlightLog:
 
     def __post_init__(self) -> None:
         if len(self.valid) != len(self.t):
-            pose = np.column_stack([self.position, self.quaternion])
-            there = finite_rows(pose)
+            there = finite_rows(self.position) & finite_rows(self.quaternion)
             object.__setattr__(self, "valid", there)
         for name in ("accelerometer", "gyro"):
             x = getattr(self, name)

@@ -58,19 +58,19 @@ def flew(log: FlightLog) -> tuple[str, str]:
     if not np.any(total > 0.0):
         return "no", "the motors never turn"
     aloft = carrying(total)
-    told = f"yes, {float(aloft.sum()) * log.period:.3g} s"
+    told = f"yes, {aloft.sum() * log.period:.3g} s"
     place = log.position[aloft & finite_rows(log.position)]
     if len(place) > 1:
         way = np.ptp(np.quantile(place, [0.01, 0.99], axis=0), axis=0)
-        far = float(np.linalg.norm(way))
+        far = np.linalg.norm(way)
         said = f"the motors turn, and the position spans {far:.3g} m, {way[2]:.3g} m of height"
-        drove = float(np.hypot(*way[:2])) > _DROVE[0] and way[2] < _DROVE[1]
+        drove = np.hypot(*way[:2]) > _DROVE[0] and way[2] < _DROVE[1]
         return "not shown" if far < _MOVES or drove else told, said
     if log.gyro is not None:
         rates = log.gyro[aloft & finite_rows(log.gyro)]
         count = max(1, round(_MEAN / log.period))
         means = rates[: len(rates) // count * count].reshape(-1, count, 3).mean(axis=1)
-        turns = float(np.std(means, axis=0).max(initial=0.0)) if len(means) else 0.0
+        turns = np.std(means, axis=0).max(initial=0.0) if len(means) else 0.0
         said = f"the motors turn, and the body by {turns:.2g} rad/s"
         return "unknown" if turns < _TURNS else told, said
     return "unknown", "the motors turn, and no motion was logged"
@@ -98,8 +98,9 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
         vehicle: the vehicle.
     """
     at_rest = np.square(rotor_speeds) @ vehicle.k < _TURNING * vehicle.weight
+    grounded = [Phase(GROUND, float(t[0]), float(t[-1]))]
     if at_rest.all():
-        return [Phase(GROUND, float(t[0]), float(t[-1]))]
+        return grounded
     turning = np.flatnonzero(~at_rest)
     on, off, last = int(turning[0]), int(turning[-1]), len(t) - 1
     starts, lands = on > 0, off < last  # whether the log shows take-off and landing
@@ -108,7 +109,7 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
     clear = height > max(before, after) + _CLEARANCE
     clear[:on] = clear[off + 1 :] = False
     if not clear.any():  # the rotors turned, but the vehicle never left the ground
-        return [Phase(GROUND, float(t[0]), float(t[-1]))]
+        return grounded
 
     # well above the ground: a bounce on landing is no flight
     typical = float(np.median(height[clear]))
@@ -116,15 +117,10 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
     climb = (np.interp(t + window, t, height) - np.interp(t - window, t, height)) / (2 * window)
     lift_off, cruise, descent, touch_down = 0, 0, last, last
     if starts:
-        up = int(np.argmax(clear & (height >= before + _WELL_ABOVE * (typical - before))))
-        lift_off = up - _run(clear[up::-1]) + 1
-        cruise = up + _run(climb[up:] > _CLIMB)
-    if lands:
-        down = last - int(
-            np.argmax((clear & (height >= after + _WELL_ABOVE * (typical - after)))[::-1])
-        )
-        touch_down = down + _run(clear[down:]) - 1
-        descent = down - _run(climb[down::-1] < -_CLIMB)
+        lift_off, cruise = _first_climb(clear, height, before, typical, climb)
+    if lands:  # a take-off, backwards in time
+        up, end = _first_climb(clear[::-1], height[::-1], after, typical, -climb[::-1])
+        touch_down, descent = last - up, last - end
     cruise, descent = min(cruise, touch_down), max(descent, lift_off)
     if cruise > descent:  # a hop: up and down again at once
         cruise = descent = (cruise + descent) // 2
@@ -135,6 +131,14 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
         for name, a, b in zip(names, edges, edges[1:], strict=False)
         if b > a
     ]
+
+
+def _first_climb(
+    clear: Mask, height: Array, ground: float, typical: float, climb: Array
+) -> tuple[int, int]:
+    """Return the first sample off the ground, and the first behind the climb (N,) from there."""
+    up = int(np.argmax(clear & (height >= ground + _WELL_ABOVE * (typical - ground))))
+    return up - _run(clear[up::-1]) + 1, up + _run(climb[up:] > _CLIMB)
 
 
 def _run(true: Mask) -> int:

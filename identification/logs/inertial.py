@@ -184,7 +184,7 @@ def _force_shares(
 def gravity_doubt(force: Array, gravity: float) -> str:
     """Return gravity's objection to the specific force (n, 3) of a flight, or nothing."""
     middle = np.median(force, axis=0)
-    size = float(np.linalg.norm(middle))
+    size = np.linalg.norm(middle)
     otherwise = (
         f"are {size:.3g} m/s2 in the median of a flight, along a{'xyz'[np.argmax(np.abs(middle))]}"
         f"; expected the specific force, which gravity makes about {gravity:.3g} along az: axes "

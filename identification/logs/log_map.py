@@ -26,7 +26,7 @@ place of one states alternatives: the first is taken with columns in the log, an
   euler (order of the turns, each about the axis moved by the turn before: zyx is yaw, pitch, roll)
   and unit (deg, rad). A column ``=0`` stands for an angle outside the table. sense: body_to_world
   or world_to_body. of: topics of its positions (default: all)
-* ``rotors``: measured speeds: columns, order (a name of ``rotor_orders`` or four motors' numbers:
+* ``rotors``: measured speeds: columns, order (a name of ``what_flew`` or four motors' numbers:
   at front-left, rear-left, rear-right, front-right), unit (rad/s, rpm, Hz, eRPM with pole_pairs)
 * ``commands``: columns, order, unit (us, normalised, duty, percent, dshot, counts), range (counts
   of no and of full command), clip (true: a command beyond the range is set to its end); assumed of
@@ -64,8 +64,8 @@ from ...runtime.errors import InputError, unknown_name
 from ...runtime.forms import STRICT, Number, Positive, checked, expected
 from ...runtime.yaml_file import read_yaml
 from .column_names import WORDS, unit_spelled
-from .rotor_orders import ORDERS, Order, rotor_order
 from .table import Array
+from .what_flew import ORDERS, Order, rotor_order
 
 MAPS = Path(__file__).parent / "maps"  # the kit's own maps
 OWN_MAP = "windwrench"  # of this kit's own columns
@@ -86,10 +86,10 @@ def _known(value: Any, known: Collection[str], what: str) -> str:
     """Return a value as one of the known words, in any case or spelling."""
     lower = {name.lower(): name for name in known}
     text = str(value).lower()
-    found = lower.get(text) or lower.get(unit_spelled(text).lower())
-    if found is None:
+    word = lower.get(text) or lower.get(unit_spelled(text).lower())
+    if word is None:
         raise unknown_name(what, str(value), known)
-    return found
+    return word
 
 
 def one_of(known: Collection[str]) -> BeforeValidator:
@@ -312,8 +312,8 @@ class LogMap:
     @property
     def sections(self) -> dict[str, Columns]:
         """The sections of the map, without the time."""
-        found = {name: getattr(self, name) for name in SECTIONS}
-        return {name: part for name, part in found.items() if part is not None}
+        parts = {name: getattr(self, name) for name in SECTIONS}
+        return {name: part for name, part in parts.items() if part is not None}
 
     @property
     def is_own(self) -> bool:
@@ -327,8 +327,10 @@ class LogMap:
 
     def with_ways(self, ways: Mapping[str, Sequence[Any]]) -> "LogMap":
         """Return the map with these ways to fill its sections, without empty ones."""
-        first: dict[str, Any] = {name: found[0] if found else None for name, found in ways.items()}
-        others = {name: tuple(found[1:]) for name, found in ways.items()}
+        first: dict[str, Any] = {
+            name: listed[0] if listed else None for name, listed in ways.items()
+        }
+        others = {name: tuple(listed[1:]) for name, listed in ways.items()}
         return replace(self, **first, alternatives={**self.alternatives, **others})
 
     def with_order(self, order: Order) -> "LogMap":
@@ -350,8 +352,16 @@ class LogMap:
 
 
 SECTIONS = (
-    *("position", "attitude", "rotors", "commands", "wrench", "battery"),
-    *("accelerometer", "gyro", "force", "torque"),
+    "position",
+    "attitude",
+    "rotors",
+    "commands",
+    "wrench",
+    "battery",
+    "accelerometer",
+    "gyro",
+    "force",
+    "torque",
 )
 _FIELDS = [field.name for field in fields(LogMap) if field.name not in ("name", "alternatives")]
 
@@ -383,8 +393,8 @@ def load_map(name: str | Path) -> LogMap:
         return shipped_map(str(name))
     if path.suffix.lower() not in (".yaml", ".yml") and not path.exists():
         raise unknown_name("map", str(name), [*map_names(), "the path of a YAML file"])
-    found = read_yaml(path, "a map file")
-    for section, part in found.items() if isinstance(found, Mapping) else ():
+    content = read_yaml(path, "a map file")
+    for section, part in content.items() if isinstance(content, Mapping) else ():
         for field_name, value in part.items() if isinstance(part, Mapping) else ():
             if UNKNOWN in (value if isinstance(value, list) else [value]):
                 # a comment beside the field holds the candidates
@@ -394,7 +404,7 @@ def load_map(name: str | Path) -> LogMap:
                     f"{path}: {section}.{field_name} is still {UNKNOWN}; expected "
                     f"{noted[1] if noted else 'columns of the table'}"
                 )
-    return parse_map(found, str(path), str(path))
+    return parse_map(content, str(path), str(path))
 
 
 @cache
@@ -406,8 +416,8 @@ def shipped_map(name: str) -> LogMap:
 @cache
 def stated(name: str) -> dict[str, Any]:
     """Return a file of ``maps/recordings`` other than a map."""
-    found: dict[str, Any] = read_yaml(MAPS / "recordings" / f"{name}.yaml", name)
-    return found
+    content: dict[str, Any] = read_yaml(MAPS / "recordings" / f"{name}.yaml", name)
+    return content
 
 
 def parse_map(value: object, where: str, name: str = "") -> LogMap:
@@ -431,30 +441,32 @@ def parse_map(value: object, where: str, name: str = "") -> LogMap:
             raise unknown_name("key", key, _FIELDS, where)
     ways = {key: given[key] for key in ("time", *SECTIONS) if isinstance(given.get(key), list)}
     first = given | {key: listed[0] for key, listed in ways.items() if listed}
-    found = checked(LogMap, first, where)
+    log_map = checked(LogMap, first, where)
     others = {
         key: [getattr(checked(LogMap, first | {key: way}, where), key) for way in listed]
         for key, listed in ways.items()
     }
-    check_whole(found, where)
-    return replace(found, name=name or where).with_ways(others)
+    check_whole(log_map, where)
+    return replace(log_map, name=name or where).with_ways(others)
 
 
-def check_whole(found: LogMap, where: str) -> None:
+def check_whole(log_map: LogMap, where: str) -> None:
     """Raise InputError where a map's sections are not enough for a flight log."""
-    has_imu = found.accelerometer is not None and found.gyro is not None
-    if (found.position is None) != (found.attitude is None) and not (found.is_own and has_imu):
-        missing = "attitude" if found.attitude is None else "position"
+    has_imu = log_map.accelerometer is not None and log_map.gyro is not None
+    if (log_map.position is None) != (log_map.attitude is None) and not (
+        log_map.is_own and has_imu
+    ):
+        missing = "attitude" if log_map.attitude is None else "position"
         raise InputError(
             f"{where}: no section {missing}; expected position and attitude, or neither where "
             "accelerometer and gyro are there"
         )
-    if found.position is None and not has_imu and not found.extra:
+    if log_map.position is None and not has_imu and not log_map.extra:
         raise InputError(
             f"{where}: no pose and no IMU; expected the sections position and attitude, or "
             "accelerometer and gyro"
         )
-    if found.rotors is None and found.commands is None and found.wrench is None:
+    if log_map.rotors is None and log_map.commands is None and log_map.wrench is None:
         raise InputError(f"{where}: no motors; expected a section rotors or commands")
-    if (found.force is None) != (found.torque is None):
+    if (log_map.force is None) != (log_map.torque is None):
         raise InputError(f"{where}: force and torque come together; expected both or neither")

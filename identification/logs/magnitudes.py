@@ -176,18 +176,24 @@ def motor_unit(
         (len(carrying) == 1, "rotors", "".join(carrying), not doubt, carries),
         (
             not commanded and middle > MAGNITUDES.counts and high <= 65535.5,
-            *("commands", "counts", False),
+            "commands",
+            "counts",
+            False,
             f"{up_to}, which may be 16 bits of a command, or rpm",
         ),
         (
             not commanded and middle > MAGNITUDES.rpm,
-            *("rotors", "rpm", True),
+            "rotors",
+            "rpm",
+            True,
             f"the median is {middle:.5g}, too fast for rad/s",
         ),
         (pulses and not speeds, "commands", "us", False, between),
         (
             middle > MAGNITUDES.fast,
-            *("rotors", "rpm", False),
+            "rotors",
+            "rpm",
+            False,
             f"the median is {middle:.4g}: few rotors turn as fast in rad/s",
         ),
     )
@@ -202,7 +208,7 @@ def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
         InputError: a number is beyond any flight's; the message names the number.
     """
     step = np.diff(log.t)
-    where, longest = f"{log.source}: column", int(np.argmax(step))
+    where, longest = f"{log.source}: column", np.argmax(step)
     if not log.period >= MAGNITUDES.shortest_period:
         raise InputError(
             f"{where} t: the median time step is {log.period:.3g} s; expected at least "
@@ -222,7 +228,7 @@ def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
             )
     doubts = [time_doubt(log.period)]
     if log.valid.any():
-        spread = float(np.max(np.ptp(log.position[log.valid], axis=0)))
+        spread = np.max(np.ptp(log.position[log.valid], axis=0))
         if spread > MAGNITUDES.widest:
             doubts.append(
                 f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected "

@@ -42,9 +42,8 @@ from .log_map import (
 )
 from .magnitudes import MAGNITUDES, likely_unit, motor_unit, within
 from .readings import DECLARED, OTHER, ROTORS, SensorReading, rotations, table_readings
-from .rotor_orders import ORDERS, Order, order_names, order_words
 from .table import Array, Table
-from .what_flew import more_rotors
+from .what_flew import ORDERS, Order, more_rotors, order_names, order_words
 
 _Choice = tuple[str, bool, str]  # value, whether it is certain, and why
 _G = UNITS["accelerometer"]["g"]
@@ -105,13 +104,15 @@ def guess_map(table: Table, vehicle: Vehicle | None = None) -> Guess:
     """
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # empty or absurd columns
-        found = _Guessing(table, vehicle)
-        missing = tuple(found.missing())
-    parts = [part for part in found.sections.values() if isinstance(part, Columns)]
-    used = {*found.time_columns, *(c for part in parts for c in part.columns)}
+        guessing = _Guessing(table, vehicle)
+        missing = tuple(guessing.missing())
+    parts = [part for part in guessing.sections.values() if isinstance(part, Columns)]
+    used = {*guessing.time_columns, *(c for part in parts for c in part.columns)}
     unused = tuple(column for column in table.header if column not in used)
-    found.sections.setdefault("time", TimeColumn(UNKNOWN))
-    return Guess(LogMap(**found.sections, name="guess"), tuple(found.reasons), unused, missing)
+    guessing.sections.setdefault("time", TimeColumn(UNKNOWN))
+    return Guess(
+        LogMap(**guessing.sections, name="guess"), tuple(guessing.reasons), unused, missing
+    )
 
 
 def _numbers_of(table: Table, names: Sequence[Name]) -> dict[str, Array]:
@@ -214,8 +215,8 @@ class _Guessing:
         out = []
 
         def lack(part: str, section: str, why: str, field: str = "columns") -> None:
-            found = self.ranked.get(part, [])[:SHOWN]
-            out.append(Reason(section, field, False, why, tuple(map(str, found))))
+            ranked = self.ranked.get(part, [])[:SHOWN]
+            out.append(Reason(section, field, False, why, tuple(map(str, ranked))))
 
         if self.clock is None:
             why = "no column looks like a time; expected one such as t, time or timestamp"
@@ -230,7 +231,7 @@ class _Guessing:
                     lack(part, part, why)
             for part in half:  # for a person to complete
                 columns, unit = self.parts[part].columns, self.parts[part].unit
-                most = float(np.max(np.abs(self.numbers.some(columns)), initial=0.0))
+                most = np.max(np.abs(self.numbers.some(columns)), initial=0.0)
                 made: Columns = Columns(columns, unit or "m")
                 if part == "attitude":
                     euler = "zyx" if len(columns) == 3 else ""
@@ -284,8 +285,8 @@ class _Guessing:
         t = np.asarray((raw - raw[np.isfinite(raw)][0]) * UNITS["time"][unit])
         middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
         t[~(np.abs(t - middle) <= 0.5 * LONGEST)] = np.nan
-        self.sections["time"] = found = TimeColumn(clock.column, unit, nanoseconds)
-        self.time_columns = found.named
+        self.sections["time"] = column = TimeColumn(clock.column, unit, nanoseconds)
+        self.time_columns = column.named
         return t
 
     def pose(self, place: Group, group: Group) -> None:
@@ -417,7 +418,7 @@ class _Guessing:
             pairs = 7 if unit == "eRPM" else 1
             self.sections[kind] = Rotors(group.columns, unit, order=order, pole_pairs=pairs)
             return
-        high = float(np.nanmax(values, initial=0.0))
+        high = np.nanmax(values, initial=0.0)
         counts = next((float(2**bits - 1) for bits in (8, 10, 11, 12) if high < 2**bits), 65535.0)
         limits = COMMAND_UNITS[unit] or (0.0, counts)
         if unit in ("us", "counts", "dshot"):

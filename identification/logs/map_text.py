@@ -6,7 +6,7 @@ import yaml
 
 from .log_map import UNKNOWN, Battery, Columns, Commands, Rotors
 from .map_guess import Guess
-from .rotor_orders import order_names
+from .what_flew import order_names
 
 
 def map_yaml(guess: Guess) -> str:

@@ -32,11 +32,10 @@ from .log_map import (
     check_whole,
     constant,
 )
-from .rotor_orders import order_names, order_words
 from .streams import Recording, Stream, readable, slerp
 from .table import Mask, Table, finite_rows
 from .table_rows import LONGEST_STEPS, check_rows, rows_apart, rows_of
-from .what_flew import UNSTATED, WhatFlew, more_rotors
+from .what_flew import UNSTATED, WhatFlew, more_rotors, order_names, order_words
 
 _SHOWN = 30  # columns in an error
 NO_QUATERNION = 0.5  # length; shorter stands for a missing quaternion
@@ -205,7 +204,7 @@ def _pose(
         new = np.append(True, np.any(np.diff(position, axis=0) != 0.0, axis=1))
         placed &= new
         notes.append(
-            f"position: sampled and held; {int(np.sum(~new))} of {len(t)} rows repeat the one "
+            f"position: sampled and held; {np.count_nonzero(~new)} of {len(t)} rows repeat the one "
             "before and are not valid"
         )
     pose = np.full((len(t), 7), np.nan)
@@ -228,17 +227,17 @@ def _pose(
         turns = in_kit_axes(log_map, turn, turns[there])
     attitude = Stream(turn.label, measured.t[there], turns)
     steps = np.diff(attitude.t)
-    longest = max(_ATTITUDE_GAP, LONGEST_STEPS * float(np.median(steps))) if len(steps) else 0.0
+    longest = max(_ATTITUDE_GAP, LONGEST_STEPS * np.median(steps)) if len(steps) else 0.0
     pose[placed] = np.column_stack([position[placed], slerp(t[placed], attitude, longest)])
     if placed.any() and not finite_rows(pose).any():
         raise InputError(
             f"{path}: position and attitude do not overlap in time; expected both over the same "
             "flight"
         )
-    alone = int(np.sum(~np.isin(t[placed], attitude.t)))
+    alone = np.count_nonzero(~np.isin(t[placed], attitude.t))
     if turned is samples and alone:
         notes.append(
-            f"{alone} of {int(placed.sum())} positions stand in rows without an attitude, which "
+            f"{alone} of {placed.sum()} positions stand in rows without an attitude, which "
             "was interpolated to their times where it has samples close by"
         )
     for name in turn.columns:
@@ -290,7 +289,7 @@ def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream
         is_said = bool(part.note) or (low, high) == (0.0, 1.0)
         taken = "" if is_said else f"{low:g} to {high:g} taken as 0 to 1, "
         notes.append(f"commands: {commands.name}, {part.unit}, {taken}{_order_note(part.order)}")
-    if outside := int(np.sum((u < -1e-9) | (u > 1.0 + 1e-9))):
+    if outside := np.count_nonzero((u < -1e-9) | (u > 1.0 + 1e-9)):
         notes.append(f"{outside} motor command(s) beyond that range were set to its end")
     return notes
 
@@ -330,8 +329,10 @@ def fitted(
             hint = f" (like {' or '.join(lower[x] for x in near)})" if near else ""
             words.append(f"{name!r} of {section}{hint}")
         more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
-        found = ", ".join(names[:_SHOWN]) + (", ..." if names[_SHOWN:] else "")
-        raise InputError(f"{where} does not fit: no column {', '.join(words)}{more}; found {found}")
+        listed = ", ".join(names[:_SHOWN]) + (", ..." if names[_SHOWN:] else "")
+        raise InputError(
+            f"{where} does not fit: no column {', '.join(words)}{more}; found {listed}"
+        )
     log_map = log_map.with_ways(fitting)
     check_whole(log_map, f"{where} does not fit")
     extra = {name: part for name, part in log_map.extra.items() if set(part.named) <= header}

@@ -78,11 +78,11 @@ def main() -> None:
             sets = dict(named("", file))
             if sum(value.nbytes for value in sets.values()) > most:
                 raise ValueError(f"it unpacks to more than {most} bytes; expected one flight")
-            found = {name: value[()].T for name, value in sets.items()}
+            arrays = {name: value[()].T for name, value in sets.items()}
     else:
         check_unpacked(data, most)
-        found = dict(named("", loadmat(data, simplify_cells=True)))
-    np.savez(sys.stdout.buffer, **{f"_{name}": value for name, value in found.items()})
+        arrays = dict(named("", loadmat(data, simplify_cells=True)))
+    np.savez(sys.stdout.buffer, **{f"_{name}": value for name, value in arrays.items()})
 
 
 if __name__ == "__main__":

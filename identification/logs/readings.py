@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 from ...runtime.yaml_file import read_yaml
 from .channels import quaternions, scaled
 from .log_map import SENSES, UNITS, Attitude
-from .rotor_orders import ORDERS, Order, order_names
 from .table import Array, Mask, finite_rows
+from .what_flew import ORDERS, Order, order_names
 
 _I = np.eye(3)
 _STATED: dict[str, Any] = read_yaml(Path(__file__).with_name("conventions.yaml"), "conventions")
@@ -120,8 +120,9 @@ class ColumnReading:
         """Return the map's section for an attitude in some columns."""
         signs = (1, self.pitch_sign, 1) if self.pitch_sign < 0 else ()
         unit = self.unit if self.euler else ""
-        order, euler, sense = self.order, self.euler, self.sense
-        return Attitude(columns, unit, signs=signs, order=order, euler=euler, sense=sense)
+        return Attitude(
+            columns, unit, signs=signs, order=self.order, euler=self.euler, sense=self.sense
+        )
 
     @property
     def moves(self) -> tuple[Any, ...]:
@@ -241,12 +242,12 @@ def _each(**aspects: Sequence[Any]) -> list[ColumnReading]:
 
 
 def _weighed(
-    found: Sequence[ColumnReading], least: float, world: str = "enu"
+    readings: Sequence[ColumnReading], least: float, world: str = "enu"
 ) -> list[ColumnReading]:
     """Return readings with a penalty of ``least``, and 1 for each less usual convention.
 
     Args:
-        found: the readings.
+        readings: the readings.
         least: log-likelihood ratio.
         world: the usual one.
     """
@@ -261,7 +262,7 @@ def _weighed(
             + (r.world != world)
             + r.frames.unusual,
         )
-        for r in found
+        for r in readings
     ]
 
 
@@ -295,10 +296,10 @@ def table_readings(
     if not orders:
         attitudes = {"euler": ("zyx", "xyz"), "unit": units, "pitch_sign": (1, -1)}
     lengths = ("ft",) if length == "ft" else ("m", "cm", "mm")
-    found = _each(**attitudes, sense=SENSES, frames=MAP_FRAMES, length=lengths)
+    readings = _each(**attitudes, sense=SENSES, frames=MAP_FRAMES, length=lengths)
     return [
         replace(r, unlikely=r.unlikely + OTHER * (length in lengths and r.length != length))
-        for r in _weighed(found, 0.0, hint or "enu")
+        for r in _weighed(readings, 0.0, hint or "enu")
     ]
 
 

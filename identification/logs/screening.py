@@ -178,7 +178,7 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
     if not np.isfinite(most):
         yield Refused(f"omega1..omega4 are beyond all rotors; expected {hover}")
     for i, column in enumerate(speeds[thrust > 0.3 * most].T):
-        if float(np.max(column)) <= 0.0:
+        if np.max(column) <= 0.0:
             yield Refused(f"omega{i + 1} {zero}; {all_four}")
     ratio = thrust_by_weight(speeds, vehicle)
     if doubt := rotor_doubt(ratio, vehicle):
@@ -205,15 +205,15 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
     most = _most_rad_s(log, vehicle)
     if (above := np.argwhere(speeds > most)).size:
         row, rotor = above[0]
-        found = (
+        racing = (
             f"omega{rotor + 1} reads {speeds[row, rotor]:.4g} rad/s at t = {log.t[row]:.6g} s "
             f"({len(above)} such value(s)), faster than {vehicle.name} turns its rotors; expected "
             f"at most {most:.4g} rad/s"
         )
         if (speeds > most).all(axis=0).any():
-            yield Refused(found)
-        yield Needed(found)
-        yield Fault(f"{found}. They were interpolated")
+            yield Refused(racing)
+        yield Needed(racing)
+        yield Fault(f"{racing}. They were interpolated")
 
 
 def _most_rad_s(log: FlightLog, vehicle: Vehicle) -> float:
@@ -246,7 +246,7 @@ def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
             f"{rate:.3g} IMU readings a second and no pose as fast; expected at least "
             f"{_LEAST_IMU_HZ:g}: a quadrotor turns within a tenth of a second"
         )
-    there = sum(float(log.t[piece[-1]] - log.t[piece[0]]) for piece in inertial_pieces(log))
+    there = sum(log.t[piece[-1]] - log.t[piece[0]] for piece in inertial_pieces(log))
     if there < least - 1e-9:
         yield Needed(
             f"{there:.3g} s of unbroken gyro and accelerometer; expected at least {least:g} s of "
@@ -281,8 +281,8 @@ def _new_poses(log: FlightLog, same: Mask) -> Findings:
 def _uneven_steps(log: FlightLog) -> Findings:
     """Check for even steps of the clock."""
     step = np.diff(log.t)
-    median = float(np.median(step))
-    uneven = float(np.mean((step < _UNEVEN[0] * median) | (step > _UNEVEN[1] * median)))
+    median = np.median(step)
+    uneven = np.mean((step < _UNEVEN[0] * median) | (step > _UNEVEN[1] * median))
     words = f"{100 * uneven:.0f} % of them far from the median of {median:.3g} s"
     if uneven > _UNEVEN_SHARE:
         yield Refused(
@@ -304,13 +304,13 @@ def _steps(log: FlightLog) -> Findings:
     far, turned = way > _LEAP[0] + _LEAP[1] * step, angle > _TURN[0] + _TURN[1] * step
     leaps = far | turned
     if leaps.any():
-        first = int(np.argmax(leaps))
+        first = np.argmax(leaps)
         what = f"{way[first]:.3g} m" if far[first] else f"{np.degrees(angle[first]):.0f} degrees"
         units = ": are px, py, pz in metres?" if far.mean() > 0.05 else ""
         kind = Refused if leaps.mean() > _MOST_LEAPS else Fault
         yield kind(
             f"the pose leaps by {what} within {step[first]:.3g} s at t = {t[first + 1]:.6g} s, "
-            f"which no quadrotor flies ({int(leaps.sum())} such step(s)){units}; expected poses of "
+            f"which no quadrotor flies ({leaps.sum()} such step(s)){units}; expected poses of "
             "one vehicle on one clock: leave the bad rows' pose empty, or cut the log there"
         )
     # two poses as if no time had passed, by velocities over 10 poses on each side
@@ -321,9 +321,9 @@ def _steps(log: FlightLog) -> Findings:
             continue
         before = (position[i] - position[a]) / (t[i] - t[a])
         after = (position[b] - position[i + 1]) / (t[b] - t[i + 1])
-        speed = min(float(np.linalg.norm(before)), float(np.linalg.norm(after)))
-        is_alike = float(np.linalg.norm(after - before)) < 0.15 * speed + 0.05 and angle[i] < 0.05
-        if speed > _MOVING and is_alike and way[i] < _SAME * speed * 0.5 * float(step[i]):
+        speed = min(np.linalg.norm(before), np.linalg.norm(after))
+        is_alike = np.linalg.norm(after - before) < 0.15 * speed + 0.05 and angle[i] < 0.05
+        if speed > _MOVING and is_alike and way[i] < _SAME * speed * 0.5 * step[i]:
             yield Fault(
                 f"column t jumps by {step[i]:.3g} s at t = {t[i]:.6g} s, but the pose goes on from "
                 f"where it was ({1e3 * way[i]:.0f} mm on at {speed:.2g} m/s); expected one clock "
@@ -340,8 +340,10 @@ def _length(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
     step = np.where(carrying(thrust), step, 0.0)
     pieces = pose_pieces(log)
     left = sum(float(step[piece[0] : piece[-1] + 1].sum()) for piece in pieces)
-    whole, runs = float(step.sum()), len(runs_of(~log.valid))
-    lost = f"the pose is lost in {runs} run(s), {int(np.sum(~log.valid))} of {len(log.t)} rows; "
+    whole, runs = step.sum(), len(runs_of(~log.valid))
+    lost = (
+        f"the pose is lost in {runs} run(s), {np.count_nonzero(~log.valid)} of {len(log.t)} rows; "
+    )
     words = f"{lost if runs else ''}{left:.3g} of {whole:.3g} s of flight lie in unbroken runs of "
     words += f"poses of more than {SHORTEST_PIECE:g} s"
     if not pieces or left < least - 1e-9:
@@ -390,9 +392,9 @@ def _still(name: str, t: Array, rows: Mask, channel: Array, sisters: Array, name
         lasts = t[end - 1] - t[first] >= _STILL
         if lasts and np.min(changes[end - 1] - changes[first]) < _SISTERS_CHANGE:
             still[first:end] = False
-    if found := _stretches(still, t, _STILL):
+    if stretches := _stretches(still, t, _STILL):
         wrong = "what depends on it there is wrong if its sensor hung"
-        yield Note(f"warning: {name} stands still for {found} while {names} change: {wrong}")
+        yield Note(f"warning: {name} stands still for {stretches} while {names} change: {wrong}")
 
 
 def _stretches(rows: Mask, t: Array, least: float) -> str:
@@ -400,8 +402,8 @@ def _stretches(rows: Mask, t: Array, least: float) -> str:
     words, or nothing.
     """
     runs = [(float(t[end - 1] - t[first]), float(t[first])) for first, end in runs_of(rows)]
-    found = [run for run in runs if run[0] >= least]
-    if not found:
+    long_runs = [run for run in runs if run[0] >= least]
+    if not long_runs:
         return ""
-    seconds, begin = max(found, key=lambda run: run[0])
-    return f"{seconds:.3g} s from t = {begin:.6g} s ({len(found)} such stretch(es))"
+    seconds, begin = max(long_runs, key=lambda run: run[0])
+    return f"{seconds:.3g} s from t = {begin:.6g} s ({len(long_runs)} such stretch(es))"

@@ -64,7 +64,7 @@ class Stream:
         out = resampled(t, self.t, self.values)
         step = np.diff(self.t)
         after = np.clip(np.searchsorted(self.t, t), 1, len(self.t) - 1)
-        there = step[after - 1] <= _SENSOR_GAP * float(np.median(step))
+        there = step[after - 1] <= _SENSOR_GAP * np.median(step)
         there |= (self.t[after] == t) | (self.t[after - 1] == t)
         out[~there | (t < self.t[0]) | (t > self.t[-1])] = np.nan
         return out
@@ -72,8 +72,8 @@ class Stream:
 
 def readable(stream: Stream | None) -> Stream | None:
     """Return the finite samples (N, K); None: fewer than two."""
-    found = None if stream is None else stream.whole()
-    return None if found is None or len(found.t) < 2 else found
+    finite = None if stream is None else stream.whole()
+    return None if finite is None or len(finite.t) < 2 else finite
 
 
 def slerp(t: Array, attitude: Stream, longest: float = np.inf) -> Array:
@@ -140,7 +140,7 @@ class Recording:
         notes += words
         after = np.searchsorted(motors.t, t)  # rows lie within the motors' span
         steps = np.diff(motors.t)[after[motors.t[after] != t] - 1]
-        if (longest := float(steps.max(initial=0.0))) > _ROTOR_GAP:
+        if (longest := steps.max(initial=0.0)) > _ROTOR_GAP:
             notes += (
                 f"{motors.name}: up to {longest:.2g} s between messages; the {_MOTORS[kind]} there "
                 "are interpolated",
@@ -160,7 +160,7 @@ class Recording:
         kept = {name: stream.between(t) for name, stream in self.extra.items()}
         times = t - t[0] if log_map.time.offset is None else t
         notes += time_notes(times)
-        without = int(np.sum(~valid)) if valid.any() else 0
+        without = np.count_nonzero(~valid) if valid.any() else 0
         if without and measured:  # the sensor may be faster than the pose
             notes += tuple(f"of the pose: {text}" for text in time_notes(times[valid]))
         elif without:
@@ -326,8 +326,8 @@ def source_rate(t: Array, values: Array) -> float:
         t: (N,) s, increasing.
         values: (N, K); a row with NaN is no sample.
     """
-    found = Stream("", t, values).whole()
-    t, values = found.t, found.values
+    finite = Stream("", t, values).whole()
+    t, values = finite.t, finite.values
     if len(t) < 2:
         return 0.0
     changes = np.flatnonzero(np.any(np.diff(values, axis=0) != 0.0, axis=1))
@@ -372,7 +372,7 @@ def _spacing(events: Rows) -> float:
     spacing = np.diff(events)
     if len(spacing) < _LEAST_CHANGES:
         return 1.0
-    median = float(np.median(spacing))
-    beat = float(np.quantile(spacing, _EARLY)) >= _LEAST_SPACING * median
+    median = np.median(spacing)
+    beat = np.quantile(spacing, _EARLY) >= _LEAST_SPACING * median
     usual = spacing[spacing < median / _LEAST_SPACING]  # no gap
     return float(np.mean(usual)) if beat and median >= _LEAST_ROWS else 1.0

@@ -103,10 +103,10 @@ def _refuse(
     if bad.any():
         i = int(np.argmax(bad))
         value = f"{column[i]:g}"
-        found = {"nan": "empty or NaN", "inf": "infinite", "-inf": "infinite"}.get(value, value)
+        words = {"nan": "empty or NaN", "inf": "infinite", "-inf": "infinite"}.get(value, value)
         assert samples.table is not None
         where = f"{samples.table.path}: column {name}, {samples.place(i)}"
-        raise InputError(f"{where} is {found}; expected {expected}")
+        raise InputError(f"{where} is {words}; expected {expected}")
 
 
 def _check_whole(samples: ChannelGroup, log_map: LogMap) -> None:
@@ -168,7 +168,7 @@ def check_rows(samples: ChannelGroup, log_map: LogMap) -> list[str]:
         inside = samples.cut(slice(read[0], read[-1] + 1)) if len(read) else samples
         for name, column in zip(part.columns, inside.values(part).T, strict=True):
             gap = _longest_gap(inside, name, column)
-            count = int(np.sum(~np.isnan(column)))
+            count = np.count_nonzero(~np.isnan(column))
             if count < _DENSE * len(column):
                 slow.append(f"{name} {count} of {len(column)}")
             elif count < len(column):
@@ -206,9 +206,9 @@ def _longest_gap(samples: ChannelGroup, name: str, column: Array) -> float:
         return 0.0
     t = samples.t
     steps = np.diff(t[read])
-    limit = max(_LONGEST_GAP, LONGEST_STEPS * float(np.median(steps)) if len(steps) else 0.0)
+    limit = max(_LONGEST_GAP, LONGEST_STEPS * np.median(steps) if len(steps) else 0.0)
     edges = np.concatenate([[t[0]], t[read], [t[-1]]])
-    at = int(np.argmax(np.diff(edges)))
+    at = np.argmax(np.diff(edges))
     gap = float(edges[at + 1] - edges[at])
     is_long = not len(read) or gap > limit * (1.0 + 1e-9)
     first = int(read[at - 1]) + 1 if at and len(read) else 0

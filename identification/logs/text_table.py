@@ -71,15 +71,17 @@ def _seconds(field: str) -> float | None:
     """Return the seconds since 1970 of a date, or since midnight of a time of day; None where a
     field is neither.
     """
-    found = _MOMENT.fullmatch(field)
-    if found is None:
+    moment = _MOMENT.fullmatch(field)
+    if moment is None:
         return None
-    day = found["date"]
+    day = moment["date"]
     try:
         days = 0 if day is None else date.fromisoformat(day.replace("/", "-")).toordinal() - _DAY_0
     except ValueError:  # the 31st of February
         return None
-    return 86_400.0 * days + 3600.0 * int(found["h"]) + 60.0 * int(found["m"]) + float(found["s"])
+    return (
+        86_400.0 * days + 3600.0 * int(moment["h"]) + 60.0 * int(moment["m"]) + float(moment["s"])
+    )
 
 
 @dataclass(frozen=True)
@@ -103,17 +105,17 @@ class TextLayout:
         if self.lists:
             line = _LIST.sub(r'"\1"', line)
         if '"' not in line:
-            found = line.split(self.separator)
+            fields = line.split(self.separator)
         else:
             rows = csv.reader([line], delimiter=self.separator, skipinitialspace=True, strict=True)
             try:
-                found = next(rows)
+                fields = next(rows)
             except csv.Error:
                 return []
         for i, count in reversed(self.lists):  # as many empty fields as an empty list has items
-            if i < len(found):
-                found[i : i + 1] = _items(found[i]) or [""] * count
-        return found
+            if i < len(fields):
+                fields[i : i + 1] = _items(fields[i]) or [""] * count
+        return fields
 
     def names(self, line: str) -> list[str]:
         """Return the columns' names of a header; a separator behind the last name, and the mark of
@@ -212,12 +214,12 @@ def open_text(path: Path) -> Table:
 
 def _lists(layout: TextLayout, lines: Sequence[str]) -> tuple[tuple[int, int], ...]:
     """Return the fields (from 0) of lists, and the length of each field's first list with items."""
-    found: dict[int, int] = {}
+    lengths: dict[int, int] = {}
     for line in lines if layout.separator != " " else ():
         for i, field in enumerate(layout.fields(_LIST.sub(r'"\1"', line))):
             if field[:1] in ("[", "("):
-                found[i] = found.get(i) or len(_items(field))
-    return tuple(sorted((i, count) for i, count in found.items() if count))
+                lengths[i] = lengths.get(i) or len(_items(field))
+    return tuple(sorted((i, count) for i, count in lengths.items() if count))
 
 
 def _latin(error: UnicodeError) -> tuple[str, int]:
@@ -301,7 +303,7 @@ def _layout(path: Path, head: list[str]) -> tuple[TextLayout, int]:
         if separator in there and (decimal == "." or (separator != "," and "," in there))
     ]
     scores = [_score(head, layout) for layout in layouts]
-    best = int(np.argmax([round(score, 9) for score, _ in scores]))
+    best = np.argmax([round(score, 9) for score, _ in scores])
     if scores[best][0]:
         return layouts[best], scores[best][1]
     if not any(head):
@@ -326,9 +328,9 @@ def _score(head: list[str], layout: TextLayout) -> tuple[float, int]:
     if width < _FEWEST:
         return 0.0, 0
     whole = sum(1 for line in head[tail[0][0] :] if line.strip())
-    most = max(k for _, n, k in tail if n == width)
-    start = next(i for i, n, k in rows if n >= 0.8 * width and k >= 0.5 * most)
-    return sum(k for _, n, k in tail if n == width) / whole, start
+    counts = [k for _, n, k in tail if n == width]
+    start = next(i for i, n, k in rows if n >= 0.8 * width and k >= 0.5 * max(counts))
+    return sum(counts) / whole, start
 
 
 def _counts(layout: TextLayout, fields: Sequence[str]) -> tuple[int, int]:

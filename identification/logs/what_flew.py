@@ -1,7 +1,10 @@
-"""A log's statements on its vehicle: airframe, outputs, and turning rotors.
+"""A log's statements on its vehicle (airframe, outputs, turning rotors), and orders of motors.
 
 This kit knows quadrotors alone. Every reader fills the same form from its log, and one gate refuses
 other vehicles, before four of six motors are taken for a quadrotor's.
+
+An order gives the motor of each of the kit's rotors: 1 front-left, 2 rear-left, 3 rear-right,
+4 front-right. ``column_words.yaml`` states the vehicles' orders by name, and their sources.
 """
 
 import re
@@ -12,10 +15,17 @@ from itertools import takewhile
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
-from ...runtime.errors import InputError
+from ...runtime.errors import InputError, unknown_name
 from .column_names import WORDS
-from .rotor_orders import Order
 from .table import Array, Table, finite_rows
+
+Order = tuple[int, int, int, int]
+
+PLACES = ("front-left", "rear-left", "rear-right", "front-right")  # of rotors 1 to 4
+
+ORDERS: dict[str, Order] = {
+    name: (a, b, c, d) for name, (a, b, c, d) in WORDS["rotor_orders"].items()
+}
 
 QUADROTOR = "a quadrotor"
 _ROTORS = {QUADROTOR: 4, "a tricopter": 3, "a hexarotor": 6, "an octorotor": 8}
@@ -27,6 +37,39 @@ _APART = np.radians(30.0)  # between a motor and its rotor, at most
 # of a further rotor's column: share of variance unexplained by the four, and its median by theirs
 _LEFT, _SIZES = 0.5, (0.5, 2.0)
 _FEWEST = 30  # rows for a decision
+
+
+def rotor_order(value: object) -> Order:
+    """Return the motor, from 1, of each of the kit's rotors.
+
+    Args:
+        value: a name of ``ORDERS``, or the four motors' numbers, front-left first.
+
+    Raises:
+        InputError: neither.
+    """
+    if isinstance(value, str):
+        if value not in ORDERS:
+            raise unknown_name("rotor order", value, ORDERS)
+        return ORDERS[value]
+    if isinstance(value, list | tuple) and sorted(map(str, value)) == ["1", "2", "3", "4"]:
+        a, b, c, d = (int(str(x)) for x in value)
+        return a, b, c, d
+    raise InputError(
+        f"{value!r}; expected one of {', '.join(ORDERS)}, or the numbers of the motors "
+        f"at the {', '.join(PLACES)}, such as [3, 2, 4, 1]"
+    )
+
+
+def order_words(order: Order) -> str:
+    """Return an order in words."""
+    places = sorted(zip(order, PLACES, strict=True))
+    return f"motors {', '.join(f'{motor} {place}' for motor, place in places)}"
+
+
+def order_names(order: tuple[int, ...]) -> list[str]:
+    """Return the names of an order, if any."""
+    return [name for name, known in ORDERS.items() if known == order]
 
 
 @dataclass(frozen=True)
@@ -81,12 +124,12 @@ def more_rotors(
     turning = [*columns]
     others = source.numeric or source.header if isinstance(source, Table) else [*source]
     for name in _numbered_on(columns, others):
-        found = source.read([*columns, name]) if isinstance(source, Table) else source
-        rows = np.column_stack([found[column] for column in (*columns, name)])
+        data = source.read([*columns, name]) if isinstance(source, Table) else source
+        rows = np.column_stack([data[column] for column in (*columns, name)])
         rows = rows[finite_rows(rows)]
         if len(rows) < _FEWEST or np.ptp(rows[:, 4]) == 0.0:
             continue
-        size = abs(float(np.median(rows[:, 4]) / max(np.median(np.abs(rows[:, :4])), 1e-12)))
+        size = abs(np.median(rows[:, 4]) / max(np.median(np.abs(rows[:, :4])), 1e-12))
         moves = rows - rows.mean(axis=0)
         left = np.linalg.lstsq(moves[:, :4], moves[:, 4])[1]
         share = float(left[0] / np.sum(moves[:, 4] ** 2)) if len(left) else 0.0
@@ -100,9 +143,9 @@ def more_rotors(
 
 def _numbered_on(columns: Sequence[str], others: Sequence[str]) -> list[str]:
     """Return the other columns with the next numbers up in the four columns' names."""
-    for found in zip(*(re.finditer(r"\d+", name) for name in columns), strict=False):
-        if len({match[0] for match in found}) == len(columns):
-            first, last = found[0], max(int(match[0]) for match in found)
+    for numbers in zip(*(re.finditer(r"\d+", name) for name in columns), strict=False):
+        if len({match[0] for match in numbers}) == len(columns):
+            first, last = numbers[0], max(int(match[0]) for match in numbers)
             before, behind = first.string[: first.start()], first.string[first.end() :]
             following = (f"{before}{n:0{len(first[0])}d}{behind}" for n in range(last + 1, 16))
             return list(takewhile(others.__contains__, following))
@@ -131,8 +174,8 @@ def order_by_places(
     motors = np.arctan2(*np.array(places, dtype=np.float64).T[::-1])
     wanted = np.arctan2(*np.array(rotors, dtype=np.float64).T[::-1])
     off = np.abs(np.angle(np.exp(1j * (wanted[:, None] - motors))))
-    found = [int(i) for i in np.argmin(off, axis=1)]
-    if sorted(found) != [0, 1, 2, 3] or off.min(axis=1).max() > _APART:
+    nearest = [int(i) for i in np.argmin(off, axis=1)]
+    if sorted(nearest) != [0, 1, 2, 3] or off.min(axis=1).max() > _APART:
         return None
-    first, second, third, fourth = (i + 1 for i in found)
+    first, second, third, fourth = (i + 1 for i in nearest)
     return first, second, third, fourth

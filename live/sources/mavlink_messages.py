@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from ...dynamics.vehicle import Vehicle
 from ...identification.logs.flight_log import NORM_TOLERANCE
-from ...identification.logs.rotor_orders import ORDERS
+from ...identification.logs.what_flew import ORDERS
 from ..messages import Array, Malformed, Measurement
 from .base import unwrapped
 

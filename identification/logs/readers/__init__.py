@@ -76,9 +76,9 @@ def find_reader(name: str) -> Reader:
     """
     name, colon, option = name.partition(":")
     if name in TABLES:
-        found = load_map(TABLES[name])
-        read = partial(map_table, log_map=found, reader=name)
-        reader = Reader(name, found.about, read, found.recognise)
+        log_map = load_map(TABLES[name])
+        read = partial(map_table, log_map=log_map, reader=name)
+        reader = Reader(name, log_map.about, read, log_map.recognise)
     elif name in READERS:
         reader = READERS[name]
     else:
@@ -159,13 +159,13 @@ def reader_by_columns(path: Path, header: Sequence[str]) -> Reader | None:
     Raises:
         InputError: the columns fit several readers.
     """
-    found = [reader for reader in table_readers() if set(header).issuperset(reader.signature)]
-    if len(found) > 1:
+    readers = [reader for reader in table_readers() if set(header).issuperset(reader.signature)]
+    if len(readers) > 1:
         raise InputError(
-            f"{path}: its columns are those of {' and of '.join(r.what for r in found)}; expected "
-            f"one: choose by --reader {' or --reader '.join(r.name for r in found)}"
+            f"{path}: its columns are those of {' and of '.join(r.what for r in readers)}; "
+            f"expected one: choose by --reader {' or --reader '.join(r.name for r in readers)}"
         )
-    return found[0] if found else None
+    return readers[0] if readers else None
 
 
 def table_readers() -> list[Reader]:

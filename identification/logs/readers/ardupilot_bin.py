@@ -39,10 +39,18 @@ from ..channels import ChannelGroup, in_order
 from ..flight_log import FlightLog
 from ..log_map import Commands, LogMap, shipped_map, stated
 from ..mapped_log import recording_of
-from ..rotor_orders import ORDERS, Order, order_words
 from ..streams import MOST_VOLTS, Stream
 from ..table import Array
-from ..what_flew import PLUS, UNSTATED, WhatFlew, order_by_places, slots_of_motors
+from ..what_flew import (
+    ORDERS,
+    PLUS,
+    UNSTATED,
+    Order,
+    WhatFlew,
+    order_by_places,
+    order_words,
+    slots_of_motors,
+)
 
 Bytes = NDArray[np.uint8]
 Parameters = Mapping[str, float]
@@ -101,7 +109,7 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
     letter = next((x for x in ("Ch", "Chan") if pulses is not None and f"{x}1" in pulses), "C")
     log_map, notes = _with_parameters(path, log_map, parameters, vehicle, letter)
     volts = messages.get("CURR", {}).get("Volt")
-    if volts is not None and float(np.median(volts)) > MOST_VOLTS:
+    if volts is not None and np.median(volts) > MOST_VOLTS:
         messages["CURR"]["Volt"] = 0.01 * volts
         notes.append("CURR: hundredths of a volt, as Copter before 3.4 logged them")
     telemetry, telemetry_notes = _telemetry(messages.pop("ESC", {}), parameters)
@@ -135,13 +143,13 @@ def _samples(name: str, messages: Messages, columns: set[str]) -> ChannelGroup |
     t = _times(messages)
     if len(t) < 2:
         return None
-    found = {name: messages[name] for name in messages if name in columns}
-    if set(_PLACE) <= set(found):
-        north, east, altitude = (found.pop(name) for name in _PLACE)  # degrees, and m
+    kept = {name: messages[name] for name in messages if name in columns}
+    if set(_PLACE) <= set(kept):
+        north, east, altitude = (kept.pop(name) for name in _PLACE)  # degrees, and m
         east = (east - east[0]) * np.cos(np.radians(north[0]))
-        found |= {"N": _EARTH * np.radians(north - north[0]), "E": _EARTH * np.radians(east)}
-        found["D"] = -altitude
-    return ChannelGroup(t, found, name)
+        kept |= {"N": _EARTH * np.radians(north - north[0]), "E": _EARTH * np.radians(east)}
+        kept["D"] = -altitude
+    return ChannelGroup(t, kept, name)
 
 
 def _texts(messages: Messages, column: str) -> list[str]:
@@ -183,9 +191,12 @@ def _order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> tuple
         order = ORDERS["ardupilot-x"]
         return order, f"quad x assumed, which the log does not state: {order_words(order)}"
     kind = int(parameters.get(name, 1))
-    if kind == _PLUS and (found := order_by_places(PLUS, vehicle)) is not None:
-        motors = ", ".join(map(str, found))
-        return found, f"{name} {kind}, a plus: rotors 1, 2, 3, 4 of the vehicle are motors {motors}"
+    if kind == _PLUS and (motors_of_plus := order_by_places(PLUS, vehicle)) is not None:
+        motors = ", ".join(map(str, motors_of_plus))
+        return (
+            motors_of_plus,
+            f"{name} {kind}, a plus: rotors 1, 2, 3, 4 of the vehicle are motors {motors}",
+        )
     known = stated("airframes")["ardupilot_order"]
     if kind not in known:
         what = f"{kind}, a plus," if kind == _PLUS else str(kind)
@@ -275,7 +286,7 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messa
     places, kinds = np.empty(most, np.int32), np.empty(most, np.uint8)
     count, used = _walk(data, places, kinds)
     places, kinds = places[:count], kinds[:count]  # take memory as they were filled
-    found: dict[str, Messages] = {}
+    by_type: dict[str, Messages] = {}
     formats = places[kinds == _FMT][:_MOST_FORMATS]
     if not len(formats):
         raise InputError(f"{path}: cannot be read as {WHAT}: no FMT message; expected some")
@@ -285,12 +296,12 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messa
         if len(of_kind):
             rows = _rows(data, of_kind, layout)
             with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
-                found[name] = {
+                by_type[name] = {
                     column: x if x.dtype.kind == "S" else x.astype(np.float64) * unit
                     for column, unit in units.items()
                     if (x := rows[column]).ndim == 1  # no list of numbers
                 }
-    return found, len(data) - int(used)
+    return by_type, len(data) - int(used)
 
 
 def _of_text(path: Path, content: bytes, wanted: Collection[str]) -> dict[str, Messages]:
@@ -310,26 +321,26 @@ def _of_text(path: Path, content: bytes, wanted: Collection[str]) -> dict[str, M
             values = rest.split(b",", len(names[name]) - 1)
             if len(values) == len(names[name]):
                 rows.setdefault(name, []).append(values)
-    found: dict[str, Messages] = {}
+    by_type: dict[str, Messages] = {}
     for name, messages in rows.items():
         check_count(f"{path}: {name}", len(messages), LIMITS.table_rows, "messages")
         columns = dict(zip(names[name], zip(*messages, strict=True), strict=True))
-        found[name] = {
+        by_type[name] = {
             column: np.char.strip(np.array(texts)) if column in _TEXTS else _numbers(texts)
             for column, texts in columns.items()
         }
-    said = found.get("MSG", {}).get("Message", np.empty(0, "S1"))
-    found["MSG"] = {"Message": np.array([*before.splitlines(), *said, b""])}
-    return found
+    said = by_type.get("MSG", {}).get("Message", np.empty(0, "S1"))
+    by_type["MSG"] = {"Message": np.array([*before.splitlines(), *said, b""])}
+    return by_type
 
 
 def _numbers(texts: Sequence[bytes]) -> NDArray[np.float64]:
     """Return texts as numbers (N,); NaN: not a number."""
-    found = np.full(len(texts), np.nan)
+    numbers = np.full(len(texts), np.nan)
     for i, text in enumerate(texts):
         with suppress(ValueError):
-            found[i] = float(text)
-    return found
+            numbers[i] = float(text)
+    return numbers
 
 
 def _rows(data: Bytes, places: NDArray[np.int32], layout: np.dtype[Any]) -> NDArray[Any]:
@@ -343,7 +354,7 @@ def _layouts(
     """Return name, layout and units of the wanted types, by number; types with a wrong length are
     left out.
     """
-    found = {}
+    layouts = {}
     for number, length, *texts in formats.tolist():
         name, letters, joined = (x.split(b"\0")[0].decode("ascii", "replace") for x in texts)
         columns = joined.split(",")
@@ -353,8 +364,8 @@ def _layouts(
         layout = np.dtype(list(zip(columns, map(_TYPES.__getitem__, letters), strict=True)))
         units = [_UNITS.get(letter, 1.0) for letter in letters]
         if layout.itemsize + _HEAD == length:
-            found[number] = name, layout, dict(zip(columns, units, strict=True))
-    return found
+            layouts[number] = name, layout, dict(zip(columns, units, strict=True))
+    return layouts
 
 
 @compiled

@@ -178,7 +178,7 @@ def _log(
         for name in groups[kind]:
             fields[name] = (fields[name] - (low if kind == "motor" else 0.0)) * scale
     for name in ("vbatLatest", "vbat"):
-        if name in stated and (volts := float(np.median(fields[name]))) > MOST_VOLTS:
+        if name in stated and (volts := np.median(fields[name])) > MOST_VOLTS:
             fields[name] = 0.1 * fields[name]
             said.append(
                 f"{name}: {volts:.4g} V is more than a vehicle's battery has: taken as a tenth, as "
@@ -254,7 +254,7 @@ def _one_g(t: Array, force: list[Array], headers: Mapping[str, str]) -> tuple[fl
     if stated := whole_number(headers.get("acc_1G", ""), 1, 10**6):
         return float(stated), f"accelerometer: acc_1G of the header: {stated} counts are 1 g"
     length = np.linalg.norm(np.column_stack(force)[t <= t[0] + _STANDING], axis=1)
-    middle = float(np.nanmedian(length)) if np.isfinite(length).any() else 0.0
+    middle = np.nanmedian(length) if np.isfinite(length).any() else 0.0
     counts = float(_ONE_G[np.argmin(np.abs(np.log2(np.maximum(middle, 1.0) / _ONE_G)))])
     return counts, (
         f"accelerometer: {counts:g} counts taken as 1 g, from its {middle:.4g} in the first "
@@ -293,8 +293,8 @@ def _layout(path: Path, headers: Mapping[str, str], names: list[str]) -> Layout:
         raise InputError(f"{path}: no field loopIteration, which its predictors count on")
 
     def number(text: str, default: int) -> int:
-        found = whole_number(text, -999_999_999, 999_999_999)
-        return default if found is None else found
+        stated = whole_number(text, -999_999_999, 999_999_999)
+        return default if stated is None else stated
 
     top, _, bottom = headers.get("P interval", "1/1").rpartition("/")
     every = headers.get("I interval", "32")

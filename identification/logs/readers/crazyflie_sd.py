@@ -60,10 +60,10 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
     data = read_bytes(path, WHAT, LIMITS.binary_log)
     if data[1:].startswith(_FIRST):
         version, (rows, end) = 1, _rows(path, data)
-        found, notes = [rows], [f"{WHAT}, of firmware before 2021"]
+        runs, notes = [rows], [f"{WHAT}, of firmware before 2021"]
     else:
         version, kinds, begin = _header(path, data)
-        found, end = _events(path, data, kinds, begin)
+        runs, end = _events(path, data, kinds, begin)
         notes = [f"{WHAT}, version {version}"]
     # behind the last event stands nothing, or the checksum (CRC-32) of all before
     if data[end:] not in (b"", zlib.crc32(data[:end]).to_bytes(4, "little")):
@@ -72,7 +72,7 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
             "are left); what stands before was used"
         )
     events: list[ChannelGroup] = []
-    for rows in found:
+    for rows in runs:
         if len(rows) < 2:
             continue
         t = _TIMES[version][1] * rows["time"].astype(np.float64)
@@ -105,11 +105,11 @@ def _header(path: Path, data: bytes) -> tuple[int, dict[int, Layout], int]:
 
     def next_part(pattern: re.Pattern[bytes], expected: str) -> tuple[bytes, ...]:
         nonlocal place
-        found = pattern.match(data, place)
-        if found is None:
+        match = pattern.match(data, place)
+        if match is None:
             raise InputError(f"{path}: byte {place} of its header: expected {expected}")
-        place = found.end()
-        return found.groups()
+        place = match.end()
+        return match.groups()
 
     first, count = next_part(_START, "bc, the version 1 or 2, and the number of events")
     version = first[0]
@@ -141,11 +141,11 @@ def _rows(path: Path, data: bytes) -> tuple[NDArray[Any], int]:
     """
     fields, place = [("event", "V0"), ("time", "<u4")], 1 + len(_FIRST)
     for _ in range(data[0] - 1):
-        found = _COLUMN.match(data, place)
-        if found is None:
+        match = _COLUMN.match(data, place)
+        if match is None:
             raise InputError(f"{path}: byte {place} of its header: expected {_VARIABLES}")
-        place = found.end()
-        fields.append((found[1].decode("ascii", "replace").strip(), f"<{found[2].decode()}"))
+        place = match.end()
+        fields.append((match[1].decode("ascii", "replace").strip(), f"<{match[2].decode()}"))
     names = [name for name, _ in fields]
     if len(set(names)) < len(names):
         raise InputError(f"{path}: a variable stands in its header twice; expected each once")

@@ -36,10 +36,9 @@ from ..channels import ChannelGroup
 from ..flight_log import FlightLog
 from ..log_map import shipped_map, stated
 from ..mapped_log import recording_of
-from ..rotor_orders import ORDERS, Order
 from ..streams import Recording
 from ..table import Array, one_line
-from ..what_flew import PLUS, QUADROTOR, WhatFlew, order_by_places, slots_of_motors
+from ..what_flew import ORDERS, PLUS, QUADROTOR, Order, WhatFlew, order_by_places, slots_of_motors
 
 Fields = Mapping[str, Array]  # (N,) of an instance of a topic, by name
 Parameters = Mapping[str, float]
@@ -244,15 +243,15 @@ def _sensor(topic: str, t: Array, fields: Fields, field: str, gained: str) -> Ch
     """Return a gyro or an accelerometer at its own times, as far as the topic has it."""
     source = field if topic == "sensor_combined" else gained
     names = {f"{field}[{i}]": f"{source}[{i}]" for i in range(3)}
-    found = {name: fields[stored] for name, stored in names.items() if stored in fields}
+    axes = {name: fields[stored] for name, stored in names.items() if stored in fields}
     if source == gained and f"{gained}_dt" in fields:
         span = _MICROSECOND * fields[f"{gained}_dt"]
-        found = {n: column / np.where(span > 0.0, span, np.nan) for n, column in found.items()}
+        axes = {n: column / np.where(span > 0.0, span, np.nan) for n, column in axes.items()}
         t = t - 0.5 * span
     late = fields.get("accelerometer_timestamp_relative", np.zeros(len(t)))
     if field == "accelerometer_m_s2" and np.all(np.abs(late) < 1e6):
         t = t + _MICROSECOND * late
-    return ChannelGroup(t, found, topic)
+    return ChannelGroup(t, axes, topic)
 
 
 class TooMuchError(Exception):
@@ -382,13 +381,13 @@ def outputs_of(path: Path, sent: Sequence[Fields], parameters: Parameters) -> Ou
     bank, slots = "MAIN", [0, 1, 2, 3]
     for name, prefix in reversed(_BANKS.items()):  # the first of several
         functions = [int(parameters.get(f"{prefix}{i + 1}", 0.0)) for i in range(_OUTPUTS)]
-        if found := slots_of_motors(functions, _MOTOR1):
-            bank, slots = name, found
+        if of_bank := slots_of_motors(functions, _MOTOR1):
+            bank, slots = name, of_bank
     each = (_of_motors(fields, slots) for fields in sent)
     motors = next((motors for motors in each if motors is not None), np.zeros((0, 4)))
-    most = float(np.nanmax(motors)) if np.isfinite(motors).any() else 0.0
+    most = np.nanmax(motors) if np.isfinite(motors).any() else 0.0
     turning = motors[motors > 0.5 * most]  # not the stop command
-    usual = float(np.median(turning)) if turning.size else _LEAST_PULSE
+    usual = np.median(turning) if turning.size else _LEAST_PULSE
 
     def pulses(end: str, default: float) -> Array:
         """Return one end (4,) of the outputs' ranges of pulses, us."""
@@ -398,7 +397,7 @@ def outputs_of(path: Path, sent: Sequence[Fields], parameters: Parameters) -> Ou
 
     lows, highs = pulses("MIN", 1000.0), pulses("MAX", 2000.0)
     # with a bus for sensors alone the motors have pulses, long ones at rest, too
-    has_bus = parameters.get("UAVCAN_ENABLE", 0.0) >= 3.0 and bool(np.any(motors < _LEAST_PULSE))
+    has_bus = parameters.get("UAVCAN_ENABLE", 0.0) >= 3.0 and np.any(motors < _LEAST_PULSE)
     timers = [parameters.get(f"PWM_{bank}_TIM{i}", 0.0) for i in range(_OUTPUTS)]
     is_dshot = parameters.get("DSHOT_CONFIG", 0.0) > 0.0 or any(x in _DSHOT_TIMERS for x in timers)
     if 0.0 < most <= _LARGEST_SHARE:

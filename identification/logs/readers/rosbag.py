@@ -123,8 +123,8 @@ def _bag_in(path: Path) -> Path:
     """
     if not os.path.isdir(path) or os.path.lexists(path / "metadata.yaml"):
         return path
-    found = sorted(path.iterdir())
-    files = [x for x in found if x.suffix.lower() in (".db3", ".mcap") and not x.is_dir()]
+    entries = sorted(path.iterdir())
+    files = [x for x in entries if x.suffix.lower() in (".db3", ".mcap") and not x.is_dir()]
     if len(files) != 1:
         raise InputError(
             f"{path}: no metadata.yaml, and {len(files)} .db3 or .mcap files; expected "
@@ -139,13 +139,13 @@ def given_map(file: Path) -> Mapping[str, Any]:
     Raises:
         InputError: the file is unreadable, or no map.
     """
-    found = read_yaml(file, "a map file")
-    if not isinstance(found, Mapping):
+    content = read_yaml(file, "a map file")
+    if not isinstance(content, Mapping):
         raise InputError(
             f"{file}: expected a mapping of position, rotors and so on to topics, got "
-            f"{type(found).__name__}"
+            f"{type(content).__name__}"
         )
-    return found
+    return content
 
 
 @contextmanager
@@ -332,14 +332,14 @@ def check_bag_files(path: Path) -> None:
         if file.suffix.lower() != ".db3":
             continue
         # a view or a computed column of a few bytes of SQL may give any number of rows of any size
-        found = []
+        tables = []
         with suppress(sqlite3.Error):  # the reader states the error
             uri = f"{file.resolve().as_uri()}?mode=ro&immutable=1"
             with closing(sqlite3.connect(uri, uri=True)) as database:
                 query = "SELECT name, type, sql FROM sqlite_master WHERE type IN ('table', 'view')"
-                found = database.execute(query).fetchmany(_TABLES)
-        for name, kind, sql in found:
-            if kind == "view" or _COMPUTED.search(sql or "") or len(found) == _TABLES:
+                tables = database.execute(query).fetchmany(_TABLES)
+        for name, kind, sql in tables:
+            if kind == "view" or _COMPUTED.search(sql or "") or len(tables) == _TABLES:
                 raise InputError(
                     f"{file}: its {kind} {name!r} is computed; expected a ROS 2 bag, whose tables "
                     "hold what was recorded"
