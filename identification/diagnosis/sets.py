@@ -131,8 +131,8 @@ class Posterior:
         for i in range(1 if given is None else 0, len(bases)):
             self._search(i)
         if given is None:
-            found = sorted(self.scores, key=self.scores.__getitem__, reverse=True)
-            self._search(0, [self.known[k].variants for k in found[:KEPT_ASKED]])
+            likeliest = sorted(self.scores, key=self.scores.__getitem__, reverse=True)
+            self._search(0, [self.known[k].variants for k in likeliest[:KEPT_ASKED]])
 
     def _likeliest(self) -> tuple[Base, _Candidate]:
         best = self.known[max(self.scores, key=self.scores.__getitem__)]

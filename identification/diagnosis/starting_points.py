@@ -41,7 +41,7 @@ def starting_points(
     declared = get(effect).starting_points
     assert declared is not None, f"{effect} declares no starting points"
     position, seen, vehicle = flights.at_rows("position"), flights.fit_rows, flights.vehicle
-    found = declared(
+    starts = declared(
         Unexplained(
             vehicle,
             {c.name: typical_size((effect, c.name), vehicle) for c in get(effect).coefficients},
@@ -54,12 +54,12 @@ def starting_points(
             residual[seen, 3:],
         )
     )
-    if len(found) <= MOST_TRIED:
-        return found
+    if len(starts) <= MOST_TRIED:
+        return starts
     # an effect without a state or clock of its own does the same in the same sample, so a few
     # samples are enough. To find out, one sample is repeated for a minute, in step with no whole Hz
     one = flights.pieces({})[0].signals.at(np.zeros(200, dtype=np.int64))
-    acts = flights.acting(replace(one, period=0.317), {effect: found[0]})
+    acts = flights.acting(replace(one, period=0.317), {effect: starts[0]})
     steady, sampled, every = bool(np.all(acts == acts[0])), [], []
     for p in flights.pieces({}):
         chosen = np.arange(len(p.rows)) % max(1, SAMPLE_STEP // int(p.rows[1] - p.rows[0])) == 0
@@ -77,9 +77,9 @@ def starting_points(
     # share of the residual along each start's wrench; the later one of equals, and none without a
     # wrench
     base, likeness = acting({}), []
-    for i, start in enumerate(found):
+    for i, start in enumerate(starts):
         shape = acting({effect: start}) - base
         size = float(np.sum(shape * shape))
         if size > 0.0:
             likeness.append((float(np.sum(shape * target * scale)) / math.sqrt(size), i))
-    return [found[i] for _, i in sorted(likeness, reverse=True)[:KEPT_OF_MORE]]
+    return [starts[i] for _, i in sorted(likeness, reverse=True)[:KEPT_OF_MORE]]

@@ -86,8 +86,10 @@ def _channels(log: FlightLog) -> Iterator[tuple[str, list[Array], float]]:
         ("accelerometer", log.accelerometer),
         (ROTORS, None if log.commanded else log.rotor_speeds),
     ):
-        rows = np.flatnonzero(np.isfinite(x).all(axis=1)) if x is not None else np.zeros(0, int)
-        if x is None or len(rows) <= SEGMENT:
+        if x is None:
+            continue
+        rows = np.flatnonzero(np.isfinite(x).all(axis=1))
+        if len(rows) <= SEGMENT:
             continue
         period = float(np.median(np.diff(log.t[rows])))
         pieces = unbroken(log.t, rows, GAP * period, SEGMENT)
