@@ -1,6 +1,4 @@
-"""What changed between two sets of flights, and which rotor lost thrust during one: sentences,
-data and pictures.
-"""
+"""Changes between two sets of flights, and rotor faults within one: sentences, data, pictures."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -26,12 +24,12 @@ from .fault_detection import ALL, NOTHING, OTHER, RotorFault
 from .trim import Trim
 
 _PLACES = ("front-left", "rear-left", "rear-right", "front-right")
-_NAMED = 0.05  # probability from which a rival is mentioned
+_NAMED = 0.05  # least probability of a rival in the sentence
 _SAID = ("place", "sure", "weaker", "carries_more", "amount", "amount_std")
 
 
 def _cannot_tell(chances: Mapping[str, float], likeliest: str, name: Callable[[str], str]) -> str:
-    """Return that the likeliest finding is not sure, and its rivals."""
+    """Return a sentence on an unsure finding and its rivals."""
     rivals = [
         f"{name(rival)} ({p:.2f})"
         for rival, p in sorted(chances.items(), key=lambda item: -item[1])
@@ -42,7 +40,7 @@ def _cannot_tell(chances: Mapping[str, float], likeliest: str, name: Callable[[s
 
 
 def change_headline(change: Change) -> str:
-    """Return what changed, as sure as it is."""
+    """Return a sentence on the change, with its probability."""
     place, chance = change.place, change.places[change.place]
     if place == NOWHERE:
         if change.sure:
@@ -124,7 +122,7 @@ def _draw_change(change: Change) -> Any:
         (change.before, BEFORE, "before"),
         (change.after, AFTER, "after"),
     ):
-        # as seen from above, front up: what lies to the left is drawn to the left
+        # seen from above, front up: the vehicle's left is the picture's
         x, y = np.transpose([[-100.0, 100.0] * trim.features[:2] for trim in trims])
         left.plot(x, y, "o", color=colour, label=label, ms=7, alpha=0.8)
     left.axhline(0.0, color=PALE, lw=1)
@@ -145,14 +143,14 @@ def _draw_change(change: Change) -> Any:
 
 
 def place_of(fault: RotorFault, rotor: int) -> str:
-    """Return the name of a rotor (1 to 4), and the log's own name where it has one."""
+    """Return the name of a rotor (1 to 4), with the log's own name if any."""
     names = fault.samples.channels.motor_names
     own = "" if names is None else f"; {names[rotor - 1]} in the log"
     return f"rotor {rotor} ({_PLACES[rotor - 1]}{own})"
 
 
 def fault_headline(fault: RotorFault) -> str:
-    """Return which rotor lost thrust, when and how much, as sure as that is."""
+    """Return a sentence on the rotor fault, its time and size, with its probability."""
     likeliest = fault.likeliest
     chance = fault.probabilities[likeliest]
     sure = f"(probability {chance:.2f})" if chance < 0.9995 else "(probability above 0.999)"

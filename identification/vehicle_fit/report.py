@@ -1,5 +1,5 @@
-"""What identify writes: the vehicle's file, the estimates beside it, and a picture of measured
-against fitted force and torque.
+"""Files of identify: the vehicle, the estimates beside it, and a picture of measured against fitted
+force and torque.
 """
 
 import json
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_SHOWN_HZ = 8.0  # of the picture: what is faster is the pose's noise
-_LEAST_HZ = 0.4  # of the shares: what is slower holds the mean, such as the weight
+_SHOWN_HZ = 8.0  # highest frequency of the picture: above it lies the pose's noise
+_LEAST_HZ = 0.4  # lowest frequency of the shares: below it lies the mean, such as the weight
 _SHOWN_SECONDS = 10.0
 
 
 def identified_data(found: Identified) -> dict[str, Any]:
-    """Return the dictionary of ``identify.json``; None for what is not known."""
+    """Return the dictionary of ``identify.json``; None for unknown values."""
     data: dict[str, Any] = {
         "vehicle": found.vehicle.name,
         "mass_kg": found.vehicle.mass,
@@ -71,7 +71,7 @@ def headline(found: Identified) -> str:
 
 def write_identified(found: Identified, path: Path) -> list[Path]:
     """Write the vehicle to a YAML file, and beside it ``NAME.identify.json``,
-    ``NAME.identify.png`` and, where it predicted, ``NAME.prediction.png``; return them.
+    ``NAME.identify.png`` and, with predictions, ``NAME.prediction.png``; return the paths.
 
     Raises:
         InputError: a file cannot be written.
@@ -97,8 +97,9 @@ def write_identified(found: Identified, path: Path) -> list[Path]:
 
 
 def fitted(found: Identified, piece: MotionPiece) -> tuple[Array, Array]:
-    """Return measured and fitted specific force (m/s2) and angular acceleration (rad/s2), (n, 6)
-    each, of a piece; both through the picture's low-pass, within the band that was used.
+    """Return a piece's measured and fitted specific force (m/s2) and angular acceleration (rad/s2).
+
+    Both are (n, 6), behind the picture's low-pass and within the band of the fit.
     """
     fit = found.fit
     then = piece.t - fit.drive.delay
@@ -114,9 +115,8 @@ def fitted(found: Identified, piece: MotionPiece) -> tuple[Array, Array]:
 
 
 def explained(found: Identified) -> Array:
-    """Return the share (6,) of measured force and turning that the fit explains in the band that it
-    used: of the power, in which a frequency counts by how far it stands out of its noise; NaN where
-    nothing is measured.
+    """Return the share (6,) of measured power of force and turning that the fit explains in its
+    band. Each frequency counts by its ratio to the noise; NaN without a measurement.
     """
     fit = found.fit
     names, values = fit.balance.names, fit.values
