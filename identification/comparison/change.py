@@ -107,8 +107,8 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     """
     if not (len(after) and len(before)):
         raise InputError("compare: expected at least one flight in each of the two sets")
-    found = difference(after, before)
-    moved, unchanged = found.mean[:, None], found.variance
+    ways = difference(after, before)
+    moved, unchanged = ways.mean[:, None], ways.variance
     unchanged[:, 3] += (_VOLTAGE_POWER * _voltage_ratio(after, before)) ** 2
     shares = np.mean([trim.thrust / trim.total for trim in before], axis=0)
 
@@ -118,7 +118,7 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
         """
         variance = unchanged[:, None] + spread**2
         off = np.square(moved - means) / variance + np.log(2.0 * np.pi * variance)
-        return np.asarray(logsumexp(found.log[:, None] - 0.5 * off.sum(axis=2), axis=0))
+        return np.asarray(logsumexp(ways.log[:, None] - 0.5 * off.sum(axis=2), axis=0))
 
     amounts = np.linspace(0.02, 4.0, _AMOUNTS) * _USUAL_AMOUNT
     prior = log_softmax(-0.5 * np.square(amounts / _USUAL_AMOUNT))
@@ -143,11 +143,11 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     places = {place: sum(p for (at, _), p in chances.items() if at == place) for place, _ in logs}
     likeliest = max(places, key=places.__getitem__)
     kinds = {kind: p / places[likeliest] for (at, kind), p in chances.items() if at == likeliest}
-    share = np.exp(found.log)
+    share = np.exp(ways.log)
     return Change(
         tuple(before),
         tuple(after),
-        share @ found.mean,
+        share @ ways.mean,
         np.sqrt(share @ unchanged),
         places,
         kinds.get("weaker", 0.0),

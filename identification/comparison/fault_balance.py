@@ -143,8 +143,8 @@ class BalanceChannel:
         gain = np.square(sy - sm * self.my / self.mm) / own_share
         width = np.log(np.maximum(gain / self.noise.variance, 1.0))
         price = 0.5 * np.maximum(1.0 + width, math.log(self.noise.whole.sum()))
-        found: Array = self.noise.log_likelihood(self.yy - self.gain * self.my - gain) - price
-        return found
+        logs: Array = self.noise.log_likelihood(self.yy - self.gain * self.my - gain) - price
+        return logs
 
     def _beginning(self, rows: Index, ramp: Array) -> Array:
         """Return products (3, K) of a share of 1 beginning at each of ``rows`` (K,) by a ramp: with

@@ -107,12 +107,12 @@ def read_channels(
         log = log or read_log(path, reader, vehicle, log_map)
         return channels_of_log(log), log.notes
     recording = px4_ulog.channels(path, has_ranges=False)
-    found: dict[str, Any] = {part: readable(recording.streams.get(part)) for part in _CHANNELS}
-    if missing := [part for part, stream in found.items() if stream is None]:
+    streams: dict[str, Any] = {part: readable(recording.streams.get(part)) for part in _CHANNELS}
+    if missing := [part for part, stream in streams.items() if stream is None]:
         raise InputError(f"{path}: no {' and no '.join(missing)}; expected all of them")
     assert recording.log_map.commands is not None
     names = tuple(f"PX4 motor {i}" for i in recording.log_map.commands.order)
-    gyro, accelerometer, command = found.values()
+    gyro, accelerometer, command = streams.values()
     return Channels(str(path), gyro, accelerometer, command, False, names), tuple(recording.notes)
 
 
@@ -217,7 +217,7 @@ def _means(times: Array, values: Array, middles: Array) -> Array:
 
 def _end(c: Channels) -> tuple[float, str]:
     """Return the end of the model's validity, and its reason: a clipped gyro, or an impact."""
-    found = [(np.inf, "")]
+    ends = [(np.inf, "")]
     count = max(3, round(CLIPPED_SECONDS / float(np.median(np.diff(c.gyro.t)))))
     for axis in c.gyro.values.T:
         size = np.abs(axis)
@@ -228,11 +228,11 @@ def _end(c: Channels) -> tuple[float, str]:
         if clipped.any():
             # the filters look half their width to either side
             first = max(0, int(np.argmax(clipped)) - count // 2)
-            found.append((float(c.gyro.t[first]), "the gyro was at its limit"))
+            ends.append((float(c.gyro.t[first]), "the gyro was at its limit"))
     hit = np.linalg.norm(c.accelerometer.values, axis=1) > IMPACT
     # take-off may be hard: an impact counts once the rotors carry the vehicle
     aloft = c.command.t[carrying(c.command.values.sum(axis=1))]
     hit &= c.accelerometer.t > aloft[0] + SETTLED if len(aloft) else False
     if hit.any():
-        found.append((float(c.accelerometer.t[np.argmax(hit)]) - STEP, "the vehicle hit something"))
-    return min(found)
+        ends.append((float(c.accelerometer.t[np.argmax(hit)]) - STEP, "the vehicle hit something"))
+    return min(ends)

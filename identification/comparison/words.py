@@ -108,10 +108,15 @@ def write_change(change: Change, folder: Path) -> tuple[Path, Path]:
     Raises:
         InputError: a file cannot be written.
     """
-    data, picture = folder / "change.json", folder / "change.png"
-    write_json(change_data(change), data)
-    write_png(_draw_change(change), picture)
-    return data, picture
+    return _written(folder / "change.json", change_data(change), _draw_change(change))
+
+
+def _written(path: Path, data: Any, figure: Any) -> tuple[Path, Path]:
+    """Write data, and a figure beside them; return both paths."""
+    picture = path.with_suffix(".png")
+    write_json(data, path)
+    write_png(figure, picture)
+    return path, picture
 
 
 @styled()
@@ -184,41 +189,39 @@ def _finding(fault: RotorFault, name: str) -> str:
 def fault_data(fault: RotorFault) -> dict[str, Any]:
     """Return the finding as plain data."""
     names = {str(i): f"rotor {i}" for i in range(1, 5)}
-    found, motors = fault.likeliest in names, fault.samples.channels.motor_names
+    of_rotor, motors = fault.likeliest in names, fault.samples.channels.motor_names
     return {
         "log": fault.samples.channels.name,
         "headline": fault_headline(fault),
         "found": names.get(fault.likeliest, fault.likeliest),
         "sure": fault.sure,
         "probabilities": {names.get(k, k): p for k, p in fault.probabilities.items()},
-        "rotor": fault.rotor if found else None,
-        "motor": motors[fault.rotor - 1] if found and motors else None,
-        "onset_s": fault.onset[0] if found else None,
-        "onset_ci95_s": list(fault.onset[1:]) if found else None,
-        "remaining": fault.remaining[0] if found else None,
-        "remaining_ci95": list(fault.remaining[1:]) if found else None,
+        "rotor": fault.rotor if of_rotor else None,
+        "motor": motors[fault.rotor - 1] if of_rotor and motors else None,
+        "onset_s": fault.onset[0] if of_rotor else None,
+        "onset_ci95_s": list(fault.onset[1:]) if of_rotor else None,
+        "remaining": fault.remaining[0] if of_rotor else None,
+        "remaining_ci95": list(fault.remaining[1:]) if of_rotor else None,
         "flight_s": fault.seconds,
         "ended_because": fault.samples.ended or None,
     }
 
 
-def write_faults(found: Sequence[RotorFault], folder: Path) -> tuple[Path, Path]:
+def write_faults(faults: Sequence[RotorFault], folder: Path) -> tuple[Path, Path]:
     """Write ``rotor_faults.json`` and ``rotor_faults.png`` into a folder and return their paths.
 
     Raises:
         InputError: a file cannot be written.
     """
-    data, picture = folder / "rotor_faults.json", folder / "rotor_faults.png"
-    write_json([fault_data(fault) for fault in found], data)
-    write_png(_draw_faults(found), picture)
-    return data, picture
+    data = [fault_data(fault) for fault in faults]
+    return _written(folder / "rotor_faults.json", data, _draw_faults(faults))
 
 
 @styled()
-def _draw_faults(found: Sequence[RotorFault]) -> Any:
-    figure = new_figure(3.4 * len(found))
-    axes = figure.subplots(len(found), 2, squeeze=False)
-    for fault, (left, right) in zip(found, axes, strict=True):
+def _draw_faults(faults: Sequence[RotorFault]) -> Any:
+    figure = new_figure(3.4 * len(faults))
+    axes = figure.subplots(len(faults), 2, squeeze=False)
+    for fault, (left, right) in zip(faults, axes, strict=True):
         samples, command = fault.samples, fault.samples.channels.command
         commands = resampled(samples.t, command.t, command.values)
         turning = samples.angular_acceleration

@@ -76,9 +76,9 @@ def log_channels(log: FlightLog) -> list[Channel]:
         step = float(np.median(steps))
         rate = min(log.rates.get(section) or np.inf, 1.0 / step)
         gaps, longest = int(np.sum(steps > _GAP * step)), max(float(steps.max()), 1.0 / rate)
-        found = (len(rows), rate, gaps, longest, low, high)
+        numbers = (len(rows), rate, gaps, longest, low, high)
         shown = _extremes(drawn)
-        out.append(Channel(name, unit, *found, t[shown], drawn[shown], title, series))
+        out.append(Channel(name, unit, *numbers, t[shown], drawn[shown], title, series))
     return out
 
 
@@ -93,8 +93,8 @@ def _extremes(values: Array) -> NDArray[np.intp]:
     bins = values[: whole * size].reshape(whole, size, -1)
     rows = size * np.arange(whole)[:, None]
     ends = rows[:, 0], np.arange(whole * size, len(values))
-    found = [(rows + pick(bins, axis=1)).ravel() for pick in (np.argmin, np.argmax)]
-    return np.unique(np.concatenate([*found, *ends]))
+    extremes = [(rows + pick(bins, axis=1)).ravel() for pick in (np.argmin, np.argmax)]
+    return np.unique(np.concatenate([*extremes, *ends]))
 
 
 @styled()

@@ -36,12 +36,12 @@ _CRAZYFLIE = [3, 2, 1, 0]  # front-right, rear-right, rear-left, front-left
 
 
 def _autopilot(
-    name: str, parameters: tuple[str, ...], most_ballistic: float, found: Identified
+    name: str, parameters: tuple[str, ...], most_ballistic: float, identified: Identified
 ) -> str:
     """Return an autopilot's parameters: momentum drag (1/s), ballistic coefficients along x and y
     (kg/m2), hover thrust (share of the full one), and the square's share in the curve.
     """
-    vehicle = found.vehicle
+    vehicle = identified.vehicle
     linear = [drag / vehicle.mass for drag in linear_drag(vehicle)[:2]]
     quadratic = [coefficient_of(vehicle, Role.BODY_DRAG, 3 + i) for i in range(2)]
     values: list[float | None] = [None] * 5
@@ -65,7 +65,7 @@ def _autopilot(
         for p, value, limit in zip(parameters, values, limits, strict=True)
         if value is not None and value > limit
     ]
-    full = found.estimates.get("thrust(1)")
+    full = identified.estimates.get("thrust(1)")
     if values[3] is not None and full is not None and full.status != IDENTIFIED:
         doubts.append(
             f"# {parameters[3]} and {parameters[4]}: the full thrust was not flown; {full.how}"
@@ -78,22 +78,22 @@ def _autopilot(
     ).removesuffix("\n")
 
 
-def _simulator(name: str, found: Identified) -> str:
+def _simulator(name: str, identified: Identified) -> str:
     """Return a simulator's parameters."""
-    v = found.vehicle
-    lag, drag = found.estimates[effect_of(Role.LAG)], linear_drag(v)
+    v = identified.vehicle
+    lag, drag = identified.estimates[effect_of(Role.LAG)], linear_drag(v)
     rows = [
         np.sign(v.positions[_CRAZYFLIE, 1]),
         -np.sign(v.positions[_CRAZYFLIE, 0]),
         -v.spin[_CRAZYFLIE],
     ]
     notes = ""
-    if found.fit.drive.commands:
+    if identified.fit.drive.commands:
         notes += (
             "# these logs hold commands, no rotor speeds: k and p are scaled so that rotors hover "
             f"at {v.hover_rate:.0f} rad/s; thrust and torque are right, speeds are not\n"
         )
-    assumed = [e.name for e in found.estimates.values() if e.status == ASSUMED]
+    assumed = [e.name for e in identified.estimates.values() if e.status == ASSUMED]
     notes += f"# assumed, not identified: {', '.join(assumed)}\n" if assumed else ""
     text = page_template(__package__, f"templates/{name}.j2", html=False)
     return text.render(

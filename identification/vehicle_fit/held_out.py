@@ -41,7 +41,7 @@ def predicted(
         number += [piece.log] * (len(edges) - 1)
         spans += list(zip(t[edges[:-1]].tolist(), t[edges[1:] - 1].tolist(), strict=True))
     turn = np.arange(len(number)) % FOLDS
-    found: dict[str, PredictionErrors] = {}
+    errors: dict[str, PredictionErrors] = {}
     for where, fold in {"held_out_blocks": turn, "flights_left_out": np.array(number)}.items():
         names = np.unique(fold)
         if len(names) < 2 and where == "flights_left_out":
@@ -53,8 +53,8 @@ def predicted(
                 windows.setdefault(number[i], []).append(spans[i])
             of = [logs[i] for i in windows]
             parts.append(prediction_errors(of, vehicle_of(part), windows=list(windows.values())))
-        found[where] = PredictionErrors.pooled(parts)
-    return found
+        errors[where] = PredictionErrors.pooled(parts)
+    return errors
 
 
 def torque_refuted(errors: Mapping[str, PredictionErrors]) -> str:

@@ -50,8 +50,8 @@ def motor_response(pieces: list[MotionPiece]) -> MotorResponse | None:
         return float(np.sum(np.square(fitted(float(np.exp(log_lag)))[1])))
 
     bounds = tuple(np.log(_LAGS))
-    found = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-3})
-    lag = float(np.exp(found.x))
+    likeliest = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-3})
+    lag = float(np.exp(likeliest.x))
     best, residual = fitted(lag)
     step = 0.01 * lag
     slope = (columns(lag + step) - columns(lag - step)) @ best / (2.0 * step)

@@ -156,7 +156,7 @@ def score_tests(
     made = made or fit.balance
     total = np.sum(_grams(made, fit.spectra), axis=0)
     step, information, *_ = _newton(made, total, model, start)
-    gradient, without, found = information @ step, list(range(len(fit.theta))), {}
+    gradient, without, tests = information @ step, list(range(len(fit.theta))), {}
 
     def reached(rows: list[int]) -> tuple[float, Array, Array]:
         inverse = np.linalg.inv(information[np.ix_(rows, rows)])
@@ -168,8 +168,8 @@ def score_tests(
         units = np.array([model.scale.get(p, 1.0) for p in group])
         fall, moved, size = reached(without + further)
         own = slice(len(without), None)
-        found[name] = fall - reached(without)[0], units * moved[own], units * size[own]
-    return found
+        tests[name] = fall - reached(without)[0], units * moved[own], units * size[own]
+    return tests
 
 
 def _moved(
