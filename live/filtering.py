@@ -197,5 +197,5 @@ def warm_up(vehicle: Vehicle) -> None:
         live.take(replace(hover, t=0.005 * i))
     live.take(replace(hover, t=0.0501))  # late
     for i in range(40, 45):
-        imu = {"gyro": np.zeros(3), "accelerometer": up}
-        live.take(replace(hover, t=0.005 * i, voltage=None, **imu))
+        row = replace(hover, t=0.005 * i, voltage=None)
+        live.take(replace(row, gyro=np.zeros(3), accelerometer=up))

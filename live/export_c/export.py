@@ -2,7 +2,7 @@
 
 Gaps, outliers and restarts are translated from the Python filter (``filter_code``), and effects
 from their Python (``effect_code``). Templates hold the other equations, written after the Python.
-Every number comes from the Python filter's own record (``estimator.filter_record``): each has one place.
+Every number comes from the Python filter's own record (``estimator.filter_record``), its one place.
 ``tests/live/test_export_c.py`` holds C and Python together, flight by flight.
 """
 
