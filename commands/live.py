@@ -143,12 +143,6 @@ def _watch(session: "Session") -> bool:
     return interrupted
 
 
-def _noise(session: "Session") -> dict[str, float] | None:
-    """Return the noise of poses as multiples of the declared one; None: not known."""
-    scales = session.watch.noise_scales
-    return None if scales is None else dict(zip(("attitude", "position"), scales, strict=True))
-
-
 def _say(session: "Session") -> None:
     """Print new lines on links and failures."""
     for line in session.tallies.news():
@@ -163,8 +157,9 @@ def _summary(session: "Session") -> dict[str, Any]:
     from ..live.terminal_page import counts_words, tuning_words
 
     _say(session)
-    tallies, restarts = session.tallies, session.filter.restarts
+    tallies, restarts, scales = session.tallies, session.filter.restarts, session.watch.noise_scales
     median, most = tallies.latency.median_and_most
+    noise = {} if scales is None else dict(zip(("attitude", "position"), scales, strict=True))
     mean, square = tallies.wrench / max(session.estimates, 1)
     deviation = np.sqrt(np.maximum(square - mean**2, 0.0))
     result: dict[str, Any] = {
@@ -178,7 +173,7 @@ def _summary(session: "Session") -> dict[str, Any]:
         "consistency": tallies.consistency.as_dict() if tallies.consistency.seconds else None,
         "period_s": session.filter.period,
         "clock_drift_ppm": session.clocks.drift,
-        "noise_scale": _noise(session),
+        "noise_scale": noise or None,
         "poses": session.watch.poses,
         "poses_too_late": session.watch.too_late,
         "latency_ms": {"median": median, "p99": most},

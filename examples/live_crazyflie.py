@@ -1,6 +1,6 @@
 """A Crazyflie's log as lines of JSON (cflib is on PyPI).
 
-python live_crazyflie.py radio://0/80/2M | windwrench live - --vehicle crazyflie --map cflib
+python examples/live_crazyflie.py radio://0/80 | windwrench live - --vehicle crazyflie --map cflib
 """
 
 import contextlib

@@ -1,6 +1,6 @@
 """Topics of ROS 2 as lines of JSON: a pose, and rotor speeds in rad/s in this kit's order.
 
-python live_ros2.py /vicon/drone /motors | windwrench live - --vehicle my_drone.yaml
+python examples/live_ros2.py /vicon/drone /motors | windwrench live - --vehicle my_drone.yaml
 """
 
 import contextlib

@@ -90,17 +90,17 @@ class Clocks:
         if sample.stamp is None:
             return self._unstamped(sample)
         if sample.kind not in self._kinds:
-            found = self._clock_of(sample.stamp, sample.arrival)
-            self._kinds[sample.kind] = found, deque(maxlen=_REMEMBERED)
+            clock = self._clock_of(sample.stamp, sample.arrival)
+            self._kinds[sample.kind] = clock, deque(maxlen=_REMEMBERED)
         clock, recent = self._kinds[sample.kind]
         if sample.stamp in recent:
             self._tallies.counts["doubled"] += 1
             return None
-        if not self._goes_on(clock, sample, sample.stamp):
+        reference, stamp = self._clocks[0], sample.stamp
+        if not self._goes_on(clock, sample, stamp):
             return None
         self._anew = False
-        recent.append(sample.stamp)
-        reference, stamp = self._clocks[0], sample.stamp
+        recent.append(stamp)
         if self._paced:
             clock.line.add(sample.arrival, stamp)
         if stamp >= clock.newest:

@@ -109,11 +109,8 @@ class FieldMap:
         if clock.column not in fields:
             return None
         value = fields[clock.column]
-        if isinstance(value, int) and not isinstance(value, bool):
-            if abs(value) < 2**63:
-                return round(value * round(UNITS["time"][clock.unit] * SECOND))
-        elif isinstance(value, float) and math.isfinite(value) and abs(value) < 1e12:
-            return round(value * (UNITS["time"][clock.unit] * SECOND))
+        if type(value) in (int, float) and abs(value) < (2**63 if type(value) is int else 1e12):
+            return round(value * round(UNITS["time"][clock.unit] * SECOND))
         raise Malformed(f"field {clock.column}: {_shown(value)}; expected a time")
 
     def _attitude(self, part: Attitude, values: Array) -> Array:

@@ -8,7 +8,6 @@ is the filter's period, and the tuning is scaled by the period.
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -46,12 +45,6 @@ class Output:
     t: float  # s, stream's time, of the estimate
     estimate: WrenchEstimate
     std: Array  # (6,) force, N, and torque, Nm, from noise and the vehicle's uncertainty
-
-    @property
-    def covariance(self) -> Array:
-        """Covariance (6, 6) of the wrench; its diagonal is ``std`` squared."""
-        noise = np.roll(self.estimate.covariance[12:, 12:], (3, 3), axis=(0, 1))
-        return noise + np.diag(self.std**2 - np.diag(noise))
 
     @property
     def wrench(self) -> Array:
@@ -191,17 +184,18 @@ class LiveFilter:
 def warm_up(vehicle: Vehicle) -> None:
     """Compile all functions for a stream of this vehicle."""
     live = LiveFilter(vehicle, Tallies())
-    hover: dict[str, Any] = {
-        "rotor_speeds": np.full(4, vehicle.hover_rate),
-        "position": np.array([0.0, 0.0, 1.0]),
-        "quaternion": np.array([1.0, 0.0, 0.0, 0.0]),
-    }
-    imu: dict[str, Any] = {
-        "gyro": np.zeros(3),
-        "accelerometer": np.array([0.0, 0.0, vehicle.gravity]),
-    }
+    hover = Row(
+        0.0,
+        0,
+        rotor_speeds=np.full(4, vehicle.hover_rate),
+        position=np.array([0.0, 0.0, 1.0]),
+        quaternion=np.array([1.0, 0.0, 0.0, 0.0]),
+        voltage=vehicle.voltage_ref or None,
+    )
+    up = np.array([0.0, 0.0, vehicle.gravity])
     for i in range(40):
-        live.take(Row(0.005 * i, 0, **hover, voltage=vehicle.voltage_ref or None))
-    live.take(Row(0.0501, 0, **hover))  # late
+        live.take(replace(hover, t=0.005 * i))
+    live.take(replace(hover, t=0.0501))  # late
     for i in range(40, 45):
-        live.take(Row(0.005 * i, 0, **hover, **imu))
+        row = replace(hover, t=0.005 * i, voltage=None)
+        live.take(replace(row, gyro=np.zeros(3), accelerometer=up))

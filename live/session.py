@@ -208,14 +208,14 @@ class Session:
         came = ", ".join(sorted(self.tallies.rates))
         bad, problems = self.tallies.counts["malformed"], self.source.problems
         if not came:
-            found = "no good message came" if bad else "no message came"
+            problem = "no good message came" if bad else "no message came"
         elif waiting:
-            found = f"poses came ({came}), and no rotor speeds"
+            problem = f"poses came ({came}), and no rotor speeds"
         else:
-            found = f"{came} came, which is no estimate yet"
+            problem = f"{came} came, which is no estimate yet"
         if problems:
             when += f"; {bad} malformed, the first: {problems[0]}"
-        return InputError(f"{self.source.name}: {found} {when}; expected {self.source.expected}")
+        return InputError(f"{self.source.name}: {problem} {when}; expected {self.source.expected}")
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from ..tallies import Tallies
 
 # s of waiting for a reader of the estimates or a stalled disk, for a file: nothing flies
 WAITS = 60.0
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 _RESTARTED = 1_000  # messages; a larger fall of a count is a new count
 _NONE_GOOD = 100  # malformed messages without a good one: a stream of another kind
 _TOLD = 3  # malformed messages in words; all are counted
@@ -87,8 +87,8 @@ class Source(ABC):
         Raises:
             Malformed: there is none to read.
         """
-        found: Measurement = message
-        return found
+        sample: Measurement = message
+        return sample
 
     def receive(self, timeout: float) -> list[Measurement] | None:
         """Return the measurements so far; None: the stream has ended.
@@ -99,12 +99,12 @@ class Source(ABC):
         messages = self.read(timeout)
         if messages is None:
             return None
-        samples = [self.unless_malformed(self.decode, *message) for message in messages]
-        found = [sample for sample in samples if sample is not None]
-        self._understood |= bool(found)
-        return found
+        decoded = (self.unless_malformed(self.decode, *message) for message in messages)
+        samples = [sample for sample in decoded if sample is not None]
+        self._understood |= bool(samples)
+        return samples
 
-    def unless_malformed(self, decode: Callable[..., Found], *message: Any) -> Found | None:
+    def unless_malformed(self, decode: Callable[..., Result], *message: Any) -> Result | None:
         """Return a function's result for a message; None: malformed, and counted."""
         try:
             with self.tallies.spared("not decoded", f"a message of {self.name}"):

@@ -67,5 +67,7 @@ def _wind(vehicle: Vehicle, output: Output) -> tuple[Array, Array] | None:
     if not level > 0.0 or float(np.linalg.eigvalsh(drag)[0]) < _TILTED * level:
         return None
     inverse = np.linalg.inv(drag)
-    covariance = inverse @ output.covariance[:2, :2] @ inverse.T
+    noise = output.estimate.covariance[15:17, 15:17]  # of the force; the vehicle's adds to it
+    force = noise + np.diag(output.std[:2] ** 2 - np.diag(noise))
+    covariance = inverse @ force @ inverse.T
     return inverse @ output.estimate.force[:2], np.sqrt(np.diagonal(covariance))

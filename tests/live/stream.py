@@ -23,6 +23,9 @@ from windwrench.live.tallies import Tallies
 from windwrench.runtime.errors import InputError
 
 VEHICLE = load_vehicle("ardrone2")
+NED = np.array([1.0, -1.0, -1.0])
+HALF = np.array([1.0, 1.0, -1.0, -1.0])
+MOTORS = [3, 1, 0, 2]  # the kit's rotors that are PX4's motors 1 to 4
 
 
 @cache
@@ -47,6 +50,19 @@ def as_objects(flown):
             zip(flown["t"].tolist(), table.tolist(), flown["voltage"].tolist(), strict=True)
         )
     ]
+
+
+def rpm_of(flown, k):
+    return [round(w * 30 / np.pi) for w in flown["rotor_speeds"][k][MOTORS]]
+
+
+def send_rotors(mav, esc_status, us, flown, k):
+    mav.send(esc_status(0, us, rpm_of(flown, k), [11.0] * 4, [1.0] * 4))
+
+
+def send_odometry(mav, us, flown, k):
+    pose = *flown["position"][k] * NED, flown["quaternion"][k] * HALF
+    mav.odometry_send(us, 1, 12, *pose, *[0] * 6, *[[0.0] * 21] * 2, 0, 0, 0)
 
 
 def as_lines(flown):
@@ -118,6 +134,7 @@ class Pipeline:
     def take(self, samples):
         for sample in samples:
             self.session.take(sample)
+            self.session.watch.look(sample.arrival)
         return self
 
     def wrench(self):

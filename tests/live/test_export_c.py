@@ -27,7 +27,7 @@ from tests.support.exported_c.hostile import PERIOD, hostile
 from tests.support.paths import ROOT
 from tests.support.synthetic_wrench import TICKS, observations
 from windwrench.controllers import Tracker
-from windwrench.controllers.observation import FORCE_X, FORCE_Y, TORQUE_Z, VELOCITY_Y
+from windwrench.controllers.observation import FORCE_X, TORQUE_Z, VELOCITY_Y
 from windwrench.controllers.trained_policy import load_policy
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import compile_effects, get, parse_setting
@@ -273,31 +273,37 @@ def test_effects_in_c_are_those_in_python(tmp_path):
             np.testing.assert_allclose(given[which], double[which], rtol=0, atol=1e-5 * scale)
 
 
+def commands(c, seen):
+    """The commands (n,) of the C along observations (n, 8)."""
+    c.c.ww_policy_init(c._policy)
+    e, out = c.estimate, []
+    for row in seen:
+        e.force[:], e.torque[:], e.velocity[1] = row[:3], row[3:6], row[VELOCITY_Y]
+        out.append(c.policy(e))
+    return np.array(out)
+
+
 def test_the_policy_in_c_commands_what_it_does_in_python(tmp_path):
     policy = exportable_policy("sac-0")
     c = CompiledFilter(export_c(load_vehicle("ardrone2"), policy=policy), tmp_path)
-    python, rng, command = load_policy(POLICY), np.random.default_rng(0), 0.0
-    e = c.estimate
-    for _ in range(50):
-        force, torque = rng.normal(0.3, 0.3, 3), rng.normal(0.0, 0.03, 3)
-        e.force[:], e.torque[:], e.velocity[1] = force, torque, 0.2
-        mine = c.policy(e)
-        observation = np.array([*force, *torque, 0.2, command])
-        command = float(python(observation)[0])
-        assert mine == pytest.approx(command, abs=2e-5)
+    python, rng = load_policy(POLICY), np.random.default_rng(0)
+    force, torque = rng.normal(0.3, 0.3, (50, 3)), rng.normal(0.0, 0.03, (50, 3))
+    seen = np.column_stack([force, torque, np.full(50, 0.2), np.zeros(50)])
+    wanted = np.zeros(51)
+    for k in range(50):
+        wanted[k + 1] = python(np.append(seen[k, :7], wanted[k]))[0]
+    np.testing.assert_allclose(commands(c, seen), wanted[1:], rtol=0, atol=2e-5)
 
 
 def test_the_law_with_lead(tmp_path):
     policy = exportable_policy("lead")
     c = CompiledFilter(export_c(load_vehicle("ardrone2"), policy=policy), tmp_path)
-    e = c.estimate
-    torque = np.array([0.001, 0.004, -0.003, 0.01, 0.1])
-    force = np.array([0.5, 0.4, 0.1, -0.2, 0.3])
+    seen = np.zeros((5, 8))
+    seen[:, TORQUE_Z] = torque = np.array([0.001, 0.004, -0.003, 0.01, 0.1])
+    seen[:, FORCE_X] = force = np.array([0.5, 0.4, 0.1, -0.2, 0.3])
     x = torque / np.maximum(force, 0.183)
     wanted = np.clip(-(11.35 * x + 2.79 * np.diff(x, prepend=x[0]) / 0.08), -1.0, 1.0)
-    for k in range(5):
-        e.force[0], e.torque[2] = force[k], torque[k]
-        assert c.policy(e) == pytest.approx(wanted[k], abs=1e-5)
+    np.testing.assert_allclose(commands(c, seen), wanted, rtol=0, atol=1e-5)
 
 
 def test_the_example_finds_the_force_that_it_is_given(tmp_path):
@@ -406,17 +412,6 @@ def c(tmp_path_factory):
     policy = exportable_policy("tracker")
     exported = export_c(VEHICLE, "constant-gain", 200.0, 0.45, policy=policy)
     return CompiledFilter(exported, tmp_path_factory.mktemp("tracker"))
-
-
-def commands(c, seen):
-    """The commands (n,) of the C along observations (n, 8)."""
-    c.c.ww_policy_init(c._policy)
-    e, out = c.estimate, []
-    for row in seen:
-        e.torque[2], e.force[0], e.force[1] = row[TORQUE_Z], row[FORCE_X], row[FORCE_Y]
-        e.velocity[1] = row[VELOCITY_Y]
-        out.append(c.policy(e))
-    return np.array(out)
 
 
 def fans(count, decisions, rng):

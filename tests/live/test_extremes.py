@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.live.stream import VEHICLE, as_objects, flight
+from tests.live.stream import VEHICLE, as_objects, flight, send_odometry, send_rotors
 from windwrench.live.filtering import LiveSettings
 from windwrench.live.session import Session
 from windwrench.live.sources.open import make_source
@@ -165,12 +165,9 @@ def test_mavlink(count, only):
         link.pieces.append(changed(rng, message._pack(sender, kind.crc_extra, payload), 0.1))
 
     def good(k):
-        us, motors = round(flown["t"][k] * 1e6), [3, 1, 0, 2]
-        rpm = [round(w * 30 / np.pi) for w in flown["rotor_speeds"][k][motors]]
-        sender.send(esc_status(0, us, rpm, [11.0] * 4, [1.0] * 4))
-        x, y, z = flown["position"][k] * [1, -1, -1]
-        q = flown["quaternion"][k] * [1, 1, -1, -1]
-        sender.odometry_send(us, 1, 12, x, y, z, q, *[0] * 6, *[[0.0] * 21] * 2, 0, 0, 0)
+        us = round(flown["t"][k] * 1e6)
+        send_rotors(sender, esc_status, us, flown, k)
+        send_odometry(sender, us, flown, k)
         link.pieces[:] = [b"".join(link.pieces)]
 
     stream.run(count, good, extreme)

@@ -1,7 +1,7 @@
 """As much of cflib and rclpy as the examples ask for: each plays the rows of a flight."""
 
 import sys
-import types
+from contextlib import contextmanager
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,27 +9,22 @@ import numpy as np
 
 def _install(monkeypatch, modules):
     for name, content in modules.items():
-        module = types.ModuleType(name)
-        module.__dict__.update(content)
-        monkeypatch.setitem(sys.modules, name, module)
+        monkeypatch.setitem(sys.modules, name, SimpleNamespace(**content))
 
 
 def install_cflib(monkeypatch, flown):
     """A Crazyflie with rpm sensors logs every other row, and takes no set point."""
 
-    class SyncCrazyflie:
-        def __init__(self, uri):
-            toc = SimpleNamespace(get_element=lambda group, name: (group, name) == ("rpm", "m1"))
-            self.cf = SimpleNamespace(commander=self, log=SimpleNamespace(toc=toc))
+    def refuse(*setpoint):
+        raise AssertionError(f"set point {setpoint}")
 
-        def send_setpoint(self, *setpoint):
-            raise AssertionError(f"set point {setpoint}")
-
-        def __enter__(self):
-            return self
-
-        def __exit__(self, *_):  # as cflib ends
-            self.cf.commander.send_setpoint(0, 0, 0, 0)
+    @contextmanager
+    def connect(uri):
+        toc = SimpleNamespace(get_element=lambda group, name: (group, name) == ("rpm", "m1"))
+        commander = SimpleNamespace(send_setpoint=refuse)
+        cf = SimpleNamespace(commander=commander, log=SimpleNamespace(toc=toc))
+        yield SimpleNamespace(cf=cf)
+        commander.send_setpoint(0, 0, 0, 0)  # as cflib ends
 
     class LogConfig:
         def __init__(self, name, period_in_ms):
@@ -38,42 +33,35 @@ def install_cflib(monkeypatch, flown):
         def add_variable(self, name, fetched):
             self.names.append(name)
 
-    class SyncLogger:
-        def __init__(self, crazyflie, block):
-            self.block = block
+    def rows(block):
+        for k in range(0, len(flown["t"]), block.period // 5):
+            rpm = flown["rotor_speeds"][k][[3, 2, 1, 0]] * 30.0 / np.pi
+            values = {f"rpm.m{i + 1}": round(float(x)) for i, x in enumerate(rpm)}
+            position = zip("xyz", flown["position"][k].tolist(), strict=True)
+            values |= {f"stateEstimate.{axis}": x for axis, x in position}
+            values |= {"stateEstimateZ.quat": k, "pm.vbat": 3.9}
+            yield round(1e3 * flown["t"][k]), {name: values[name] for name in block.names}, block
 
-        def __enter__(self):
-            return self
+    @contextmanager
+    def log(crazyflie, block):
+        yield rows(block)
 
-        def __exit__(self, *_):
-            pass
-
-        def __iter__(self):
-            for k in range(0, len(flown["t"]), self.block.period // 5):
-                rpm = flown["rotor_speeds"][k][[3, 2, 1, 0]] * 30.0 / np.pi
-                values = {f"rpm.m{i + 1}": round(float(x)) for i, x in enumerate(rpm)}
-                position = flown["position"][k].tolist()
-                values |= {f"stateEstimate.{a}": x for a, x in zip("xyz", position, strict=True)}
-                values |= {"stateEstimateZ.quat": k, "pm.vbat": 3.9}
-                row = {name: values[name] for name in self.block.names}
-                yield round(1e3 * flown["t"][k]), row, self.block
-
+    crtp = SimpleNamespace(init_drivers=lambda: None)
     _install(
         monkeypatch,
         {
-            "cflib": {},
-            "cflib.crtp": {"init_drivers": lambda: None},
+            "cflib": {"crtp": crtp},
+            "cflib.crtp": vars(crtp),
             "cflib.crazyflie": {},
             "cflib.crazyflie.log": {"LogConfig": LogConfig},
-            "cflib.crazyflie.syncCrazyflie": {"SyncCrazyflie": SyncCrazyflie},
-            "cflib.crazyflie.syncLogger": {"SyncLogger": SyncLogger},
+            "cflib.crazyflie.syncCrazyflie": {"SyncCrazyflie": connect},
+            "cflib.crazyflie.syncLogger": {"SyncLogger": log},
             "cflib.utils": {},
             "cflib.utils.encoding": {
                 "decompress_quaternion": lambda k: flown["quaternion"][k][[1, 2, 3, 0]]
             },
         },
     )
-    monkeypatch.setattr(sys.modules["cflib"], "crtp", sys.modules["cflib.crtp"], raising=False)
 
 
 def install_rclpy(monkeypatch, flown):
