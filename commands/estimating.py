@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     from ..estimator.consistency import Consistency
     from ..identification.logs.flight_log import FlightLog
 
-# endings of the wrench's file, with the library that writes it and the extra that brings it
+# endings of the wrench's file, with library and extra
 _TRACKS: dict[str, tuple[str, str] | None] = {
     ".csv": None,
     ".mcap": ("rosbags", "logs"),
 }
-# what innovations that agree within a second say, of a given and of a fitted tuning
+# sentences on innovations in agreement within a second, for a given and for a fitted tuning
 _TOO_SLOW = (
     "warning: innovations agree with each other within a second: the wrench changes faster than "
     "the tuning says. It is late, and its deviations are too small. Leave out --no-tune and "
@@ -73,7 +73,7 @@ def estimate(
     if needed := _TRACKS[track.suffix]:
         need(*needed, f"--out {out}")
     folder = results_folder(track.parent)
-    begin = f"{track.stem}." if track == out else ""  # of the names of what lies beside it
+    begin = f"{track.stem}." if track == out else ""  # before the names of the other files
     run.record = folder / f"{begin}run.json"
     if smooth is None:
         smooth = (flight.gyro is None) == (flight.accelerometer is None)
@@ -135,8 +135,8 @@ def estimate(
 def _tuned(
     flight: "FlightLog", model: "Vehicle", given: "UKFTuning | None", wanted: bool
 ) -> "tuple[NoiseFit | None, Consistency | None, str]":
-    """Return the fitted tuning, if that is wanted and can be had; what the innovations say of the
-    tuning that is used, if there are enough; and a sentence on both.
+    """Return the fitted tuning, if wanted and possible; the innovations' consistency with the final
+    tuning, if there are enough; and a sentence on both.
     """
     from ..identification.wrench_series import consistency_with_log, tune_to_log
 

@@ -1,4 +1,4 @@
-"""All that a log allows, in one go: ``windwrench LOG``."""
+"""Everything from a log, in one go: ``windwrench LOG``."""
 
 import shlex
 from collections.abc import Callable, Mapping
@@ -104,7 +104,7 @@ def look(
 
 
 def _typed(command: str, log: Path, reading: Reading) -> str:
-    """Return what a user types for one step alone."""
+    """Return the command of one step alone."""
     given = vars(reading).items()
     options = [str(x) for name, value in given if value is not None for x in (f"--{name}", value)]
     return shlex.join(["windwrench", command, str(log), *options])
@@ -116,7 +116,7 @@ def _tell(step: Any) -> None:
 
 
 def _what_it_holds(found: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return what ``check`` found as sentences."""
+    """Return the results of ``check`` as sentences."""
     read = f"{found['samples']} rows, {found['seconds']:.1f} s, read by {found['read_by']}."
     rates = (f"{name} {c['rate_hz']:.3g} Hz" for name, c in found["channels"].items())
     doubts = len(found["doubts"])
@@ -132,8 +132,8 @@ def _what_acts(result: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _what_lacks(result: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the first sentence of a diagnosis, and what is left of the force: in that sentence
-    where it has no number of its own, else as a further one.
+    """Return the first sentence of a diagnosis, and the residual force: within the sentence where
+    the headline has no number, else as a further one.
     """
     headline, error = result["headline"], result["error"]
     before, after = (1e3 * error[when]["force_rms_N"] for when in ("before", "after"))

@@ -1,7 +1,7 @@
 """The same wind in other simulators, by stand-ins of what each of them documents."""
 
 import sys
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -105,14 +105,11 @@ def test_crazyflow_gets_force_and_torque_of_all_worlds():
 
 
 def test_pybullet_drones_get_force_and_torque(monkeypatch):
-    applied = {"Force": [], "Torque": []}
-    bullet = ModuleType("pybullet")
-    bullet.WORLD_FRAME = 2
-    bullet.applyExternalForce = lambda body, link, force, at, frame, client: applied[
-        "Force"
-    ].append((body, link, *force, *at, frame, client))
-    bullet.applyExternalTorque = lambda body, link, torque, frame, client: applied["Torque"].append(
-        (body, link, *torque, frame, client)
+    forces, torques = [], []
+    bullet = SimpleNamespace(
+        WORLD_FRAME=2,
+        applyExternalForce=lambda *given: forces.append(np.hstack(given)),
+        applyExternalTorque=lambda *given: torques.append(np.hstack(given)),
     )
     monkeypatch.setitem(sys.modules, "pybullet", bullet)
     env = SimpleNamespace(
@@ -132,8 +129,8 @@ def test_pybullet_drones_get_force_and_torque(monkeypatch):
     blow_pybullet_drones(env, drag)
     force, torque = expected(0.5)
     for i, body in enumerate(env.DRONE_IDS):
-        np.testing.assert_allclose(applied["Force"][i], [body, -1, *force[i], *PLACE[i], 2, 1])
-        np.testing.assert_allclose(applied["Torque"][i], [body, -1, *torque[i], 2, 1])
+        np.testing.assert_allclose(forces[i], [body, -1, *force[i], *PLACE[i], 2, 1])
+        np.testing.assert_allclose(torques[i], [body, -1, *torque[i], 2, 1])
     env.PYB_STEPS_PER_CTRL, env.CTRL_FREQ = 5, 48
     with pytest.raises(InputError, match="expected ctrl_freq equal to pyb_freq, got 48 and 240 Hz"):
         blow_pybullet_drones(env, drag)
