@@ -147,7 +147,8 @@ def test_a_filter_whose_state_is_no_number_starts_over():
     env.step(STILL)
     env.loop.state[16] = np.nan
     observation, _, lost, _, info = env.step(STILL)
-    assert not (lost or info["lost"])
+    assert not lost
+    assert not info["lost"]
     assert np.isfinite(env.loop.state[:19]).all()
     assert observation in env.observation_space
 
