@@ -75,8 +75,8 @@ def demo(
     show_page(page, not no_open)
     return {
         "effect": story.effect_words,
-        "found": [e.name for e in story.found.effects],
-        "verdict": story.found.verdict,
+        "found": [e.name for e in story.diagnosis.effects],
+        "verdict": story.diagnosis.verdict,
         "steps": [
             {"title": s.title, "sentences": s.sentences, "command": s.command} for s in steps
         ],

@@ -46,7 +46,7 @@ class Story:
         episodes: flights before and after the diagnosis.
         out: folder for the results.
         log: the recorded flight.
-        found: its diagnosis.
+        diagnosis: of the recorded flight.
         reports: files of the diagnosis.
     """
 
@@ -57,7 +57,7 @@ class Story:
     episodes: int
     out: Path
     log: FlightLog = field(init=False)
-    found: Diagnosis = field(init=False)
+    diagnosis: Diagnosis = field(init=False)
     reports: list[Path] = field(init=False)
 
     @property
@@ -138,11 +138,11 @@ class Story:
             f"windwrench diagnose {self.out / 'flight.csv'} --vehicle "
             f"{shlex.quote(self.vehicle_name)} --out {folder}"
         )
-        self.found = diagnose([self.log], self.vehicle, (), (), stage)
-        self.reports = write_report(self.found, folder, command)
+        self.diagnosis = diagnose([self.log], self.vehicle, (), (), stage)
+        self.reports = write_report(self.diagnosis, folder, command)
         told = (
             "The diagnosis sees the log and the declared vehicle.",
-            headline(self.found),
+            headline(self.diagnosis),
             f"True: {self.effect_words}.",
         )
         return [Step("Diagnose it", told, command, report="diagnose/report.html")]
@@ -151,7 +151,7 @@ class Story:
         """Fly the same episodes with the declared model and with the amended one."""
         count, law = self.episodes, make_controller(CONTROLLER)
         flown: list[Episode] = []
-        for model in (self.vehicle, self.found.amended):
+        for model in (self.vehicle, self.diagnosis.amended):
             env = FanTrackingEnv(SCENARIO, vehicle=model, effects=[self.effect], truth=self.vehicle)
             for i in range(count):
                 each = _counted(report, len(flown), 2 * count)
