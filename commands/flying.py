@@ -19,7 +19,7 @@ def fly(
     task: str = "FanTracking",
     scenario: str = "base",
     controller: str | None = None,
-    seed: int = 4,  # of FanTracking a fan that moves; that of 0 stands still
+    seed: int = 4,  # a moving fan in FanTracking; the fan of seed 0 stands still
     vehicle: str = "ardrone2",
     truth: str | None = None,
     effect: list[str] | None = None,

@@ -43,16 +43,15 @@ def captioned(env: Task, title: str, flown: Sequence[Mapping[str, Any]]) -> NDAr
     size = height / _HEIGHT
     draw = ImageDraw.Draw(image)
     margin, line = round(_MARGIN * size), round(_LINE * size)
-    plain, small, bold = (
-        _font(max(8, round(points * size)), heavy)
-        for points, heavy in ((_FONT, False), (_SMALL, False), (_FONT, True))
-    )
 
-    def write(x: float, y: float, text: str, font: Any, anchor: str = "la") -> None:
+    def write(
+        x: float, y: float, text: str, anchor: str, points: int = _SMALL, bold: bool = False
+    ) -> None:
+        font = _font(max(8, round(points * size)), bold)
         draw.text((x, y), text, _INK, font, anchor, stroke_width=2, stroke_fill=_PAPER)
 
-    write(margin, margin, title, bold)
-    write(width - margin, margin, f"{info['time']:.1f} s", bold, "ra")
+    write(margin, margin, title, "la", _FONT, True)
+    write(width - margin, margin, f"{info['time']:.1f} s", "ra", _FONT, True)
 
     # the legend: a wide pale arrow is the truth, a narrow dark one the estimate, as in the picture
     middle = margin + 2.0 * line
@@ -65,11 +64,11 @@ def captioned(env: Task, title: str, flown: Sequence[Mapping[str, Any]]) -> NDAr
         colour = tuple(np.round(255 * mark[:3]).astype(int).tolist())
         shown = margin, middle, margin + 34 * size, middle
         draw.line(shown, colour, max(1, round(stroke * size)))
-        write(margin + 44 * size, middle, label, small, "lm")
-        write(margin + 305 * size, middle, told, small, "rm")
+        write(margin + 44 * size, middle, label, "lm")
+        write(margin + 305 * size, middle, told, "rm")
         middle += line
     for row, text in enumerate(_scores(flown)):
-        write(width - margin, margin + (2.0 + row) * line, text, plain, "rm")
+        write(width - margin, margin + (2.0 + row) * line, text, "rm", _FONT)
 
     pixels = viewer.pixels_per_metre(loop.position)
     length = max((s for s in _STEPS if s * pixels <= 0.2 * width), default=_STEPS[0])
@@ -79,7 +78,7 @@ def captioned(env: Task, title: str, flown: Sequence[Mapping[str, Any]]) -> NDAr
         draw.line((x, below - 5 * size, x, below + 5 * size), _INK, max(1, round(2 * size)))
     newtons, millis = length / viewer.scales[0], 1e3 * length / viewer.scales[1]
     told = f"this long: {length:g} m at the vehicle, {_short(newtons)} N, {_short(millis)} mNm"
-    write(margin, below - 8 * size, told, small, "lb")
+    write(margin, below - 8 * size, told, "lb")
     return np.asarray(image, dtype=np.uint8)
 
 

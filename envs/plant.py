@@ -133,8 +133,9 @@ def plant_record(vehicle: Vehicle, settings: PlantSettings) -> tuple[np.ndarray,
         vehicle.omega_max if math.isfinite(vehicle.omega_max) else 2.0 * vehicle.hover_rate
     )
     p["omega_lsb"] = vehicle.omega_lsb
-    p["sigma_position"] = vehicle.mocap.sigma_pos_m if settings.sensor_noise else 0.0
-    p["sigma_attitude"] = vehicle.mocap.sigma_att_rad if settings.sensor_noise else 0.0
+    if settings.sensor_noise:
+        p["sigma_position"] = vehicle.mocap.sigma_pos_m
+        p["sigma_attitude"] = vehicle.mocap.sigma_att_rad
     for name in ("disturbance_force", "disturbance_torque", "battery_life"):
         p[name] = getattr(settings, name)
     p["disturbance_keep"] = math.exp(-TICK / settings.disturbance_time)
@@ -145,21 +146,21 @@ def plant_record(vehicle: Vehicle, settings: PlantSettings) -> tuple[np.ndarray,
                 f"PlantSettings: {name}_delay must be 0 to {MAX_DELAY} s, got {delay!r}"
             )
         p[f"{name}_late"] = round(delay / TICK)
-    share, leaves = settings.dropout, 1.0 - settings.dropout
+    share, leaves, burst = settings.dropout, 1.0 - settings.dropout, settings.dropout_burst
     if not 0.0 <= share <= 1.0:
         raise InputError(f"PlantSettings: dropout must be 0 to 1, got {share!r}")
-    if settings.dropout_burst != 0.0 and 0.0 < share < 1.0:
+    if burst != 0.0 and 0.0 < share < 1.0:
         shortest = TICK * max(1.0, share / leaves)
-        if not settings.dropout_burst >= shortest:
+        if not burst >= shortest:
             raise InputError(
                 f"PlantSettings: dropout_burst must be 0, or at least {shortest:.4g} s where a "
-                f"share of {share:g} is lost, got {settings.dropout_burst!r}"
+                f"share of {share:g} is lost, got {burst!r}"
             )
         # Gilbert, Bell System Technical Journal 39 (1960): a chain of two states
-        ends = TICK / settings.dropout_burst
+        ends = TICK / burst
         share, leaves = ends * share / leaves, ends
     p["dropout"] = ndtri(share)
-    p["dropout_kept"] = ndtri(1.0 - leaves) if settings.dropout_burst != 0.0 else p["dropout"]
+    p["dropout_kept"] = ndtri(1.0 - leaves) if burst != 0.0 else p["dropout"]
     p["voltage_ref"] = vehicle.voltage_ref
     return record, amended
 

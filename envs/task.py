@@ -68,7 +68,7 @@ def is_flying(state: Array, position: Array, velocity: Array) -> bool:
 
 
 @compiled
-def vehicle_of(motion: Motion, n: int) -> tuple[Array, Array, Array, Array]:
+def vehicle_of(motion: Motion, n: int | np.integer[Any]) -> tuple[Array, Array, Array, Array]:
     """Return pose (7,), velocity (6,), true wrench (6,) and a copy of the estimate (20,) of vehicle
     ``n``.
     """
@@ -85,7 +85,12 @@ def vehicle_of(motion: Motion, n: int) -> tuple[Array, Array, Array, Array]:
 
 @compiled
 def note(
-    value: Record, episodes: Episodes, n: int, wrench: Array, square: float, change: float
+    value: Record,
+    episodes: Episodes,
+    n: int | np.integer[Any],
+    wrench: Array,
+    square: float,
+    change: float,
 ) -> None:
     """Write the common values of episode ``n``: time, true wrench (6,), and rewards.
 

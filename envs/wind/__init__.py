@@ -1,9 +1,8 @@
 """Winds: velocity fields of the air, evaluated at points of the world and in time.
 
 A wind is anything with ``velocity(points (n, 3) m, time s) -> (n, 3) m/s``, world frame. The winds
-of this room are compiled, which a flight needs that evaluates them at the stations of a vehicle 100
-times a second; they add up with ``+``. Any other wind flies as it is, and faster as a grid that it
-was sampled on (``on_grid``).
+of this room are compiled, for 100 evaluations a second at the stations of a vehicle; they add up
+with ``+``. Any other wind flies as it is, and faster sampled on a grid (``on_grid``).
 """
 
 from .adapters import (
