@@ -83,7 +83,7 @@ def test_a_command_that_is_gone_is_seen_unless_its_commit_is_named(tmp_path, mon
     text = f"Made by `python -m evidence.pages`.\n\n{gone}, commit 0123abc.\n\n{gone}.\n"
     (tmp_path / "page.md").write_text(text, encoding="utf-8")
     monkeypatch.setattr(rendering, "DOCS", tmp_path)
-    assert missing_sources() == ["page.md names studies.gone and no commit that has it"]
+    assert missing_sources() == ["page.md names evidence.gone and no commit that has it"]
 
 
 def test_the_rule_of_a_sure_name_is_that_of_the_code():
