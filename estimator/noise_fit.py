@@ -239,19 +239,19 @@ def _numbers(tuning: UKFTuning) -> Array:
 
 def _starts(flight: _Flight) -> list[UKFTuning]:
     """Return the given tuning, and variants with other walks and less white noise."""
-    tunings = []
-    for rise in flight.use.rise_times:
-        made = UKFTuning.for_vehicle(flight.vehicle, flight.period, rise)
-        tunings.append(
+    factors = {"force_walk": 1, "torque_walk": 1, "thrust_noise": 0.1, "motor_torque_noise": 0.1}
+    others = (
+        UKFTuning.for_vehicle(flight.vehicle, flight.period, r) for r in flight.use.rise_times
+    )
+    return [
+        flight.given,
+        *(
             replace(
-                flight.given,
-                force_walk=made.force_walk,
-                torque_walk=made.torque_walk,
-                thrust_noise=0.1 * np.asarray(made.thrust_noise),
-                motor_torque_noise=0.1 * np.asarray(made.motor_torque_noise),
+                flight.given, **{n: f * np.asarray(getattr(made, n)) for n, f in factors.items()}
             )
-        )
-    return [flight.given, *tunings]
+            for made in others
+        ),
+    ]
 
 
 def _bounds(vehicle: Vehicle, period: float, use: NoiseFitSettings) -> Array:
@@ -326,9 +326,7 @@ class _Flight:
     def pieces(self, rows: slice) -> list[Piece]:
         """Return the pieces of some rows."""
         columns: list[Any] = [None if c is None else c[rows] for c in self.columns]
-        t, speeds, x, q, volts = columns
-        gap, startup = self.use.longest_gap, self.use.startup
-        return pieces_of(self.vehicle, t, speeds, x, q, volts, gap, startup)
+        return pieces_of(self.vehicle, *columns, self.use.longest_gap, self.use.startup)
 
     def evaluate(self, tuning: UKFTuning, pieces: Sequence[Piece]) -> Innovations:
         """Return the result of a pass of the filter with this tuning."""

@@ -20,7 +20,7 @@ WEIGHT, ARM = VEHICLE.weight, VEHICLE.arm_l
 LARGEST = 0.3  # parts of weight (times the arm, for torque) that a disturbance reaches in flight
 CUTOFF, EDGE = 4.0, 200  # Hz, samples
 DISTURBANCES = sorted({**OUTSIDERS, **HELD_BACK})
-# sizes of each; ``python -m tests.studies.test_practice_flights`` writes them anew
+# sizes of each; ``python -m tests.evidence.test_practice_flights`` writes them anew
 GOLDEN = ROOT / "tests" / "golden" / "disturbances.json"
 
 
