@@ -35,8 +35,8 @@ Step = tuple[Wide, Wide, Wide]  # A (n, n), B (n, 1) and D (n, d) of a decision
 
 
 def regulator(A: Wide, B: Wide, effort: float) -> tuple[Wide, Wide, Wide]:
-    """Return the gain (1, n) of the linear-quadratic regulator, the cost to go (n, n), and the
-    factor (1, n) of a cost slope in the command.
+    """Return the linear-quadratic regulator's gain (1, n), its cost to go (n, n), and the command's
+    factor (1, n) on a cost slope.
     """
     from scipy.linalg import solve_discrete_are
 
@@ -51,8 +51,8 @@ def preview(A: Wide, B: Wide, D: Wide, effort: float, count: int) -> tuple[Wide,
     """Return the gain (n,) on the state, and (count, d) on the disturbances of each decision from
     now on.
 
-    The command ``u = -(gain x + sum of gains times d)`` makes the sum of ``x[0]^2 + effort u^2``
-    least for ``x' = A x + B u + D d``.
+    The model is ``x' = A x + B u + D d``. The command ``u = -(gain x + sum of gains times d)``
+    makes the sum of ``x[0]^2 + effort u^2`` least.
     """
     gain, cost, turned = regulator(A, B, effort)
     closed, slope, ahead = (A - B @ gain).T, cost @ D, []

@@ -187,22 +187,17 @@ class InformedTracker(_Belief):
     spread: float = 0.1486  # of particles drawn anew, as a share of their standard deviation
     # 1/s, how often a particle leaves the family and moves as those of ``Tracker``; 0: never
     leave: float = 0.03
-    _arrays: ClassVar[tuple[str, ...]] = (
-        *("_level", "_memory", "_place", "_velocity"),
-        *("_kind", "_sign", "_side", "_motion", "_free"),
-    )
+    _arrays = (*_Belief._arrays, "_kind", "_sign", "_side", "_motion", "_free")
 
     def _begin(self) -> None:
         rng, n, known = self._rng, self.particles, self._briefing.motions
         names = np.array([list(PLACES).index(name) for name in known.motions])
         self._kind = names[rng.integers(len(names), size=n)]
         self._sign = rng.choice([-1.0, 1.0], n)
-        side = rng.choice([-1.0, 1.0], n)
-        low, high = np.transpose([known.speed, known.travel, known.offset])
+        self._side = rng.choice([-1.0, 1.0], n)
         # speed, travel and offset at the start of each, within their bounds
-        self._bounds = low, high
+        self._bounds = low, high = np.transpose([known.speed, known.travel, known.offset])
         self._motion = rng.uniform(low, high, (n, 3))
-        self._side = side
         self._free = np.zeros(n, dtype=bool)  # of those that left the family
         self._go(0.0)
 

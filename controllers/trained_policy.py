@@ -160,9 +160,9 @@ class TrainedPolicy(_Network):
         card: ``features``, ``repeat`` (decisions a command), ``activation``, ``squash`` (the output
             goes through a tanh), and the policy's origin.
         weights: dense layers ``weight0`` (out, in), ``bias0`` (out,), ... Before them a recurrent
-            cell, if any: the LSTM ``lstm_input`` (4h, in), ``lstm_hidden`` (4h, h),
-            ``lstm_input_bias``, ``lstm_hidden_bias`` (4h,), or the GRU ``gru_input`` (3h, in) and
-            so on.
+            cell, if any. An LSTM has ``lstm_input`` (4h, in), ``lstm_hidden`` (4h, h),
+            ``lstm_input_bias``, ``lstm_hidden_bias`` (4h,). A GRU has ``gru_input`` (3h, in) and so
+            on.
 
     Raises:
         InputError: card and weights do not go together.

@@ -200,8 +200,8 @@ class L1Adaptive(WindLaw):
     Wu, Cheng, Ackerman, Gahlawat, Lakshmanan, Zhao and Hovakimyan, *L1 adaptive augmentation for
     geometric tracking control of quadrotors*, ICRA 2022 (and L1Quad, arXiv 2302.07208): a state
     predictor ``dv^/dt = f/m - g + sigma^ + A_s (v^ - v)``, the piecewise constant adaptation law
-    ``sigma^ = -Phi^-1 exp(A_s T) (v^ - v)`` with ``Phi = A_s^-1 (exp(A_s T) - I)``, and the control
-    ``-C(s) sigma^`` with a first-order low-pass. The predictor's input is the rotors' specific
+    ``sigma^ = -Phi^-1 exp(A_s T) (v^ - v)`` with ``Phi = A_s^-1 (exp(A_s T) - I)``, and a low-pass
+    of first order: the control ``-C(s) sigma^``. The predictor's input is the rotors' specific
     force by the declared model, and of the torque the wrench filter's estimate stands for
     ``sigma^``. Neither acts where the command does, before the attitude loop: both are unmatched,
     and the control is ``-C(s) H_m^-1(s) H_um(s) sigma^`` (Xargay, Hovakimyan and Cao, ACC 2010). To

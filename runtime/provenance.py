@@ -12,8 +12,14 @@ from .. import __version__
 _ROOT = Path(__file__).resolve().parent.parent
 # packages behind a result
 _PACKAGES = (
-    *("stable-baselines3", "sb3-contrib", "torch", "numpy", "scipy", "numba"),
-    *("mujoco", "gymnasium"),
+    "stable-baselines3",
+    "sb3-contrib",
+    "torch",
+    "numpy",
+    "scipy",
+    "numba",
+    "mujoco",
+    "gymnasium",
 )
 
 

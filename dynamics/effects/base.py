@@ -72,7 +72,7 @@ ROTOR_VOLTAGE = 5  # V; 0: not known
 ROTOR_TIME = 6  # s, since the start
 ROTORS_SIZE = 7
 
-# sample: the values rewritten by a sensing model, and further inputs
+# sample: values rewritten by a sensing model, and inputs
 SAMPLE_SPEED = 0  # 4, rad/s
 SAMPLE_POSITION = 4  # 3, m, world
 SAMPLE_QUATERNION = 7  # 4, body to world

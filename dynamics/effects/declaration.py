@@ -27,8 +27,7 @@ class Family(StrEnum):
     SURROUNDINGS = "surroundings"  # wind, jets, floor and ceiling
     THRUST = "thrust"  # share of the declared thrust that rotors deliver
     ROTOR_DYNAMICS = "rotor dynamics"  # changes of the rotors' speed, and their times
-    # parts bolted to the body, moving along at any frequency. A part on a soft mount does so in
-    # slow motion alone
+    # parts bolted to the body, moving along at any frequency. A soft mount allows slow motion alone
     RIGID_BODY = "rigid body"
     LOAD = "load"  # hanging from the body
     STEADY = "steady"  # a constant force or torque

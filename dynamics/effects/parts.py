@@ -136,11 +136,11 @@ def delay(
     """Replace ``width`` numbers of ``values`` from ``at`` on by what they were ``wanted`` s ago.
 
     ``memory`` is the delay line: the number of entries, the time since the last new one (summed by
-    the caller), and the entries, newest first. An entry is an age and its numbers. Between entries
-    runs the cubic through the nearest four, within their range. A line between two would damp noise
-    by its distance from both. The best fit of a noisy log would be the delay with most damping.
-    Four unevenly spaced entries get a line; before the oldest the value is held. A delay line fed
-    faster than 200 Hz keeps at most 200 entries a second.
+    the caller), and the entries. The newest is first; an entry is an age and its numbers. Between
+    entries runs the cubic through the nearest four, within their range. A line between two would
+    damp noise by its distance from both. The best fit of a noisy log would be the delay with most
+    damping. Four unevenly spaced entries get a line; before the oldest the value is held. A delay
+    line fed faster than 200 Hz keeps at most 200 entries a second.
     """
     size = width + 1
     count = int(memory[0])
