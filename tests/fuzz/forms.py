@@ -134,12 +134,11 @@ def _betaflight_table():
 def _bag(kind):
     """Return the files of a bag with a pose and rotor speeds: one of ROS 1, or a folder's of ROS 2,
     by the ending of the file that holds the messages."""
-    count = len(_times())
     still = FlightLog(
         _times(),
-        np.tile([0.0, 0.0, 1.0], (count, 1)),
-        np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
-        np.full((count, 4), 376.0),
+        np.tile([0.0, 0.0, 1.0], (_COUNT, 1)),
+        np.tile([1.0, 0.0, 0.0, 0.0], (_COUNT, 1)),
+        np.full((_COUNT, 4), 376.0),
     )
     name = "flight.bag" if kind == "bag" else "flight"
     return _written(lambda path: write_bag(still, path, kind, "/pose"), name)
