@@ -36,7 +36,7 @@ def named(found):
 
 
 @pytest.mark.parametrize("effects", [{}, {"rotor_drag": {"kdx": 1.2e-4, "kdy": 0.9e-4}}])
-def test_nothing_is_named_where_nothing_or_what_is_declared_was_added(effects):
+def test_nothing_is_named_where_the_model_lacks_nothing(effects):
     (log,) = [fly(name, **values) for name, values in effects.items()] or [fly()]
     found = diagnose([log], VEHICLE.with_effects(*settings(effects)))
     assert named(found) == []
