@@ -19,7 +19,7 @@ A Kalman filter's model knows none of five events. Each breaks another assumptio
   there after ``Recovery.patience``, without a gate at once. Poses in disagreement restart the
   filter after ``Recovery.give_up``, with their disagreement as deviation.
 
-After a restart attitude and rate are little known: a spin, and then a torque, would explain a
+After a restart attitude and rate may be little known: a spin, and then a torque, would explain a
 contradicting pose. So the filter restarts again at poses that come back to a guessed attitude.
 Within ``Recovery.patience`` it restarts once at an unlikely pose that goes on. A repeated restart
 allows no third: with noise twice the declared each restart brought the next, 44 a second. The

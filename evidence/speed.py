@@ -145,7 +145,8 @@ def logs() -> list[Contender]:
     folder = Path(tempfile.mkdtemp())
     first, kit = folder / "flight.csv", ("-m", "windwrench")
     program("", "", *kit, "record", "--seconds", 60, "--out", first, "--quiet").run()
-    recorded, found = read_log(first), []
+    recorded = read_log(first)
+    found = []
     for suffix in (".csv", ".csv.gz", ".parquet"):
         file = first.with_suffix(suffix)
         write_log(recorded, file)

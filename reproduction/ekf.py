@@ -37,7 +37,7 @@ def _predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
 @compiled
 def _step_at(address: int, parts: int, dt: float, voltage: float) -> int:
     f = carray(pointer_to(address), 1, FILTER)[0]
-    usable = check_sample(f, f.z, parts)
+    usable: int = check_sample(f, f.z, parts)
     if usable >= 0:
         sample = undo_sensing(f, f.z, usable, dt)
         if dt > 0.0:
