@@ -107,6 +107,13 @@ FILTER = np.dtype(
         ("innovation", "f8", (6,)),
         # derivatives of the torque, body, by the error state: of the linearised model
         ("torques", "f8", (3, N)),
+        # twelve sigma points side by side, one a column
+        ("points", "f8", (19, 12)),
+        ("accelerations", "f8", (6, 12)),
+        # in a step: square of half the angle, its cosine, rate to quaternion
+        ("turns", "f8", (3, 12)),
+        ("errors", "f8", (N, 12)),
+        ("rows", "f8", (12, N)),  # the errors, one point a row
         # of the filter with a constant gain, facing along x: the gain, and the inverse covariance
         # of the innovation
         ("gain", "f8", (N, 6)),

@@ -33,7 +33,7 @@ from ..runtime.addresses import STEP, address_of, pointer_to
 from ..runtime.arguments import real_numbers
 from ..runtime.compiled import Record, compiled, compiled_inline
 from ..runtime.errors import InputError
-from ..runtime.vector_lanes import all_of, any_of, choose, first_below, first_column
+from ..runtime.vector_lanes import all_of, any_of, choose, first_below, first_column, lanes_by
 from .bias_states import (
     begin_imu,
     carry_companions,
@@ -94,13 +94,13 @@ from .recovery import (
     pose_noise,
 )
 from .sample import Sample, check_sample, undo_first_pose, undo_sensing
+from .sigma_points import PAIRS, errors_of_points, halve_pairs, propagate_points, spread_points
 from .tuning import UKFTuning
 
 # A call of a filter: rotor speeds and pose, which parts of the pose there are, s, V; or gyro and
 # accelerometer, and which of both
 CALL = np.dtype([("z", "f8", (11,)), ("parts", "i8"), ("dt", "f8"), ("voltage", "f8")])
 IMU_PARTS = 4, 8  # gyro and accelerometer, beside the parts of a pose
-PAIRS = 6  # columns of the root that turn or spin the vehicle
 _VARIANCES = slice(WITHOUT_COVARIANCE, None, N + 1)  # of an estimate's numbers
 
 
@@ -115,7 +115,7 @@ def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
         root_of_twelve(f)
         propagate(f, f.x, dt, f.centre)
         _carry_linear(f, dt)
-        _pairs(f, dt, 2 * PAIRS, propagate)
+        _pairs_in_turn(f, dt, 2 * PAIRS, propagate)
         add_pairs(f, 0)
         add_pairs(f, PAIRS)
         _gather(f, dt)
@@ -130,20 +130,17 @@ def carry(f: Record, dt: float) -> None:
     root_of_six(f)
     move(f, f.x, dt, f.centre)
     _carry_linear(f, dt)
-    _pairs(f, dt, PAIRS, _move_point)
+    _pairs(f, dt)
     add_pairs(f, 0)
     _gather(f, dt)
 
 
 @compiled_inline
-def _pairs(f: Record, dt: float, pairs: int, moved: Any) -> None:
+def _pairs_in_turn(f: Record, dt: float, pairs: int, moved: Any) -> None:
     """Write the scaled half differences and half sums of the first pairs of sigma points, and their
     mean. ``moved`` carries one point after the other ahead.
     """
-    weight = 0.5 / (N + NOISE + f.kappa)  # (28)
-    # with a pair of errors e and d: ee' + dd' = ((e - d)(e - d)' + (e + d)(e + d)') / 2. The second
-    # half is not zero where the model is nonlinear, in the first 12 rows.
-    spread, scale = math.sqrt(N + NOISE + f.kappa), math.sqrt(0.5 * weight)
+    spread, weight, scale = _spread_of(f)
     x, H, E, mean, error = f.x, f.H, f.E, f.mean, f.error
     for i in range(N):
         mean[i] = 0.0
@@ -164,6 +161,38 @@ def _pairs(f: Record, dt: float, pairs: int, moved: Any) -> None:
 def _move_point(f: Record, x: Array, dt: float, out: Array) -> None:
     quaternion_to_matrix(x[3:7], f.rotation)
     move(f, x, dt, out)
+
+
+@compiled
+def _pairs_in_lanes(f: Record, dt: float) -> None:
+    """Do as ``_pairs_together`` where each number is a vector already: one point after the other
+    needs no more memory than one.
+    """
+    _pairs_in_turn(f, dt, PAIRS, _move_point)
+
+
+@compiled
+def _pairs_together(f: Record, dt: float) -> None:
+    """Write the same of six pairs, all of them side by side."""
+    spread, weight, scale = _spread_of(f)
+    spread_points(f, spread)
+    propagate_points(f, dt)
+    errors_of_points(f)
+    halve_pairs(f, scale, weight)
+
+
+_pairs = lanes_by(_pairs_together, _pairs_in_lanes)
+
+
+@compiled
+def _spread_of(f: Record) -> tuple[float, float, float]:
+    """Return how far out sigma points lie, and the factors of a pair's mean and of
+    its differences.
+    """
+    weight = 0.5 / (N + NOISE + f.kappa)  # (28)
+    # with a pair of errors e and d: ee' + dd' = ((e - d)(e - d)' + (e + d)(e + d)') / 2, and the
+    # second half is only there where the model is nonlinear, in the first 12 rows
+    return math.sqrt(N + NOISE + f.kappa), weight, math.sqrt(0.5 * weight)
 
 
 @compiled

@@ -242,6 +242,25 @@ overload(first_below, strict=False)(
 )
 
 
+def lanes_by(singly: Callable[..., Any], lanes: Callable[..., Any]) -> Callable[..., Any]:
+    """Return what compiled code calls one of two compiled functions of a record and a step in s by:
+    ``singly`` for a record of single numbers, ``lanes`` for one with lanes.
+
+    They do the same in another order of memory.
+    """
+
+    def call(f: Any, dt: Any) -> Any:
+        return singly(f, dt)
+
+    @overload(call, strict=False)
+    def _call(f: Any, dt: Any) -> Any:
+        if isinstance(f, _LaneRecord):
+            return lambda f, dt: lanes(f, dt)
+        return lambda f, dt: singly(f, dt)
+
+    return call
+
+
 def corners(table: Any, i: Any, j: Any) -> Any:
     """Return what stands in ``table`` (n, m), contiguous, at (i, j), (i, j + 1), (i + 1, j) and
     (i + 1, j + 1); i and j are whole numbers as floats, each lane's own, and inside of it.
