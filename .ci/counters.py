@@ -21,7 +21,10 @@ CEILINGS = ROOT / ".ci/ceilings.yaml"
 # outside the wheel
 NOT_KIT = ("tests", "evidence", "reproduction", "examples", "docs", ".ci")
 DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+HAS_GIT = (ROOT / ".git").exists()
+BUILT = (".venv", ".venv-ci", "build", "dist", "results", "site")
 LONG = 25  # words
+LANDED = ("--first-parent", "--format=%H")  # of git log: what was landed, newest first
 SUBJECT = 72  # characters of a commit's first line
 # the modules that a flight log passes until it is read
 READING = """
@@ -43,9 +46,18 @@ print(sum(name.startswith("windwrench.") for name in passed))
 
 
 def sources() -> dict[str, str]:
-    """Return the text of each Python file that git tracks."""
-    names = git("ls-files", "-co", "--exclude-standard", "*.py").split("\n")
-    return {n: (ROOT / n).read_text(encoding="utf-8") for n in names if n and (ROOT / n).exists()}
+    """Return the text of each Python file that git tracks; without git, of each file outside
+    environments.
+    """
+    if HAS_GIT:
+        paths = [ROOT / name for name in git("ls-files", "-co", "--exclude-standard").split("\n")]
+    else:
+        paths = [p for p in ROOT.rglob("*.py") if p.relative_to(ROOT).parts[0] not in BUILT]
+    return {
+        path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
+        for path in paths
+        if path.suffix == ".py" and path.exists()
+    }
 
 
 def git(*words: str) -> str:
@@ -144,10 +156,12 @@ def run(program: str) -> str:
 
 
 def earlier_ceilings() -> dict[str, float]:
-    """Return the lowest ceiling of each name in the commits before."""
+    """Return the lowest ceiling of each name in what was landed before."""
     lowest: dict[str, float] = {}
+    if not HAS_GIT:
+        return lowest
     path = CEILINGS.relative_to(ROOT).as_posix()
-    for commit in git("log", "--format=%H", "--diff-filter=AM", "--", path).split():
+    for commit in git("log", *LANDED, "--diff-filter=AM", "--", path).split():
         for name, value in yaml.safe_load(git("show", f"{commit}:{path}")).items():
             lowest[name] = min(value, lowest.get(name, value))
     return lowest
@@ -167,12 +181,13 @@ def problems(counts: dict[str, float], ceilings: dict[str, float]) -> Iterator[s
 
 def bad_commits() -> Iterator[str]:
     """Yield one line for each commit since the first ceilings whose message lacks something."""
+    if not HAS_GIT:
+        return
     path = CEILINGS.relative_to(ROOT).as_posix()
-    first = git("log", "--format=%H", "--diff-filter=A", "--", path).split()[-1:]
+    first = git("log", *LANDED, "--diff-filter=A", "--", path).split()[-1:]
     commits = f"{first[0]}..HEAD" if first else "HEAD..HEAD"
-    for entry in git("log", "--no-merges", "--format=%h%x00%s%x00%b%x01", commits).split("\x01")[
-        :-1
-    ]:
+    messages = git("log", "--no-merges", "--format=%h%x00%s%x00%b%x01", commits)
+    for entry in messages.split("\x01")[:-1]:
         commit, subject, body = entry.strip("\n").split("\x00")
         if not is_good_message(subject, body):
             expected = f"'scope: change', {SUBJECT} characters at most, and a body with the reason"

@@ -243,15 +243,11 @@ def _starts(flight: _Flight) -> list[UKFTuning]:
     others = (
         UKFTuning.for_vehicle(flight.vehicle, flight.period, r) for r in flight.use.rise_times
     )
-    return [
-        flight.given,
-        *(
-            replace(
-                flight.given, **{n: f * np.asarray(getattr(made, n)) for n, f in factors.items()}
-            )
-            for made in others
-        ),
+    variants: list[dict[str, Any]] = [
+        {name: factor * np.asarray(getattr(made, name)) for name, factor in factors.items()}
+        for made in others
     ]
+    return [flight.given, *(replace(flight.given, **variant) for variant in variants)]
 
 
 def _bounds(vehicle: Vehicle, period: float, use: NoiseFitSettings) -> Array:
@@ -326,7 +322,9 @@ class _Flight:
     def pieces(self, rows: slice) -> list[Piece]:
         """Return the pieces of some rows."""
         columns: list[Any] = [None if c is None else c[rows] for c in self.columns]
-        return pieces_of(self.vehicle, *columns, self.use.longest_gap, self.use.startup)
+        t, speeds, position, quaternion, voltage = columns
+        gap, startup = self.use.longest_gap, self.use.startup
+        return pieces_of(self.vehicle, t, speeds, position, quaternion, voltage, gap, startup)
 
     def evaluate(self, tuning: UKFTuning, pieces: Sequence[Piece]) -> Innovations:
         """Return the result of a pass of the filter with this tuning."""

@@ -110,7 +110,8 @@ class FieldMap:
             return None
         value = fields[clock.column]
         if type(value) in (int, float) and abs(value) < (2**63 if type(value) is int else 1e12):
-            return round(value * round(UNITS["time"][clock.unit] * SECOND))
+            stamp: int = round(value * round(UNITS["time"][clock.unit] * SECOND))
+            return stamp
         raise Malformed(f"field {clock.column}: {_shown(value)}; expected a time")
 
     def _attitude(self, part: Attitude, values: Array) -> Array:

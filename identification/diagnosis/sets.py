@@ -189,9 +189,9 @@ class Posterior:
                 index = [at[c] for v in some for c in v]
                 base.tried[self.power, some] = None
                 with suppress(np.linalg.LinAlgError):
-                    evidence = set_evidence(m, index, low, high)
-                    if self._possible(_Candidate(base, some, evidence)):
-                        base.tried[self.power, some] = evidence
+                    first_evidence = set_evidence(m, index, low, high)
+                    if self._possible(_Candidate(base, some, first_evidence)):
+                        base.tried[self.power, some] = first_evidence
             if (evidence := base.tried[self.power, some]) is None:
                 return -math.inf
             total = evidence.log_evidence - sum(math.log(ways[v[0][0]]) for v in some)

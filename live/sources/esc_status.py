@@ -32,12 +32,15 @@ def add_esc_status(dialect: Any) -> Any:
         unpacker = struct.Struct(_LAYOUT)
         instance_field, instance_offset = None, -1
 
-        def __init__(self, *values: Any) -> None:
+        def __init__(
+            self, index: int, time_usec: int, rpm: Any, voltage: Any, current: Any
+        ) -> None:
             super().__init__(NUMBER, "ESC_STATUS")
             self._fieldnames = self.fieldnames
             self._instance_field = self.instance_field
             self._instance_offset = self.instance_offset
-            vars(self).update(zip(self.fieldnames, values, strict=True))
+            self.index, self.time_usec = index, time_usec
+            self.rpm, self.voltage, self.current = rpm, voltage, current
 
         def pack(self, mav: Any, force_mavlink1: bool = False) -> Any:
             """Return the message's bytes."""
