@@ -1,8 +1,8 @@
 """windwrench: a quadrotor that feels the wind.
 
 Importing the package registers its environments with Gymnasium: ``windwrench/FanTracking``,
-``FanTracking2D``, ``WindHover`` and ``WindTrajectory``, each as ``-v0`` in SI units, for designed
-laws, and as ``-v1`` normalised, for learners.
+``FanTracking2D``, ``WindHover`` and ``WindTrajectory``, each as ``-v1``: normalised, for learners,
+or with ``normalize=False`` in SI units, for designed laws. ``-v0`` is the latter's id until 3.0.
 """
 
 import warnings
@@ -25,16 +25,19 @@ _TASKS = {  # pytest imports this file a second time, as a folder's
     "WindTrajectory": ("wind_tasks:WindTrajectoryEnv", "make_wind_trajectory_vector", 500),
 }
 for _name, (_single, _vector, _steps) in _TASKS.items():
-    for _version in (0, 1):
+    for _version, _entry, _vector_entry, _given in (
+        (1, _single, f"lanes.vector:{_vector}", {"normalize": True}),
+        (0, "aliases:make_single", "aliases:make_many", {"task": _name}),
+    ):
         if f"windwrench/{_name}-v{_version}" not in gymnasium.registry:
             gymnasium.register(
                 id=f"windwrench/{_name}-v{_version}",
-                entry_point=f"windwrench.envs.{_single}",
-                vector_entry_point=f"windwrench.envs.lanes.vector:{_vector}",
+                entry_point=f"windwrench.envs.{_entry}",
+                vector_entry_point=f"windwrench.envs.{_vector_entry}",
                 max_episode_steps=_steps,
-                kwargs={"version": _version} if _version else {},
+                kwargs=_given,
             )
-# Gymnasium takes the older for outdated
+# the alias says more
 warnings.filterwarnings("ignore", r".*windwrench/\w+-v0 is out of date", DeprecationWarning)
 
 

@@ -13,8 +13,8 @@ from .terminal import console, results_folder, say, show_table, working
 if TYPE_CHECKING:
     from ..evaluation.leaderboard import Standing
 
-# of a narrow terminal
-_SHOWN = ("scenario", "law", "RMSE", "median", "lost", "score", "wins", "against", "to the")
+# columns of a narrow terminal
+_SHOWN = ("scenario", "law", "RMSE", "median", "terminated", "score", "wins", "against", "to the")
 
 
 @expensive
@@ -76,10 +76,10 @@ def write_board(
         folder: for ``leaderboard.json``, ``.md`` and ``.png``.
         controllers: as ``fly_all`` takes them.
         scenarios: likewise.
-        episodes: of each scenario.
-        seed: of the benchmark.
+        episodes: number in each scenario.
+        seed: the benchmark's.
         progress: takes ``more`` episodes.
-        task: that is flown.
+        task: a name of ``TASKS``.
         where: ``jobs`` and ``cluster`` of ``fly_all``.
 
     Returns:

@@ -18,7 +18,7 @@ def demo(
     vehicle: str = "ardrone2",
     effect: str = "constant_torque:tz=0.01",
     episodes: int = 3,
-    seed: int = 5,  # of a fan that moves: on a still one there is nothing to follow
+    seed: int = 5,  # a moving fan: behind a still one there is nothing to follow
     no_open: bool = False,
     out: Path = Path("results/demo"),
 ) -> dict[str, Any]:
@@ -75,8 +75,8 @@ def demo(
     show_page(page, not no_open)
     return {
         "effect": story.effect_words,
-        "found": [e.name for e in story.found.effects],
-        "verdict": story.found.verdict,
+        "found": [e.name for e in story.diagnosis.effects],
+        "verdict": story.diagnosis.verdict,
         "steps": [
             {"title": s.title, "sentences": s.sentences, "command": s.command} for s in steps
         ],
@@ -86,7 +86,7 @@ def demo(
 
 
 def _tell(steps: list[Any], new: Iterable[Any]) -> None:
-    """Add steps to those that were told, and tell them."""
+    """Add and print steps."""
     for step in new:
         steps.append(step)
         words = " ".join(step.sentences[1:])

@@ -1,16 +1,14 @@
 """Learning: policies trained, and the gains of designed controllers tuned."""
 
-from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..runtime.errors import InputError
 from ..runtime.extras import need
+from ..runtime.workers import every
 from .running import expensive
-from .terminal import command_line, console, results_folder, say, show_table, working
-
-if TYPE_CHECKING:
-    from ..training.sweep import Job
+from .terminal import command_line, console, results_folder, say, working
 
 
 @expensive
@@ -21,8 +19,6 @@ def train(
     steps: int | None = None,
     setting: list[str] | None = None,
     config: Path | None = None,
-    seeds: int = 1,
-    search: list[str] | None = None,
     cluster: str | None = None,
     out: Path = Path("results/train"),
 ) -> dict[str, Any]:
@@ -32,49 +28,27 @@ def train(
     Example: windwrench train sac --scenario base --seed 0 --steps 60000 --out results/sac-0
     """
     from ..training.configuration import load_config
-    from ..training.sweep import jobs_of
+    from ..training.training_envs import check_training_env
 
     need("stable_baselines3", "rl")
     if algorithm == "recurrent-ppo":
         need("sb3_contrib", "rl")
-    overrides = [*(setting or []), *([f"steps={steps}"] if steps else [])]
-    several = seeds > 1 or bool(search or cluster)
+    given = load_config(
+        algorithm, [*(setting or []), *([f"steps={steps}"] if steps else [])], config
+    )
     if algorithm == "tune":
-        if several:
-            raise InputError("train tune: expected no --seeds, --search or --cluster")
-        return _tune(load_config("tune", overrides, config), scenario, seed, out)
-    from ..training.training_envs import check_training_env
-
+        if cluster:
+            raise InputError("train tune: expected no --cluster")
+        return _tune(given, scenario, seed, out)
     check_training_env(scenario)
-    told = f"{algorithm}, {scenario}"
-    if not several:
-        return _learn(load_config(algorithm, overrides, config), told, scenario, seed, out)
     if cluster:
         need("ray", "cluster")
-    runs = range(seed, seed + seeds)
-    jobs = jobs_of(algorithm, scenario, runs, overrides, search or [], config)
-    return _sweep(jobs, told, cluster, out)
+    return _learn(given, scenario, seed, cluster, out)
 
 
-def _sweep(jobs: "Sequence[Job]", told: str, cluster: str | None, out: Path) -> dict[str, Any]:
-    from ..training.sweep import run_jobs
-
-    folder = results_folder(out, runs=[job.name for job in jobs], cluster=cluster)
-    with working(told, len(jobs)) as progress:
-        found = run_jobs(jobs, folder, cluster, advance=lambda: progress(more=1))
-    best_first = sorted(found, key=lambda run: float(run["validation_rmse_m"]))
-    show_table(
-        ("run", "validation RMSE (m)", "minutes"),
-        [
-            (run["run"], f"{run['validation_rmse_m']:.3f}", f"{run['seconds'] / 60:.1f}")
-            for run in best_first
-        ],
-    )
-    say(*(Path(one["policy"]) for one in found))
-    return {"runs": found}
-
-
-def _learn(given: dict[str, Any], told: str, scenario: str, seed: int, out: Path) -> dict[str, Any]:
+def _learn(
+    given: dict[str, Any], scenario: str, seed: int, cluster: str | None, out: Path
+) -> dict[str, Any]:
     from ..training.run import Progress, read_progress
     from ..training.train import train
 
@@ -86,6 +60,7 @@ def _learn(given: dict[str, Any], told: str, scenario: str, seed: int, out: Path
         decisions=given["steps"],
         config=given,
     )
+    told = f"{given['algorithm']}, {scenario}"
     with working(told, given["steps"]) as progress:
 
         def report(now: Progress) -> None:
@@ -93,7 +68,11 @@ def _learn(given: dict[str, Any], told: str, scenario: str, seed: int, out: Path
             progress(text=f"{told}: {error}")
             console.print(f"{now.steps[-1]:8d} decisions: {error}, {now.lost[-1]} lost")
 
-        path = train(given, scenario, seed, folder, progress, report)
+        if cluster:  # a run whose worker is lost resumes elsewhere, from its last checkpoint
+            there = partial(train, given, scenario, seed)
+            ((_, path),) = every(there, [folder.resolve()], cluster=cluster)
+        else:
+            path = train(given, scenario, seed, folder, progress, report)
     done = read_progress(folder)
     assert done is not None
     console.print(
@@ -120,12 +99,12 @@ def _tune(given: dict[str, Any], scenario: str, seed: int, out: Path) -> dict[st
         out, task=task, controller=law, scenario=scenario, trials=trials, episodes=episodes
     )
     with working(f"{law}, {scenario}", trials) as progress:
-        found = tune(law, scenario, trials, episodes, seed, progress, task)
-    keep_gains(found, folder / "tuned.yaml", command_line())
-    gains = ", ".join(f"{name} {value:.3g}" for name, value in found["gains"].items())
+        result = tune(law, scenario, trials, episodes, seed, progress, task)
+    keep_gains(result, folder / "tuned.yaml", command_line())
+    gains = ", ".join(f"{name} {value:.3g}" for name, value in result["gains"].items())
     console.print(
-        f"{law} on {scenario}: {gains}: {found['rmse_m']:.3f} m over {episodes} validation "
-        f"episodes (first gains: {found['default_rmse_m']:.3f} m)",
+        f"{law} on {scenario}: {gains}: {result['rmse_m']:.3f} m over {episodes} validation "
+        f"episodes (first gains: {result['default_rmse_m']:.3f} m)",
     )
     say(folder / "tuned.yaml")
-    return found
+    return result

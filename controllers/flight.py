@@ -111,7 +111,7 @@ def _wanted(c: Record, x: Array, dt: float, i: int) -> float:
     wanted = (
         s[6 + i] + c.position * error + c.velocity * (s[3 + i] - x[7 + i]) + c.integral * c.sum[i]
     )
-    # what the model's effects push, the rotors need not
+    # the model's effects take their part from the rotors
     left: float = wanted - c.foreseen[i] / c.body.mass
     return left
 
@@ -154,7 +154,7 @@ def fly(c: Record, x: Array, dt: float) -> None:
     J = c.body.inertia
     hx, hy, hz = product(J, wx, wy, wz)
     tx, ty, tz = product(J, alpha_x, alpha_y, alpha_z)
-    # what a declared centre of mass off the rotors' centre makes of the thrust is balanced here
+    # here the thrust's torque about a declared centre of mass off the rotors' centre is balanced
     tx = tx + wy * hz - wz * hy - c.foreseen[3] + c.body.com[1] * thrust
     ty = ty + wz * hx - wx * hz - c.foreseen[4] - c.body.com[0] * thrust
     tz = tz + wx * hy - wy * hx - c.foreseen[5]

@@ -1,8 +1,8 @@
-"""The optimal law of the tasks in the wind that feels the wind through the estimated wrench: a
+"""The optimal law of the tasks in the wind, with the estimated wrench as its measure of wind: a
 linear-quadratic Gaussian regulator (LQG).
 
-It commands the flight loop by the same model of it (``axis_models``) as the oracle (``preview``),
-and by the same weight of a position error. What they know differs, and nothing else.
+It commands the flight loop by the oracle's (``preview``) model of the loop (``axis_models``), and
+by the same weight of a position error. Only the two laws' knowledge differs.
 """
 
 from collections.abc import Mapping
@@ -40,14 +40,14 @@ class LQG:
     """A linear-quadratic Gaussian regulator with the external force and torque as states.
 
     Each axis is a Kalman filter and a regulator (Anderson and Moore, *Optimal Control: Linear
-    Quadratic Methods*, 1990). Force and torque are Ornstein-Uhlenbeck processes. Their estimates,
-    as the wrench filter shows them, follow behind a lag of first order; the accelerometer less the
-    rotors' force shows the force at once, but biased; the rotors' force shows the tilt. The torque
-    matters since it tilts the vehicle before anything has moved.
+    Quadratic Methods*, 1990). Force and torque are Ornstein-Uhlenbeck processes. Their estimates
+    from the wrench filter follow behind a lag of first order. The accelerometer less the rotors'
+    force shows the force at once, but biased; the rotors' force shows the tilt. The torque matters:
+    a tilt comes before any motion.
 
-    Everything but ``effort`` describes what is measured, and little more than its order of size
-    matters: halving or doubling the sizes and times of the wrench, or the lag of its estimates,
-    changed the error on WindHover's base by at most 4.2 % (16 validation episodes).
+    Everything but ``effort`` describes measured quantities, and little more than their order of
+    size matters. Sizes and times of the wrench, and the lag of its estimates, were halved and
+    doubled. The error on WindHover's base changed by at most 4.2 % (16 validation episodes).
 
     Raises:
         InputError: a number is not above zero.
@@ -151,8 +151,8 @@ class LQG:
 
 
 def _process_noise(A: Wide, spread: Wide) -> Wide:
-    """Return what white noise of density ``spread`` (n, n) adds over a decision (Van Loan, IEEE TAC
-    23(3), 1978).
+    """Return the covariance of white noise of density ``spread`` (n, n) over a decision (Van Loan,
+    IEEE TAC 23(3), 1978).
     """
     from scipy.linalg import expm
 

@@ -19,7 +19,7 @@ def load_controller(name: str) -> Any:
     only one.
 
     Raises:
-        InputError: no such file or class, one that fails, or that is no controller.
+        InputError: no such file or class, an error while it runs, or no controller.
     """
     stem, _, wanted = name.partition(".py:")
     path = f"{stem}.py" if wanted else name.removesuffix(":")

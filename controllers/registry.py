@@ -1,5 +1,5 @@
-"""The controllers of each task by their names: designed laws, the gains found for them by search
-(``tuned.yaml`` says for which scenario and how), and the trained policies that come with the kit.
+"""The controllers of each task by their names: designed laws, their gains from a search (with
+scenario and command in ``tuned.yaml``), and the kit's trained policies.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ STANDARD_SCENARIO = "base"  # of the gains of a law that is called no more than 
 
 
 class Controller(Protocol):
-    """From an observation to a command; ``info`` is the environment's, for those that may see the
+    """From an observation to a command; ``info`` is the environment's, for controllers that see the
     truth.
 
-    One that also has ``brief(briefing)`` is told what its vehicle, its sensors and the fan are
-    (``controllers.briefing.Briefing``) before ``reset``, which one without a memory may lack.
+    A method ``brief(briefing)`` gets vehicle, sensors and fan (``controllers.briefing.Briefing``)
+    before ``reset``. A controller without a memory needs no ``reset``.
     """
 
     def reset(self) -> None:
@@ -49,25 +49,25 @@ Laws = dict[str, Callable[..., Any]]
 
 @cache
 def tuned_gains(task: str = STANDARD_TASK) -> dict[str, dict[str, Any]]:
-    """Return what is known of a task's gains: law, of FanTracking also scenario, and then ``gains``
-    and how they were found.
+    """Return a task's tuned gains: law, of FanTracking also scenario, and then ``gains`` and how
+    they were found.
     """
     sections: dict[str, dict[str, dict[str, Any]]] = read_yaml(
         Path(__file__).with_name("tuned.yaml"), "tuned gains"
     )
     if task != STANDARD_TASK:
         return sections.get(task, {})
-    return {law: found for law, found in sections.items() if law in LAWS}
+    return {law: entries for law, entries in sections.items() if law in LAWS}
 
 
 def _tuned() -> Laws:
     """Return ``LAW-tuned`` (for the scenario base) and ``LAW-tuned-SCENARIO`` of FanTracking."""
     return {
         f"{law}-tuned" + ("" if scenario == STANDARD_SCENARIO else f"-{scenario}"): partial(
-            LAWS[law], **found["gains"]
+            LAWS[law], **entry["gains"]
         )
         for law, scenarios in tuned_gains().items()
-        for scenario, found in scenarios.items()
+        for scenario, entry in scenarios.items()
     }
 
 
@@ -114,8 +114,8 @@ _AS = {"WindTrajectory": "WindHover"}
 
 
 def make_controller(name: str, task: str = STANDARD_TASK) -> Any:
-    """Return a new ``Controller`` of a task by its name; where the name of a law of another task
-    than FanTracking has gains that were found, the law has these.
+    """Return a new ``Controller`` of a task by its name. In tasks other than FanTracking a law has
+    its tuned gains, where there are some.
 
     Raises:
         InputError: no task or no controller has this name.
@@ -127,17 +127,17 @@ def make_controller(name: str, task: str = STANDARD_TASK) -> Any:
         raise unknown_name("controller", name, laws)
     if task == STANDARD_TASK:
         return laws[name]()
-    found = tuned_gains(task).get(name) or tuned_gains(_AS.get(task, task)).get(name, {})
-    return laws[name](**found.get("gains", {}))
+    entry = tuned_gains(task).get(name) or tuned_gains(_AS.get(task, task)).get(name, {})
+    return laws[name](**entry.get("gains", {}))
 
 
 @cache
 def shipped_policies(task: str = STANDARD_TASK) -> dict[str, Path]:
-    """Return the file of each policy of a task that this installation has, sorted by name. A wheel
-    has one seed of each kind, a checkout all.
+    """Return the file of each installed policy of a task, sorted by name. A wheel has one seed of
+    each kind, a checkout all.
     """
     folder = Path(str(resources.files(__package__))).parent / "training" / "policies"
     start = "" if task == STANDARD_TASK else f"{task}-"
-    found = (folder / "tasks" if start else folder).glob(f"{start}*.npz")
-    kept = (path for path in found if path.with_suffix(".json").exists())
+    files = (folder / "tasks" if start else folder).glob(f"{start}*.npz")
+    kept = (path for path in files if path.with_suffix(".json").exists())
     return {path.stem.removeprefix(start): path for path in sorted(kept)}

@@ -1,12 +1,11 @@
-"""Trackers: controllers that keep a belief of where the fan is and how it moves, and fly along.
+"""Trackers: controllers with a belief of the fan's place and motion, flying along.
 
-Each is a particle filter. A particle is a path of the fan; what the wrench filter should show if
-the fan had moved so is the jet's mean at the vehicle's stations (effect ``fan_jet``) behind the
-filter's own lag, and what it shows instead is coloured noise of known covariance
-(``sensor_model``). Nothing is known but the observation and what ``briefing`` says: the declared
-vehicle, the fan, the pose's noise and the filter's tuning, and how much a vehicle of this size is
-disturbed as a rule. The random numbers come from a generator of the controller's own, which begins
-anew with every episode.
+Each is a particle filter. A particle is a path of the fan. Its expected estimate is the jet's mean
+at the vehicle's stations (effect ``fan_jet``) behind the filter's own lag. The difference to the
+estimate is coloured noise of known covariance (``sensor_model``). Nothing is known but the
+observation and the ``briefing``: the declared vehicle, the fan, the pose's noise and the filter's
+tuning, and how much a vehicle of this size is disturbed as a rule. The random numbers come from a
+generator of the controller's own, which begins anew with every episode.
 """
 
 from __future__ import annotations
@@ -40,9 +39,9 @@ _SMALLEST = 1e-12  # variance of particles of a kind
 
 @dataclass(eq=False, kw_only=True)
 class _Belief(ABC):
-    """What the trackers share: particles with weights, and the command that follows from them.
+    """Shared by the trackers: particles with weights, and their command.
 
-    After a decision ``mean`` holds what is believed: the fan's place from the vehicle (m) and its
+    After a decision ``mean`` holds the belief: the fan's place from the vehicle (m) and its
     velocity (m/s); ``deviation`` is the standard deviation of the place (m).
     """
 
@@ -61,8 +60,8 @@ class _Belief(ABC):
         self.reset()
 
     def brief(self, briefing: Briefing) -> None:
-        """Take what is known of vehicle, sensors, fan and its motions, but not of its gusts; it
-        counts from the next ``reset`` on.
+        """Take the knowledge of vehicle, sensors, fan and its motions, but not of its gusts, from
+        the next ``reset`` on.
         """
         self._briefing = nominal(briefing)
 
@@ -89,7 +88,7 @@ class _Belief(ABC):
         """Carry particles on by one decision."""
 
     def _choose(self, chosen: NDArray[np.int64]) -> None:
-        """Let the particles be those chosen (n,)."""
+        """Keep the chosen particles (n,)."""
         for name in self._arrays:
             setattr(self, name, getattr(self, name)[chosen])
 
@@ -135,9 +134,9 @@ def velocity_after(
     jumps: float = 0.25,
     speed: float = 0.28,
 ) -> Array:
-    """Return velocities (n,) m/s a decision after ``before`` (n,) of fans of which nothing is
-    known: each rests, or its velocity stays and drifts a little; now and then the velocity changes
-    at once, to none, to the opposite, or to any other. Defaults and units as of ``Tracker``.
+    """Return velocities (n,) m/s a decision after ``before`` (n,) of unknown fans. Each rests, or
+    its velocity stays and drifts a little. Now and then the velocity changes at once, to none, to
+    the opposite, or to any other. Defaults and units as of ``Tracker``.
     """
     n = len(before)
     drift = acceleration * np.sqrt(DECISION_PERIOD) * (before != 0.0)
@@ -174,12 +173,12 @@ class Tracker(_Belief):
 
 @dataclass(eq=False, kw_only=True)
 class InformedTracker(_Belief):
-    """Knows the family of the fan's motions (``briefing.Motions``) and learns which one it is: a
+    """Knows the family of the fan's motions (``briefing.Motions``) and learns the motion: a
     particle is a motion with its speed, travel and place at the start.
 
-    Drawn anew, particles of a kind are shrunk towards their mean and spread again, which keeps mean
-    and covariance (Liu and West, *Combined parameter and state estimation in simulation-based
-    filtering*, 2001).
+    Drawn anew, particles of a kind are shrunk towards their mean and spread again, at constant mean
+    and covariance. See Liu and West, *Combined parameter and state estimation in simulation-based
+    filtering*, 2001.
     """
 
     gain: float = 1.429
@@ -188,22 +187,17 @@ class InformedTracker(_Belief):
     spread: float = 0.1486  # of particles drawn anew, as a share of their standard deviation
     # 1/s, how often a particle leaves the family and moves as those of ``Tracker``; 0: never
     leave: float = 0.03
-    _arrays: ClassVar[tuple[str, ...]] = (
-        *("_level", "_memory", "_place", "_velocity"),
-        *("_kind", "_sign", "_side", "_motion", "_free"),
-    )
+    _arrays = (*_Belief._arrays, "_kind", "_sign", "_side", "_motion", "_free")
 
     def _begin(self) -> None:
         rng, n, known = self._rng, self.particles, self._briefing.motions
         names = np.array([list(PLACES).index(name) for name in known.motions])
         self._kind = names[rng.integers(len(names), size=n)]
         self._sign = rng.choice([-1.0, 1.0], n)
-        side = rng.choice([-1.0, 1.0], n)
-        low, high = np.transpose([known.speed, known.travel, known.offset])
+        self._side = rng.choice([-1.0, 1.0], n)
         # speed, travel and offset at the start of each, within their bounds
-        self._bounds = low, high
+        self._bounds = low, high = np.transpose([known.speed, known.travel, known.offset])
         self._motion = rng.uniform(low, high, (n, 3))
-        self._side = side
         self._free = np.zeros(n, dtype=bool)  # of those that left the family
         self._go(0.0)
 
@@ -225,7 +219,7 @@ class InformedTracker(_Belief):
         self._velocity = (self._place_at(time + self.ahead) - self._place) / self.ahead
 
     def _place_at(self, time: float) -> Array:
-        """Return where the particles that stay in the family are at a time (s), (n,) m."""
+        """Return the places (n,) m, at a time (s), of the particles in the family."""
         speed, travel, offset = self._motion.T
         place: Array = self._side * offset
         for kind, place_after in enumerate(PLACES.values()):
@@ -256,10 +250,10 @@ class InformedTracker(_Belief):
 
 @dataclass(eq=False, kw_only=True)
 class _Regulated(_Belief):
-    """A belief that commands by the oracle's regulator, which looks ahead along the expected path.
+    """A belief with the oracle's regulator along the expected path.
 
-    Of its own motion it observes place and speed; tilt, its rates and the set point follow from its
-    commands and the estimated wrench by the model of the flight loop.
+    Place and speed of the vehicle are observed. Tilt, its rates and the set point follow from
+    commands and estimated wrench by the model of the flight loop.
     """
 
     gain: float = 0.0  # the regulator has its own
@@ -300,10 +294,9 @@ class _Regulated(_Belief):
 
 @dataclass(eq=False, kw_only=True)
 class TrackerLQG(_Regulated, Tracker):
-    """The tracker that knows nothing of how the fan moves, with the oracle's regulator.
+    """The tracker without knowledge of the fan's motion, with the oracle's regulator.
 
-    A fan that changes its velocity at once stops, turns round or moves anyhow, so its expected
-    velocity decays.
+    At a sudden change the fan stops, turns round or moves anyhow, so its expected velocity decays.
     """
 
     def _ahead(self, seconds: float) -> Array:
@@ -314,16 +307,15 @@ class TrackerLQG(_Regulated, Tracker):
 
 @dataclass(eq=False, kw_only=True)
 class Limit(_Regulated, InformedTracker):
-    """What the best controller could reach from these measurements: the informed tracker with the
-    true parameters of everything that is drawn at random, gusts included, many particles, and the
-    oracle's regulator.
+    """The best possible controller from these measurements: the informed tracker with the true
+    parameters of all random draws, gusts included, many particles, and the oracle's regulator.
 
     On the leaderboard's base and fast the regulator is worth 9 and 6 % (mean RMSE .0896 to .0818
-    and .1113 to .1043 m). It is not robust: under an undeclared latency of 30 ms it is worse than
-    the trackers (.270 m).
+    and .1113 to .1043 m). It is not robust: worse than the trackers under an undeclared latency of
+    30 ms (.270 m).
 
-    No entry, but the end of the scale for those that see the wrench alone. What an episode of the
-    scenario ``varied`` draws anew, and effects that nobody declared, it does not know either.
+    No entry, but the end of the scale for laws with the wrench alone. The draws of an episode of
+    ``varied``, and undeclared effects, are unknown here, too.
     """
 
     ahead: float = 0.12
@@ -332,7 +324,7 @@ class Limit(_Regulated, InformedTracker):
     leave: float = 0.0
 
     def brief(self, briefing: Briefing) -> None:
-        """Take all that is known."""
+        """Take the whole briefing."""
         self._briefing = briefing
 
     def _ahead(self, seconds: float) -> Array:
@@ -340,5 +332,5 @@ class Limit(_Regulated, InformedTracker):
 
 
 def nominal(briefing: Briefing) -> Briefing:
-    """Return a briefing whose air is as gusty as in the standard scenarios."""
+    """Return a briefing with the gusts of the standard scenarios."""
     return replace(briefing, air=replace(briefing.air, turbulence=Air().turbulence))

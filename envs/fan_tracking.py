@@ -25,6 +25,8 @@ from .task import (
     Task,
     is_flying,
     keep_within,
+    note,
+    vehicle_of,
 )
 
 DECISION_TICKS = 16  # 12.5 Hz
@@ -37,8 +39,8 @@ FAN_TIMES = TICK * np.arange(round(EPISODE_SECONDS / TICK) + 2, dtype=np.float64
 
 
 class FanTask(Task):
-    """What the tasks in front of a fan share: the fan moves along a path of y and height (n, 2) m,
-    a row a tick, and the agent commands velocities across its jet.
+    """Base of the tasks in front of a fan: the fan moves along a path of y and height (n, 2) m, a
+    row a tick, and the agent commands velocities across its jet.
     """
 
     scenarios = SCENARIOS
@@ -73,8 +75,8 @@ class FanTask(Task):
         self.loop.reset(self.np_random, start, math.pi)
 
     def _truth(self) -> dict[str, Any]:
-        """Return beside ``Task._truth`` the places (3,) m of vehicle and set point, and where the
-        fan's axis is now and after each decision to come, (foresight + 1, 2) m.
+        """Return ``Task._truth``, the places (3,) m of vehicle and set point, and the fan's axis
+        now and after each decision to come, (foresight + 1, 2) m.
         """
         loop, path = self.loop, self.path
         rows = loop.ticks - 1 + self.decision_ticks * np.arange(self.foresight + 1)
@@ -89,26 +91,21 @@ class FanTask(Task):
 def look_along_y(
     which: np.ndarray, episodes: Episodes, motion: Motion, frames: Frame, values: np.ndarray
 ) -> None:
-    """Write what ``FanTrackingEnv`` sees and tells of the episodes ``which``."""
-    lanes = motion.state.shape[2]
+    """Write frames and values of ``FanTrackingEnv`` for the episodes ``which``."""
     for n in np.flatnonzero(which):
-        b, lane = n // lanes, n % lanes
-        p, v = motion.position[b, :, lane], motion.velocity[b, :, lane]
-        state, path, value = motion.state[b, :, lane].copy(), episodes.paths[n], values[n]
-        frame = frames[n]
+        p, v, wrench, state = vehicle_of(motion, n)
+        path, value, frame = episodes.paths[n], values[n], frames[n]
         for i in range(3):
             frame[i], frame[3 + i] = state[16 + i], state[13 + i]  # force, torque
         frame[6], frame[7] = state[8], episodes.commands[n, 0]
         keep_within(frame, _LIMITS)
         k = min(episodes.ticks[n], len(path) - 1)
-        value.time, value.fan_y = episodes.ticks[n] * TICK, path[max(k - 1, 0), 0]
+        value.fan_y = path[max(k - 1, 0), 0]
         value.fan_velocity = (path[k, 0] - value.fan_y) / TICK
         value.y, value.offset = p[1], p[1] - value.fan_y
-        value.force[:], value.torque[:] = motion.wrench[b, :3, lane], motion.wrench[b, 3:, lane]
         ratio, change = value.offset / TRACKING_WIDTH, episodes.changes[n, 0]
-        value.reward_tracking = 1.0 / (1.0 + ratio * ratio)
-        value.reward_change = -CHANGE_COST * change * change
-        # written such that a number that is not finite counts as lost
+        note(value, episodes, n, wrench, ratio * ratio, -CHANGE_COST * change * change)
+        # in this form a number that is not finite counts as lost
         value.lost = episodes.broken[n] or not (
             is_flying(state, p, v)
             and abs(value.offset) <= LOST_OFFSET
@@ -122,10 +119,10 @@ class FanTrackingEnv(FanTask):
 
     ## Description
 
-    A drum fan stands at the origin, blows along +x and moves along y. A quadrotor hovers 2.3 m in front of it, at the
-    height of its axis, and faces it. An unscented Kalman filter turns rotor speeds and motion-capture pose into the
-    external force and torque, at 200 Hz. On the axis the jet pushes the vehicle back; off the axis it also turns it,
-    because its drag falls off across the vehicle's span. The agent sees the estimate, 12.5 times a second, and commands
+    A drum fan stands at the origin, blows along +x and moves along y. A quadrotor hovers 2.3 m in front of the fan, at
+    the height of its axis, and faces the fan. An unscented Kalman filter turns rotor speeds and motion-capture pose into the
+    external force and torque, at 200 Hz. On the axis the jet pushes the vehicle back. Off the axis the
+    drag falls off across the vehicle's span and turns the vehicle, too. The agent sees the estimate, 12.5 times a second, and commands
     a velocity along y; an inner flight loop does the rest. The task follows McKinnon and Schoellig, IROS 2016, V-C.
 
     ## Action space
@@ -149,7 +146,7 @@ class FanTrackingEnv(FanTask):
     | 6   | own estimated velocity along y            | 5     | m/s  |
     | 7   | last command                              | 1     | m/s  |
 
-    Where the fan is, is not observed: ``info`` has it.
+    The fan's place is not observed: ``info`` has it.
 
     ``observe`` takes another view of the same flight, for ablations:
 
@@ -160,12 +157,13 @@ class FanTrackingEnv(FanTask):
     | `"pose"`              | 8    | no wrench: the pose, as the filter estimates it                    |
     | `"history"`           | 200  | the table above at the last 25 decisions (2 s), oldest first       |
 
-    The pose is the position since the start x, y, z (m), the velocity along y (m/s), the x and y of the body's z axis
-    (its tilt), yaw less 180 degrees (rad), and the last command. Before the start the history is as at the start.
+    The pose is the position since the start x, y, z (m), the velocity along y (m/s), and the x and y of the body's z
+    axis (its tilt). Then come yaw less 180 degrees (rad) and the last command. Before the start the history is as at the
+    start.
 
-    In v1, and with ``normalize=True``, each number is divided by a fixed scale, so that it is about 1 in flight:
+    With ``normalize=True`` each number is divided by a fixed scale, and is about 1 in flight:
     force 0.5 N, torque 0.03 Nm, velocity 0.5 m/s, command 1 m/s, position 1 m, tilt 0.1, yaw 0.2 rad.
-    The action needs no scale: it lies between -1 and 1 as it is.
+    The action needs no scale: the limits are -1 and 1 as they are.
 
     ## Rewards
 
@@ -188,7 +186,7 @@ class FanTrackingEnv(FanTask):
     ## Arguments
 
     ```python
-    gym.make("windwrench/FanTracking-v0", scenario="base", render_mode=None)
+    gym.make("windwrench/FanTracking-v1", scenario="base", normalize=True, render_mode=None)
     ```
 
     | Parameter     | Default      | Description                                                               |
@@ -204,8 +202,8 @@ class FanTrackingEnv(FanTask):
 
     ## Version history
 
-    * v1: ``normalize=True`` by default; ``info`` has ``observation`` and ``command`` in SI units.
-    * v0: initial version.
+    * v1: ``normalize``, True by default; ``info`` has ``observation`` and ``command`` in SI units.
+    * v0: v1 with ``normalize=False``, as an alias until 3.0.
     """  # noqa: E501
 
     name = "FanTracking"

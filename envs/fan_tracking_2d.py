@@ -12,11 +12,19 @@ from .fan_tracking import AWAY, CHANGE_COST, FAN_TIMES, TRACKING_WIDTH, FanTask
 from .observing import Episodes, Motion
 from .plant import TICK
 from .scenarios import draw_fan_path
-from .task import COMMON_VALUES, LOST_OFFSET, Frame, is_flying, keep_within
+from .task import (
+    COMMON_VALUES,
+    LOST_OFFSET,
+    Frame,
+    is_flying,
+    keep_within,
+    note,
+    vehicle_of,
+)
 
 FAN_HEIGHT = 1.5  # m, of the fan's axis at the start
 CAGE = 0.6  # rad, of the cage's stations above and below the rotors' plane
-_VERTICAL = 0.5  # of the scenario's speeds and travels that the fan moves up and down with
+_VERTICAL = 0.5  # share of the scenario's speeds and travels, up and down
 _LIMITS = np.array([10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 5.0, 5.0, 1.0, 1.0])
 SCALES_2D = (0.5, 0.5, 0.5, 0.03, 0.03, 0.03, 0.5, 0.5, 1.0, 1.0)
 
@@ -25,13 +33,10 @@ SCALES_2D = (0.5, 0.5, 0.5, 0.03, 0.03, 0.03, 0.5, 0.5, 1.0, 1.0)
 def look_across(
     which: np.ndarray, episodes: Episodes, motion: Motion, frames: Frame, values: np.ndarray
 ) -> None:
-    """Write what ``FanTracking2DEnv`` sees and tells of the episodes ``which``."""
-    lanes = motion.state.shape[2]
+    """Write frames and values of ``FanTracking2DEnv`` for the episodes ``which``."""
     for n in np.flatnonzero(which):
-        b, lane = n // lanes, n % lanes
-        p, v = motion.position[b, :, lane], motion.velocity[b, :, lane]
-        x, path, value = motion.state[b, :, lane].copy(), episodes.paths[n], values[n]
-        frame, change = frames[n], 0.0
+        p, v, wrench, x = vehicle_of(motion, n)
+        path, value, frame, change = episodes.paths[n], values[n], frames[n], 0.0
         for i in range(3):
             frame[i], frame[3 + i] = x[16 + i], x[13 + i]
         k = min(episodes.ticks[n], len(path) - 1)
@@ -41,12 +46,10 @@ def look_across(
             value.fan_velocity[i] = (path[k, i] - value.fan[i]) / TICK
             change += episodes.changes[n, i] ** 2
         keep_within(frame, _LIMITS)
-        value.time = episodes.ticks[n] * TICK
         value.error = math.hypot(p[1] - value.fan[0], p[2] - value.fan[1])
-        value.force[:], value.torque[:] = motion.wrench[b, :3, lane], motion.wrench[b, 3:, lane]
-        value.reward_tracking = 1.0 / (1.0 + (value.error / TRACKING_WIDTH) ** 2)
-        value.reward_change = -CHANGE_COST * change
-        # written such that a number that is not finite counts as lost
+        square = (value.error / TRACKING_WIDTH) ** 2
+        note(value, episodes, n, wrench, square, -CHANGE_COST * change)
+        # in this form a number that is not finite counts as lost
         value.lost = episodes.broken[n] or not (
             is_flying(x, p, v)
             and value.error <= LOST_OFFSET
@@ -58,15 +61,15 @@ def look_across(
 class FanTracking2DEnv(FanTask):
     """A quadrotor in a spherical cage must stay on the axis of a fan that moves in y and z.
 
-    What is not said here is as in ``FanTrackingEnv``: the filter, the times, the arguments ``scenario``
-    and ``fan``, and what is refused.
+    The filter, the times, the arguments ``scenario`` and ``fan``, and refusals are as in
+    ``FanTrackingEnv``.
 
     ## Description
 
-    A drum fan blows along +x and moves along y and along z. The quadrotor flies in a cage: the stations
-    on which the wind acts on its hull lie in turn 0.15 m above and below the rotors, so that a jet that
-    falls off in height pitches it as one that falls off sideways turns it (a flat ring, as in
-    ``FanTracking``, would feel no torque of a vertical offset).
+    A drum fan blows along +x and moves along y and along z. The quadrotor flies in a cage: the wind acts
+    on its hull at stations in turn 0.15 m above and below the rotors. Off the axis in height the jet
+    pitches the vehicle, and sideways turns it. A flat ring, as in ``FanTracking``, would feel no torque
+    of a vertical offset.
 
     ## Action space
 
@@ -102,8 +105,8 @@ class FanTracking2DEnv(FanTask):
 
     ## Version history
 
-    * v1: ``normalize=True`` by default; ``info`` has ``observation`` and ``command`` in SI units.
-    * v0: initial version.
+    * v1: ``normalize``, True by default; ``info`` has ``observation`` and ``command`` in SI units.
+    * v0: v1 with ``normalize=False``, as an alias until 3.0.
     """  # noqa: E501
 
     name = "FanTracking2D"
@@ -125,8 +128,8 @@ class FanTracking2DEnv(FanTask):
         super().__init__(*shared, fan=fan, **named)
 
     def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> Any:
-        """Return the closed loop; its accelerometer, which nobody reads, uses three more normals of
-        a tick, of which the episodes of this version are made.
+        """Return the closed loop. Its accelerometer is not read; the episodes of this version rest
+        on the three normals a tick behind it.
         """
         return super().make_loop(vehicle, fan, accelerometer=(0.0, 0.0), **given)
 

@@ -1,5 +1,5 @@
-"""What episodes side by side are, and what their agents see: the whole frame, parts of it, its
-history, or the pose alone; in SI units or divided by fixed scales.
+"""Episodes side by side, and their agents' views: the whole frame, a part, the history, or the pose
+alone; in SI units or divided by fixed scales.
 """
 
 import math
@@ -24,7 +24,7 @@ class Episodes(NamedTuple):
 
     ticks: NDArray[np.int64]  # (n,) since the start; below zero while the filter settles
     paths: Array  # (n, m, 2) m, y and height of the fan's axis, a column a tick
-    references: Array  # (n, k, 10) to be flown, a column a tick; k = 0: the set point moves
+    references: Array  # (n, k, 10), a column a tick; k = 0: the set point moves
     distance: Array  # (n,) m, from the fan at the start
     commands: Array  # (n, actions) in SI units
     changes: Array  # (n, actions) of the commands
@@ -68,23 +68,23 @@ class Motion(NamedTuple):
 FRAMES = 25  # decisions of a history, 2 s
 # largest size of a frame's numbers: N, Nm, m/s and m/s
 LIMITS = (10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 5.0, MAX_COMMAND)
-# sizes that become 1: N, Nm, m/s and m/s; what the jet does to the standard vehicle
+# divisors: N, Nm, m/s and m/s; the jet's effect on the standard vehicle
 SCALES = (0.5, 0.5, 0.5, 0.03, 0.03, 0.03, 0.5, 1.0)
-# of the pose: position (m), velocity (m/s), tilt, yaw (rad), command (m/s)
+# for the pose: position (m), velocity (m/s), tilt, yaw (rad), command (m/s)
 _POSE_LIMITS = (5.0, 5.0, 5.0, 5.0, 1.0, 1.0, math.pi, MAX_COMMAND)
 _POSE_SCALES = (1.0, 1.0, 1.0, 0.5, 0.1, 0.1, 0.2, 1.0)
 OBSERVE = ("wrench", "wrench-without-fx", "history", "pose")
 
 
 class View:
-    """From the frames (n, size) of environments side by side to what their agents see.
+    """From the frames (n, size) of environments side by side to their agents' observations.
 
     Args:
-        observe: one of ``OBSERVE``; other than ``"wrench"`` of FanTracking alone.
+        observe: one of ``OBSERVE``; other than ``"wrench"`` for FanTracking alone.
         normalize: whether each number is divided by its scale.
         limits: largest size (size,) of a frame's numbers.
-        scales: sizes (size,) that become 1.
-        count: n, how many environments.
+        scales: divisors (size,) of the numbers.
+        count: n, number of environments.
 
     Raises:
         InputError: an unknown view.
@@ -105,12 +105,10 @@ class View:
         if observe == "pose":
             limits, scales = _POSE_LIMITS, _POSE_SCALES
         kept = self._kept = slice(FORCE_X + 1 if observe == "wrench-without-fx" else 0, None)
-        self._limits = np.array(limits, dtype=np.float32)[kept]
-        self._scales = np.array(scales if normalize else np.ones(len(scales)), dtype=np.float32)[
-            kept
-        ]
+        divisors = scales if normalize else np.ones(len(scales))
+        self._limits, self._scales = (np.array(s, np.float32)[kept] for s in (limits, divisors))
         self._past = np.zeros((count, FRAMES, len(self._limits)), dtype=np.float32)
-        self._begins = np.ones(count, dtype=np.bool_)  # no frame of the episode was seen
+        self._begins = np.ones(count, dtype=np.bool_)  # before the episode's first frame
         self._start = np.zeros((count, 3))  # m
 
     def of_many(self, count: int) -> "View":
@@ -118,7 +116,7 @@ class View:
         return View(*self._given, count)
 
     def bound(self) -> Frame:
-        """Return the largest size (m,) of what is seen."""
+        """Return the largest size (m,) of an observation."""
         frames = FRAMES if self.observe == "history" else 1
         largest: Frame = np.tile(self._limits / self._scales, frames)
         return largest
@@ -128,8 +126,8 @@ class View:
         self._begins[which], self._start[which] = True, states[which, :3]
 
     def of(self, which: Flags | slice, frames: Frame, states: Array) -> Frame:
-        """Return what is seen (k, m) next of frames (n, size) and estimated states (n, 20) in the
-        environments ``which`` (n,).
+        """Return the next observations (k, m) from frames (n, size) and estimated states (n, 20) in
+        the environments ``which`` (n,).
         """
         if self.observe == "pose":
             pose = np.clip(self._pose(which, frames, states), -self._limits, self._limits)

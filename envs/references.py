@@ -12,7 +12,7 @@ REFERENCE_FADE = 1.5  # s, over which a moving reference gets up to speed
 
 
 def hold(position: Array, yaw: float, seconds: float) -> Array:
-    """Return a reference (n, 10) that stays at ``position`` (3,) m."""
+    """Return a reference (n, 10) at rest at ``position`` (3,) m."""
     return _rows(np.tile(position, (round(seconds / TICK) + 1, 1)), yaw)
 
 
@@ -27,8 +27,11 @@ def _rows(position: Array, yaw: float) -> Array:
     return rows
 
 
-def _warp(t: Array) -> Array:
-    """Return times that run slow at first and then as ``t`` less half the fade; twice smooth."""
+def _warped(seconds: float) -> Array:
+    """Return times of the ticks in ``seconds``, slow at first and then less half the fade; twice
+    smooth.
+    """
+    t = TICK * np.arange(round(seconds / TICK) + 1, dtype=np.float64)
     u = np.clip(t / REFERENCE_FADE, 0.0, 1.0)
     # integral of the smooth step 10 u^3 - 15 u^4 + 6 u^5
     return REFERENCE_FADE * (2.5 * u**4 - 3.0 * u**5 + u**6) + np.maximum(t - REFERENCE_FADE, 0.0)
@@ -42,7 +45,7 @@ def figure_of_eight(
 
     ``along = a sin(w t)``, ``across = b sin(2 w t)``.
     """
-    t = _warp(TICK * np.arange(round(seconds / TICK) + 1, dtype=np.float64))
+    t = _warped(seconds)
     phase = 2.0 * math.pi / period * t
     along, across = size[0] * np.sin(phase), size[1] * np.sin(2.0 * phase)
     c, s = math.cos(turn), math.sin(turn)
@@ -53,12 +56,11 @@ def figure_of_eight(
 def random_spline(
     rng: np.random.Generator, centre: Array, yaw: float, seconds: float, size: Array, every: float
 ) -> Array:
-    """Return a cubic spline (n, 10) through points drawn from a box of half ``size`` (3,) m about
-    ``centre``, one ``every`` s, which begins at the centre at rest.
+    """Return a cubic spline (n, 10) that begins at ``centre`` at rest. Every ``every`` s it passes
+    a point drawn from a box of half ``size`` (3,) m about the centre.
     """
     count = math.ceil(seconds / every) + 2
     points = centre + size * rng.uniform(-1.0, 1.0, (count, 3))
     points[0] = centre
     spline = CubicSpline(every * np.arange(count), points, bc_type=((1, np.zeros(3)), "not-a-knot"))
-    t = _warp(TICK * np.arange(round(seconds / TICK) + 1, dtype=np.float64))
-    return _rows(np.asarray(spline(t)), yaw)
+    return _rows(np.asarray(spline(_warped(seconds))), yaw)

@@ -27,7 +27,7 @@ def _ordered(value: tuple[float, float]) -> tuple[float, float]:
     return value
 
 
-# what a scenario's file may state
+# types of the fields of a scenario's file
 Range = Annotated[
     tuple[NotNegative, NotNegative],
     AfterValidator(_ordered),
@@ -47,8 +47,8 @@ Motions = Annotated[
 
 @dataclass(frozen=True, kw_only=True)
 class Drawn:
-    """What is drawn anew each episode: ranges (low, high). Those that are stated here replace what
-    ``PlantSettings`` say, in their units; None: as these say.
+    """Ranges (low, high) of an episode's draws. Stated ranges replace fields of ``PlantSettings``
+    in their units; None: no draw.
     """
 
     __pydantic_config__ = STRICT
@@ -61,8 +61,7 @@ class Drawn:
 
     def draw(self, rng: np.random.Generator) -> dict[str, float]:
         """Return one value of each field by its name, uniform, in the order of the fields."""
-        ranges = vars(self)
-        return {name: float(rng.uniform(*r)) for name, r in ranges.items() if r is not None}
+        return {name: rng.uniform(*r) for name, r in vars(self).items() if r is not None}
 
 
 @dataclass(frozen=True)
@@ -78,13 +77,13 @@ class Variation(Drawn):
     fan_speed: Factors = (0.85, 1.25)
     rotor_drag: Range = (0.8, 1.2)
     hull_area: Range = (0.8, 1.2)
-    mass: Factors = (0.93, 1.07)  # of the true vehicle; the filter keeps the declared
+    mass: Factors = (0.93, 1.07)  # the true vehicle's; the filter keeps the declared
     inertia: Factors = (0.9, 1.1)
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """How the fan moves, where the vehicle starts, and what it measures with."""
+    """Motion of the fan, start of the vehicle, and its measurement."""
 
     __pydantic_config__ = STRICT
 
@@ -110,12 +109,11 @@ SCENARIOS = kept_scenarios("fan", Scenario)
 
 
 def find_scenario(name: str, known: Mapping[str, AnyScenario]) -> AnyScenario:
-    """Return a scenario by its name, or that of a YAML file, whose fields are those of the known
-    ones and keep their defaults where the file states nothing.
+    """Return a scenario by its name, or of a YAML file. A file states any fields of the known
+    scenarios; others keep their defaults.
 
     Raises:
-        InputError: no scenario has this name; no such file; or a field of it that is unknown,
-            malformed or out of range.
+        InputError: an unknown name; no such file; or a field is unknown, malformed or out of range.
     """
     if name.endswith((".yaml", ".yml")):
         form = type(next(iter(known.values())))
@@ -126,13 +124,12 @@ def find_scenario(name: str, known: Mapping[str, AnyScenario]) -> AnyScenario:
 
 
 def draw_fan_path(scenario: Scenario, rng: np.random.Generator, t: Array) -> tuple[str, Array]:
-    """Draw how the fan moves: name of the motion, and y (n,) m at times ``t`` (n,) s.
+    """Draw the fan's motion: its name, and y (n,) m at times ``t`` (n,) s.
 
     The path starts at 0. Sine and triangle swing 0.5-1.2 m to either side; a ramp stops after
     0.8-1.6 m.
     """
     motion = scenario.motions[rng.integers(len(scenario.motions))]
-    speed = float(rng.uniform(*scenario.speed))
-    sign = float(rng.choice([-1.0, 1.0]))
-    travel = float(rng.uniform(0.5, 1.2))
+    speed, sign = rng.uniform(*scenario.speed), float(rng.choice([-1.0, 1.0]))
+    travel = rng.uniform(0.5, 1.2)
     return motion, sign * PLACES[motion](speed, travel, t)

@@ -1,7 +1,7 @@
-"""What the tasks share: one environment around one flight loop.
+"""The base of all tasks: one environment around one flight loop.
 
-A task states its spaces, its scenarios and its decision as data, and writes ``hover`` (draw an
-episode and hover at its start) and ``look``, compiled: what is seen, told and rewarded.
+A task states its spaces, its scenarios and its decision as data. Its ``hover`` draws an episode and
+hovers at the start; its ``look``, compiled, writes observation, reward and ``info``.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ..dynamics.rotation import quaternion_to_matrix
 from ..dynamics.vehicle import EffectSetting, Mocap, Vehicle
 from ..dynamics.vehicle_file import load_vehicle
 from ..estimator.tuning import UKFTuning
-from ..runtime.compiled import compiled, specialised
+from ..runtime.compiled import Record, compiled, specialised
 from ..runtime.errors import InputError, unknown_name
 from .closed_loop import ESTIMATORS, REFERENCE_SIZE, ClosedLoop, Stage, is_healthy
 from .display import modes_shown, need_display
@@ -54,7 +54,7 @@ _NUMBERS = {1: "one finite number", 2: "two finite numbers", 3: "three finite nu
 
 @compiled
 def keep_within(frame: Frame, limits: Array) -> None:
-    """Limit the numbers of a frame (n,) to ``limits`` (n,) on either side; not finite: 0."""
+    """Limit the numbers of a frame (n,) to ``limits`` (n,) on either side; 0 where not finite."""
     for i in range(len(frame)):
         seen = frame[i]
         frame[i] = min(max(seen, -limits[i]), limits[i]) if math.isfinite(seen) else 0.0
@@ -67,10 +67,52 @@ def is_flying(state: Array, position: Array, velocity: Array) -> bool:
     return is_healthy(state, velocity) and 1.0 - 2.0 * tilted >= UPRIGHT
 
 
+@compiled
+def vehicle_of(motion: Motion, n: int | np.integer[Any]) -> tuple[Array, Array, Array, Array]:
+    """Return pose (7,), velocity (6,), true wrench (6,) and a copy of the estimate (20,) of vehicle
+    ``n``.
+    """
+    lanes = motion.state.shape[2]
+    b, lane = n // lanes, n % lanes
+    estimate = motion.state[b, :, lane].copy()
+    return (
+        motion.position[b, :, lane],
+        motion.velocity[b, :, lane],
+        motion.wrench[b, :, lane],
+        estimate,
+    )
+
+
+@compiled
+def note(
+    value: Record,
+    episodes: Episodes,
+    n: int | np.integer[Any],
+    wrench: Array,
+    square: float,
+    change: float,
+) -> None:
+    """Write the common values of episode ``n``: time, true wrench (6,), and rewards.
+
+    Args:
+        value: row of the task's table.
+        episodes: all episodes.
+        n: an episode.
+        wrench: N and Nm, world.
+        square: of the error over the task's tracking width.
+        change: reward for the change of the command.
+    """
+    value.time = episodes.ticks[n] * TICK
+    for i in range(3):
+        value.force[i], value.torque[i] = wrench[i], wrench[3 + i]
+    value.reward_tracking = 1.0 / (1.0 + square)
+    value.reward_change = change
+
+
 def true_motion(
     vehicle: Vehicle, pose: Array, velocity: Array, speeds: Array, integral: Array
 ) -> dict[str, Any]:
-    """Return what an oracle knows of a vehicle's motion.
+    """Return a vehicle's motion as an oracle knows it.
 
     Args:
         vehicle: as it is declared.
@@ -98,21 +140,19 @@ class Task(gym.Env[Frame, Frame], ABC):
     Args:
         scenario: a name, a YAML path, or a scenario of the task's kind.
         render_mode: ``"human"`` (needs a display), ``"rgb_array"`` or None.
-        vehicle: what filter and flight loop know: preset, YAML path or ``Vehicle``.
-        effects: of the true vehicle, which nobody declared.
+        vehicle: as filter and flight loop know it: preset, YAML path or ``Vehicle``.
+        effects: undeclared ones of the true vehicle.
         truth: the true vehicle, before ``effects``; default: as declared.
-        settings: of the plant: motor lag, unmodelled disturbance, delays, losses.
+        settings: motor lag, unmodelled disturbance, delays and losses of the plant.
         estimator: ``"ukf"``, or ``"constant-gain"``: the filter's converged gain, which is faster.
-        normalize: whether observations, and actions in m/s2, are divided by fixed scales; default:
-            from version 1 on.
-        width: of a picture, in pixels.
+        normalize: whether observations, and actions in m/s2, are divided by fixed scales; the id
+            ``-v1`` says True where nothing is said.
+        width: pixels of a picture.
         height: likewise.
-        stages: of a user's own, in the pipeline of a tick: ``windwrench.envs.Stage``.
-        version: of the task. From 1 on ``info`` has, in SI units, the frame ``observation`` and the
-            ``command`` that was flown.
+        stages: a user's own ``windwrench.envs.Stage``, in the pipeline of a tick.
 
     Raises:
-        InputError: an argument that names what does not exist.
+        InputError: an argument names nothing known.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 13}  # noqa: RUF012
@@ -122,15 +162,15 @@ class Task(gym.Env[Frame, Frame], ABC):
     action_size: ClassVar[int]
     largest_action: ClassVar[float] = 1.0
     action_unit: ClassVar[str] = "m/s"
-    label: ClassVar[str] = "fan_motion"  # entry of ``info`` that names what was drawn
+    label: ClassVar[str] = "fan_motion"  # entry of ``info`` with the name of the episode's draw
     accelerates: ClassVar[bool] = False  # whether a command is an acceleration, not a velocity
-    draws: ClassVar[int] = 1  # of an episode, until the vehicle is not lost in it at once
-    # writes frames (n, size) and a table (n,) of ``values`` for the episodes that are named
+    draws: ClassVar[int] = 1  # at most, until an episode begins with the vehicle not lost
+    # writes frames (n, size) and a table (n,) of ``values`` of the chosen episodes
     look: ClassVar[Callable[..., None]]
     fan: Fan
-    values: ClassVar[np.dtype]  # of the entries of ``info`` beside ``label``
-    limits: ClassVar[Sequence[float]]  # of the frame's numbers
-    scales: ClassVar[Sequence[float]]  # that ``normalize`` divides them by
+    values: ClassVar[np.dtype]  # entries of ``info`` beside ``label``
+    limits: ClassVar[Sequence[float]]  # largest sizes of the frame's numbers
+    scales: ClassVar[Sequence[float]]  # divisors of ``normalize``
 
     def __init__(
         self,
@@ -141,11 +181,10 @@ class Task(gym.Env[Frame, Frame], ABC):
         truth: str | Vehicle | None = None,
         settings: PlantSettings | None = None,
         estimator: str = "ukf",
-        normalize: bool | None = None,
+        normalize: bool = False,
         width: int = 640,
         height: int = 480,
         stages: Sequence[Stage] = (),
-        version: int = 0,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(
@@ -153,8 +192,6 @@ class Task(gym.Env[Frame, Frame], ABC):
             )
         if render_mode == "human":
             need_display()
-        self.version = version
-        normalize = version > 0 if normalize is None else normalize
         if not isinstance(normalize, bool | np.bool_):
             raise InputError(f"{self.name}: normalize must be True or False, got {normalize!r}")
         if estimator not in ESTIMATORS:
@@ -163,8 +200,7 @@ class Task(gym.Env[Frame, Frame], ABC):
             scenario = find_scenario(scenario, self.scenarios)
         self.scenario = scenario
         self.vehicle = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle)
-        # a declared vehicle whose model was amended must not bring its effects into the world a
-        # second time
+        # an amended vehicle must not bring its effects into the world a second time
         true = self.vehicle if truth is None else truth
         self.truth = true if isinstance(true, Vehicle) else load_vehicle(true)
         self.effects = tuple(check_setting(e, f"{self.name}: effects") for e in effects)
@@ -177,12 +213,12 @@ class Task(gym.Env[Frame, Frame], ABC):
         self.action_space = gym.spaces.Box(-largest, largest, (self.action_size,), np.float32)
         self.viewer: Any = None
         self._loop: ClosedLoop | None = None
-        self.drawn: dict[str, float] = {}  # of an episode, where the scenario varies
+        self.drawn: dict[str, float] = {}  # factors of an episode, where the scenario varies
         self._in_flight = False
         self.command: Array = np.zeros(self.action_size)  # the last one, in SI units
-        self.foresight = 0  # decisions to come that ``info`` tells of, for the oracle
+        self.foresight = 0  # decisions ahead in ``info``, for the oracle
         self._see_by(View("wrench", self.normalize, self.limits, self.scales))
-        # of an episode: the fan's path (m, 2) m, its distance in m, and its name
+        # the fan's path (m, 2) m, its distance in m, and the episode's name
         self.path, self.distance = np.zeros((1, 2)), 0.0
         self.drawn_label = ""
         self._frames = np.zeros((1, len(self.limits)), dtype=np.float32)
@@ -192,13 +228,11 @@ class Task(gym.Env[Frame, Frame], ABC):
 
     @classmethod
     def decisions(cls) -> int:
-        """Return how many decisions an episode has."""
+        """Return the number of decisions of an episode."""
         return round(EPISODE_SECONDS / (TICK * cls.decision_ticks))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy in the middle of an episode starts from: all but the window and
-        compiled code.
-        """
+        """Return all but the window and compiled code, for a copy in the middle of an episode."""
         return self.__dict__ | {"viewer": None, "_look": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -210,18 +244,18 @@ class Task(gym.Env[Frame, Frame], ABC):
         self._look = specialised(type(self).look, _ONE, *seen)
 
     def _see_by(self, view: View) -> None:
-        """Let the agent see by a view."""
+        """Take a view for the agent's observation."""
         self.view, bound = view, view.bound()
         self.observation_space = gym.spaces.Box(-bound, bound, bound.shape, np.float32)
 
     def _lay_episode(self) -> None:
-        """Let what is looked at be the episode that was drawn."""
+        """Look at the episode just drawn."""
         self._episodes = Episodes.alike(
             1, self.action_size, self.path, self.reference, self.distance
         )
 
     def _look_around(self) -> None:
-        """Write frame and values of now."""
+        """Write the present frame and values."""
         loop, episodes = self.loop, self._episodes
         episodes.ticks[0], episodes.broken[0] = loop.ticks, loop.was_reset
         self._look(_ONE, episodes, loop.shown, self._frames, self._table)
@@ -251,18 +285,18 @@ class Task(gym.Env[Frame, Frame], ABC):
 
     @property
     def tuning(self) -> UKFTuning:
-        """What the filter is told."""
+        """The filter's tuning."""
         return UKFTuning.for_vehicle(self.declared, TICK, self.scenario.rise_time)
 
     def briefing(self) -> Briefing:
-        """Return what a designed controller may know of itself before it flies: nothing of what is
-        drawn anew in an episode, and nothing of undeclared effects.
+        """Return a designed controller's knowledge before its flight: no draws of an episode, no
+        undeclared effects.
         """
         return Briefing(self.vehicle)
 
     def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> ClosedLoop:
-        """Return the closed loop of a true vehicle, before the undeclared effects; the filter knows
-        the declared one.
+        """Return the closed loop of a true vehicle and the undeclared effects; the filter knows the
+        declared vehicle.
         """
         declared = self.declared
         drawn: dict[str, Any] = {
@@ -282,33 +316,28 @@ class Task(gym.Env[Frame, Frame], ABC):
 
     def draw_loop(self) -> None:
         """Make the closed loop of an episode, drawn where the scenario varies."""
-        fan = self.fan
-        self.drawn = {}
         if not self.scenario.varied:
-            if self._loop is None:
-                self._loop = self.make_loop(self.truth, fan)
+            self.drawn = {}
+            self._loop = self._loop or self.make_loop(self.truth, self.fan)
             return
-        drawn = self.drawn = self.scenario.variation.draw(self.np_random)
+        fan, truth, drawn = self.fan, self.truth, self.scenario.variation.draw(self.np_random)
+        self.drawn = drawn
         fan = replace(
             fan,
             speed=fan.speed * drawn.get("fan_speed", 1.0),
             rotor_drag=fan.rotor_drag * drawn["rotor_drag"],
             hull_area=fan.hull_area * drawn["hull_area"],
         )
-        vehicle = replace(
-            self.truth,
-            mass=self.truth.mass * drawn["mass"],
-            inertia=self.truth.inertia * drawn["inertia"],
-        )
-        self._loop = self.make_loop(vehicle, fan)
+        mass, inertia = truth.mass * drawn["mass"], truth.inertia * drawn["inertia"]
+        self._loop = self.make_loop(replace(truth, mass=mass, inertia=inertia), fan)
 
     def take_loop(self, loop: ClosedLoop, drawn: dict[str, float]) -> None:
-        """Go on with the closed loop of an episode, and what was drawn for it."""
+        """Go on with an episode's closed loop and its draws."""
         self._loop, self.drawn = loop, drawn
 
     def _begin(self) -> None:
-        """Draw an episode, hover at its start, and let the filter settle; draw anew where the winds
-        carry the vehicle off before the episode is the agent's.
+        """Draw an episode, hover at its start, and let the filter settle. Draw anew where the winds
+        carry the vehicle off before the agent's first decision.
         """
         self.draw_loop()
         for _ in range(self.draws):
@@ -333,33 +362,30 @@ class Task(gym.Env[Frame, Frame], ABC):
         """Draw an episode, and place the vehicle in hover at its start."""
 
     def _get_obs(self) -> Frame:
-        """Return what the agent sees now."""
+        """Return the agent's observation."""
         seen: Frame = self.view.of(_ALL, self._frames, self.loop.shown.state[..., 0])[0]
         return seen
 
     def _get_info(self) -> dict[str, Any]:
-        """Return the terms of the reward, the truth that the agent does not see, and whether the
-        vehicle is lost.
+        """Return the terms of the reward, the truth behind the observation, and whether the vehicle
+        is lost.
         """
-        found = {}
-        for name in self.values.names or ():
-            value = self._table[name][0]
-            found[name] = value.copy() if value.ndim else value.item()
-        if self.version > 0:
-            found["observation"] = self._frames[0].copy()
-            found["command"] = self._episodes.commands[0].copy()
-        return found | {self.label: self.drawn_label}
+        values = ((name, self._table[name][0]) for name in self.values.names or ())
+        info = {name: value.copy() if value.ndim else value.item() for name, value in values}
+        info["observation"] = self._frames[0].copy()
+        info["command"] = self._episodes.commands[0].copy()
+        return info | {self.label: self.drawn_label}
 
     def _truth(self) -> dict[str, Any]:
-        """Return what the oracle knows beyond ``info``: the true motion and the integral of the
-        flight loop, world axes, SI units. A task adds what is to come.
+        """Return the oracle's knowledge beyond ``info``: the true motion and the integral of the
+        flight loop, world axes, SI units. A task adds wind or fan to come.
         """
         record, world = self.loop.record[0], self.loop.world
         speeds, integral = record["plant"]["speeds"], record["flight"]["sum"]
         return true_motion(self.vehicle, world.qpos, world.qvel, speeds, integral)
 
     def _told(self) -> dict[str, Any]:
-        """Return ``info``, with the truth where somebody foresees."""
+        """Return ``info``, with the truth for a controller with foresight."""
         info = self._get_info()
         return info | self._truth() if self.foresight else info
 
@@ -369,7 +395,7 @@ class Task(gym.Env[Frame, Frame], ABC):
         """Start an episode; the same seed gives the same episode, bit for bit.
 
         Raises:
-            InputError: ``options`` that are not empty: there are none.
+            InputError: any ``options``.
         """
         if options:
             raise InputError(
@@ -384,19 +410,18 @@ class Task(gym.Env[Frame, Frame], ABC):
         self.view.restart(_ALL, self.loop.shown.state[..., 0])
         if self.render_mode == "human":
             self.render()
-        # rewards, and whether the vehicle is lost, are decided by steps
+        # steps alone decide rewards and losses
         first = {"reward_tracking": 0.0, "reward_change": 0.0, "lost": False}
         return self._get_obs(), self._told() | first
 
     def step(self, action: Frame) -> tuple[Frame, float, bool, bool, dict[str, Any]]:
-        """Fly a decision with an action as ``action_space`` has it; one out of range is clipped.
+        """Fly a decision with an action of ``action_space``, clipped to its range.
 
         Raises:
             InputError: the action has another shape or is not finite, or there was no reset.
         """
         given = np.asarray(action, dtype=np.float64)
-        numbers = given.ravel().tolist()
-        if given.shape != (self.action_size,) or not math.isfinite(sum(numbers)):
+        if given.shape != (self.action_size,) or not np.isfinite(given).all():
             raise InputError(
                 f"{self.name}: action must be {_NUMBERS[self.action_size]} in "
                 f"{self.unit_of_actions}, shape ({self.action_size},), got {action!r}"
@@ -404,8 +429,7 @@ class Task(gym.Env[Frame, Frame], ABC):
         if not self._in_flight:
             raise InputError(f"{self.name}: call reset before step")
         last, largest = self.command, self.largest_action
-        wanted = [self.action_scale * number for number in numbers]
-        self.command = np.array([min(max(value, -largest), largest) for value in wanted])
+        self.command = np.clip(self.action_scale * given, -largest, largest)
         self._episodes.commands[0], self._episodes.changes[0] = self.command, self.command - last
         self.fly()
         self._look_around()
@@ -417,7 +441,7 @@ class Task(gym.Env[Frame, Frame], ABC):
 
     @property
     def unit_of_actions(self) -> str:
-        """Unit of an action as ``action_space`` has it."""
+        """Unit of an action of ``action_space``."""
         return "units of the largest" if self.action_scale != 1.0 else self.action_unit
 
     def fly(self) -> None:

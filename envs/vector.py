@@ -1,5 +1,5 @@
 """Many environments of a task in one process: each flies its own loop, and one compiled call writes
-what came of all of them.
+the observations and rewards of all.
 """
 
 import inspect
@@ -21,34 +21,33 @@ from .task import Frame, Task
 from .untimed import Untimed
 
 Infos = dict[str, Any]
-# hooks of a task for users; ``look`` writes observation, terms of the reward and ``lost``
+# a task's hooks for users; ``look`` writes observation, terms of the reward and ``lost``
 _HOOKS = ("make_loop", "draw_loop", "hover", "fly")
 
 
 class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
     """``num_envs`` environments side by side, each bit for bit the single one with its seed.
 
-    ``reset(seed=s)`` seeds them with s, s + 1, ...; a list gives each its own. An environment whose
-    episode has ended starts its next one at the following step, whose action it ignores
-    (``AutoresetMode.NEXT_STEP``, the default), or within the step that ended it
-    (``AutoresetMode.SAME_STEP``): then ``infos["final_obs"]`` and ``infos["final_info"]`` hold what
-    ended it, as in Gymnasium's own vector environments. Each entry of ``infos`` is an array with a
-    row for each environment; all environments have all of them.
+    ``reset(seed=s)`` seeds them with s, s + 1, ...; a list gives each its own. After an episode the
+    next one starts at the following step, whose action is ignored (``AutoresetMode.NEXT_STEP``, the
+    default), or within the same step (``AutoresetMode.SAME_STEP``). There ``infos["final_obs"]``
+    and ``infos["final_info"]`` hold the episode's end, as in Gymnasium's own vector environments.
+    Each entry of ``infos`` is an array with a row for each environment.
 
     Args:
-        num_envs: how many.
-        max_episode_steps: decisions after which an episode is truncated; default: those of 20 s.
-        threads: over which the environments are spread; the results do not depend on it. MuJoCo
-            gains little by threads: its step is called through Python.
+        num_envs: number of environments.
+        max_episode_steps: decisions until an episode is truncated; default: those of 20 s.
+        threads: number of threads, without a change of the results. MuJoCo gains little by
+            threads: its step is called through Python.
         autoreset_mode: ``NEXT_STEP`` or ``SAME_STEP``, of ``gymnasium.vector.AutoresetMode`` or its
             value as text.
-        task: whose environments they are.
-        **kwargs: of ``task``.
+        task: class of the environments.
+        **kwargs: arguments of ``task``.
 
     Raises:
-        InputError: ``num_envs`` or ``threads`` is not positive, another mode, what ``task``
-            refuses, or a ``task`` with its own ``step``, ``reset``, ``_get_obs`` or any other
-            method of ``Task`` outside ``called``.
+        InputError: ``num_envs`` or ``threads`` is not positive, the mode is another, or ``task``
+            refuses an argument. Also a ``task`` with its own ``step``, ``reset``, ``_get_obs`` or
+            any other method of ``Task`` outside ``called``.
     """
 
     # methods of ``Task`` whose overrides hold in every environment here
@@ -72,17 +71,13 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         task: type[Task] = FanTrackingEnv,
         **kwargs: Any,
     ) -> None:
-        if max_episode_steps is None:
-            max_episode_steps = task.decisions()
-        for name, value in (
-            ("num_envs", num_envs),
-            ("max_episode_steps", max_episode_steps),
-            ("threads", threads),
-        ):
+        steps = task.decisions() if max_episode_steps is None else max_episode_steps
+        counts = {"num_envs": num_envs, "max_episode_steps": steps, "threads": threads}
+        for name, value in counts.items():
             if value < 1:
                 raise InputError(f"{task.name}: {name} must be at least 1, got {value}")
         self.task, self.autoreset_mode = task, _mode(autoreset_mode, task.name)
-        self.num_envs, self.max_episode_steps = num_envs, max_episode_steps
+        self.num_envs, self.max_episode_steps = num_envs, steps
         self.threads = min(threads, num_envs)
         self.envs = self._make_envs(kwargs)
         first = self.envs[0]
@@ -93,13 +88,13 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         self.single_observation_space = first.observation_space
         self.action_space = gym.vector.utils.batch_space(first.action_space, num_envs)
         self.observation_space = gym.vector.utils.batch_space(first.observation_space, num_envs)
-        self._decisions = np.zeros(num_envs, dtype=np.int64)  # of the episode in hand
+        self._decisions = np.zeros(num_envs, dtype=np.int64)  # since the episode's start
         self._begun = np.zeros(num_envs, dtype=np.bool_)
         self._over = np.zeros(num_envs, dtype=np.bool_)  # episodes that ended at the last step
         self._episodes = Episodes.alike(num_envs, first.action_size, first.path, first.reference)
         self._view = first.view.of_many(num_envs)
         self._frames = np.zeros(self.observation_space.shape or (), dtype=np.float32)
-        # frames before a view is taken of them
+        # frames before their view
         self._whole = np.zeros((num_envs, len(first.limits)), dtype=np.float32)
         self._table = np.zeros(num_envs, dtype=first.values)
         self._labels = np.zeros(num_envs, dtype=object)
@@ -111,14 +106,13 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
     @property
     def _values(self) -> Infos:
         """Entries of ``infos``, as views."""
-        env = self.envs[0]
-        values: Infos = {name: self._table[name] for name in env.values.names or ()}
-        if env.version > 0:
-            values |= {"observation": self._whole, "command": self._episodes.commands}
-        return values | {env.label: self._labels}
+        task = self.envs[0]
+        values: Infos = {name: self._table[name] for name in task.values.names or ()}
+        values |= {"observation": self._whole, "command": self._episodes.commands}
+        return values | {task.label: self._labels}
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy starts from: all but threads and compiled code."""
+        """Return all but threads and compiled code, for a copy."""
         return self.__dict__ | {"_pool": None, "_compiled": {}}
 
     def reset(
@@ -153,11 +147,10 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         return self._frames.copy(), self._infos(self._all)
 
     def step(self, actions: Frame) -> tuple[Frame, NDArray[np.float64], Flags, Flags, Infos]:
-        """Fly a decision in every environment with actions (num_envs, n) as ``action_space`` has
-        them.
+        """Fly a decision in every environment with actions (num_envs, n) of ``action_space``.
 
         Raises:
-            InputError: another shape, or a number that is not finite; nothing has flown then.
+            InputError: another shape, or a number is not finite; nothing flies.
         """
         task, env = self.task, self.envs[0]
         wanted, shape = np.asarray(actions, dtype=np.float64), self._episodes.commands.shape
@@ -193,7 +186,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         return self._frames.copy(), rewards, lost, truncated, infos
 
     def _start(self, which: Flags, seeds: Sequence[int | None] | None = None) -> None:
-        """Start an episode in all environments that ``which`` (num_envs,) names."""
+        """Start an episode in the environments of ``which`` (num_envs,)."""
         started = np.flatnonzero(which).tolist()
         self._begun[which] = False
         _, _, _, _, *moves = self._episodes
@@ -207,7 +200,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         self._begun[which] = True
 
     def _refuse_uncalled(self, env: Task) -> None:
-        """Refuse an environment with an override of a method outside ``called``."""
+        """Refuse an environment's own methods outside ``called``."""
         for name, own in inspect.getmembers_static(Task):
             method = callable(own) or isinstance(own, property | classmethod | staticmethod)
             if name.startswith("__") or name in self.called or not method:
@@ -225,11 +218,11 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         return [self.task(**kwargs) for _ in range(self.num_envs)]
 
     def _make_memory(self) -> Motion:
-        """Make what ``_fly`` works on; return the motion of all, which ``_fly`` writes."""
+        """Make the memory of ``_fly``; return the motion of all."""
         return Motion.zeros(self.num_envs)
 
     def _draw(self, i: int, env: Task) -> None:
-        """Write down the episode that an environment has drawn."""
+        """Write down an environment's new episode."""
         given, labels = self._episodes, self._labels
         if given.paths.shape[1] != len(env.path) or given.references.shape[1] != len(env.reference):
             self._episodes = given = given._replace(
@@ -260,7 +253,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
             self._see(i)
 
     def _see(self, i: int) -> None:
-        """Write where environment ``i`` stands."""
+        """Write the motion of environment ``i``."""
         loop, episodes = self.envs[i].loop, self._episodes
         for kept, shown in zip(self._motion, loop.shown, strict=True):
             kept[i] = shown[0]
@@ -277,7 +270,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         return rows[: self.num_envs]
 
     def _look(self, which: Flags) -> None:
-        """Write frames and values of some environments, as their task has them."""
+        """Write frames and values of some environments by their task's ``look``."""
         given = self._episodes, self._motion, self._whole, self._table
         self._call(self.task.look, which, *given)
         self._frames[which] = self._view.of(which, self._whole, self._states)
@@ -291,29 +284,21 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         self._compiled[function](*arguments)
 
     def _spread(self, work: Callable[[int], object], which: Sequence[int]) -> None:
-        """Call ``work`` with each number, once.
-
-        A thread that is done takes the next number, so that no thread waits for a slow one.
-        """
-        numbers, threads = iter(which), min(self.threads, len(which))
-
-        def take_numbers() -> None:
-            for n in numbers:
+        """Call ``work`` with each number, once: each free thread takes the next number."""
+        if min(self.threads, len(which)) < 2:
+            for n in which:
                 work(n)
-
-        if threads < 2:
-            take_numbers()
             return
         if self._pool is None:
             self._pool = ThreadPoolExecutor(self.threads)
-        working = [self._pool.submit(take_numbers) for _ in range(threads)]
+        working = [self._pool.submit(work, n) for n in which]
         wait(working)
         for each in working:
             each.result()
 
     def _infos(self, which: Flags) -> Infos:
-        """Return what some environments say as Gymnasium's vector environments do: an array and a
-        mask for each entry; zeros, or None, where the mask is not set.
+        """Return the ``infos`` of some environments as Gymnasium's vector environments do: an array
+        and a mask for each entry; zeros, or None, outside the mask.
         """
         infos: Infos = {}
         for name, values in self._values.items():
@@ -335,9 +320,9 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
 
 
 def _mode(given: AutoresetMode | str, task: str) -> AutoresetMode:
-    known = (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP)
+    known = AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP
     for mode in known:
-        if given is mode or given in (mode.value, mode.name):
+        if given in (mode, mode.value, mode.name):
             return mode
     raise InputError(
         f"{task}: autoreset_mode must be {' or '.join(m.name for m in known)} of "

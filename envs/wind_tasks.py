@@ -19,7 +19,6 @@ from ..runtime.compiled import compiled_without_gil
 from .closed_loop import ClosedLoop
 from .fan import STATIONS, Fan, jet_wrench
 from .observing import Episodes, Motion
-from .plant import TICK
 from .task import (
     COMMON_VALUES,
     EPISODE_SECONDS,
@@ -28,6 +27,8 @@ from .task import (
     Task,
     is_flying,
     keep_within,
+    note,
+    vehicle_of,
 )
 from .wind import Sum, Wind
 from .wind_scenarios import HEIGHT, START, WIND_SCENARIOS, draw_reference, draw_winds
@@ -44,13 +45,12 @@ _LIMITS = np.array(OBSERVATION_LIMITS)
 def look_at_reference(
     which: np.ndarray, episodes: Episodes, motion: Motion, frames: Frame, values: np.ndarray
 ) -> None:
-    """Write what ``WindHoverEnv`` sees and tells of the episodes ``which``."""
+    """Write frames and values of ``WindHoverEnv`` for the episodes ``which``."""
     lanes = motion.state.shape[2]
     for n in np.flatnonzero(which):
         b, lane = n // lanes, n % lanes
-        p, v = motion.position[b, :, lane], motion.velocity[b, :, lane]
-        x, value, frame = motion.state[b, :, lane].copy(), values[n], frames[n]
-        rows = episodes.references[n]
+        p, v, wrench, x = vehicle_of(motion, n)
+        value, frame, rows = values[n], frames[n], episodes.references[n]
         reference = rows[min(max(episodes.ticks[n], 0), len(rows) - 1)]
         square, change = 0.0, 0.0
         for i in range(3):
@@ -60,8 +60,6 @@ def look_at_reference(
             frame[18 + i], frame[21 + i] = motion.specific[b, i, lane], motion.thrust[b, i, lane]
             frame[24 + i] = episodes.commands[n, i]
             value.position[i], value.reference[i] = p[i], reference[i]
-            value.force[i] = motion.wrench[b, i, lane]
-            value.torque[i] = motion.wrench[b, 3 + i, lane]
             wind = 0.0
             for station in range(STATIONS):
                 wind += motion.air[b, station, i, lane]
@@ -69,10 +67,10 @@ def look_at_reference(
             square += (p[i] - reference[i]) * (p[i] - reference[i])
             change += episodes.changes[n, i] * episodes.changes[n, i]
         keep_within(frame, _LIMITS)
-        value.time, value.error = episodes.ticks[n] * TICK, math.sqrt(square)
-        value.reward_tracking = 1.0 / (1.0 + square / (TRACKING_WIDTH * TRACKING_WIDTH))
-        value.reward_change = -CHANGE_COST * change
-        # written such that a number that is not finite counts as lost
+        value.error = math.sqrt(square)
+        square /= TRACKING_WIDTH * TRACKING_WIDTH
+        note(value, episodes, n, wrench, square, -CHANGE_COST * change)
+        # in this form a number that is not finite counts as lost
         value.lost = episodes.broken[n] or not (
             is_flying(x, p, v) and p[2] > 0.0 and value.error <= LOST_OFFSET
         )
@@ -83,13 +81,13 @@ class WindHoverEnv(Task):
 
     ## Description
 
-    A quadrotor hovers 2.3 m in front of a wall of 3 x 3 fans that switch by themselves, in a
-    sheared mean wind with turbulence, in gusts, or below another vehicle: what blows is its scenario's. It
-    must stay where it is. An unscented Kalman filter turns rotor speeds and motion-capture pose into the
-    external force and torque, at 200 Hz, and a flight loop (position, velocity, a weak integral,
-    attitude) flies to the reference by the estimated state. The agent commands an acceleration
-    beside the flight loop's own, 25 times a second: it must cancel what the wind does before the
-    flight loop's error grows. The wind acts at 12 stations of the vehicle, each in its own air.
+    A quadrotor must stay in its place, by its scenario 2.3 m in front of a wall of 3 x 3 switching fans,
+    in a sheared mean wind with turbulence, in gusts, or below another vehicle. An unscented Kalman filter
+    turns rotor speeds and motion-capture pose into the external force and torque, at 200 Hz. A flight
+    loop (position, velocity, a weak integral, attitude) flies to the reference by the estimated state.
+    The agent commands an acceleration beside the flight loop's own, 25 times a second: the command must
+    cancel the wind before the flight loop's error grows. The wind acts at 12 stations of the vehicle,
+    each in its own air.
 
     ## Action space
 
@@ -121,8 +119,8 @@ class WindHoverEnv(Task):
     | 24-26 | last action                                              | 4     | 4     | m/s2 |
 
     The accelerometer sits in the centre of mass and has a noise of 0.15 m/s2 a tick (5 ms) and a bias of
-    0.05 m/s2, drawn each episode; it is turned into the world by the estimated attitude. The filter does
-    not use it. Wind and true force are not observed: ``info`` has them.
+    0.05 m/s2, drawn each episode. The estimated attitude turns its axes into the world. The filter does
+    not use the accelerometer. Wind and true force are not observed: ``info`` has them.
 
     ## Rewards
 
@@ -135,8 +133,8 @@ class WindHoverEnv(Task):
     ## Starting state
 
     The vehicle hovers at the start of the reference, 2.3 m in front of the wall and 1.5 m high, facing
-    it, for 1.5 s in the wind of time 0, in which the filter settles. Winds, reference and all noise are
-    drawn from the seed; winds in which the vehicle is lost before the episode begins are drawn anew.
+    the wall. For 1.5 s in the wind of time 0 the filter settles. Winds, reference and all noise are drawn
+    from the seed; winds are drawn anew where the vehicle is lost before the episode begins.
 
     ## Episode end
 
@@ -146,7 +144,7 @@ class WindHoverEnv(Task):
     ## Arguments
 
     ```python
-    gym.make("windwrench/WindHover-v0", scenario="base", render_mode=None)
+    gym.make("windwrench/WindHover-v1", scenario="base", normalize=True, render_mode=None)
     ```
 
     | Parameter     | Default      | Description                                                          |
@@ -160,8 +158,8 @@ class WindHoverEnv(Task):
 
     ## Version history
 
-    * v1: ``normalize=True`` by default; ``info`` has ``observation`` and ``command`` in SI units.
-    * v0: initial version.
+    * v1: ``normalize``, True by default; ``info`` has ``observation`` and ``command`` in SI units.
+    * v0: v1 with ``normalize=False``, as an alias until 3.0.
     """  # noqa: E501
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 25}  # noqa: RUF012
@@ -220,8 +218,8 @@ class WindHoverEnv(Task):
         self.loop.reset(rng, START, math.pi, winds, reference)
 
     def _truth(self) -> dict[str, Any]:
-        """Return beside ``Task._truth`` the actuators' disturbance (6,) N and Nm, world, and the
-        wrench (foresight, 6) of the winds over each decision to come, where the vehicle is now.
+        """Return ``Task._truth``, the actuators' disturbance (6,) N and Nm, world, and the winds'
+        wrench (foresight, 6) over each decision to come, at the vehicle's present place.
         """
         loop, R, wind = self.loop, np.empty((3, 3)), np.empty(3)
         fan = loop.record["fan"].copy()[0]
@@ -241,24 +239,24 @@ class WindHoverEnv(Task):
 class WindTrajectoryEnv(WindHoverEnv):
     """A quadrotor must fly figures of eight and random splines through turbulence and jets.
 
-    Action, observation, reward, episode end and arguments are those of ``WindHoverEnv``; the
-    scenarios are those of ``WindHover``, too. What differs is the reference.
+    Action, observation, reward, episode end, arguments and scenarios are those of ``WindHoverEnv``.
+    The reference differs.
 
     ## Reference
 
     A lying figure of eight (1.0-1.4 m along, 0.4-0.6 m across, in 6-9 s, turned by any angle), or a
-    spline through random points of a box of 2.4 x 2.4 x 0.8 m, one every 1.5-2.2 s. The reference
-    gets up to speed in 1.5 s. The flight loop is given its position, velocity and acceleration, and
-    the agent sees its velocity and acceleration.
+    spline. The spline has a random point of a box of 2.4 x 2.4 x 0.8 m every 1.5-2.2 s. The
+    reference gets up to speed in 1.5 s. The flight loop is given its position, velocity and
+    acceleration, and the agent sees its velocity and acceleration.
 
     ```python
-    gym.make("windwrench/WindTrajectory-v0", scenario="base", render_mode=None)
+    gym.make("windwrench/WindTrajectory-v1", scenario="base", normalize=True, render_mode=None)
     ```
 
     ## Version history
 
-    * v1: ``normalize=True`` by default; ``info`` has ``observation`` and ``command`` in SI units.
-    * v0: initial version.
+    * v1: ``normalize``, True by default; ``info`` has ``observation`` and ``command`` in SI units.
+    * v0: v1 with ``normalize=False``, as an alias until 3.0.
     """
 
     name = "WindTrajectory"

@@ -10,8 +10,8 @@ from ..runtime.workers import every
 from .episodes import Episode, benchmark_seeds, fly_episode
 from .tasks import TASKS, make_pilot, task_of
 
-_CHUNK = 5  # episodes that a worker flies at a time
-_SEEDS = 2**32  # of a benchmark
+_CHUNK = 5  # episodes of a worker at a time
+_SEEDS = 2**32  # bound of a benchmark's seeds
 
 Results = dict[tuple[str, str], list[Episode]]  # by controller and scenario
 Chunk = tuple[str, str, str, tuple[int, ...]]  # task, controller, scenario, seeds
@@ -24,7 +24,7 @@ def check_request(
     seed: int,
     task: str = STANDARD_TASK,
 ) -> None:
-    """Check what ``fly_all`` is asked for, before anything is flown.
+    """Check a request for ``fly_all``, before any flight.
 
     Raises:
         InputError: an unknown name, no episodes, or a seed out of range.
@@ -43,7 +43,7 @@ def check_request(
 def count_flights(
     controllers: Sequence[str], scenarios: Sequence[str], episodes: int, task: str = STANDARD_TASK
 ) -> int:
-    """Return how many episodes ``fly_all`` flies."""
+    """Return the number of episodes of ``fly_all``."""
     return len(task_of(task).references(controllers)) * len(set(scenarios)) * episodes
 
 
@@ -63,11 +63,11 @@ def fly_all(
         controllers: names, of trained policies too, or their paths, or FILE.py:CLASS.
         scenarios: names, or paths of YAML files.
         episodes: a scenario.
-        seed: of the benchmark.
-        jobs: processes; default: one a core. The results do not depend on it.
+        seed: the benchmark's.
+        jobs: processes, without a change of the results; default: one a core.
         advance: called with the number of episodes flown since the last call.
-        cluster: address of a Ray cluster that flies, or ``local`` for one of its own on this
-            machine; default: none.
+        cluster: address of a Ray cluster, or ``local`` for a new one on this machine; default:
+            none.
         task: one of ``TASKS``.
 
     Raises:
@@ -82,7 +82,7 @@ def fly_all(
         for controller in wanted
         for i in range(0, episodes, _CHUNK)
     ]
-    # one episode first, so that soon there is something to count
+    # one episode first, for an early count
     first = chunks[0]
     chunks[:1] = [(*first[:3], part) for part in (first[3][:1], first[3][1:]) if part]
     flown: dict[Chunk, list[Episode]] = {}

@@ -1,4 +1,4 @@
-"""Flying a controller through an episode of any task, and how well it holds the vehicle."""
+"""Flying a controller through an episode of any task, and its errors."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,8 +11,7 @@ from ..envs.fan_tracking import LOST_OFFSET, FanTrackingEnv
 
 Array = NDArray[np.float64]
 DECISIONS = FanTrackingEnv.decisions()
-# Seeds of episodes that score controllers; those of training and validation lie below, so none is
-# shared.
+# Seeds of scored episodes; training and validation use seeds below, and share none.
 FIRST_TEST_SEED = 1_000_000
 
 
@@ -47,7 +46,7 @@ class Episode:
 
     @property
     def command(self) -> Array:
-        """Command (n,) of FanTracking as it was flown, m/s."""
+        """Flown command (n,) of FanTracking, m/s."""
         return self.observation[:, 7]
 
     @property
@@ -73,16 +72,16 @@ def fly_episode(
     each: Callable[[dict[str, Any]], None] = lambda info: None,
     decisions: int | None = None,
 ) -> Episode:
-    """Fly one episode of a task and return it.
+    """Fly and return one episode of a task.
 
     Args:
         env: the environment.
-        controller: called with ``observation`` and ``info``. Its ``brief`` and its ``reset``,
-            where it has them, are called first, the former with ``Task.briefing``; its
-            ``foresight`` is how many decisions ahead it sees wind or fan.
-        seed: of the episode.
+        controller: called with ``observation`` and ``info``. If present, ``brief`` is called first
+            with ``Task.briefing``, then ``reset``. A ``foresight`` is the number of decisions of
+            wind or fan ahead in ``info``.
+        seed: the episode's.
         each: called with the ``info`` of every decision.
-        decisions: of a whole episode; default: those of the task.
+        decisions: length of a whole episode; default: the task's.
     """
     env.unwrapped.foresight = getattr(controller, "foresight", 0)
     observation, info = env.reset(seed=seed)
@@ -93,8 +92,8 @@ def fly_episode(
     loop, rows, total = env.unwrapped.loop, [], 0.0
     whole = decisions or env.unwrapped.decisions()
     for _ in range(whole):
-        action = controller(observation, info)
-        observation, reward, lost, _, info = env.step(np.asarray(action, dtype=np.float32))
+        action = np.asarray(controller(observation, info), dtype=np.float32)
+        observation, reward, terminated, _, info = env.step(action)
         total += float(reward)
         row = (
             info["time"],
@@ -109,7 +108,7 @@ def fly_episode(
         )
         rows.append(row)
         each(info)
-        if lost:
+        if terminated:
             break
     columns = [np.array(column, dtype=np.float64) for column in zip(*rows, strict=True)]
     motion = info.get("fan_motion") or info.get("trajectory", "")
@@ -124,9 +123,9 @@ def benchmark_seeds(seed: int, episodes: int) -> list[int]:
 def time_series(episode: Episode) -> dict[str, Array]:
     """Return an episode as columns (n,), a row a decision.
 
-    ``t`` s; ``error`` m; ``px, py, pz`` m and ``qw, qx, qy, qz``, true, body to world; ``fx, fy,
-    fz`` N and ``tx, ty, tz`` Nm, estimated, ``true_fx`` to ``true_tz`` true, both in the world
-    frame. Of FanTracking also ``fan_y`` m, ``command`` m/s along y and ``vy`` m/s, estimated.
+    ``t`` s; ``error`` m; ``px, py, pz`` m and ``qw, qx, qy, qz``, true, body to world. In the world
+    frame ``fx, fy, fz`` N and ``tx, ty, tz`` Nm are estimated, ``true_fx`` to ``true_tz`` true.
+    FanTracking also has ``fan_y`` m, ``command`` m/s along y and ``vy`` m/s, estimated.
     """
     groups = {
         ("px", "py", "pz"): episode.position,

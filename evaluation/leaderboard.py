@@ -56,10 +56,10 @@ class Standing:
     change_over_best_ci95: tuple[float, float]
     # of no change, corrected (Holm); null for laws, and for policies of a kind
     p_over_best: float | None
-    policies: int  # that this row counts together
-    most_lost_fraction: float  # of the policy that loses most
-    # (rival - this) / (rival - limit), of the means: the share of the way from the rival to the
-    # best that the measurements allow; null where ``limit`` does not fly
+    policies: int  # counted together in this row
+    most_lost_fraction: float  # of the policy with most losses
+    # (rival - this) / (rival - limit), of the means: share of the way from the rival to the best
+    # possible by the measurements; null where ``limit`` does not fly
     share_of_limit: float = math.nan
 
 
@@ -68,8 +68,8 @@ def leaderboard(
 ) -> list[Standing]:
     """Return the leaderboard's rows, scenario by scenario, best first.
 
-    Policies of one kind that come with the kit (``sac-0``, ``sac-1``) have a row each, and one as a
-    kind (``sac``), whose intervals speak of other training seeds, too.
+    The kit's policies of one kind (``sac-0``, ``sac-1``) have a row each, and one as a kind
+    (``sac``). The kind's intervals are for other training seeds, too.
     """
     names, known = list(dict.fromkeys(controllers)), TASKS[task]
     kinds: dict[str, list[str]] = {}
@@ -138,14 +138,12 @@ def _row(
 
 
 def _share(start: float, here: float, end: float) -> float:
-    """Return the share of the way from one RMSE to a smaller one; not a number where there is no
-    way.
-    """
+    """Return the share of the way from one RMSE to a smaller one; not a number without a way."""
     return (start - here) / (start - end) if start > end else math.nan
 
 
 def _corrected(rows: Sequence[Standing]) -> list[Standing]:
-    """Return the rows with p-values corrected (Holm) for all that a page shows of them."""
+    """Return the rows with p-values corrected (Holm) for all rows on a page."""
     claims = {id(row): row.p_over_best for row in shown(rows) if row.p_over_best is not None}
     p = dict(zip(claims, holm(list(claims.values())).tolist(), strict=True))
     return [replace(row, p_over_best=p.get(id(row))) for row in rows]
@@ -154,7 +152,7 @@ def _corrected(rows: Sequence[Standing]) -> list[Standing]:
 def write_leaderboard(rows: Sequence[Standing], folder: Path) -> Path:
     """Write the rows as ``leaderboard.json``, at once or not at all; return its path.
 
-    A number that means nothing is null.
+    A number without a meaning is null.
     """
     path = folder / "leaderboard.json"
     data = [
@@ -166,14 +164,14 @@ def write_leaderboard(rows: Sequence[Standing], folder: Path) -> Path:
 
 
 def shown(rows: Sequence[Standing]) -> list[Standing]:
-    """Return the rows without policies that the row of their kind counts."""
+    """Return the rows without single policies of a kind with its own row."""
     kinds = {row.controller for row in rows if row.policies > 1}
     return [row for row in rows if row.controller.rpartition("-")[0] not in kinds]
 
 
 def summary(rows: Sequence[Standing]) -> str:
-    """Return what the rows say as a list, a scenario a line: losses first, then which policies are
-    better or worse than the best designed law at a corrected p-value below 0.05.
+    """Return the rows in words, a scenario a line: losses first, then the policies better or worse
+    than the best designed law at a corrected p-value below 0.05.
     """
     lines = []
     for scenario in dict.fromkeys(row.scenario for row in rows):
@@ -192,9 +190,9 @@ def summary(rows: Sequence[Standing]) -> str:
         better = [row for row in judged if row.change_over_best < 0]
         worse = [row for row in judged if row.change_over_best > 0]
         lines.append(
-            f"* **{scenario}**, {some[0].episodes} episodes each. Lost: {told}. Against the best "
-            f"designed law there, `{some[0].best_law}`: clearly worse {_listed(worse)}; clearly "
-            f"better {_listed(better)}."
+            f"* **{scenario}**, {some[0].episodes} episodes each. Terminated: {told}. Against the "
+            f"best designed law there, `{some[0].best_law}`: clearly worse {_listed(worse)}; "
+            f"clearly better {_listed(better)}."
         )
     return "\n".join(lines) + "\n" if lines else ""
 
@@ -230,7 +228,7 @@ def table(rows: Sequence[Standing]) -> dict[str, list[str]]:
             "policies": "-" if designed else str(row.policies),
             "RMSE (m), 95 %": f"{row.rmse_m:.3f} ({low:.3f}-{high:.3f})",
             "median": f"{row.median_rmse_m:.3f}",
-            "lost": _lost(row),
+            "terminated": _lost(row),
             "score": f"{row.score:.2f}",
             "wins": f"{100 * row.wins_over_rival:.0f} %",
             "P": f"{row.improvement_over_rival:.2f}",

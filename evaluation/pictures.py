@@ -24,7 +24,7 @@ from .episodes import Episode
 from .leaderboard import Standing, shown
 from .tasks import short_names
 
-# of controllers in every picture; all others take turns
+# fixed in every picture; other controllers take turns
 COLOURS = {"hover": GREY, "admittance": SERIES[1], "limit": BLACK, "oracle": SERIES[0]}
 _OTHERS = (*SERIES[2:], "#5f0f40", "#6a994e", "#8c564b", "#e08dac", "#3d405b")
 
@@ -43,7 +43,7 @@ def draw_episode(episode: Episode, title: str, path: Path) -> None:
     )
     figure = new_figure(7.0)
     top, *others = figure.subplots(4, 1, sharex=True, height_ratios=[2, 1, 1, 1])
-    end = "lost" if episode.lost else "never lost"
+    end = "terminated" if episode.lost else "not terminated"
     told = f" ({episode.motion}, seed {episode.seed})"
     top.set_title(f"{title}: RMSE {episode.rmse:.3f} m, {end}{told}")
     if episode.in_jet:
@@ -77,8 +77,8 @@ def _legend(axes: Any, columns: int) -> None:
 
 @styled()
 def draw_leaderboard(rows: Sequence[Standing], results: Results, path: Path) -> None:
-    """Draw the RMSE of every episode and the mean with its interval, and the rival's median
-    episode, a scenario a row; of a kind, the episodes of all policies, and the first one's path.
+    """Draw a scenario a row: the RMSE of every episode and the mean with its interval, and the
+    rival's median episode. A kind has the episodes of all policies, and the first one's path.
     """
     rows = shown(rows)
     scenarios = list(dict.fromkeys(row.scenario for row in rows))
@@ -89,14 +89,14 @@ def draw_leaderboard(rows: Sequence[Standing], results: Results, path: Path) -> 
     for (left, right), scenario in zip(grid, scenarios, strict=True):
         all_of_it = [row for row in rows if row.scenario == scenario]
         some = all_of_it[:MOST_ROWS]
-        rival = results[some[0].rival, scenario]
+        flights = {name: each for (name, world), each in results.items() if world == scenario}
+        rival = flights[some[0].rival]
         middle = int(np.argsort([e.rmse for e in rival])[len(rival) // 2])
         for i, row in enumerate(some):
             flown = [
                 each
-                for (name, world), each in results.items()
-                if world == scenario
-                and (name if row.policies == 1 else name.rpartition("-")[0]) == row.controller
+                for name, each in flights.items()
+                if (name if row.policies == 1 else name.rpartition("-")[0]) == row.controller
             ]
             values = np.array([e.rmse for each in flown for e in each])
             jitter = np.random.default_rng(0).uniform(-0.24, 0.24, len(values))
@@ -104,25 +104,18 @@ def draw_leaderboard(rows: Sequence[Standing], results: Results, path: Path) -> 
             left.scatter(values, i + jitter, s=11, color=colour, alpha=0.4, lw=0)
             left.plot(row.rmse_ci95_m, [i, i], color=BLACK, lw=2.2, solid_capstyle="butt", zorder=4)
             left.plot(row.rmse_m, i, "o", color=colour, mec=BLACK, ms=8, zorder=5)
-            lost = f", {100 * row.lost_fraction:.1f} % lost" if row.lost_fraction else ""
-            left.annotate(
-                f"{row.rmse_m:.3f} m{lost}",
-                (1.01, i),
-                xycoords=("axes fraction", "data"),
-                va="center",
-            )
+            lost = f", {100 * row.lost_fraction:.1f} % terminated" if row.lost_fraction else ""
+            beside, text = ("axes fraction", "data"), f"{row.rmse_m:.3f} m{lost}"
+            left.annotate(text, (1.01, i), xycoords=beside, va="center")
             episode = flown[0][middle]
             way = episode.y if episode.in_jet else episode.error
             right.plot(episode.time, way, color=colour)
-        longest = max(
-            (each[middle] for (_, world), each in results.items() if world == scenario),
-            key=lambda episode: len(episode.time),
-        )
+        longest = max((each[middle] for each in flights.values()), key=lambda e: len(e.time))
         right.plot(longest.time, longest.fan_y, "--", color=BLACK, lw=1.3)
         left.set_yticks(range(len(some)), [names[row.controller] for row in some])
         left.invert_yaxis()
         left.set_xlim(left=0)
-        of = f", the best {len(some)} of {len(all_of_it)}" if len(some) < len(all_of_it) else ""
+        of = f", the best {len(some)} of {len(all_of_it)}" if some != all_of_it else ""
         left.set_title(f"{scenario}{of}: RMSE of each episode, mean, 95 % interval")
         left.set_xlabel("RMSE (m)")
         told = "y (m), fan dashed" if longest.in_jet else "error (m)"

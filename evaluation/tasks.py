@@ -1,4 +1,4 @@
-"""The four tasks as data: environment, scenarios, laws, and what a leaderboard compares with."""
+"""The four tasks as data: environment, scenarios, laws, and the rivals on a leaderboard."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,23 +8,23 @@ from typing import Any
 from ..controllers.own_file import is_file_name, load_controller
 from ..controllers.registry import STANDARD_TASK, TASK_LAWS, make_controller, shipped_policies
 from ..controllers.trained_policy import is_policy_path, load_policy
-from ..envs import task as environments
 from ..envs.fan_tracking import FanTrackingEnv
 from ..envs.fan_tracking_2d import FanTracking2DEnv
+from ..envs.task import Task
 from ..envs.wind_tasks import WindHoverEnv, WindTrajectoryEnv
 from ..runtime.errors import InputError, unknown_name
 from .statistics import episode_bootstrap, hierarchical_bootstrap
 
 
 @dataclass(frozen=True)
-class Task:
-    """What a benchmark needs to know of a task."""
+class BenchmarkTask:
+    """A task with its rivals and defaults."""
 
-    environment: type[environments.Task]
-    rival: str  # the law over which wins are counted
-    flown: str  # the law that is flown where none is named
-    defaults: tuple[str, ...]  # its scenarios where none is named
-    selected: tuple[str, ...] = ()  # laws of a benchmark where none is named; none: all
+    environment: type[Task]
+    rival: str  # wins are counted over this law
+    flown: str  # default law of one episode
+    defaults: tuple[str, ...]  # default scenarios
+    selected: tuple[str, ...] = ()  # default laws of a benchmark; none: all
     bounds: tuple[str, ...] = ("hover", "oracle")  # no designed laws: the ends of the scales
     # 95 % interval of one law's mean RMSE
     interval: Callable[..., tuple[float, float]] = hierarchical_bootstrap
@@ -41,27 +41,27 @@ class Task:
 
     @property
     def standard(self) -> tuple[str, ...]:
-        """Laws of a benchmark where none is named."""
+        """Default laws of a benchmark."""
         return self.selected or tuple(self.laws)
 
     @property
     def decisions(self) -> int:
-        """How many an episode has."""
+        """Decisions of an episode."""
         return self.environment.decisions()
 
     def policies(self) -> Mapping[str, Path]:
-        """Return the policies that come with the kit, by name."""
+        """Return the kit's own policies, by name."""
         return shipped_policies(self.environment.name)
 
     def references(self, names: Sequence[str]) -> list[str]:
-        """Return ``names`` and the laws that scores, wins and shares are relative to."""
+        """Return ``names`` and the reference laws of scores, wins and shares."""
         return list(dict.fromkeys([*names, "hover", self.rival, *self.bounds]))
 
 
-TASKS: dict[str, Task] = {
+TASKS: dict[str, BenchmarkTask] = {
     task.environment.name: task
     for task in (
-        Task(
+        BenchmarkTask(
             FanTrackingEnv,
             "admittance",
             "admittance",
@@ -70,14 +70,14 @@ TASKS: dict[str, Task] = {
             ("hover", "limit", "oracle"),
             episode_bootstrap,
         ),
-        Task(FanTracking2DEnv, "admittance", "admittance", ("static", "base", "fast")),
-        Task(WindHoverEnv, "pid", "pid-force", ("base", "turbulent")),
-        Task(WindTrajectoryEnv, "pid", "pid-force", ("base", "turbulent")),
+        BenchmarkTask(FanTracking2DEnv, "admittance", "admittance", ("static", "base", "fast")),
+        BenchmarkTask(WindHoverEnv, "pid", "pid-force", ("base", "turbulent")),
+        BenchmarkTask(WindTrajectoryEnv, "pid", "pid-force", ("base", "turbulent")),
     )
 }
 
 
-def task_of(name: str) -> Task:
+def task_of(name: str) -> BenchmarkTask:
     """Return a task by its name.
 
     Raises:
@@ -92,8 +92,8 @@ def make_pilot(name: str, task: str = STANDARD_TASK) -> Any:
     """Return a new controller of a task.
 
     Args:
-        name: a law; a policy that comes with the kit; the path of a trained policy; or
-            FILE.py:CLASS of a file that is then run.
+        name: a law, one of the kit's policies, the path of a trained policy, or FILE.py:CLASS; the
+            file is then run.
         task: one of ``TASKS``.
 
     Raises:
@@ -114,8 +114,8 @@ def make_pilot(name: str, task: str = STANDARD_TASK) -> Any:
 
 
 def short_names(names: Sequence[str]) -> dict[str, str]:
-    """Return what tables and pictures call controllers: a policy by the name of its file, with as
-    many of its folders as it takes to tell it from the others.
+    """Return the controllers' names in tables and pictures: of a policy's file the name, with
+    enough of its folders to tell policies apart.
     """
     parts = {
         name: Path(name).with_suffix("").parts if is_policy_path(name) else (name,)

@@ -1,4 +1,4 @@
-"""Python files of a user's own, named on purpose: running them is what is asked for."""
+"""Python files of a user's own, named on purpose: a user who names a file asks to run the file."""
 
 import importlib.util
 import os
@@ -11,20 +11,20 @@ from .errors import InputError
 
 
 def import_file(path: str | Path, what: str) -> ModuleType:
-    """Return the module in a file, run once in a process; ``what`` says in errors what was
-    expected.
+    """Return the module in a file, run once in a process; ``what`` is the expected thing, for
+    errors.
 
-    It goes by its absolute path among the modules, so that it never hides another and is found
-    again.
+    Its name among the modules is the absolute path, so the module never hides another and is run
+    once.
 
     Raises:
-        InputError: there is no such file, or running it fails; the message names the line.
+        InputError: no such file, or an error while it runs; the message names the line.
     """
     path = Path(path).resolve()
     name = str(path)
     if name in sys.modules:
         return sys.modules[name]
-    if not os.path.isfile(path):  # False for a name that is too long
+    if not os.path.isfile(path):  # False for too long a name
         raise InputError(f"{path}: there is no such file; expected {what}")
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:

@@ -1,4 +1,4 @@
-"""A network that says what a tracker would believe, and how it is fitted to episodes."""
+"""A network with a tracker's belief as its output, and its fit to episodes."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -28,21 +28,21 @@ class Sequences:
     counts: Array  # (decisions, episodes), 0 where the vehicle is lost or the truth unknown
 
     def single_decisions(self) -> "Sequences":
-        """Return each decision that counts as an episode of its own."""
+        """Return each counting decision as an episode of its own."""
         some = self.counts.ravel() > 0.0
         seen, truth = (x.reshape(1, len(some), -1)[:, some] for x in (self.seen, self.truth))
         return Sequences(seen, truth, self.counts.reshape(1, -1)[:, some])
 
 
 class BeliefNetwork(torch.nn.Module):
-    """A recurrent cell or none, dense layers, and for each quantity that it is taught a mean and
-    the logarithm of a standard deviation.
+    """A recurrent cell or none, dense layers, and for each taught quantity a mean and the logarithm
+    of a standard deviation.
 
     Args:
         quantities: of a frame.
-        taught: quantities that it says.
-        cell: ``gru``, ``lstm`` or ``none``; torch fits an LSTM in less than half the time, but it
-            needs more epochs.
+        taught: quantities of the output.
+        cell: ``gru``, ``lstm`` or ``none``; torch fits an LSTM in less than half the time, but with
+            more epochs.
         state: size of the cell.
         net: sizes of the dense layers between.
         activation: of these layers.
@@ -81,7 +81,7 @@ class BeliefNetwork(torch.nn.Module):
     def whiten(self, seen: Array) -> None:
         """Let the cell see frames whose quantities are not correlated and of size 1, as they are in
         ``seen`` (decisions, episodes, quantities): a small difference of two of them counts as much
-        as their sum. The policy has it in the weights of its cell.
+        as their sum. The policy has this change in the weights of its cell.
         """
         flat = seen.reshape(-1, seen.shape[-1]).astype(np.float64)
         sizes, axes = np.linalg.eigh(np.cov(flat.T))
@@ -116,12 +116,12 @@ def fit(
     generator: torch.Generator,
     mirrored: Array | None = None,
 ) -> float:
-    """Fit means and deviations to what is taught, over whole episodes; return the last epoch's
-    mean loss.
+    """Fit means and deviations to the taught quantities, over whole episodes; return the last
+    epoch's mean loss.
 
-    The loss is the likelihood of normal errors, each times the deviation that was said: where the
-    fan is hard to tell a sample counts less, but not as little as by the likelihood alone, which
-    would let hard episodes go (beta-NLL with beta 0.5: Seitzer and others, *On the pitfalls of
+    The loss is the likelihood of normal errors, each times the deviation of the output. Samples
+    with a fan hard to locate count less, but more than by the likelihood alone, with which hard
+    episodes would be lost (beta-NLL with beta 0.5: Seitzer and others, *On the pitfalls of
     heteroscedastic uncertainty estimation with probabilistic neural networks*, 2022).
 
     Args:
@@ -131,9 +131,9 @@ def fit(
         batch_size: episodes.
         rates: learning rate at first and in the end; it falls as a cosine.
         generator: of the order, and of which episodes are mirrored.
-        mirrored: signs (quantities,) of a frame where left and right change places, and all that is
-            taught changes its sign: each time that an episode is learned from, it is mirrored or
-            not. Default: none is.
+        mirrored: signs (quantities,) of a frame where left and right change places, and all taught
+            quantities change their signs. At each use an episode is mirrored or not. Default: none
+            is.
     """
     seen, truth, counts = (
         torch.from_numpy(x) for x in (episodes.seen, episodes.truth, episodes.counts)

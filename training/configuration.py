@@ -1,6 +1,4 @@
-"""Configurations of training, as data: one YAML file an algorithm, every key of which a run may
-override.
-"""
+"""Configurations of training, as data: one YAML file an algorithm; a run may override every key."""
 
 import copy
 from collections.abc import Sequence
@@ -22,12 +20,11 @@ def load_config(algorithm: str, overrides: Sequence[str] = (), file: Path | None
 
     Args:
         algorithm: one of ``ALGORITHMS``.
-        overrides: ``KEY=VALUE`` in YAML, with dots for what lies deeper: ``learner.gamma=0.98``.
-        file: a YAML file of such keys, nested, that changes the algorithm's own before
-            ``overrides`` do.
+        overrides: ``KEY=VALUE`` in YAML, with dots for deeper keys: ``learner.gamma=0.98``.
+        file: a YAML file of such keys, nested, merged before ``overrides``.
 
     Raises:
-        InputError: an algorithm, key or value that does not exist or is of another kind.
+        InputError: an unknown algorithm or key, or a value of another kind.
     """
     if algorithm not in ALGORITHMS:
         raise unknown_name("algorithm", algorithm, ALGORITHMS)
@@ -113,5 +110,5 @@ def _check(config: Config) -> None:
 
 
 def features_of(config: Config) -> Features:
-    """Return what the configured policy sees."""
+    """Return the inputs of the configured policy."""
     return Features(tuple(config["features"]["frame"]), config["features"]["history"])

@@ -1,9 +1,10 @@
 """Soft actor-critic with the update of stable-baselines3 in far fewer calls.
 
 Networks as small as these spend most of an update between operations, not in them. The two critics
-are computed side by side as one batch of matrices, gradients are taken only of what is to be
-changed, and optimiser and target network take one call each. The arithmetic is that of
-``stable_baselines3.SAC.train``, drawn in the same order: a test holds one to the other.
+are computed side by side as one batch of matrices. Gradients are taken of changed weights alone,
+and optimiser and target network take one call each. The arithmetic is
+``stable_baselines3.SAC.train``'s, with random numbers in the same order: a test holds one to the
+other.
 """
 
 import math
@@ -106,8 +107,8 @@ class FastSAC(SAC):  # type: ignore[misc]
 
 
 def _stack(critic: Any) -> tuple[list[torch.Tensor], list[torch.Tensor]]:
-    """Return weights (2, in, out) and biases (2, 1, out) of both critics, layer by layer, whose
-    memory they share from now.
+    """Return weights (2, in, out) and biases (2, 1, out) of both critics, layer by layer; from now
+    on they share the critics' memory.
     """
     layers = [[m for m in net if isinstance(m, torch.nn.Linear)] for net in critic.q_networks]
     weights, biases = [], []
@@ -124,7 +125,7 @@ def _stack(critic: Any) -> tuple[list[torch.Tensor], list[torch.Tensor]]:
 def _critics(
     weights: list[torch.Tensor], biases: list[torch.Tensor], inputs: torch.Tensor
 ) -> torch.Tensor:
-    """Return what both critics think (2, n, 1) of observations and actions (n, in)."""
+    """Return both critics' values (2, n, 1) of observations and actions (n, in)."""
     x = inputs.expand(len(weights[0]), -1, -1)
     for i, (weight, bias) in enumerate(zip(weights, biases, strict=True)):
         x = torch.baddbmm(bias, x, weight)

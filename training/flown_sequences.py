@@ -1,4 +1,4 @@
-"""Training flights as sequences: what a policy saw, and what a simulator knows of each decision."""
+"""Training flights as sequences: a policy's inputs, and the simulator's truth of each decision."""
 
 from collections.abc import Callable
 from typing import Any
@@ -22,8 +22,8 @@ _CALM = 0.5  # share of the episodes, after the first round, in which nothing le
 
 
 class FanLesson:
-    """FanTracking: the command of a law that sees the fan (its velocity, and a gain on the offset),
-    or where the fan is ``ahead`` decisions later.
+    """FanTracking: the command of a law with sight of the fan (its velocity, and a gain on the
+    offset), or the fan's place ``ahead`` decisions later.
     """
 
     decisions, period, largest = DECISIONS, DECISION_PERIOD, MAX_COMMAND
@@ -52,8 +52,8 @@ class FanLesson:
         return self._history.flat(), wanted[:, None]
 
     def taught(self, kept: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
-        """Return what is taught of the episodes since ``begin``, and what counts (decisions, n);
-        ``kept`` (decisions + 1, n) says where a vehicle still flies.
+        """Return the taught quantities of the episodes since ``begin``, and weights (decisions, n);
+        ``kept`` (decisions + 1, n): the vehicle still flies.
 
         Taught is the command (decisions, n, 1), or the fan's offset, its velocity and that less the
         vehicle's own (decisions, n, 3).
@@ -71,14 +71,15 @@ class FanLesson:
 
 
 class Flights:
-    """Training flights side by side, and what came of them.
+    """Training flights side by side, and their results.
 
     Args:
-        envs: vector environments in which each round is flown; one that has lost its vehicle goes
-            on with another episode.
-        lesson: what is seen and taught: a ``FanLesson``, or what has its constants and methods.
+        envs: vector environments of each round; after a loss of its vehicle one goes on with
+            another episode.
+        lesson: inputs and taught quantities: a ``FanLesson``, or an object with its constants and
+            methods.
         config: ``rounds``, ``wander`` (``size`` and ``time``, s, of an error of the commands).
-        seed: of the run.
+        seed: the run's.
         advance: called with the number of decisions flown so far.
     """
 
@@ -96,7 +97,7 @@ class Flights:
         self.episodes = 0
 
     def sequences(self) -> Sequences:
-        """Return all that were flown."""
+        """Return all flown sequences."""
         return Sequences(
             *(
                 np.concatenate([getattr(one, name) for one in self._flown], axis=1)

@@ -1,14 +1,14 @@
-"""Imitation of one who knows (DAgger): a network learns a teacher's command, or where the fan is.
+"""Imitation of a teacher with knowledge (DAgger): a network learns a teacher's command, or where
+the fan is.
 
-In every round of DAgger (Ross, Gordon and Bagnell, 2011) the newest network flies. It sees what any
-policy may see; the simulator says, of every decision, what the teacher would command, or how far
-the fan's axis was and how fast it moved next (privileged supervision, as of Chen and others,
-*Learning by cheating*, 2020). The network is fitted to all that was said so far. With a recurrent
-cell it is fitted to whole episodes, and what it says then is close to the mean of the posterior
-under the motions that it was trained on. The command is what a tracker makes of such a mean: the
-fan's velocity, a gain on the offset and a damping of the difference of velocities. All of it is
-linear in what the network says, so it is folded into the last layer. Gain and damping are chosen on
-the validation episodes.
+In every round of DAgger (Ross, Gordon and Bagnell, 2011) the newest network flies. It has the
+inputs of any policy. For every decision the simulator gives the teacher's command, or the fan axis'
+offset and next velocity (privileged supervision, as of Chen and others, *Learning by cheating*,
+2020). The network is fitted to all answers so far. With a recurrent cell the fit is over whole
+episodes, and the output comes close to the posterior mean under the trained motions. The command is
+a tracker's for such a mean: the fan's velocity, a gain on the offset and a damping of the
+difference of velocities. All this is linear in the network's output, so it is folded into the last
+layer. Gain and damping are chosen on the validation episodes.
 """
 
 import itertools

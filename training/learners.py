@@ -1,5 +1,5 @@
-"""The learners of stable-baselines3, made from a configuration, and what they have learned as a
-policy's weights.
+"""The learners of stable-baselines3, made from a configuration, and their results as a policy's
+weights.
 """
 
 import itertools
@@ -19,7 +19,7 @@ ACTIVATIONS = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}
 
 
 def make_learner(config: Config, env: VecEnv, seed: int) -> Any:
-    """Return the SB3 algorithm that a configuration describes."""
+    """Return the SB3 algorithm of a configuration."""
     torch.set_num_threads(1)  # the networks are small: threads would only wait for each other
     algorithm = config["algorithm"]
     policy: dict[str, Any] = {

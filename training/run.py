@@ -1,4 +1,4 @@
-"""A run of training in its folder: what the run is, how it goes, and the best policy so far."""
+"""A run of training in its folder: its request, its progress, and the best policy so far."""
 
 import platform
 import time
@@ -21,7 +21,7 @@ from .configuration import Config, features_of
 from .seeds import FIRST_VALIDATION_SEED, validation_seeds
 from .training_envs import check_training_env, make_training_env
 
-_SQUASHED = ("sac", "td3")  # algorithms whose policy sends its output through a tanh
+_SQUASHED = ("sac", "td3")  # algorithms with a tanh behind the policy's output
 
 
 @dataclass
@@ -30,7 +30,7 @@ class Progress:
 
     __pydantic_config__ = STRICT
 
-    steps: list[int] = field(default_factory=list)  # of each validation
+    steps: list[int] = field(default_factory=list)  # at each validation
     rmse_m: list[float] = field(default_factory=list)  # mean over the validation episodes
     lost: list[int] = field(default_factory=list)  # episodes of each validation
     best: int = -1  # index of the best
@@ -43,22 +43,22 @@ class Progress:
 
 
 def progress_from(data: Any, path: Path) -> Progress:
-    """Return the progress that a file holds.
+    """Return the progress from a file's data.
 
     Raises:
         InputError: the file holds something else.
     """
     try:
-        found = checked(Progress, data, str(path))
+        progress = checked(Progress, data, str(path))
     except InputError:
-        found = None
-    counts = {len(found.steps), len(found.rmse_m), len(found.lost)} if found else ()
-    if found is None or len(counts) > 1 or not -1 <= found.best < len(found.steps):
+        progress = None
+    counts = {len(progress.steps), len(progress.rmse_m), len(progress.lost)} if progress else ()
+    if progress is None or len(counts) > 1 or not -1 <= progress.best < len(progress.steps):
         raise InputError(
             f"{path}: does not hold the progress of a training "
             f"({', '.join(f.name for f in fields(Progress))}); delete {path.parent} to start anew"
         )
-    return found
+    return progress
 
 
 def read_progress(folder: Path) -> Progress | None:
@@ -74,12 +74,12 @@ def read_progress(folder: Path) -> Progress | None:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions that a policy was trained with."""
+    """Return the versions behind a trained policy."""
     return {"windwrench": __version__, "python": platform.python_version(), **package_versions()}
 
 
 def origin(algorithm: str, scenario: str, seed: int, steps: int, activation: str) -> dict[str, Any]:
-    """Return the entries that the cards of all learned policies share."""
+    """Return the shared entries of all learned policies' cards."""
     return {
         "algorithm": algorithm,
         "scenario": scenario,
@@ -92,7 +92,7 @@ def origin(algorithm: str, scenario: str, seed: int, steps: int, activation: str
 
 
 def card_of(config: Config, scenario: str, seed: int, steps: int) -> dict[str, Any]:
-    """Return the card of a policy: all that is needed to fly the policy, and to train it again."""
+    """Return the card of a policy: everything needed to fly the policy, and to train another."""
     last = FIRST_VALIDATION_SEED + config["validation"]["episodes"] - 1
     return {
         **origin(config["algorithm"], scenario, seed, steps, config["activation"]),
@@ -119,18 +119,18 @@ def validate(policy: TrainedPolicy | TaskPolicy, env: Any, episodes: int) -> tup
 class Run:
     """A run of training in its folder.
 
-    The folder holds ``training.json`` (what the run is), ``progress.json``, and the policies
+    The folder holds ``training.json`` (the run's request), ``progress.json``, and the policies
     ``last.npz`` and ``best.npz`` with their cards.
 
     Args:
         config: as of ``load_config``.
         scenario: scenario or tier to train in.
-        seed: of the run.
+        seed: the run's.
         folder: for its files.
         report: called after each validation.
 
     Raises:
-        InputError: a scenario that does not exist, or a folder with another run.
+        InputError: an unknown scenario, or a folder with another run.
     """
 
     def __init__(
@@ -150,7 +150,7 @@ class Run:
         self.best = folder / "best.npz"
 
     def _claim(self) -> None:
-        """Write what the run is into its folder."""
+        """Write the run's request into its folder."""
         path = self.folder / "training.json"
         run = {"config": self.config, "scenario": self.scenario, "seed": self.seed}
         if path.exists():
@@ -184,7 +184,7 @@ class Run:
         return last or steps // every > before // every
 
     def card(self, steps: int) -> dict[str, Any]:
-        """Return the card of the policy that ``steps`` decisions have taught."""
+        """Return the card of the policy after ``steps`` decisions."""
         return card_of(self.config, self.scenario, self.seed, steps)
 
     def validate(self, policy: TrainedPolicy) -> tuple[float, int]:
@@ -192,7 +192,8 @@ class Run:
         return validate(policy, self.judge, self.config["validation"]["episodes"])
 
     def take_stock(self, policy: TrainedPolicy) -> tuple[float, int]:
-        """Validate a policy, save the policy as the last one, and as the best if it is.
+        """Validate a policy, save the policy as the last one, and as the best where no earlier one
+        is better.
 
         Returns:
             As ``validate``.

@@ -1,11 +1,11 @@
-"""Policies of the tasks beside ``FanTracking``: a GRU that is taught by who knows, and SAC.
+"""Policies of the tasks beside ``FanTracking``: a GRU taught by a law with knowledge, and SAC.
 
 ``python -m windwrench.training.task_policies --task WindHover --kind gru --seed 0 --out FOLDER``.
 
-``gru`` is imitation with a memory (``imitation``): in the wind it is taught what would have been
-best in view of all that came (``hindsight``), in a mix of scenarios or in one of them; in
-``FanTracking2D`` the simulator says where the fan is and how it moves. ``sac`` is that of
-stable-baselines3 on the task's version 1. Beside the wind all learn on ``base``.
+``gru`` is imitation with a memory (``imitation``): in the wind it is taught the best commands in
+view of the future (``hindsight``), in a mix of scenarios or in one. In ``FanTracking2D`` the
+simulator gives place and motion of the fan. ``sac`` is stable-baselines3's on the task's version 1.
+Beside the wind all learn on ``base``.
 """
 
 import argparse
@@ -66,7 +66,7 @@ def _card(task: str, kind: str, scenario: str, seed: int, steps: int) -> dict[st
 
 class FanPlaneLesson:
     """FanTracking2D: scaled observations; the fan's offset from the vehicle (m) and its velocity
-    (m/s), both in the plane of the commands. A law that sees both flies the first round.
+    (m/s), both in the plane of the commands. A law with sight of both flies the first round.
     """
 
     _kind = TASKS["FanTracking2D"].environment
@@ -84,12 +84,12 @@ class FanPlaneLesson:
         return observations / self.scale, truth @ _shares(True, _GAINS[1]).T
 
     def taught(self, kept: NDArray[np.bool_]) -> tuple[Any, NDArray[np.bool_]]:
-        """Return what is taught (decisions, n, 4), and what counts (decisions, n)."""
+        """Return the taught quantities (decisions, n, 4), and weights (decisions, n)."""
         return np.array(self._truth[:-1]), kept[:-1]
 
 
 def _shares(of_fan: bool, gain: float) -> Array:
-    """Return what is commanded (axes, 4 or 3) of each quantity that is taught."""
+    """Return the shares (axes, 4 or 3) of each taught quantity in the command."""
     if not of_fan:
         return np.eye(3, dtype=np.float32)
     return np.array([[gain, 0.0, 1.0, 0.0], [0.0, gain, 0.0, 1.0]], dtype=np.float32)
@@ -98,7 +98,7 @@ def _shares(of_fan: bool, gain: float) -> Array:
 def teach(
     task: str, scenario: str, seed: int, rounds: int, episodes: int, epochs: int
 ) -> TaskPolicy:
-    """Return a GRU that was taught in rounds of DAgger of so many episodes each."""
+    """Return a GRU taught in rounds of DAgger of so many episodes each."""
     of_fan = task == "FanTracking2D"
     lesson = FanPlaneLesson() if of_fan else WindLesson(task)
     config = {
@@ -128,7 +128,7 @@ def teach(
 
 
 def sac(task: str, seed: int, steps: int) -> TaskPolicy:
-    """Return what SAC learns in ``steps`` decisions."""
+    """Return SAC's policy after ``steps`` decisions."""
     from stable_baselines3.common.monitor import Monitor
     from stable_baselines3.common.vec_env import DummyVecEnv
 

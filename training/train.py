@@ -24,21 +24,21 @@ def train(
     """Train a policy; return the path of the best one on the validation episodes.
 
     ``folder`` then holds ``best.npz`` and ``last.npz`` with their cards, ``progress.json``,
-    ``training.json``, TensorBoard's events, and ``checkpoint.pt``. Called again after a run was
-    killed, it goes on from the last checkpoint and ends with the same policies, bit for bit, as a
-    run that was not. Imitation has neither events nor checkpoint and starts anew.
+    ``training.json``, TensorBoard's events, and ``checkpoint.pt``. A killed run resumes from its
+    last checkpoint at the next call. Its policies are, bit for bit, the ones of an undisturbed run.
+    Imitation has neither events nor checkpoint and starts anew.
 
     Args:
         config: as of ``load_config``.
         scenario: scenario or tier to train in.
-        seed: of the run.
+        seed: the run's.
         folder: for its files.
-        advance: called with the number of decisions (over all environments) that the run stands at.
+        advance: called with the number of decisions so far (over all environments).
         report: called after each validation.
-        stop_after: decisions after which to return early, at the next checkpoint; for tests.
+        stop_after: decisions before an early return, at the next checkpoint; for tests.
 
     Raises:
-        InputError: a scenario that does not exist, or a folder with another run.
+        InputError: an unknown scenario, or a folder with another run.
     """
     run = Run(config, scenario, seed, folder, report)
     if config["algorithm"] in IMITATIONS:
@@ -95,7 +95,7 @@ def _follower(advance: Callable[[int], None]) -> Any:
     from stable_baselines3.common.callbacks import BaseCallback
 
     class Follow(BaseCallback):  # type: ignore[misc]
-        """Tell how far the run is, and what the episodes of training that ended were worth."""
+        """Tell the decisions so far, and the RMSE of finished training episodes."""
 
         def _on_step(self) -> bool:
             advance(self.num_timesteps)

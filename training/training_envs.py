@@ -1,4 +1,4 @@
-"""The environments that policies are trained in: a scenario, or a tier that mixes several."""
+"""The environments of training: a scenario, or a tier, a mix of several."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -15,9 +15,9 @@ from ..evaluation.episodes import DECISIONS
 from ..runtime.errors import InputError, unknown_name
 
 LANES = "ukf-lanes"
-_SCENARIO = 1  # second word of the seed that draws the scenario of an episode
+_SCENARIO = 1  # second word of the seed of an episode's scenario
 
-# a scenario that comes twice is drawn twice as often
+# a repeated scenario is drawn twice as often
 TIERS: dict[str, tuple[str, ...]] = {
     "base-fast": ("base", "fast"),
     "wide": (
@@ -92,11 +92,10 @@ def make_training_envs(name: str, count: int, estimator: str = "ukf") -> TaskVec
         name: scenario or tier.
         count: how many.
         estimator: of the environments: ``ukf``, ``constant-gain``, its fast stand-in, or
-            ``ukf-lanes``: the full filter, with plant and flight loop beside it in the lanes of a
-            vector unit.
+            ``ukf-lanes``: the full filter, plant and flight loop in the lanes of a vector unit.
 
     Raises:
-        InputError: a name that does not exist, or ``ukf-lanes`` with a tier.
+        InputError: an unknown name, or ``ukf-lanes`` with a tier.
     """
     check_training_env(name)
     if estimator == LANES:

@@ -20,11 +20,11 @@ Array = NDArray[np.float32]
 class FeatureVecEnv(VecEnv):  # type: ignore[misc]
     """An SB3 ``VecEnv`` over a Gymnasium vector environment of fan-tracking environments.
 
-    Each environment on its own: where an episode ends, ``infos[i]["terminal_observation"]`` holds
-    the features that ended it, ``infos[i]["TimeLimit.truncated"]`` says that only the clock ended
-    it, and the observation returned is the first of its next episode. Every episode's seed is given
-    by ``seed_of``. ``episode`` (n,) holds the numbers of the episodes in flight: set to those of
-    another run, ``reset`` goes on with the episodes that follow.
+    Each environment on its own: at an episode's end, ``infos[i]["terminal_observation"]`` holds its
+    last features, and ``infos[i]["TimeLimit.truncated"]`` is True where only the clock ended the
+    episode. The returned observation is the first of the next episode. Every episode's seed is
+    given by ``seed_of``. ``episode`` (n,) holds the numbers of the episodes in flight: set to those
+    of another run, ``reset`` goes on with the episodes that follow.
 
     Args:
         envs: of FanTracking.
@@ -123,7 +123,7 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
         )
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """Say that episodes are counted here, so that SB3 reads ``infos[i]["episode"]``."""
+        """Tell SB3 to read ``infos[i]["episode"]``: episodes are counted here."""
         return [wrapper_class.__name__ == "Monitor" for _ in self._get_indices(indices)]
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:

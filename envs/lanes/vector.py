@@ -23,9 +23,9 @@ from ..task import SETTLE_TICKS, Task, true_motion
 from ..vector import TaskVectorEnv
 from ..wind.field import Sum
 from ..wind_tasks import WindHoverEnv, WindTrajectoryEnv
-from .flight import Blocks, fly_blocks
+from .flight import LoopBlocks, fly_blocks
 
-_LARGEST = 1e10  # of a number that MuJoCo goes on with
+_LARGEST = 1e10  # beyond it MuJoCo starts over
 _GENERATOR = typeof(np.random.default_rng(0))
 
 
@@ -33,51 +33,51 @@ class TaskLanes(TaskVectorEnv):
     """``TaskVectorEnv`` without MuJoCo: plant, filter and flight loop side by side, an environment
     in each lane of a vector unit.
 
-    An episode is that of the MuJoCo environment with its seed, to rounding: the same draws of the
-    same generators, the same equations in the same order, and MuJoCo's integrator written out for
-    the one free body there is. It is the same bit for bit for any ``num_envs`` and ``threads``.
-    Observation, reward, ``infos`` and autoreset modes are those of ``TaskVectorEnv``.
+    An episode equals the MuJoCo environment's with its seed, to rounding: the same draws of the
+    same generators and the same equations in the same order. MuJoCo's integrator is written out
+    for the one free body. Bits depend on neither ``num_envs`` nor ``threads``. Observation, reward,
+    ``infos`` and autoreset modes are those of ``TaskVectorEnv``.
 
     All scenarios fly, with any ``vehicle``, ``truth``, ``fan``, ``settings``, ``fan_path``,
-    ``gains``, view and compiled ``winds``. What does not, and is refused: effects other than those
-    of the rigid body (mass, inertia, com_offset), declared or not; ``estimator="constant-gain"``;
-    ``render_mode``; ``stages`` and winds of one's own; a task with its own ``fly``, ``draw_loop``
-    or ``_begin``. One environment draws the episodes of all: an override of ``hover`` or
-    ``make_loop`` must keep nothing from episode to episode.
+    ``gains``, view and compiled ``winds``. Effects beyond the rigid body's (mass, inertia,
+    com_offset) are refused, declared or not. So are ``estimator="constant-gain"``, ``render_mode``,
+    ``stages``, winds of one's own, and a task with its own ``fly``, ``draw_loop`` or ``_begin``.
+    One environment draws the episodes of all: an override of ``hover`` or ``make_loop`` must keep
+    nothing from episode to episode.
 
     Args:
-        num_envs: how many.
+        num_envs: number of environments.
         *args: as of ``TaskVectorEnv``.
         **kwargs: likewise.
 
     Raises:
-        InputError: what does not fly in lanes, or what ``TaskVectorEnv`` refuses.
+        InputError: lanes or ``TaskVectorEnv`` refuse an argument.
     """
 
     called = TaskVectorEnv.called - {"_begin", "draw_loop", "fly"}
 
     def _make_envs(self, kwargs: dict[str, Any]) -> list[Task]:
-        """Return one environment: it says what all are, and never flies."""
+        """Return one environment: a model of all, never flown."""
         return [self.task(**kwargs)]
 
     def _make_memory(self) -> Motion:
-        """Make what ``_fly`` works on; return the motion of all."""
+        """Make the memory of ``_fly``; return the motion of all."""
         env = self.envs[0]
         self._like = env.make_loop(env.truth, env.fan)
         _refuse(env, self._like)
-        # each environment's own; one that was not reset yet has another's
+        # each environment's own; before its first reset a placeholder
         self._generators = generator_list([np.random.default_rng(0)] * self.num_envs)
         self._step = step_address()
-        self._flying = Blocks(-(-self.num_envs // WIDTH), self._like)
-        self._settling = Blocks(0, self._like)
+        self._flying = LoopBlocks(-(-self.num_envs // WIDTH), self._like)
+        self._settling = LoopBlocks(0, self._like)
         self._works: deque[np.ndarray] = deque()
         self._seeded = np.zeros(self.num_envs, dtype=np.bool_)
-        self._blowing: list[Sum] = [Sum()] * self.num_envs  # what ``_calls`` has the addresses of
+        self._blowing: list[Sum] = [Sum()] * self.num_envs  # keeps the winds at ``_calls``
         self._lay_calls()
         return self._flying.motion
 
     def _lay_calls(self) -> None:
-        """Write down where the winds of all environments are: (n, winds, 2), and how many."""
+        """Write down the addresses (n, winds, 2) and numbers (n,) of the environments' winds."""
         most = max(len(winds.calls) for winds in self._blowing)
         self._calls = np.zeros((self.num_envs, most, 2), dtype=np.int64)
         self._winds = np.array([len(winds.calls) for winds in self._blowing])
@@ -85,9 +85,7 @@ class TaskLanes(TaskVectorEnv):
             self._calls[i, : len(winds.calls)] = winds.calls
 
     def truth(self) -> dict[str, Array]:
-        """Return the true motion and the integral of the flight loop as ``Task`` tells an oracle of
-        them, a row an environment.
-        """
+        """Return an oracle's true motion and the flight loop's integral, a row an environment."""
         loops, vehicle = self._flying.loops, self.envs[0].vehicle
         values = *self._motion[:2], loops["plant"]["speeds"], loops["flight"]["sum"]
         rows = zip(*map(self._rows, values), strict=True)
@@ -95,9 +93,7 @@ class TaskLanes(TaskVectorEnv):
         return {name: np.array([one[name] for one in known]) for name in known[0]}
 
     def late(self) -> Array:
-        """Return by how much (n,) s an answer of the flight loop is late: that of the actuators
-        and that of the pose.
-        """
+        """Return the delay (n,) s of the flight loop's answer: actuators and pose."""
         plant = self._flying.loops["plant"]
         ticks: Array = plant["actuator_late"] + plant["pose_late"]
         return TICK * ticks.ravel()[: self.num_envs]
@@ -117,9 +113,9 @@ class TaskLanes(TaskVectorEnv):
         self._flying.loops[...], self._flying.filters[...] = state["_flying"]
         self._lay_calls()
 
-    def _fly_blocks(self, blocks: Blocks, slots: np.ndarray, ticks: int) -> None:
-        """Fly blocks in which ``slots`` (lanes,) say whose vehicle is in a lane; -1: nobody's. Each
-        thread has a record of its own for the filters in hand.
+    def _fly_blocks(self, blocks: LoopBlocks, slots: np.ndarray, ticks: int) -> None:
+        """Fly blocks with the vehicles of ``slots`` (lanes,) in their lanes; -1: none. Each thread
+        has a record of its own for the filters in hand.
         """
         count = len(slots) // WIDTH
         parts = 1 if self.threads == 1 else count
@@ -133,7 +129,7 @@ class TaskLanes(TaskVectorEnv):
             try:
                 first, last = part * count // parts, (part + 1) * count // parts
                 memory = *blocks.addresses, work.ctypes.data, self._step, self._like.jet_table
-                flown = blocks.drawn, blocks.motion, *given
+                flown = blocks.fields, blocks.motion, *given
                 kind = self._like.noise_size, self.envs[0].accelerates
                 self._call(fly_blocks, first, last, *memory, *flown, *kind)
             finally:
@@ -149,9 +145,9 @@ class TaskLanes(TaskVectorEnv):
 
     def _hover(self, which: list[int], seeds: Sequence[int | None]) -> None:
         env, vehicles = self.envs[0], {}
-        for i, seed in ((i, seeds[i]) for i in which):
-            if not self._seeded[i] or seed is not None:
-                self._generators[i], self._seeded[i] = np_random(seed)[0], True
+        for i in which:
+            if not self._seeded[i] or seeds[i] is not None:
+                self._generators[i], self._seeded[i] = np_random(seeds[i])[0], True
             env.np_random = self._generators[i]
             env.draw_loop()
             vehicles[i] = env.loop, env.drawn
@@ -159,20 +155,24 @@ class TaskLanes(TaskVectorEnv):
             self._settle(which, vehicles)
             drawn = np.isin(np.arange(self.num_envs), which)
             self._call(start_over, drawn, *self._motion[:2], self._episodes.broken)
-            self._call(
-                self.task.look, drawn, self._episodes, self._motion, self._whole, self._table
-            )
+            seen = self._episodes, self._motion, self._whole, self._table
+            self._call(self.task.look, drawn, *seen)
             which = np.flatnonzero(drawn & self._table["lost"]).tolist()
             if not which:
                 return
         env.refuse_draws()
 
     def _settle(self, which: list[int], vehicles: dict[int, Any]) -> None:
-        """Draw episodes for drawn vehicles, and let these hover at the start."""
-        env, places = self.envs[0], _places(which)
-        count = 1 + max((block for block, _ in places.values()), default=-1)
+        """Draw episodes for drawn vehicles, and let these hover at the start: each in its own lane,
+        of the first block with that lane free.
+        """
+        env, taken, places = self.envs[0], [0] * WIDTH, {}
+        for i in which:
+            places[i] = taken[i % WIDTH], i % WIDTH
+            taken[i % WIDTH] += 1
+        count = max(taken)
         if count > len(self._settling):
-            self._settling = Blocks(count, self._like)
+            self._settling = LoopBlocks(count, self._like)
         settling, slots = self._settling, np.full(count * WIDTH, -1)
         for i, (block, lane) in places.items():
             env.np_random = self._generators[i]
@@ -190,7 +190,7 @@ class TaskLanes(TaskVectorEnv):
 
 
 def generator_list(generators: Sequence[np.random.Generator]) -> Any:
-    """Return generators as a typed list, which compiled code takes at no cost a generator."""
+    """Return generators as a typed list, at no cost a generator in compiled code."""
     listed = typed.List.empty_list(_GENERATOR)
     for generator in generators:
         listed.append(generator)
@@ -199,7 +199,7 @@ def generator_list(generators: Sequence[np.random.Generator]) -> Any:
 
 @compiled
 def start_over(which: Flags, position: Array, velocity: Array, broken: Flags) -> None:
-    """Let environments start over, as MuJoCo does, whose numbers are too large or not finite."""
+    """Let environments with numbers too large or not finite start over, as MuJoCo does."""
     for n in np.flatnonzero(which):
         b, lane = n // WIDTH, n % WIDTH
         p, v = position[b, :, lane], velocity[b, :, lane]
@@ -209,20 +209,8 @@ def start_over(which: Flags, position: Array, velocity: Array, broken: Flags) ->
             p[3] = 1.0
 
 
-def _places(which: list[int]) -> dict[int, tuple[int, int]]:
-    """Return block and lane in which each environment settles: in its own lane, of the first block
-    that has the lane free.
-    """
-    taken = [0] * WIDTH
-    places = {}
-    for i in which:
-        places[i] = taken[i % WIDTH], i % WIDTH
-        taken[i % WIDTH] += 1
-    return places
-
-
 def _refuse(env: Task, loop: ClosedLoop) -> None:
-    """Refuse what does not fly in lanes."""
+    """Refuse arguments without a flight in lanes."""
     record = loop.record[0]
     called = any(
         record[part][f"{kind}_count"]
@@ -250,13 +238,13 @@ def make_vector(
 
     Args:
         task: the class of its environment.
-        num_envs: how many.
+        num_envs: number of environments.
         plant: ``"mujoco"``, the reference (``TaskVectorEnv``), or ``"lanes"``, the same flight in
             the lanes of a vector unit (``TaskLanes``): several times as fast.
-        **kwargs: of the class.
+        **kwargs: arguments of the class.
 
     Raises:
-        InputError: an unknown plant, or what the class refuses.
+        InputError: an unknown plant, or a refusal of the class.
     """
     if plant not in PLANTS:
         raise unknown_name("plant", str(plant), PLANTS, f"{task.name}: plant")

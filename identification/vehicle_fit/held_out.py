@@ -1,6 +1,6 @@
-"""How well a vehicle predicts what it was not fitted to: its coefficients are fitted anew without
-some segments of its flights, or without one of the flights, and predict those. Which parameters it
-has, and the noise's spectrum, are not asked again.
+"""Errors of a vehicle's predictions of held-out data. Coefficients are fitted anew without some
+segments of the flights, or without one flight, and predict the segments or flight left out. The set
+of parameters and the noise's spectrum stay.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,7 +15,7 @@ from .channels import MotionPiece
 from .solve import VehicleFit, refitted
 from .spectra import edges_of
 
-FOLDS = 3  # of all segments, every third is held out at a time
+FOLDS = 3  # every third segment is held out at a time
 
 
 def predicted(
@@ -33,7 +33,7 @@ def predicted(
     for log in logs:
         if not log.has_pose:
             raise InputError(f"{log.name}: has no pose; expected one, to predict from")
-    # of each segment: its log, and from and to, s after its log's start
+    # each segment's log, and from and to, s after the log's start
     number: list[int] = []
     spans: list[tuple[float, float]] = []
     for piece in pieces:
@@ -41,7 +41,7 @@ def predicted(
         number += [piece.log] * (len(edges) - 1)
         spans += list(zip(t[edges[:-1]].tolist(), t[edges[1:] - 1].tolist(), strict=True))
     turn = np.arange(len(number)) % FOLDS
-    found: dict[str, PredictionErrors] = {}
+    errors: dict[str, PredictionErrors] = {}
     for where, fold in {"held_out_blocks": turn, "flights_left_out": np.array(number)}.items():
         names = np.unique(fold)
         if len(names) < 2 and where == "flights_left_out":
@@ -53,14 +53,14 @@ def predicted(
                 windows.setdefault(number[i], []).append(spans[i])
             of = [logs[i] for i in windows]
             parts.append(prediction_errors(of, vehicle_of(part), windows=list(windows.values())))
-        found[where] = PredictionErrors.pooled(parts)
-    return found
+        errors[where] = PredictionErrors.pooled(parts)
+    return errors
 
 
 def torque_refuted(errors: Mapping[str, PredictionErrors]) -> str:
-    """Return the figures where fitted torques predict the body rate of held-out blocks worse than
-    the guess that nothing changes; nothing where they do not. A flight that alone shows something,
-    such as yaw, is no test: without it the others do not.
+    """Return the figures if fitted torques predict the body rate of held-out blocks worse than the
+    guess of no change; else nothing. A whole flight left out is no test: the only flight with yaw
+    takes Jzz with it.
     """
     rate, of = list(QUANTITIES).index("body rate"), errors.get("held_out_blocks")
     if of is None or of.model[rate, -1] <= of.still[rate, -1]:
@@ -73,9 +73,7 @@ def torque_refuted(errors: Mapping[str, PredictionErrors]) -> str:
 
 
 def warnings_of(errors: Mapping[str, PredictionErrors]) -> list[str]:
-    """Return a warning for each kind of flight that a vehicle predicts worse than the guess that
-    nothing changes.
-    """
+    """Return a warning for each kind of flight predicted worse than by the guess of no change."""
     return [
         f"warning: {where.replace('_', ' ')}: {', '.join(of.worse)}: predicted worse than by the "
         "guess that nothing changes. This vehicle is no model of it"

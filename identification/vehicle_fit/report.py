@@ -1,5 +1,5 @@
-"""What identify writes: the vehicle's file, the estimates beside it, and a picture of measured
-against fitted force and torque.
+"""Files of identify: the vehicle, the estimates beside it, and a picture of measured against fitted
+force and torque.
 """
 
 import json
@@ -24,28 +24,34 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_SHOWN_HZ = 8.0  # of the picture: what is faster is the pose's noise
-_LEAST_HZ = 0.4  # of the shares: what is slower holds the mean, such as the weight
+_SHOWN_HZ = 8.0  # highest frequency of the picture: above it lies the pose's noise
+_LEAST_HZ = 0.4  # lowest frequency of the shares: below it lies the mean, such as the weight
 _SHOWN_SECONDS = 10.0
 
 
-def identified_data(found: Identified) -> dict[str, Any]:
-    """Return the dictionary of ``identify.json``; None for what is not known."""
+def identified_data(identified: Identified) -> dict[str, Any]:
+    """Return the dictionary of ``identify.json``; None for unknown values."""
     data: dict[str, Any] = {
-        "vehicle": found.vehicle.name,
-        "mass_kg": found.vehicle.mass,
-        "flight_s": found.fit.balance.seconds,
-        "segments": len(found.fit.balance.segments),
-        "channels": found.sources,
+        "vehicle": identified.vehicle.name,
+        "mass_kg": identified.vehicle.mass,
+        "flight_s": identified.fit.balance.seconds,
+        "segments": len(identified.fit.balance.segments),
+        "channels": identified.sources,
         "estimates": [
-            {"name": e.name, "value": e.value, "interval_95": [e.low, e.high]}
-            | {"unit": e.unit, "status": e.status, "how": e.how}
-            for e in found.estimates.values()
+            {
+                "name": e.name,
+                "value": e.value,
+                "interval_95": [e.low, e.high],
+                "unit": e.unit,
+                "status": e.status,
+                "how": e.how,
+            }
+            for e in identified.estimates.values()
         ],
-        "notes": found.notes,
-        "advice": found.advice,
+        "notes": identified.notes,
+        "advice": identified.advice,
     }
-    for where, errors in found.predicted.items():
+    for where, errors in identified.predicted.items():
         of = zip(QUANTITIES.items(), errors.model, errors.still, strict=True)
         data[where] = {
             "starts": errors.starts,
@@ -59,48 +65,49 @@ def identified_data(found: Identified) -> dict[str, Any]:
     return told
 
 
-def headline(found: Identified) -> str:
+def headline(identified: Identified) -> str:
     """Return one sentence on how much of the vehicle the logs tell."""
     essential = ["Jxx", "Jyy", "Jzz", "p/k"]
-    open_ones = [n for n in essential if found.estimates[n].status in (ASSUMED, NOTHING)]
-    told = "thrust" if found.fit.drive.commands else "k"
+    open_ones = [n for n in essential if identified.estimates[n].status in (ASSUMED, NOTHING)]
+    told = "thrust" if identified.fit.drive.commands else "k"
     if not open_ones:
         return f"{told}, inertia and reaction torque are identified"
     return f"{told} is identified; assumed, since these logs do not tell: {', '.join(open_ones)}"
 
 
-def write_identified(found: Identified, path: Path) -> list[Path]:
+def write_identified(identified: Identified, path: Path) -> list[Path]:
     """Write the vehicle to a YAML file, and beside it ``NAME.identify.json``,
-    ``NAME.identify.png`` and, where it predicted, ``NAME.prediction.png``; return them.
+    ``NAME.identify.png`` and, with predictions, ``NAME.prediction.png``; return the paths.
 
     Raises:
         InputError: a file cannot be written.
     """
-    known = found.estimates
+    known = identified.estimates
     std = {
         e.name: {
             c: (estimate.high - estimate.low) / 3.92
             for c in e.coefficients
             if (estimate := known.get(f"{e.name} {c}", known.get(e.name)))
         }
-        for e in found.vehicle.effects
+        for e in identified.vehicle.effects
     }
-    save_vehicle(found.vehicle, path, std)
+    save_vehicle(identified.vehicle, path, std)
     data, picture = (path.with_name(f"{path.stem}.identify.{end}") for end in ("json", "png"))
-    write_text(json.dumps(identified_data(found), indent=1) + "\n", data)
-    write_png(_picture(found), picture)
+    write_text(json.dumps(identified_data(identified), indent=1) + "\n", data)
+    write_png(_picture(identified), picture)
     written = [path, data, picture]
-    if found.predicted:
+    if identified.predicted:
         written.append(path.with_name(f"{path.stem}.prediction.png"))
-        write_png(_prediction_picture(*list(found.predicted.items())[-1]), written[-1])
+        write_png(_prediction_picture(*list(identified.predicted.items())[-1]), written[-1])
     return written
 
 
-def fitted(found: Identified, piece: MotionPiece) -> tuple[Array, Array]:
-    """Return measured and fitted specific force (m/s2) and angular acceleration (rad/s2), (n, 6)
-    each, of a piece; both through the picture's low-pass, within the band that was used.
+def fitted(identified: Identified, piece: MotionPiece) -> tuple[Array, Array]:
+    """Return a piece's measured and fitted specific force (m/s2) and angular acceleration (rad/s2).
+
+    Both are (n, 6), behind the picture's low-pass and within the band of the fit.
     """
-    fit = found.fit
+    fit = identified.fit
     then = piece.t - fit.drive.delay
     columns = {n: np.interp(then, piece.t, x) for n, x in rotor_columns(piece, fit.drive).items()}
     columns |= air_columns(piece, fit.drive)
@@ -113,12 +120,11 @@ def fitted(found: Identified, piece: MotionPiece) -> tuple[Array, Array]:
     return low_pass(measured, shown_hz, piece.period), low_pass(model, shown_hz, piece.period)
 
 
-def explained(found: Identified) -> Array:
-    """Return the share (6,) of measured force and turning that the fit explains in the band that it
-    used: of the power, in which a frequency counts by how far it stands out of its noise; NaN where
-    nothing is measured.
+def explained(identified: Identified) -> Array:
+    """Return the share (6,) of measured power of force and turning that the fit explains in its
+    band. Each frequency counts by its ratio to the noise; NaN without a measurement.
     """
-    fit = found.fit
+    fit = identified.fit
     names, values = fit.balance.names, fit.values
     model = coefficients(values, names, fit.model.mass, fit.model.powers)
     total, left = np.zeros((2, 6))
@@ -132,12 +138,12 @@ def explained(found: Identified) -> Array:
 
 
 @styled()
-def _picture(found: Identified) -> "Figure":
-    mass, inertia = found.vehicle.mass, np.diag(found.vehicle.inertia)
+def _picture(identified: Identified) -> "Figure":
+    mass, inertia = identified.vehicle.mass, np.diag(identified.vehicle.inertia)
     scale = np.concatenate([np.full(3, mass), inertia])
-    longest = max(found.pieces, key=lambda p: len(p.t))
-    measured, model = fitted(found, longest)
-    share, band = explained(found), found.fit.drive.band
+    longest = max(identified.pieces, key=lambda p: len(p.t))
+    measured, model = fitted(identified, longest)
+    share, band = explained(identified), identified.fit.drive.band
     middle = longest.t[len(longest.t) // 2]
     shown = np.abs(longest.t - middle) <= 0.5 * _SHOWN_SECONDS
     figure = new_figure(4.8)

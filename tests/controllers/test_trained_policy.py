@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 from windwrench.controllers.features import Features
 from windwrench.controllers.registry import shipped_policies
@@ -50,7 +51,7 @@ def test_what_is_written_is_what_is_read(tmp_path):
     assert path.read_bytes() == again.read_bytes()
     for name in ("a.npz", "a.json"):
         policy = load_policy(tmp_path / name)
-        np.testing.assert_array_equal(policy.weights["weight0"], follower()["weight0"])
+        assert_array_equal(policy.weights["weight0"], follower()["weight0"])
         assert policy.card["algorithm"] == "test"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.json", "a.npz", "b.json", "b.npz"]
 
@@ -59,7 +60,7 @@ def test_a_held_command_changes_every_other_decision():
     policy = TrainedPolicy({**CARD, "repeat": 2}, follower())
     episode = fly_episode(FanTrackingEnv("static"), policy, 1)
     commands = episode.command[:40].reshape(20, 2)
-    np.testing.assert_array_equal(commands[:, 0], commands[:, 1])
+    assert_array_equal(commands[:, 0], commands[:, 1])
     assert len(np.unique(commands[:, 0])) > 15
 
 
@@ -121,7 +122,7 @@ def test_a_shipped_policy_of_two_axes_flies_better_than_hover():
 
 def test_what_is_mirrored_is_known():
     features = Features(("torque_z", "force_x", "path_y"), 2)
-    np.testing.assert_array_equal(features.mirrored, [-1, 1, -1, -1, 1, -1])
+    assert_array_equal(features.mirrored, [-1, 1, -1, -1, 1, -1])
 
 
 def test_seeds_of_training_validation_and_test_never_meet():

@@ -70,11 +70,7 @@ def test_an_inherited_override_and_one_of_an_instance_are_refused():
             TaskVectorEnv(2, task=task)
 
 
-def test_every_task_of_the_kit_flies_side_by_side():
-    """All of the kit's own overrides are of methods that are called."""
-    for task in (FanTrackingEnv, WindHoverEnv):
-        for many in FANS:
-            many(1, task=task).close()
+def test_training_s_own_task_flies_with_mujoco_alone():
     TaskVectorEnv(1, task=MixedFanTracking, scenario=("base", "fast")).close()
     with pytest.raises(InputError, match="MixedFanTracking overrides draw_loop"):
         TaskLanes(1, task=MixedFanTracking, scenario=("base", "fast"))
@@ -110,8 +106,7 @@ class Wide(WindHoverEnv):
 
 @pytest.mark.parametrize("plant", ["mujoco", "lanes"])
 def test_hooks_and_numbers_of_a_user_s_own_hold_in_many_as_in_a_single_one(plant):
-    given = {"version": 1, "normalize": False}
-    single, many = Wide(**given), make_vector(Wide, 2, plant=plant, **given)
+    single, many = Wide(), make_vector(Wide, 2, plant=plant)
     frame, _ = single.reset(seed=4)
     frames, infos = many.reset(seed=4)
     assert infos["trajectory"].tolist() == ["higher"] * 2

@@ -23,6 +23,11 @@ RNG = np.random.default_rng(5)
 X, Y = RNG.normal(1.0, 0.3, (5, 12)), RNG.normal(0.8, 0.3, (4, 12))
 
 
+def covered(intervals):
+    """Share of the intervals around 2."""
+    return np.mean([low <= 2.0 <= high for low, high in intervals])
+
+
 def test_probability_of_improvement_counts_all_pairs_of_runs_task_by_task():
     a, b = X.round(1), Y.round(1)  # with ties
     pairs = [
@@ -44,12 +49,8 @@ def test_paired_wins_are_of_an_episode_and_changes_of_the_means():
 
 
 def test_the_bootstrap_covers_the_truth_as_often_as_it_says():
-    inside = 0
-    for k in range(120):
-        sample = np.random.default_rng(k).normal(2.0, 1.0, 40)
-        low, high = episode_bootstrap(mean, sample, resamples=300)
-        inside += low <= 2.0 <= high
-    assert 0.87 <= inside / 120 <= 0.99
+    samples = [np.random.default_rng(k).normal(2.0, 1.0, 40) for k in range(120)]
+    assert 0.87 <= covered(episode_bootstrap(mean, s, resamples=300) for s in samples) <= 0.99
     assert episode_bootstrap(mean, [[3.0]]) == (3.0, 3.0)
 
 
@@ -68,18 +69,12 @@ def test_hierarchical_draws_have_the_variance_of_crossed_policies_and_episodes(p
 
 
 def test_the_hierarchical_interval_covers_other_policies_and_other_episodes():
-    inside = 0
-    for k in range(150):
-        rng = np.random.default_rng(k)
-        scores = (
-            2.0
-            + rng.normal(0.0, 0.3, (8, 1))
-            + rng.normal(0.0, 1.0, (1, 40))
-            + rng.normal(0.0, 0.5, (8, 40))
-        )
-        low, high = hierarchical_bootstrap(mean, scores, resamples=400, seed=k)
-        inside += low <= 2.0 <= high
-    assert 0.88 <= inside / 150 <= 0.99
+    def interval(k):
+        rng, sizes = np.random.default_rng(k), {(8, 1): 0.3, (1, 40): 1.0, (8, 40): 0.5}
+        scores = 2.0 + sum(rng.normal(0.0, sigma, shape) for shape, sigma in sizes.items())
+        return hierarchical_bootstrap(mean, scores, resamples=400, seed=k)
+
+    assert 0.88 <= covered(map(interval, range(150))) <= 0.99
 
 
 def test_a_single_policy_stays_and_a_pair_is_drawn_together():

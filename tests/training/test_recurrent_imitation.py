@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from windwrench.controllers.observation import VELOCITY_Y
 from windwrench.controllers.trained_policy import TrainedPolicy, load_policy
@@ -39,7 +40,7 @@ def test_a_policy_commands_its_shares_of_what_the_network_says(cell):
     with torch.no_grad():
         means, _, _ = network(torch.from_numpy(frames)[:, None])
     expected = np.clip(means[:, 0].numpy() @ shares[0], -1.0, 1.0)
-    np.testing.assert_allclose([policy.act(x)[0] for x in frames], expected, atol=1e-5)
+    assert_allclose([policy.act(x)[0] for x in frames], expected, atol=1e-5)
 
 
 def test_what_is_taught_is_the_fan_s_place_and_velocity():
@@ -55,17 +56,15 @@ def test_what_is_taught_is_the_fan_s_place_and_velocity():
     features, fan, offsets, speeds = features_of(config), [], [], []
     for k in range(40):
         seen = features.frames(observation[None])[0]
-        np.testing.assert_array_equal(flown.seen[k, 0, :5], seen[:5])
+        assert_array_equal(flown.seen[k, 0, :5], seen[:5])
         fan.append(info["fan_y"])
         offsets.append(info["fan_y"] - info["y"])
         speeds.append(observation[VELOCITY_Y])
         observation, _, _, _, info = env.step(flown.seen[k + 1, 0, 4:5])
-    np.testing.assert_allclose(flown.truth[:40, 0, 0], offsets, atol=1e-6)
+    assert_allclose(flown.truth[:40, 0, 0], offsets, atol=1e-6)
     velocities = (np.array(fan[2:]) - fan[:-2]) / 0.16
-    np.testing.assert_allclose(flown.truth[:38, 0, 1], velocities, atol=1e-5)
-    np.testing.assert_allclose(
-        flown.truth[:38, 0, 2], velocities - np.array(speeds)[:38], atol=1e-5
-    )
+    assert_allclose(flown.truth[:38, 0, 1], velocities, atol=1e-5)
+    assert_allclose(flown.truth[:38, 0, 2], velocities - np.array(speeds)[:38], atol=1e-5)
 
 
 def test_nothing_is_taught_where_the_vehicle_is_lost():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 pytest.importorskip("torch", reason="pip install 'windwrench[rl]'")
 
@@ -31,13 +32,13 @@ def test_lanes_tell_the_truth_of_the_single_environment():
         lanes.step(np.tile(action, (3, 1)))
         *_, info = single.step(np.array(action))
     for name, values in lanes.truth().items():
-        np.testing.assert_allclose(values[1], info[name], rtol=1e-6, atol=1e-9)
+        assert_allclose(values[1], info[name], rtol=1e-6, atol=1e-9)
 
 
 def test_lanes_tell_how_late_their_answers_are():
     lanes = TaskLanes(3, task=HOVER, settings=PlantSettings(actuator_delay=0.01, pose_delay=0.015))
     lanes.reset(seed=0)
-    np.testing.assert_allclose(lanes.late(), 0.025)
+    assert_allclose(lanes.late(), 0.025)
     (delayed,) = lanes_of("WindHover", LATE, 8)
     delayed.reset(seed=0)
     assert len(set(delayed.late())) > 2
@@ -62,7 +63,7 @@ def test_hindsight_knows_what_came_beside_the_model(late):
         wanted.append(-(x[3] @ gain + np.einsum("kni,ki->n", came[3 : 3 + AHEAD], ahead)))
     lesson._states, lesson._commands = list(zip(*states, strict=True)), list(commands)
     best, counts = lesson.taught(np.ones((count + 1, 2), dtype=np.bool_))
-    np.testing.assert_allclose(best[3], np.transpose(wanted))
+    assert_allclose(best[3], np.transpose(wanted))
     assert counts.sum(axis=0).tolist() == [count - AHEAD + 1] * 2
 
 
@@ -74,14 +75,14 @@ def test_a_policy_sees_what_its_network_saw_whitened():
     network.whiten(seen)
     turn, mean = (x.numpy() for x in network._white)
     white = (seen.reshape(-1, 27) - mean) @ turn
-    np.testing.assert_allclose(np.cov(white.T), np.eye(27), atol=0.1)
+    assert_allclose(np.cov(white.T), np.eye(27), atol=0.1)
     with torch.no_grad():
         said = network(torch.from_numpy(seen))[0].numpy()
     policy = TaskPolicy(
         _card("WindHover", "gru", MIX, 0, 0), network.policy_weights(np.eye(3, dtype=np.float32))
     )
     flown = [policy(frame * np.float32(HOVER.scales)) for frame in seen[:, 2]]
-    np.testing.assert_allclose(flown, said[:, 2], atol=1e-4)
+    assert_allclose(flown, said[:, 2], atol=1e-4)
 
 
 def test_a_mix_has_all_of_its_scenarios():
@@ -96,7 +97,7 @@ def test_a_taught_network_is_the_same_again(task):
     scenario = MIX if task == "WindHover" else "base"
     one, other = (teach(task, scenario, 0, rounds=2, episodes=16, epochs=1) for _ in range(2))
     for name, array in one.weights.items():
-        np.testing.assert_array_equal(array, other.weights[name])
+        assert_array_equal(array, other.weights[name])
     assert one.card["steps"] == 8000
 
 

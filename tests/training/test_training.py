@@ -12,6 +12,7 @@ import zipfile
 import gymnasium as gym
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.training.tiny import TINY
 from windwrench.controllers.features import Features, History
@@ -84,7 +85,7 @@ def test_the_shipped_policy_does_what_the_learner_would(algorithm):
         expected, state = learner.predict(
             x[None], state=state, episode_start=np.array([state is None]), deterministic=True
         )
-        np.testing.assert_allclose(policy.act(x), expected[0], atol=1e-5)
+        assert_allclose(policy.act(x), expected[0], atol=1e-5)
 
 
 def wind_env(config):
@@ -116,7 +117,7 @@ def test_the_fast_update_is_that_of_stable_baselines3(make_env):
             {**learner.policy.state_dict(), "log_ent_coef": learner.log_ent_coef.detach()}
         )
     for name, value in learned[0].items():
-        np.testing.assert_allclose(value.numpy(), learned[1][name].numpy(), atol=2e-5, err_msg=name)
+        assert_allclose(value.numpy(), learned[1][name].numpy(), atol=2e-5, err_msg=name)
     fresh = make_learner(config, make_env(config), 0).policy.state_dict()
     assert (
         float((fresh["actor.mu.weight"] - learned[0]["actor.mu.weight"]).abs().max()) > 1e-3
@@ -330,7 +331,7 @@ def test_each_environment_ends_by_itself_with_its_own_last_observation():
     gone = len(first) - 1
     assert 5 < gone < limit
     seen = env.reset()
-    np.testing.assert_array_equal(seen[1], first[0])
+    assert_array_equal(seen[1], first[0])
     still, _, _ = lone_flight(seed_of(0, 0), [0.0] * limit)
     for k in range(1, limit + 1):
         seen, _, dones, infos = env.step(
@@ -339,18 +340,18 @@ def test_each_environment_ends_by_itself_with_its_own_last_observation():
         assert dones.tolist() == [k == limit, k == gone, k == limit]
         assert ["terminal_observation" in info for info in infos] == dones.tolist()
         if k == gone:
-            np.testing.assert_array_equal(infos[1]["terminal_observation"], first[-1])
+            assert_array_equal(infos[1]["terminal_observation"], first[-1])
             assert infos[1]["TimeLimit.truncated"] is False
             assert infos[1]["episode"]["l"] == gone
-            np.testing.assert_array_equal(
+            assert_array_equal(
                 seen[1], lone_flight(seed_of(1, 1), [])[0][0]
             )  # its next episode's first
-            np.testing.assert_array_equal(seen[0], still[k])  # nobody else's changed
+            assert_array_equal(seen[0], still[k])  # nobody else's changed
         if k == limit:
             for i in (0, 2):
                 assert infos[i]["TimeLimit.truncated"] is True
-            np.testing.assert_array_equal(infos[0]["terminal_observation"], still[-1])
-            np.testing.assert_array_equal(seen[0], lone_flight(seed_of(0, 1), [])[0][0])
+            assert_array_equal(infos[0]["terminal_observation"], still[-1])
+            assert_array_equal(seen[0], lone_flight(seed_of(0, 1), [])[0][0])
     assert not np.array_equal(infos[0]["terminal_observation"], infos[2]["terminal_observation"])
 
 
@@ -370,9 +371,7 @@ def test_rewards_are_weighted_terms():
     _, rewards, _ = lone_flight(seed_of(0, 0), commands)
     env = make(1, 50)
     env.reset()
-    np.testing.assert_allclose(
-        [env.step(np.array([[c]]))[1][0] for c in commands], rewards, rtol=1e-6
-    )
+    assert_allclose([env.step(np.array([[c]]))[1][0] for c in commands], rewards, rtol=1e-6)
     squared = FeatureVecEnv(
         TaskVectorEnv(1, 50, scenario="static"),
         FEATURES,
