@@ -49,11 +49,18 @@ def identify(
 
     Example: windwrench identify flight.csv --mass 0.465 --geometry 0.126 --out my_drone.yaml
     """
-    from ..identification.prediction import QUANTITIES, prediction_errors
+    from ..identification.prediction import errors_of_models
     from ..identification.vehicle_fit.exports import EXPORTS
     from ..identification.vehicle_fit.geometry import parse_geometry
+    from ..identification.vehicle_fit.held_out import models_of
     from ..identification.vehicle_fit.identify import identify as fit
-    from ..identification.vehicle_fit.report import headline, identified_data, write_identified
+    from ..identification.vehicle_fit.report import (
+        headline,
+        identified_data,
+        table_of,
+        use_of,
+        write_identified,
+    )
 
     out = result_file(out, "vehicle.yaml")
     if out.suffix not in (".yaml", ".yml"):
@@ -73,8 +80,13 @@ def identify(
     if unseen:
         with working("predicting"):
             parts_of = [[window] for window in windows[len(logs) :]]
-            errors = prediction_errors(unseen, identified.vehicle, windows=parts_of)
-        identified = replace(identified, predicted={**identified.predicted, "prediction": errors})
+            models = identified.vehicle, models_of(identified.vehicle)[2]
+            errors, simplest = errors_of_models(unseen, models, windows=parts_of)
+        identified = replace(
+            identified,
+            predicted={**identified.predicted, "prediction": errors},
+            simplest={**identified.simplest, "prediction": simplest},
+        )
     run.record = out.with_name(f"{out.stem}.run.json")
     written = write_identified(identified, out)
     log_notes([*(text for flight in flights for text in flight.notes), *identified.notes])
@@ -99,13 +111,15 @@ def identify(
     for line in identified.advice:
         console.print(line)
     for of, errors in identified.predicted.items():
-        ends = zip(QUANTITIES.items(), errors.model[:, -1], errors.still[:, -1], strict=True)
+        simplest = identified.simplest.get(of)
         after = f"{errors.horizon[-1]:.2g} s after {errors.starts} starts"
         console.print(f"{of.replace('_', ' ')}: {after}, by what was not fitted to them:")
+        simple = () if simplest is None else ("thrust and drag",)
         show_table(
-            ("mean error", "of the vehicle", "if nothing changes", "unit"),
-            [(name, f"{x:.3g}", f"{y:.3g}", unit) for (name, unit), x, y in ends],
+            ("mean error", "of the vehicle", *simple, "if nothing changes", "unit"),
+            table_of(errors, simplest),
         )
+    console.print(use_of(identified))
     result = identified_data(identified)
     if export is not None:
         text = EXPORTS[export](identified)

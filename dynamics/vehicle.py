@@ -166,6 +166,30 @@ class Uncertainty:
     command: Share = 0.0
 
 
+Standing = Literal["identified", "assumed", "refuted"]
+
+
+@dataclass(frozen=True)
+class ModelStatus:
+    """What predictions of held-out flights say of a vehicle's model.
+
+    A refuted force keeps the velocity of a prediction, a refuted torque the body rate: see
+    ``windwrench.identification.predict``. Plant and filter use the numbers in any case.
+
+    Attributes:
+        force: "identified": thrust and drag predict held-out motion no worse than an unchanged
+            velocity. "refuted": worse. "assumed": no held-out flight was predicted.
+        torque: the same of the rotors' torques and an unchanged body rate.
+        coefficients: the source of single numbers, by the names of ``identify``'s table.
+    """
+
+    __pydantic_config__ = STRICT
+
+    force: Standing = "assumed"
+    torque: Standing = "assumed"
+    coefficients: Mapping[str, str] = field(default_factory=dict)
+
+
 @dataclass(frozen=True)
 class EffectSetting:
     """One effect of a vehicle's model: its name and the given coefficients; the others are zero.
@@ -207,6 +231,7 @@ class Vehicle:
         floor_z: m, world, height of the floor.
         ceiling_z: m, world, height of the ceiling.
         uncertainty: how well these numbers are known.
+        status: what predictions of held-out flights say of force, torque and single numbers.
     """
 
     __pydantic_config__ = STRICT
@@ -232,6 +257,7 @@ class Vehicle:
     floor_z: Number = -math.inf
     ceiling_z: Number = math.inf
     uncertainty: Uncertainty = Uncertainty()
+    status: ModelStatus = ModelStatus()
 
     def __repr__(self) -> str:
         effects = ", ".join(effect.name for effect in self.effects) or "none"

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,6 +42,7 @@ Segments = Sequence[tuple[float, float]]
 _LONGEST_ROTOR_STEP = 0.005  # s, over which rotors are held
 # of the motion in one of those: one step alone, at its zero-order hold, adds 5 mm in a second
 _MOTION_STEPS = 4
+_HEAVY = 1e9  # kg m2: torques turn nothing
 _STEP_TOLERANCE = 0.1  # of a period: a step so little too long is still one step
 # s after the start of unbroken pose: the filter of a prediction's start settles
 _START_MARGIN = 0.5
@@ -82,6 +83,9 @@ def predict(
     sample. Rotors and effects start with the memory of the flight before. Declared sensing effects
     are taken out of the log. No row after a start changes its state.
 
+    A torque that held-out flights refuted (``vehicle.status``) leaves the body rate as at the
+    start. A refuted force leaves the velocity.
+
     The start limits a prediction: 1 mrad of tilt is 5 mm after a second, 10 mrad/s of angular
     velocity is 16 mm. See ``causal_states``.
 
@@ -99,7 +103,7 @@ def predict(
         InputError: no stretch of pose is unbroken for 3 s, a state has another shape or a
             quaternion of another length than 1, or the vehicle has too many effects for a model.
     """
-    log = undo_log_sensing(log, vehicle)
+    log = undo_log_sensing(with_commanded_speeds(log, vehicle), vehicle)
     if state is None:
         pieces, states = known_pieces(log), causal_states(log, vehicle)
     else:
@@ -158,12 +162,16 @@ def _flown(
     last_known = np.maximum.accumulate(np.where(known, np.arange(len(log.t)), 0))[first:]
     # the model along the flight, and its copy from a start on
     models = np.zeros(2, dtype=_MODEL)
+    if vehicle.status.torque == "refuted":
+        vehicle = replace(vehicle, inertia=_HEAVY * np.eye(3))
     load_model(models[0], vehicle)
     t = log.t[first:] - log.t[0]
     models[0]["time"] = t[0]
     voltage = np.zeros(len(log.t)) if log.voltage is None else log.voltage
     speeds, volts = (np.ascontiguousarray(x[first:]) for x in (log.rotor_speeds, voltage))
-    _fly_along(models, t, speeds, volts, states[last_known], starts - first, log.period, path)
+    keeps = vehicle.status.force == "refuted"
+    after = states[last_known], starts - first, log.period, keeps, path
+    _fly_along(models, t, speeds, volts, *after)
     return path
 
 
@@ -182,7 +190,7 @@ def rollout_error(log: FlightLog, vehicle: Vehicle, segments: Segments) -> float
         InputError: the vehicle has too many effects for a model.
     """
     try:
-        _, seen, path = _predictions(log, vehicle, segments, _HORIZON)
+        _, seen, (path,) = _predictions(log, [vehicle], segments, _HORIZON)
     except InputError:
         return math.nan
     off = path[:, -1, POSITION] - seen[:, -1, POSITION]
@@ -211,11 +219,14 @@ class PredictionErrors:
 
     @classmethod
     def pooled(cls, parts: Sequence[PredictionErrors]) -> PredictionErrors:
-        """Return the errors over all starts of several with one horizon."""
+        """Return the errors over all starts of several, at the samples of the slowest."""
+        horizon = min((part.horizon for part in parts), key=len)
+        at = [np.searchsorted(part.horizon, horizon - 0.5 * part.horizon[0]) for part in parts]
+        of = [[part.model[:, i] for part, i in zip(parts, at, strict=True)]]
+        of.append([part.still[:, i] for part, i in zip(parts, at, strict=True)])
         starts = [part.starts for part in parts]
-        both = [[part.model for part in parts], [part.still for part in parts]]
-        means = (np.average(of, axis=0, weights=starts) for of in both)
-        return cls(sum(starts), parts[0].horizon, *means)
+        means = (np.average(each, axis=0, weights=starts) for each in of)
+        return cls(sum(starts), horizon, *means)
 
 
 def prediction_errors(
@@ -240,26 +251,40 @@ def prediction_errors(
             None: the predicting one.
 
     Raises:
-        InputError: no stretch of pose is long enough, or poses come at different rates.
+        InputError: no stretch of pose is long enough.
     """
-    model: list[Array] = []
-    still: list[Array] = []
-    horizons: list[Array] = []
+    return errors_of_models(logs, [vehicle], horizon_s, windows, start_by)[0]
+
+
+def errors_of_models(
+    logs: Sequence[FlightLog],
+    vehicles: Sequence[Vehicle],
+    horizon_s: float = 0.5,
+    windows: Sequence[Segments] | None = None,
+    start_by: Vehicle | None = None,
+) -> list[PredictionErrors]:
+    """Return ``prediction_errors`` of several models of one vehicle, from the same starts: by the
+    first one's filters, where ``start_by`` names no other.
+
+    Raises:
+        InputError: no stretch of pose is long enough.
+    """
+    parts: list[list[PredictionErrors]] = []
     whole = [[(0.0, math.inf)]] * len(logs)
-    for log, parts in zip(logs, windows or whole, strict=True):
+    for log, spans in zip(logs, windows or whole, strict=True):
         first, last = log.t[[0, -1]].tolist()
-        ends = [(first + begin, min(first + end, last)) for begin, end in parts]
-        flown = with_commanded_speeds(log, vehicle)
-        begun, seen, path = _predictions(flown, vehicle, ends, horizon_s, start_by)
-        if len(path):
-            horizons.append(log.period * np.arange(1, path.shape[1] + 1))
-            model.append(_distances(path, seen))
-            still.append(_distances(_unchanged(begun, horizons[-1]), seen))
-    if len({len(horizon) for horizon in horizons}) != 1:
+        ends = [(first + begin, min(first + end, last)) for begin, end in spans]
+        flown = with_commanded_speeds(log, vehicles[0])
+        begun, seen, paths = _predictions(flown, vehicles, ends, horizon_s, start_by)
+        if len(begun):
+            horizon = log.period * np.arange(1, seen.shape[1] + 1)
+            still = _distances(_unchanged(begun, horizon), seen).mean(axis=0)
+            means = (_distances(path, seen).mean(axis=0) for path in paths)
+            parts.append([PredictionErrors(len(begun), horizon, mean, still) for mean in means])
+    if not parts:
         names = ", ".join(log.name for log in logs)
-        raise InputError(f"{names}: expected poses at one rate, unbroken for {horizon_s + 1:g} s")
-    both = np.concatenate(model), np.concatenate(still)
-    return PredictionErrors(len(both[0]), horizons[-1], *(x.mean(axis=0) for x in both))
+        raise InputError(f"{names}: expected a pose, unbroken for {horizon_s + 1:g} s")
+    return [PredictionErrors.pooled(each) for each in zip(*parts, strict=True)]
 
 
 def _unchanged(begun: Array, ahead: Array) -> Array:
@@ -287,15 +312,15 @@ def _distances(x: Array, y: Array) -> Array:
 
 def _predictions(
     log: FlightLog,
-    vehicle: Vehicle,
+    vehicles: Sequence[Vehicle],
     segments: Segments,
     horizon: float,
     start_by: Vehicle | None = None,
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, list[Array]]:
     """Return the start states (n, STATE) of predictions, and the states (n, m, STATE) of flight and
-    prediction at the next m samples.
+    of each model's prediction at the next m samples.
     """
-    log = undo_log_sensing(log, vehicle)
+    log = undo_log_sensing(log, vehicles[0])
     ahead = max(1, round(horizon / log.period))
     starts, seen = [], []
     for piece in log_signals(log):
@@ -305,9 +330,9 @@ def _predictions(
         seen.append(_seen(piece, log.t[rows, None] + log.period * np.arange(1, ahead + 1)))
     rows, target = np.concatenate(starts), np.concatenate(seen)
     if not rows.size:
-        return np.empty((0, STATE)), target, target
-    states = causal_states(log, start_by or vehicle)
-    return states[rows], target, _flown(log, vehicle, states, rows, ahead)
+        return np.empty((0, STATE)), target, [target for _ in vehicles]
+    states = causal_states(log, start_by or vehicles[0])
+    return states[rows], target, [_flown(log, v, states, rows, ahead) for v in vehicles]
 
 
 def _start_rows(
@@ -339,10 +364,12 @@ def _fly_along(
     states: Array,
     starts: np.ndarray,
     period: float,
+    keeps_velocity: bool,
     path: Array,
 ) -> None:
     """Run the first model along a flight of n rows, for the memory of rotors and effects; let a
-    copy of it go at each start, and write the copy's states (starts, ahead, STATE).
+    copy of it go at each start, and write the copy's states (starts, ahead, STATE). With
+    ``keeps_velocity`` no force acts.
     """
     f, g = models[0], models[1]
     after, x, between = np.zeros(STATE_SIZE), np.zeros(STATE_SIZE), np.empty(4)
@@ -376,6 +403,10 @@ def _fly_along(
                     drive(g, between, dt, volts)
                     for _ in range(_MOTION_STEPS):
                         propagate(g, x, dt / _MOTION_STEPS, after)
+                        if keeps_velocity:
+                            for j in range(3):
+                                after[7 + j] = x[7 + j]
+                                after[j] = x[j] + x[7 + j] * dt / _MOTION_STEPS
                         x[:] = after
                     g.time += dt
                 path[at, i] = x[:size]

@@ -41,7 +41,8 @@ _preset = cache(load_vehicle)  # asked three times a log
 def with_commanded_speeds(
     log: FlightLog, vehicle: Vehicle | None, model: Commands | None = None
 ) -> FlightLog:
-    """Return a log with rotor speeds from its commands, unless speeds were measured.
+    """Return a log with rotor speeds from its commands, unless speeds were measured. Speeds that
+    another vehicle's thrust model gave are replaced by those of ``vehicle``'s motor curve.
 
     Args:
         log: the flight.
@@ -49,7 +50,8 @@ def with_commanded_speeds(
         model: thrust of a command for a vehicle without a motor curve; None: grows with the
             command's square.
     """
-    if log.command is None or log.has_rotor_speeds:
+    of_another = log.commanded and vehicle is not None and vehicle.motor_curve is not None
+    if log.command is None or (log.has_rotor_speeds and not of_another):
         return log
     speeds, notes = _speeds(log, log.command, vehicle, model or Commands(()))
     log = replace(log, notes=(*log.notes, *notes))

@@ -162,6 +162,8 @@ def pieces_of(
             inside = (piece.t >= log.t[0] + first) & (piece.t <= log.t[0] + last)
             for part in _cut(piece, inside):
                 pieces += _cut(part, _flying(part))
+    moving = [piece for piece in pieces if piece.velocity is not None]
+    pieces, sources = moving or pieces, replace(sources, velocity=bool(moving))
     if not pieces:
         raise InputError(
             f"{logs[0].name}: no piece of {_SHORTEST_PIECE:g} s in flight is unbroken "
@@ -198,8 +200,15 @@ def _inertial(log: FlightLog, sources: Sources) -> Iterator[_Motion]:
         t = np.arange(log.t[rows[0]], log.t[rows[-1]], period)
         rate = _sensor(log, log.gyro, t)
         force = None if log.accelerometer is None else _sensor(log, log.accelerometer, t)
+        turning = derivative(rate, period)
         velocity = _velocity(log, t) if sources.velocity else None
-        yield t, period, force, derivative(rate, period), rate, velocity
+        if velocity is None:
+            yield t, period, force, turning, rate, None
+            continue
+        for a, b in runs_of(np.isfinite(velocity[:, 0])):
+            if (b - a) * period >= _SHORTEST_PIECE:
+                felt = None if force is None else force[a:b]
+                yield t[a:b], period, felt, turning[a:b], rate[a:b], velocity[a:b]
 
 
 def _piece(log: FlightLog, number: int, motion: _Motion, sources: Sources) -> MotionPiece:
@@ -236,7 +245,9 @@ def _sensor(log: FlightLog, values: Array, t: Array) -> Array:
 
 
 def _velocity(log: FlightLog, t: Array) -> Array | None:
-    """Return the velocity (n, 3) in body axes at times; None where the pose has gaps."""
+    """Return the velocity (n, 3) in body axes at times, NaN in gaps of the pose; None where each
+    unbroken stretch is too short.
+    """
     try:
         signals = log_signals(log)
     except InputError:
@@ -246,7 +257,9 @@ def _velocity(log: FlightLog, t: Array) -> Array | None:
         inside = (t >= s.t[0]) & (t <= s.t[-1])
         body = Rotation.from_matrix(s.rotation).inv().apply(s.velocity)
         out[inside] = resampled(t[inside], s.t, body)
-    return None if np.isnan(out).any() else out
+    known = runs_of(np.isfinite(out[:, 0]))
+    longest = max((b - a for a, b in known), default=0) * float(t[1] - t[0])
+    return out if longest >= _SHORTEST_PIECE else None
 
 
 def _flying(piece: MotionPiece) -> Mask:

@@ -18,18 +18,18 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ...runtime.threads import one_thread
 from ..logs.flight_log import FlightLog
-from ..prediction import PredictionErrors
 from .assemble import advice_of, vehicle_of
 from .channels import MotionPiece, Sources, pieces_of, rounding_step, speed_noise
 from .columns import ANSWERED_HZ, Drive, balance
 from .effect_settings import effect_of
 from .estimates import Estimates, thrust_of
 from .geometry import SPIN, Geometry
-from .held_out import predicted, torque_refuted, warnings_of
+from .held_out import HeldOut, held_out, warnings_of, without_further
 from .motors import motor_response
 from .parameters import FORCE_BIAS, FURTHER, first_model
-from .result import IDENTIFIED, NOTHING, Estimate, Identified, told
-from .solve import Interval, VehicleFit, score_tests, solve
+from .plausible import check_rotors, check_thrust
+from .result import IDENTIFIED, NOTHING, REFUTED, Estimate, Identified, told
+from .solve import Interval, VehicleFit, nearest_body, score_tests, solve
 from .spectra import BAND
 
 Report = Callable[[float, str], None]
@@ -44,6 +44,7 @@ _CLOSE = 0.01  # share of thrust: two bands may differ by it at any interval
 _LEAST_VOLTAGE_RANGE = 0.03  # share: no exponent is fitted to a smaller range of voltage
 _LEAST_LAG = 4.0  # standard deviations of a lag behind logged rotor speeds
 _LAGS = (0.03, 0.08)  # s, starts of the search for a lag
+WITHOUT_EFFECTS = "drag and thrust alone predict data outside the fit better"
 
 
 @one_thread()
@@ -74,6 +75,7 @@ def identify(
     if not logs:
         raise InputError("identify: no log is given; expected one or more of a vehicle")
     pieces, sources = pieces_of(logs, windows or [(0.0, math.inf)] * len(logs))
+    check_rotors(pieces, logs)
     notes: list[str] = []
     voltage = _voltage(pieces)
     commands = sources.rotors == "commands"
@@ -116,17 +118,23 @@ def identify(
     motors = None if commands or "lag" in fit.model.free else motor_response(pieces)
 
     def described(part: VehicleFit, doubt: str) -> tuple[dict[str, Estimate], Vehicle]:
+        part, _ = nearest_body(part)
         named = Estimates(part, sources, geometry, kept, hidden, doubt).say_all(pieces)
         return named, vehicle_of(name, part, named, geometry, logs, voltage, step, motors)
 
     report(0.9, "predicting what is held out")
-    errors: dict[str, PredictionErrors] = {}
-    try:
-        errors = predicted(pieces, logs, fit, lambda part: described(part, doubt)[1])
-    except InputError as error:
-        notes.append(f"nothing that is held out was predicted: {error}")
-    notes += warnings_of(errors)
-    named, vehicle = described(fit, doubt or torque_refuted(errors))
+    tested = held_out(pieces, logs, fit, lambda part: described(part, doubt)[1])
+    notes += warnings_of(tested)
+    named, vehicle = described(fit, doubt or tested.why)
+    if not commands:
+        check_thrust(named["k"].value, vehicle.rotor_radius, logs[0].name)
+    _, excess = nearest_body(fit)
+    if excess > _APART:
+        notes.append(
+            f"warning: turning shows a principal inertia {excess:.1f} standard deviations above "
+            "the sum of the other two, the most that a body has: something else turns the vehicle"
+        )
+    vehicle = _with_status(vehicle, named, tested)
     if "lag" in fit.model.free:
         named["lag without offset"] = _lag_alone(pieces, fit)
     if motors is not None:
@@ -141,8 +149,20 @@ def identify(
         fit,
         tuple(notes),
         tuple(advice_of(named)),
-        errors,
+        tested.errors,
+        tested.simplest,
     )
+
+
+def _with_status(vehicle: Vehicle, named: dict[str, Estimate], tested: HeldOut) -> Vehicle:
+    """Return the vehicle with its status, and without refuted effects; mark these in ``named``."""
+    flown = vehicle if tested.further else without_further(vehicle)
+    for effect in vehicle.effects:
+        for name in (effect.name, *(f"{effect.name} {c}" for c in effect.coefficients)):
+            if effect not in flown.effects and name in named:
+                named[name] = replace(named[name], status=REFUTED, how=WITHOUT_EFFECTS)
+    sources = {e.name: e.status for e in named.values() if e.status != NOTHING}
+    return replace(flown, status=replace(tested.status, coefficients=sources))
 
 
 def _lag_alone(pieces: list[MotionPiece], fit: VehicleFit) -> Estimate:

@@ -17,6 +17,7 @@ from ..motion.smoothing import low_pass
 from ..prediction import QUANTITIES, PredictionErrors
 from .channels import MotionPiece
 from .columns import air_columns, rotor_columns
+from .held_out import LEAST_HZ, powers
 from .model import coefficients
 from .result import ASSUMED, NOTHING, Identified
 
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 
 
 _SHOWN_HZ = 8.0  # highest frequency of the picture: above it lies the pose's noise
-_LEAST_HZ = 0.4  # lowest frequency of the shares: below it lies the mean, such as the weight
 _SHOWN_SECONDS = 10.0
 
 
@@ -51,16 +51,19 @@ def identified_data(identified: Identified) -> dict[str, Any]:
         "notes": identified.notes,
         "advice": identified.advice,
     }
+    data["status"] = identified.vehicle.status
     for where, errors in identified.predicted.items():
         of = zip(QUANTITIES.items(), errors.model, errors.still, strict=True)
-        data[where] = {
-            "starts": errors.starts,
-            "horizon_s": errors.horizon,
-            **{
-                name.replace(" ", "_"): {"unit": unit, "model": model, "if_nothing_changes": still}
-                for (name, unit), model, still in of
-            },
-        }
+        data[where] = {"starts": errors.starts, "horizon_s": errors.horizon}
+        for i, ((name, unit), model, still) in enumerate(of):
+            data[where][name.replace(" ", "_")] = {
+                "unit": unit,
+                "model": model,
+                "if_nothing_changes": still,
+            }
+            if where in identified.simplest:
+                simplest = identified.simplest[where].model[i]
+                data[where][name.replace(" ", "_")]["thrust_and_drag"] = simplest
     told: dict[str, Any] = plain(data)
     return told
 
@@ -73,6 +76,34 @@ def headline(identified: Identified) -> str:
     if not open_ones:
         return f"{told}, inertia and reaction torque are identified"
     return f"{told} is identified; assumed, since these logs do not tell: {', '.join(open_ones)}"
+
+
+def use_of(identified: Identified) -> str:
+    """Return one sentence: the use of the vehicle's file for predictions."""
+    status = identified.vehicle.status
+    refuted = [part for part in ("force", "torque") if getattr(status, part) == "refuted"]
+    if len(refuted) == 2:
+        return (
+            "Use: assume an unchanged velocity and body rate; the vehicle predicts no better. Fly "
+            "as advised and identify again."
+        )
+    if refuted == ["torque"]:
+        return (
+            "Use: the vehicle for force, with an unchanged body rate (predict does both). Inertia "
+            "and reaction torque are assumed."
+        )
+    if refuted:
+        return "Use: the vehicle for torque, with an unchanged velocity (predict does both)."
+    return "Use: this vehicle."
+
+
+def table_of(errors: PredictionErrors, simplest: PredictionErrors | None) -> list[tuple[str, ...]]:
+    """Return rows: quantity, mean error of the vehicle, of thrust and drag, of no change, unit."""
+    columns = [errors.model[:, -1], errors.still[:, -1]]
+    if simplest is not None:
+        columns.insert(1, simplest.model[:, -1])
+    cells = ([f"{x:.3g}" for x in row] for row in np.array(columns).T)
+    return [(name, *row, unit) for (name, unit), row in zip(QUANTITIES.items(), cells, strict=True)]
 
 
 def write_identified(identified: Identified, path: Path) -> list[Path]:
@@ -125,15 +156,7 @@ def explained(identified: Identified) -> Array:
     band. Each frequency counts by its ratio to the noise; NaN without a measurement.
     """
     fit = identified.fit
-    names, values = fit.balance.names, fit.values
-    model = coefficients(values, names, fit.model.mass, fit.model.powers)
-    total, left = np.zeros((2, 6))
-    for s, spectrum in zip(fit.balance.segments, fit.spectra, strict=True):
-        inside = s.frequency >= _LEAST_HZ
-        measured = s.columns[:, inside, :6]
-        residual = measured - s.columns[:, inside, 6 : 6 + len(names)] @ model.T
-        for sum_, x in ((total, measured), (left, residual)):
-            sum_ += np.sum(np.abs(x) ** 2 / spectrum[inside], axis=(0, 1))
+    left, total = powers(fit, fit.balance.segments, fit.spectra)
     return np.clip(1.0 - left / np.where(total > 0.0, total, np.nan), 0.0, 1.0)
 
 
@@ -159,7 +182,7 @@ def _picture(identified: Identified) -> "Figure":
         axes[1, i].set_xlabel("time (s)")
     axes[0, 0].legend()
     figure.suptitle(
-        f"explained: of the power from {_LEAST_HZ:g} to {band:g} Hz, each frequency by its noise; "
+        f"explained: of the power from {LEAST_HZ:g} to {band:g} Hz, each frequency by its noise; "
         f"drawn: up to {min(_SHOWN_HZ, band):g} Hz"
     )
     return figure

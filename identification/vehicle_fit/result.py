@@ -10,6 +10,7 @@ from .channels import MotionPiece, Sources
 from .solve import VehicleFit
 
 IDENTIFIED, ASSUMED, GIVEN, NOTHING = "identified", "assumed", "given", "not identifiable"
+REFUTED = "refuted"  # by data outside the fit
 
 
 # half-width of a 95 % interval as a share of the value (of its logarithm): a positive quantity with
@@ -32,7 +33,7 @@ class Estimate:
     low: float
     high: float
     unit: str
-    status: str  # identified, assumed, given, not identifiable
+    status: str  # identified, assumed, given, refuted, not identifiable
     how: str  # channels, assumption, or reason not to know
 
 
@@ -50,3 +51,5 @@ class Identified:
     # errors on data outside the fit: held_out_blocks, flights_left_out (each in turn, of several),
     # and prediction, of further flights
     predicted: Mapping[str, PredictionErrors]
+    # the same of thrust and drag with an unchanged body rate
+    simplest: Mapping[str, PredictionErrors]

@@ -32,6 +32,8 @@ _RANGES = {"lag": (0.0, 0.5), "delay": (-0.1, 0.1), "gamma": (-4.0, 4.0)}  # s, 
 _MOST_CHANGE = 0.05  # for each of these in a round
 # one frequency's leverage: noise is hidden where the parameters explain nearly all power
 _MOST_LEVERAGE = 0.8
+# largest moment of inertia over the sum of the others: 1 of a flat body, and a file rounds
+_FLATTEST = 0.995
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +144,30 @@ def refitted(fit: VehicleFit, kept: Sequence[Mask]) -> list[VehicleFit]:
         again = replace(fit, theta=theta, information=information, scores=fit.scores[keep])
         out.append(again)
     return out
+
+
+def nearest_body(fit: VehicleFit) -> tuple[VehicleFit, float]:
+    """Return a fit whose inertia a body can have, and the standard deviations to it.
+
+    No moment of inertia exceeds ``_FLATTEST`` of the sum of the other two. Where one does, all
+    parameters move to the likeliest ones that obey: along the constraint's slope in the metric of
+    the covariance.
+    """
+    names, size = ("Jx", "Jy", "Jz"), 0.0
+    at = [fit.model.free.index(name) for name in names]
+    for i in range(len(names)):
+        for _ in range(_ROUNDS):
+            moments = np.array([fit.values[name] for name in names])
+            share = np.where(np.arange(3) == i, 1.0, -_FLATTEST) * moments
+            if share.sum() <= 1e-9 * moments[i]:
+                break
+            slope = np.zeros(len(fit.theta))
+            slope[at] = share  # of logarithms
+            move = fit.covariance @ slope
+            variance = float(slope @ move)
+            size = max(size, float(share.sum()) / math.sqrt(variance))
+            fit = replace(fit, theta=fit.theta - move * (share.sum() / variance))
+    return fit, size
 
 
 def score_tests(
