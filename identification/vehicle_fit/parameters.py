@@ -12,9 +12,10 @@ from ...dynamics.effects import Role
 from ...runtime.arrays import Array
 from ...runtime.errors import InputError
 from .channels import MotionPiece, Sources
-from .columns import Drive, rotor_columns
+from .columns import ANSWERED_HZ, Drive, rotor_columns
 from .geometry import GRAVITY, USUAL
 from .model import Model
+from .spectra import BAND
 
 # accelerometer with its factory's calibration alone, m/s2 and rad: 20 mg, as in data sheets of such
 # sensors
@@ -28,6 +29,7 @@ _FIRST_DELAYS = np.linspace(0.0, 0.08, 9)
 # correlation of turning with torque: a smaller one is no sign of opposition. A Crazyflie with
 # hardly any roll has -.06
 _OPPOSED = 0.15
+_SWING_HZ = (0.5, 8.0)
 
 BASE = (
     *("Jx", "Jy", "Jz", "reach", "cx", "cy", "Jr", "tilt x", "tilt y", "rx", "ry", "rz"),
@@ -86,9 +88,12 @@ def first_model(
     totals = [np.concatenate([c[f"T{j}"] for c in columns]) for j in range(len(drive.exponents))]
     each = [mass * GRAVITY / max(float(np.mean(total)), 1e-12) for total in totals]
     share = 1.0 / len(each)
-    gains, alike = _first_gains(pieces, columns, [share * a for a in each])
-    for axis, correlation in zip(("roll", "pitch"), alike, strict=False):
-        if correlation < -_OPPOSED:
+    shares = [share * a for a in each]
+    gains, alike = _first_gains(pieces, columns, shares, _SWING_HZ)
+    # a loop that answers a swinging load opposes its own slow torque, and no quick one
+    _, quick = _first_gains(pieces, columns, shares, (ANSWERED_HZ, BAND))
+    for axis, both in zip(("roll", "pitch"), np.column_stack([alike, quick]), strict=False):
+        if both[0] < -_OPPOSED and both[1] < 0.0:
             raise InputError(
                 f"{axis} turns against the torque of its rotors; expected rotors in the order "
                 "front-left, rear-left, rear-right, front-right, and body axes forward, left, up"
@@ -131,11 +136,15 @@ def first_model(
 
 
 def _first_gains(
-    pieces: list[MotionPiece], columns: list[dict[str, Array]], thrust: list[float]
+    pieces: list[MotionPiece],
+    columns: list[dict[str, Array]],
+    thrust: list[float],
+    band: tuple[float, float],
 ) -> tuple[Array, Array]:
     """Return the angular acceleration per torque (3,) in 1/(kg m2), roughly, and their correlation
-    (3,). About x and y the first is the inertia's inverse, about z the inverse times torque over
-    thrust (m). Each is taken at the delay, up to 80 ms, of the largest correlation of either sign.
+    (3,) in a ``band`` in Hz. About x and y the first is the inertia's inverse, about z the inverse
+    times torque over thrust (m). Each is taken at the delay, up to 80 ms, of the largest
+    correlation of either sign.
     """
     gains, alike = np.zeros(3), np.zeros(3)
     for i, letter in enumerate("XYZ"):
@@ -143,8 +152,8 @@ def _first_gains(
         for piece, column in zip(pieces, columns, strict=True):
             torque = np.sum([a * column[f"{letter}{j}"] for j, a in enumerate(thrust)], axis=0)
             # turning is the integral of torque: compared where neither is differentiated
-            spin = _swing(np.cumsum(torque - torque.mean()) * piece.period, piece.period)
-            rate = _swing(piece.angular_velocity[:, i], piece.period)
+            spin = _passed(np.cumsum(torque - torque.mean()) * piece.period, piece.period, band)
+            rate = _passed(piece.angular_velocity[:, i], piece.period, band)
             late = np.rint(_FIRST_DELAYS / piece.period).astype(int)
             cross += [float(spin[: len(spin) - n] @ rate[n:]) for n in late]
             power += float(spin @ spin)
@@ -155,7 +164,8 @@ def _first_gains(
     return gains, alike
 
 
-def _swing(x: Array, period: float) -> Array:
-    """Return the part of ``x`` (n,) above about 0.5 Hz."""
-    sections = butter(2, [1.0 * period, min(0.9, 16.0 * period)], btype="bandpass", output="sos")
+def _passed(x: Array, period: float, band: tuple[float, float]) -> Array:
+    """Return the part of ``x`` (n,) in a ``band`` in Hz."""
+    low, high = (2.0 * f * period for f in band)
+    sections = butter(2, [min(low, 0.8), min(0.9, high)], btype="bandpass", output="sos")
     return np.asarray(sosfiltfilt(sections, x))

@@ -22,21 +22,27 @@ from tests.identification.vehicle_fit.flown import (
     inertial_flights,
 )
 from tests.support.alike import assert_alike
+from tests.support.data_paths import data_file
 from tests.support.flown import recorded
 from tests.support.golden_identification import CRAZYFLIE, GOLDEN, made, vehicles
 from windwrench.dynamics import load_vehicle
-from windwrench.dynamics.vehicle import EffectSetting, MotorCurve
+from windwrench.dynamics.vehicle import EffectSetting, ModelStatus, MotorCurve
 from windwrench.dynamics.vehicle_file import dump_vehicle, parse_vehicle
+from windwrench.identification.causal_states import causal_states
+from windwrench.identification.logs.commanded_speeds import with_commanded_speeds
+from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
-from windwrench.identification.prediction import PredictionErrors
+from windwrench.identification.prediction import PredictionErrors, predict
 from windwrench.identification.vehicle_fit.channels import MotionPiece, Sources
 from windwrench.identification.vehicle_fit.columns import Drive
 from windwrench.identification.vehicle_fit.exports import EXPORTS
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
+from windwrench.identification.vehicle_fit.held_out import judged
 from windwrench.identification.vehicle_fit.identify import identify
 from windwrench.identification.vehicle_fit.parameters import first_model
-from windwrench.identification.vehicle_fit.report import explained
+from windwrench.identification.vehicle_fit.report import explained, use_of
 from windwrench.identification.vehicle_fit.result import IDENTIFIED, Estimate
+from windwrench.identification.vehicle_fit.solve import nearest_body
 from windwrench.identification.vehicle_fit.spectra import LOSS, segments_of
 from windwrench.identification.wrench_series import estimate_log
 from windwrench.runtime.errors import InputError
@@ -201,12 +207,20 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say(inertial):
 
 def test_torque_that_loses_to_a_rate_that_stays_tells_no_inertia(commanded, monkeypatch):
     """As where the flight loop answers what nothing measures: 17 against .7 rad/s was a warning."""
-    lost = PredictionErrors(9, np.array([0.5]), np.full((4, 1), 2.0), np.full((4, 1), 1.0))
-    where = "windwrench.identification.vehicle_fit.identify.predicted"
-    monkeypatch.setattr(where, lambda *_: {"held_out_blocks": lost})
+    lost, kept = (
+        PredictionErrors(9, np.array([0.5]), np.full((4, 1), off), np.full((4, 1), 1.0))
+        for off in (2.0, 1.0)
+    )
+    where = "windwrench.identification.vehicle_fit.held_out.errors_of_models"
+    monkeypatch.setattr(where, lambda *_, **__: [lost, kept, kept, lost])
     logs = commanded[:2]
     found = of_crazyflie(logs)
     check(found, "k", CRAZYFLIE.k[0], 0.05)
+    status = parse_vehicle(dump_vehicle(found.vehicle)).status
+    assert (status.force, status.torque) == ("identified", "refuted")
+    assert status.coefficients["k"] == "identified"
+    assert status.coefficients["Jxx"] == "assumed"
+    assert "unchanged body rate" in use_of(found)
     for name in ("Jxx", "Jyy", "Jzz", "p/k", "p", "com x", "com y", "flapping_moment kflap"):
         assert found.estimates[name].status in ("assumed", "not identifiable")
         assert "(2 against 1 rad/s after 0.5 s)" in found.estimates[name].how
@@ -217,6 +231,82 @@ def test_torque_that_loses_to_a_rate_that_stays_tells_no_inertia(commanded, monk
         InputError, match=r"2 against 1 rad/s.*no arm is given; expected --geometry"
     ):
         identify(logs, CRAZYFLIE.mass, parse_geometry(None))
+
+
+def of(position, velocity, attitude, rate):
+    model = np.array([[position], [velocity], [attitude], [rate]])
+    return PredictionErrors(9, np.array([0.5]), model, np.ones((4, 1)))
+
+
+@pytest.mark.parametrize(
+    ("whole", "keeps_rate", "simplest", "status", "further"),
+    [
+        ((0.2, 0.2, 0.2, 0.2), (0.5, 0.5, 1, 1), (0.5, 0.5, 1, 1), "identified identified", True),
+        ((0.2, 0.2, 0.2, 9.0), (0.5, 0.5, 1, 1), (0.5, 0.5, 1, 1), "identified refuted", True),
+        ((0.6, 0.6, 0.5, 0.5), (0.5, 0.5, 1, 1), (0.5, 0.5, 1, 1), "identified refuted", True),
+        ((3.0, 3.0, 3.0, 3.0), (0.9, 0.9, 1, 1), (0.5, 0.5, 1, 1), "identified refuted", False),
+        ((3.0, 3.0, 3.0, 3.0), (2.0, 2.0, 1, 1), (2.0, 2.0, 1, 1), "refuted refuted", True),
+    ],
+)
+def test_the_simplest_model_that_is_not_worse_stands(whole, keeps_rate, simplest, status, further):
+    models = [of(*whole), of(*keeps_rate), of(*simplest), of(1.0, 1.0, *whole[2:])]
+    tested = judged({"held_out_blocks": models})
+    assert f"{tested.status.force} {tested.status.torque}" == status
+    assert tested.further == further
+    assert not tested.errors["held_out_blocks"].worse
+
+
+def test_a_vehicle_that_is_refuted_keeps_its_motion(commanded):
+    log, status = commanded[0], ModelStatus("refuted", "refuted")
+    path = predict(log, replace(CRAZYFLIE, status=status), every=200)
+    state = causal_states(log, CRAZYFLIE)[path.start]
+    ahead = path.period * np.arange(1, path.velocity.shape[1] + 1)[:, None]
+    assert path.velocity == pytest.approx(
+        np.broadcast_to(state[:, None, 7:10], path.velocity.shape)
+    )
+    assert path.position == pytest.approx(state[:, None, :3] + ahead * state[:, None, 7:10])
+    still = np.broadcast_to(state[:, None, 10:], path.velocity.shape)
+    assert path.angular_velocity == pytest.approx(still, abs=1e-4)
+
+
+def test_commands_are_read_by_the_curve_of_the_vehicle_that_predicts(inertial):
+    """Rotor speeds of a preset's curve stayed in the log: 3 m off after .5 s."""
+    log, speeds = inertial[0]
+    curve = MotorCurve((0.0, 0.0, K * FULL**2))
+    vehicle = replace(CRAZYFLIE, k=np.full(4, K), motor_curve=curve)
+    other = replace(log, rotor_speeds=0.5 * speeds, commanded=True)
+    again = with_commanded_speeds(other, vehicle)
+    assert again.rotor_speeds == pytest.approx(FULL * log.command)
+    measured = replace(log, rotor_speeds=speeds)
+    assert with_commanded_speeds(measured, vehicle) is measured
+
+
+def test_an_inertia_that_no_body_has_moves_to_the_nearest(commanded):
+    fit = of_crazyflie(commanded[:2]).fit
+    flat = fit.theta.copy()
+    flat[fit.model.free.index("Jz")] += 0.4
+    body, size = nearest_body(replace(fit, theta=flat))
+    values = body.values
+    assert values["Jz"] == pytest.approx(0.995 * (values["Jx"] + values["Jy"]))
+    assert size > 3.0
+    same, none = nearest_body(body)
+    assert none == 0.0
+    assert same.values == values
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("same_motor_four_times.csv.gz", "motors 1 and 2 are equal in every row"),
+        ("px4_gz_rads_as_rpm.ulg", r"thrust coefficient 1\.99 .* expected 0\.002 to 0\.1"),
+        ("ardupilot_rpm_tenth.bin", r"thrust coefficient 2\.18 .* expected 0\.002 to 0\.1"),
+        ("px4_one_esc_low.ulg", "medians of the four motors' rotor speeds are 390, 395, 393, 70.7"),
+    ],
+)
+def test_rotor_speeds_that_no_quadrotor_has_are_refused(name, line):
+    log = data_file(f"hard_logs/{name}")
+    with pytest.raises(InputError, match=line):
+        identify([read_log(log)], 1.5, parse_geometry("0.17"))
 
 
 def test_rotors_in_another_order_are_refused(inertial):
