@@ -5,11 +5,9 @@ path for 0.5 s, from a start every 0.25 s. Beside it stand the guess that nothin
 vehicle's thrust and drag with a body rate that stays.
 """
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 
 from windwrench import __version__
@@ -17,14 +15,14 @@ from windwrench.evidence.kept_results import DOCS
 from windwrench.evidence.nanodrone_benchmark import ARM, MASS
 from windwrench.evidence.runner import start
 from windwrench.identification.logs.reading import read_log
-from windwrench.identification.prediction import PredictionErrors, prediction_errors
+from windwrench.identification.prediction import PredictionErrors, errors_of_models
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
+from windwrench.identification.vehicle_fit.held_out import models_of
 from windwrench.identification.vehicle_fit.identify import identify
 from windwrench.runtime.page_files import write_json
 from windwrench.runtime.provenance import commit, made_by
 
 MAP = Path(__file__).with_name("nanodrone_map.yaml")
-HEAVY = 1e3  # kg m2: rotors turn nothing
 # what predicts: the vehicle; its thrust and drag while the body rate stays; nothing changes
 WAYS = ("identified vehicle", "its thrust and drag", "no change")
 
@@ -64,8 +62,8 @@ def study(
         seen = [log for path, log in flights.items() if not path.stem.startswith(held)]
         unseen = [log for path, log in flights.items() if path.stem.startswith(held)]
         vehicle = identify(seen, MASS, parse_geometry(str(ARM))).vehicle
-        heavy = replace(vehicle, inertia=HEAVY * np.eye(3))
-        parts.append([prediction_errors(unseen, of, start_by=vehicle) for of in (vehicle, heavy)])
+        print(f"{held}: {vehicle.status.force} force, {vehicle.status.torque} torque", flush=True)
+        parts.append(errors_of_models(unseen, [vehicle, models_of(vehicle)[2]]))
         rows.append(row(held, *parts[-1]))
     rows.append(row("all", *(PredictionErrors.pooled(of) for of in zip(*parts, strict=True))))
     result = {"version": __version__, "commit": code, "paths": rows}
