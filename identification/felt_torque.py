@@ -1,22 +1,23 @@
-"""The noise of the torque about z as a vehicle's own wrench filter shows it, from a flight along a
-measured profile.
+"""The noise of a law's loop, from a flight along a measured profile: of the torque about z as the
+vehicle's own wrench filter shows it, and of the vehicle's place.
 """
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from ..controllers.briefing import FilterNoise
-from ..controllers.jet_design import FollowingLoop, following_loop
 from ..controllers.observation import DECISION_PERIOD
-from ..controllers.wrench_lag import ORDER, autoregressions
 from ..dynamics.vehicle import Vehicle
 from ..estimator import UKFTuning
 from ..runtime.errors import InputError
+from .jet_design import FollowingLoop, following_loop
 from .logs.flight_log import FlightLog
 from .logs.table import Array
 from .wind_profile import WindProfile
 from .wrench_series import estimate_log
 
 _ROWS = 100  # decisions of a flight at least
+_SLOW = 6.0  # s, over which a place is the flight's way
 
 
 def loops_of(
@@ -50,22 +51,17 @@ def loops_of(
     for k, change in enumerate(np.diff(true, prepend=true[0])):
         error = alone.keep @ error + alone.enter * change
         expected[k] = true[k] - error[2]
-    noise = felt - expected
-    inside = (place > edges[0]) & (place < edges[1]) & np.isfinite(noise)
-    noise = np.where(inside, noise - noise[inside].mean() if inside.any() else 0.0, 0.0)
+    # the vehicle's own wandering, beside its slow way
+    span = round(_SLOW / DECISION_PERIOD)
+    wander = place - uniform_filter1d(place, span, mode="nearest")
+    noise = np.column_stack([felt - expected, wander])
+    inside = (place > edges[0]) & (place < edges[1]) & np.isfinite(noise).all(axis=1)
     if inside.sum() < _ROWS:
         raise InputError(
             f"{log.source or log.name}: only {DECISION_PERIOD * inside.sum():.0f} s of the flight "
             f"lie in the jet; expected {DECISION_PERIOD * _ROWS:.0f} s or more"
         )
-    far = [
-        float(noise[lag:] @ noise[: len(noise) - lag]) / inside.sum() for lag in range(ORDER + 1)
-    ]
-    coefficients, variances = autoregressions(np.array(far))
     own = following_loop(
-        inertia,
-        filter_noise(rise_time),
-        tuple(coefficients[ORDER].tolist()),
-        float(np.sqrt(variances[ORDER])),
+        inertia, filter_noise(rise_time), noise[inside] - noise[inside].mean(axis=0)
     )
     return loops | {rise_time: own}

@@ -1,8 +1,9 @@
 """The admittance law of a measured jet: its gain, and what a vehicle with this law can follow.
 
 The law flies a torque's profile over the place. Beside the profile count the wrench filter's lag,
-the flight loop's answer to a velocity, the hold between two decisions, and the torque's noise as
-the filter shows it. The loop is flown many times, in one dimension, behind a fan at a steady speed.
+the flight loop's answer to a velocity, and the hold between two decisions. The noise is a measured
+one: of the torque as the filter shows it, and of the vehicle's place. The loop is flown many times,
+in one dimension, behind fans of steady speeds.
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .briefing import Air, FilterNoise
-from .flight import FlightGains
-from .observation import DECISION_PERIOD, MAX_COMMAND
-from .wrench_lag import axis_lag
+from ..controllers.briefing import Air, FilterNoise
+from ..controllers.flight import FlightGains
+from ..controllers.observation import DECISION_PERIOD, MAX_COMMAND
+from ..controllers.wrench_lag import axis_lag
 
 Array = NDArray[np.float64]
 
@@ -40,7 +41,7 @@ _MOTOR_LAG = 0.04  # s, of the rotors
 
 @dataclass(frozen=True)
 class JetShape:
-    """What a law needs of the torque's profile: places in m, torques in Nm, left the lower place."""
+    """A torque's profile, for a law: places in m, torques in Nm; left is the lower place."""
 
     centre: float  # where the torque is zero
     slope: float  # Nm/m, the steepest between the peaks, over 0.2 m
@@ -121,8 +122,9 @@ class FollowingLoop:
     enter: Array  # (3,) an even change of the torque's part in it
     carry: Array  # (7, 7) of the flight loop: set point, place, velocity, and the rest
     push: Array  # (7,) a commanded velocity's part
-    noise: tuple[float, ...]  # autoregression of the felt torque's noise,
-    innovation: float  # Nm, and the standard deviation of its innovations
+    noise: (
+        Array  # (m, 2) measured noise of the felt torque, Nm, and of the place, m, a decision a row
+    )
 
     def margins(self, gain: float) -> tuple[float, float, float]:
         """Return phase margin (rad), gain margin (a factor) and delay margin (s) of the loop whose
@@ -177,8 +179,7 @@ def _flight_loop(gains: FlightGains) -> tuple[Array, Array]:
 def following_loop(
     inertia_z: float,
     filter_noise: FilterNoise,
-    noise: tuple[float, ...] = (),
-    innovation: float = 0.0,
+    noise: Array | None = None,
     gains: FlightGains | None = None,
 ) -> FollowingLoop:
     """Return the loop of a vehicle with this inertia (kg m2), wrench filter and flight loop.
@@ -186,15 +187,15 @@ def following_loop(
     Args:
         inertia_z: kg m2.
         filter_noise: of the wrench filter; settles its lag.
-        noise: coefficients of the autoregression of the felt torque's noise, a decision apart.
-        innovation: Nm, standard deviation of its innovations.
+        noise: (m, 2) of the felt torque (Nm) and of the place (m), a row a decision; default: none.
         gains: of the flight loop; default: the kit's.
     """
     f = filter_noise
     steps = max(1, round(DECISION_PERIOD / f.period))
     lag = axis_lag(inertia_z, (f.torque, f.torque_walk, f.attitude), Air(), f.period, steps)
     carry, push = _flight_loop(gains or FlightGains())
-    return FollowingLoop(lag.keep, lag.enter, carry, push, noise, innovation)
+    measured = np.zeros((1, 2)) if noise is None else noise
+    return FollowingLoop(lag.keep, lag.enter, carry, push, measured)
 
 
 def followed(
@@ -207,7 +208,8 @@ def followed(
     flights: int = _FLIGHTS,
     seed: int = 0,
 ) -> tuple[Array, Array]:
-    """Fly the law behind fans of steady speeds; the noise is the same for all gains and speeds.
+    """Fly the law behind fans of steady speeds. Each flight begins anywhere in the measured noise,
+    with either sign; flights are the same for all gains and speeds.
 
     Args:
         loop: filter, flight loop and noise.
@@ -225,24 +227,22 @@ def followed(
     """
     rng = np.random.default_rng(seed)
     size = (*speeds.shape, flights)
-    state = np.zeros((7, *size))
+    state, error = np.zeros((7, *size)), np.zeros((3, *size))
     offset = np.broadcast_to(rng.uniform(-_START, _START, flights), size)
-    sides = rng.choice([-1.0, 1.0], flights)
     state[:2] = offset
-    error, past = np.zeros((3, *size)), np.zeros((len(loop.noise), flights))
+    sides, signs = rng.choice([-1.0, 1.0], (2, flights))
+    first = rng.integers(len(loop.noise), size=flights)
     left, right = shape.edges[0] - shape.centre, shape.edges[1] - shape.centre
     at, decisions = place - shape.centre, round(FLIGHT_TIME / DECISION_PERIOD)
     axis, felt = np.zeros(size), np.interp(offset, at, torque, 0.0, 0.0)
     held, square = np.ones(size, dtype=np.bool_), np.zeros(size)
-    for _ in range(20 * len(loop.noise)):  # the noise settles
-        past = _next(loop, past, rng)
-    for _ in range(decisions):
-        past = _next(loop, past, rng)
-        shown = felt - error[2] + (past[0] if len(past) else 0.0)
+    for k in range(decisions):
+        noise, drift = signs * loop.noise[(first + k) % len(loop.noise)].T
+        shown = felt - error[2] + noise
         command = np.clip(-gains[:, None, None] * shown, -MAX_COMMAND, MAX_COMMAND)
         state = np.tensordot(loop.carry, state, 1) + loop.push[:, None, None, None] * command
         axis = axis + sides * speeds[..., None] * DECISION_PERIOD
-        offset = state[1] - axis
+        offset = state[1] + drift - axis
         true = np.interp(offset, at, torque, 0.0, 0.0)
         error = np.tensordot(loop.keep, error, 1)
         error += loop.enter[:, None, None, None] * (true - felt)
@@ -252,14 +252,6 @@ def followed(
     return held.mean(axis=2), np.sqrt(square / decisions).mean(axis=2)
 
 
-def _next(loop: FollowingLoop, past: Array, rng: np.random.Generator) -> Array:
-    """Return the noise one decision later, the newest first."""
-    if not len(past):
-        return past
-    new = np.asarray(loop.noise) @ past + loop.innovation * rng.standard_normal(past.shape[1])
-    return np.vstack([new, past[:-1]])
-
-
 @dataclass(frozen=True)
 class AdmittanceDesign:
     """The law of a jet, and what it can follow."""
@@ -267,8 +259,8 @@ class AdmittanceDesign:
     gain: float  # m/s per Nm
     bound: float  # m/s, gain times the weaker one of the two largest torques
     fastest: float  # m/s of a fan that is followed in ``HELD_SHARE`` of the flights
-    designed_for: float  # m/s of a fan behind which the gain has the least offset
-    offset: float  # m, root-mean-square, behind that fan
+    designed_for: float  # m/s, largest speed of the fans behind which the gain has the least offset
+    offset: float  # m, root-mean-square, mean over these fans
     rise_time: float  # s, of the filter that the design is for
     phase_margin: float  # rad
     gain_margin: float
@@ -284,8 +276,8 @@ def design_admittance(
     shape: JetShape,
     speed: float | None = None,
 ) -> AdmittanceDesign | None:
-    """Return the gain with the least offset behind a fan, among those with a phase margin of
-    ``MARGIN``, and what it can follow; None where the noise lets no gain follow any fan.
+    """Return the gain with the least offset behind fans of all speeds up to one, among those with a
+    phase margin of ``MARGIN``, and what it can follow; None where no gain follows any fan.
 
     Args:
         loops: by the filter's rise time, s.
@@ -293,7 +285,7 @@ def design_admittance(
         place: (n,) m of the profile.
         torque: (n,) Nm.
         shape: of the profile.
-        speed: m/s of the fan; default: half of the fastest that any gain can follow.
+        speed: m/s, the largest of these fans; default: half of the fastest that any gain follows.
     """
     loop, flown = loops[rise_time], (place, torque, shape)
     crossings = np.array([c for c in _CROSSINGS if loop.margins(c)[0] >= MARGIN])
@@ -304,8 +296,8 @@ def design_admittance(
     if fastest.max() <= 0.0:
         return None
     wanted = 0.5 * float(fastest.max()) if speed is None else speed
-    alike = np.full((len(gains), 1), wanted)
-    offsets = followed(loop, *flown, gains, alike, 4 * _FLIGHTS, 1)[1][:, 0]
+    alike = np.tile(wanted * np.linspace(0.0, 1.0, 5), (len(gains), 1))
+    offsets = followed(loop, *flown, gains, alike, seed=1)[1].mean(axis=1)
     best = int(np.argmin(offsets))
     crossing, gain = float(crossings[best]), float(gains[best])
     kept = [rise for rise, one in loops.items() if one.margins(crossing)[0] >= MARGIN]
