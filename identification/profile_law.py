@@ -3,33 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
-from ..controllers.observation import MAX_COMMAND
+from ..controllers.briefing import FilterNoise
+from ..controllers.observation import DECISION_PERIOD, MAX_COMMAND
 from ..dynamics.vehicle import Vehicle
+from ..estimator import UKFTuning
 from ..runtime.errors import InputError
-from .felt_torque import loops_of
 from .jet_design import (
-    RISE_TIMES,
-    AdmittanceDesign,
+    FollowingLoop,
     JetShape,
     design_admittance,
     fastest_followed,
+    following_loop,
     no_jet,
     shape_of,
 )
 from .logs.flight_log import FlightLog
+from .logs.table import Array
 from .wind_profile import WindProfile, wind_profile
-from .wrench_series import WrenchSeries, estimate_log
+from .wrench_series import estimate_log
 
 RISE_TIME = 0.45  # s, of the filter in the tasks
-_DRAWS = 40  # of the profile, for the intervals
-_SPREAD = 0.15  # m, of a flight about its line, above which a note is due
-_UNLIKE = 3.0  # standard deviations between the two largest torques, for a note
-
-Interval = tuple[float, float]
+_ROWS = 100  # decisions of a flight in the jet, at least
+_SLOW = 6.0  # s, over which a place is the flight's way
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,18 +43,15 @@ class ProfiledJet:
         others: along the flight's other lines.
         why: empty where there is a law.
         shape: of the torque's profile.
-        design: the law.
-        intervals: 95 %, from the profile's draws: ``bound`` and ``fastest`` in m/s, ``left`` and
-            ``right`` in m, places of the largest torques.
-        notes: sentences for the user.
+        law: ``design_admittance``, with 95 % intervals from the profile's draws.
+        notes: on the log.
     """
 
     profile: WindProfile
     others: tuple[WindProfile, ...]
     why: str
     shape: JetShape | None
-    design: AdmittanceDesign | None
-    intervals: dict[str, Interval]
+    law: dict[str, float | list[float]] | None
     notes: tuple[str, ...]
 
 
@@ -86,61 +85,62 @@ def profile_log(
         profile = wind_profile(series, axis, line)
     except InputError as error:
         raise InputError(f"{log.source or log.name}: {error}") from error
-    others, notes = _others(series, profile), [*series.notes, *_notes(profile)]
-    why = no_jet(profile.place, profile.torque, profile.std[5])
-    shape = None if why else shape_of(profile.place, profile.torque)
+    others = []
+    for beside in profile.lines[profile.lines != profile.beside].tolist():
+        with suppress(InputError):  # too short a line
+            others.append(wind_profile(series, profile.direction, beside))
+    found = partial(ProfiledJet, profile, tuple(others), notes=series.notes)
+    std = (profile.high - profile.wrench)[5] / 1.96
+    why, shape = no_jet(profile.place, profile.torque, std), None
+    if not why:
+        shape = shape_of(profile.place, profile.torque)
     if shape is None:
-        return ProfiledJet(profile, others, why, None, None, {}, tuple(notes))
-    notes += _one_sided(profile, shape)
-    loops = loops_of(log, vehicle, profile, shape.edges, rise_time, RISE_TIMES)
-    flown = profile.place, profile.torque
-    design = design_admittance(loops, rise_time, *flown, shape, speed)
-    if design is None:
-        why = "the torque's noise lets no gain follow a fan: fly longer, or nearer to the fan"
-        return ProfiledJet(profile, others, why, shape, None, {}, tuple(notes))
+        return found(why, None, None)
+
+    def loop(rise: float, noise: Array | None = None) -> FollowingLoop:
+        tuning = UKFTuning.for_vehicle(vehicle, log.period, rise)
+        noise_of = FilterNoise.of(tuning, log.period)
+        return following_loop(float(vehicle.inertia[2, 2]), noise_of, noise)
+
+    noise = _noise(log, vehicle, profile, shape.edges_m, rise_time, loop(rise_time))
+    if len(noise) < _ROWS:
+        return found(f"only {DECISION_PERIOD * len(noise):.0f} s lie in the jet", shape, None)
+    flying = loop(rise_time, noise)
+    law = design_admittance(flying, loop, profile.place, profile.torque, shape, speed)
+    if law is None:
+        return found("the torque's noise lets no gain follow a fan", shape, None)
     drawn = []
-    for torque in profile.torque_draws[:_DRAWS]:
+    for torque in profile.torque_draws:
         if one := shape_of(profile.place, torque):
-            gain = np.array([design.gain])
-            fastest = fastest_followed(loops[rise_time], profile.place, torque, one, gain)[0]
-            bound = min(design.gain * one.weaker, MAX_COMMAND)
-            drawn.append((bound, fastest, *one.peaks))
-    low, high = np.quantile(np.array(drawn), (0.025, 0.975), axis=0).tolist()
-    names = "bound", "fastest", "left", "right"
-    intervals = dict(zip(names, zip(low, high, strict=True), strict=True))
-    return ProfiledJet(profile, others, "", shape, design, intervals, tuple(notes))
+            bound = min(law["gain"] * one.weaker, MAX_COMMAND)
+            gain = np.array([law["gain"]])
+            drawn.append((bound, fastest_followed(flying, profile.place, torque, one, gain)[0]))
+    ends = np.quantile(drawn, (0.025, 0.975), axis=0).T.tolist()
+    names = "bound_ci95_m_s", "fastest_fan_ci95_m_s"
+    return found("", shape, law | dict(zip(names, ends, strict=True)))
 
 
-def _others(series: WrenchSeries, profile: WindProfile) -> tuple[WindProfile, ...]:
-    """Return the profiles of the flight's other lines, where they are long enough."""
-    found = []
-    for beside, _ in profile.lines:
-        if abs(beside - profile.beside) > 0.05:
-            try:
-                found.append(wind_profile(series, profile.direction, float(beside)))
-            except InputError:
-                continue
-    return tuple(found)
-
-
-def _notes(profile: WindProfile) -> list[str]:
-    """Return a warning of a flight that strayed from its line."""
-    if max(profile.spread) <= _SPREAD:
-        return []
-    return [
-        f"warning: the flight strays {profile.spread[0]:.2f} m along the wind and "
-        f"{profile.spread[1]:.2f} m in height (standard deviations): the profile is a mean over both"
-    ]
-
-
-def _one_sided(profile: WindProfile, shape: JetShape) -> list[str]:
-    """Return a warning of largest torques that differ beyond their uncertainty."""
-    left, right = (float(np.interp(p, profile.place, profile.std[5])) for p in shape.peaks)
-    total = sum(shape.torques)
-    if abs(total) <= _UNLIKE * float(np.hypot(left, right)):
-        return []
-    return [
-        f"warning: the two largest torques differ by {1e3 * abs(total):.2g} mNm: about "
-        f"{5e2 * total:+.2g} mNm is not the jet's, or the jet leans. The law rests where the torque "
-        "is zero, and follows by the weaker side"
-    ]
+def _noise(
+    log: FlightLog,
+    vehicle: Vehicle,
+    profile: WindProfile,
+    edges: tuple[float, float],
+    rise_time: float,
+    loop: FollowingLoop,
+) -> Array:
+    """Return the noise (k, 2) of a flight within the ``edges`` (m) of a jet, a row a decision: of
+    the torque about z that the vehicle's own filter shows (Nm), and of the place (m).
+    """
+    series = estimate_log(log, vehicle, UKFTuning.for_vehicle(vehicle, log.period, rise_time))
+    t = np.arange(log.t[0] + 4.0 * rise_time, log.t[-1], DECISION_PERIOD)
+    rows = np.searchsorted(log.t, t)
+    place = profile.along(series.position)[rows]
+    true = np.interp(place, profile.place, profile.torque)
+    error, expected = np.zeros(3), true.copy()
+    for k, change in enumerate(np.diff(true, prepend=true[:1])):
+        error = loop.keep @ error + loop.enter * change
+        expected[k] -= error[2]
+    way = uniform_filter1d(place, round(_SLOW / DECISION_PERIOD), mode="nearest")
+    noise = np.column_stack([series.torque[rows, 2] - expected, place - way])
+    inside = noise[(place > edges[0]) & (place < edges[1]) & np.isfinite(noise).all(axis=1)]
+    return np.asarray(inside - inside.mean(axis=0)) if len(inside) else inside

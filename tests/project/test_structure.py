@@ -36,7 +36,6 @@ STOREYS = (
     {"inertial_wrench"},
     {"wrench_series"},
     {"causal_states", "wind_profile", "jet_design"},
-    {"felt_torque"},
     {"profile_law"},
     {"prediction"},
     {"comparison", "vehicle_fit", "diagnosis"},
