@@ -9,6 +9,7 @@ from .flight_logs import AS_THEY_ARE, LogOptions, log_notes, read_flights
 from .terminal import command_line, console, results_folder, run, say, show_table, working
 
 _PARTS = tuple(f"{kind}_{way}" for kind in ("f", "t") for way in ("wind", "line", "up"))
+_JET = ("axis_m", "slope_Nm_m", "torques_Nm", "torques_at_m", "edges_m")  # of ``JetShape``
 
 
 def profile(
@@ -26,7 +27,7 @@ def profile(
 
     Example: windwrench profile hovers.csv --vehicle ardrone2 --write law.yaml
     """
-    from dataclasses import asdict
+    from dataclasses import astuple
 
     import numpy as np
     import yaml
@@ -48,7 +49,7 @@ def profile(
     log_notes(found.notes)
     p, law = found.profile, found.law
     seen = {"direction_deg": math.degrees(p.direction), "along_wind_m": p.beside}
-    jet = None if found.shape is None else asdict(found.shape)
+    jet = found.shape and dict(zip(_JET, astuple(found.shape), strict=True))
     result = {
         "log": flight.name,
         "vehicle": model.name,
@@ -78,9 +79,9 @@ def profile(
     low, high = law["fastest_fan_ci95_m_s"]  # type: ignore[misc]
     left, right = (place - jet["axis_m"] for place in jet["torques_at_m"])
     console.print(
-        f"A gain of {law['gain']:.3g} m/s per Nm follows fans of up to {law['fastest_fan_m_s']:.2g} "
-        f"m/s in 80 % of flights of 20 s ({low:.2g} to {high:.2g} m/s; its bound k tau_max is "
-        f"{law['bound_m_s']:.2g} m/s), loses the jet beyond {left:.2f} and {right:+.2f} m from the "
+        f"A gain of {law['gain']:.3g} m/s per Nm follows fans of up to "
+        f"{law['fastest_fan_m_s']:.2g} m/s in 80 % of flights of 20 s ({low:.2g} to {high:.2g} "
+        f"m/s; its bound k tau_max is {law['bound_m_s']:.2g} m/s), loses the jet beyond {left:.2f} and {right:+.2f} m from the "
         f"axis, and allows the filter a rise time of up to {law['largest_rise_time_s']:.2g} s.",
         soft_wrap=True,
     )

@@ -1,9 +1,9 @@
 """How far a measured profile and its law are to be trusted: fans unknown to the kit's defaults.
 
-Each fan has a drawn strength, radius and distance. A vehicle flies hovers on a line, or slow sweeps,
-through its jet; ``profile_log`` reads the log. Counted are: places of the true mean jet within the
-95 % intervals; the designed law's error beside the default one's on the same episodes; and how many
-flights follow fans slower and faster than the stated fastest one.
+Each fan has a drawn strength, radius and distance. A vehicle flies hovers on a line, or slow
+sweeps, through its jet; ``profile_log`` reads the log. Counted are: places of the true mean jet
+within the 95 % intervals; the designed law's error beside the default one's on the same episodes;
+and how many flights follow fans slower and faster than the stated fastest one.
 
 ``python -m evidence.profiled_fans --fans 12 --episodes 40 --out FILE.json``
 """
@@ -128,7 +128,7 @@ def _flown(found: ProfiledJet, fan: Fan, distance: float, episodes: int) -> dict
     law, env = Admittance(found.law["gain"]), make_env(fan, distance)
     fastest = found.law["fastest_fan_m_s"]
     seeds = benchmark_seeds(68, episodes)
-    reach = np.array(found.shape.edges_m) - found.shape.axis_m
+    reach = np.array(found.shape.edges) - found.shape.axis
     own, default = (
         [fly_episode(env, one, seed).rmse for seed in seeds] for one in (law, Admittance())
     )

@@ -40,16 +40,16 @@ _MOTOR_LAG = 0.04  # s, of the rotors
 class JetShape:
     """A torque's profile, for a law. Of two numbers the first is that of the lower places."""
 
-    axis_m: float  # where the torque is zero
-    slope_Nm_m: float  # the steepest over 0.2 m
-    torques_Nm: tuple[float, float]  # the largest
-    torques_at_m: tuple[float, float]  # beyond, the fan is lost
-    edges_m: tuple[float, float]  # beyond, the torque is below a fifth of the largest
+    axis: float  # m, where the torque is zero
+    slope: float  # Nm/m, the steepest over 0.2 m
+    torques: tuple[float, float]  # Nm, the largest
+    peaks: tuple[float, float]  # m, where they are; beyond, the fan is lost
+    edges: tuple[float, float]  # m; beyond, the torque is below a fifth of the largest
 
     @property
     def weaker(self) -> float:
         """The smaller one of the two largest torques, Nm."""
-        return min(-self.torques_Nm[0], self.torques_Nm[1])
+        return min(-self.torques[0], self.torques[1])
 
 
 def shape_of(place: Array, torque: Array) -> JetShape | None:
@@ -87,7 +87,7 @@ def no_jet(place: Array, torque: Array, std: Array) -> str:
     shape = shape_of(place, torque)
     if shape is None:
         return "the torque about z falls across the line, where that of a jet's drag rises"
-    for end, edge, size in zip((0, -1), shape.edges_m, shape.torques_Nm, strict=True):
+    for end, edge, size in zip((0, -1), shape.edges, shape.torques, strict=True):
         if edge == place[end] and torque[end] / size + 2.0 * std[end] / abs(size) > 0.9:
             return f"the torque has not fallen yet at {edge:.2f} m, where the flight ends: fly on"
     return ""
@@ -181,8 +181,8 @@ def followed(
     first = rng.integers(len(loop.noise), size=_FLIGHTS)
     sides, signs = rng.choice([-1.0, 1.0], (2, _FLIGHTS))
     start = rng.uniform(-_START, _START, _FLIGHTS)
-    at, decisions = place - shape.axis_m, round(FLIGHT_TIME / DECISION_PERIOD)
-    left, right = np.array(shape.edges_m) - shape.axis_m
+    at, decisions = place - shape.axis, round(FLIGHT_TIME / DECISION_PERIOD)
+    left, right = np.array(shape.edges) - shape.axis
     state, error = np.zeros((len(loop.push), *size)), np.zeros((3, *size))
     felt = np.broadcast_to(np.interp(start, at, torque), size)
     held, square = np.ones(size, dtype=np.bool_), np.zeros(size)
@@ -232,7 +232,7 @@ def design_admittance(
     """
     flown = place, torque, shape
     crossings = np.array([c for c in _CROSSINGS if loop.margins(c)[0] >= MARGIN])
-    gains = crossings / shape.slope_Nm_m
+    gains = crossings / shape.slope
     fastest = fastest_followed(loop, *flown, gains)
     if not fastest.any():
         return None

@@ -102,7 +102,7 @@ def profile_log(
         noise_of = FilterNoise.of(tuning, log.period)
         return following_loop(float(vehicle.inertia[2, 2]), noise_of, noise)
 
-    noise = _noise(log, vehicle, profile, shape.edges_m, rise_time, loop(rise_time))
+    noise = _noise(log, vehicle, profile, shape.edges, rise_time, loop(rise_time))
     if len(noise) < _ROWS:
         return found(f"only {DECISION_PERIOD * len(noise):.0f} s lie in the jet", shape, None)
     flying = loop(rise_time, noise)

@@ -107,8 +107,9 @@ def wind_profile(
     if float(np.sum(used[:, 3:6] @ _ways(direction)[0])) < 0.0:
         direction += math.pi
     ways = _ways(direction)
-    number = _groups(used[:, :3] @ ways[0])
-    lines = np.array([np.median((used[number == k, :3] @ ways[0])) for k in range(max(number) + 1)])
+    beyond = used[:, :3] @ ways[0]
+    number = _groups(beyond)
+    lines = np.array([np.median(beyond[number == k]) for k in range(max(number) + 1)])
     sizes = np.bincount(number[number >= 0]) if beside is None else -np.abs(lines - beside)
     chosen = np.zeros(len(means), dtype=np.bool_)
     chosen[slow] = number == int(np.argmax(sizes))
@@ -157,8 +158,10 @@ def _groups(x: Array) -> Rows:
 
 
 def _curve(place: Array, second: Rows, y: Array, at: Array) -> tuple[Array, Array, Array, float]:
-    """Return the smooth curve of means ``y`` over the places (N,) of their seconds (N,): values and
-    standard deviations at places ``at`` (n,), draws of the curve, and the effective number of means.
+    """Return the smooth curve of means ``y`` over the places (N,) of their seconds (N,).
+
+    Values and standard deviations stand at places ``at`` (n,), with draws of the curve (k, n) and
+    the effective number of means.
 
     Beside a mean stands the spline's own mean over the places of its second: the smoothed wrench
     does not follow a faster change of place.
