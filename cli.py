@@ -22,6 +22,7 @@ from .commands.live import live
 from .commands.looking import is_path, look
 from .commands.output import prepare_output
 from .commands.paper import reproduce
+from .commands.profiling import profile
 from .commands.running import as_command, command_name
 from .commands.terminal import errors
 from .commands.warming import warm
@@ -92,6 +93,7 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
     compare,
     live,
     identify,
+    profile,
     export_c,
     record,
     reproduce,

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..runtime.errors import unknown_name
 from ..runtime.yaml_file import read_yaml
 from .fan_laws import Admittance, AdmittancePID, Hover, Lead, Ratio
+from .law_file import is_law_file, load_law
 from .lqg import LQG
 from .preview import Oracle, WindOracle
 from .tracker import InformedTracker, Limit, Tracker, TrackerLQG
@@ -114,15 +115,17 @@ _AS = {"WindTrajectory": "WindHover"}
 
 
 def make_controller(name: str, task: str = STANDARD_TASK) -> Any:
-    """Return a new ``Controller`` of a task by its name. In tasks other than FanTracking a law has
-    its tuned gains, where there are some.
+    """Return a new ``Controller`` of a task by its name, or by a law's YAML file. In tasks other
+    than FanTracking a law has its tuned gains, where there are some.
 
     Raises:
-        InputError: no task or no controller has this name.
+        InputError: no task or no controller has this name, or as ``load_law``.
     """
     if task not in TASK_LAWS:
         raise unknown_name("task", task, TASK_LAWS)
     laws = TASK_LAWS[task]
+    if is_law_file(name):
+        return load_law(name, task, laws)
     if name not in laws:
         raise unknown_name("controller", name, laws)
     if task == STANDARD_TASK:

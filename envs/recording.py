@@ -11,11 +11,14 @@ from scipy.spatial.transform import Rotation
 from ..dynamics.vehicle import EffectSetting, Vehicle
 from ..runtime.errors import InputError, unknown_name
 from .closed_loop import ClosedLoop
+from .fan import Fan
 from .plant import NOISE, TICK, PlantSettings
 
 Array = NDArray[np.float64]
 _RAMP = 2.0  # s, over which a trajectory fades in
 _REPORTED = 4_000  # ticks between two reports of progress
+_REACH = 1.5  # m, to either side of a fan's axis
+_HOVERS = 21  # at most, on a line
 _CEILING = 2.6  # m, of a room without a stated ceiling
 
 # Weak background turbulence: 15 mN and 0.3 mNm over 0.25 s for a 0.46 kg vehicle
@@ -60,6 +63,41 @@ def _ground(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
 def _ceiling(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
     gap = 0.3 + 0.5 * np.cos(math.pi * t / rng.uniform(5.0, 7.0)) ** 2
     return _drifting(rng, t, ceiling - gap)
+
+
+def _across(x: Array, y: Array) -> Array:
+    """Return a path (n, 4) of places in the plane of a fan's axis, facing the fan."""
+    return np.stack([x, y, np.full(len(x), 1.2), np.full(len(x), math.pi)], axis=1)
+
+
+def _hovers(rows: Sequence[float]) -> _Draw:
+    """Return a draw of hovers on lines across a jet, to and fro, ``rows`` (m) farther from the fan.
+    Each hover takes 6 s or more, of which 1 s or more is the way from the one before.
+    """
+
+    def draw(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
+        each = min(max(2, int((t[-1] - _RAMP) / (6.0 * len(rows)))), _HOVERS)
+        line = np.linspace(-_REACH, _REACH, each)
+        y = np.concatenate([line[:: (-1) ** i] for i in range(len(rows))])
+        time = (t[-1] - _RAMP) / len(y)  # s, of a hover
+        way = min(time, max(1.0, 4.0 * _REACH / (each - 1)))  # s, of it
+        count = np.clip((t - _RAMP) / time, 0.0, len(y))
+        k = np.minimum(count.astype(int), len(y) - 1)
+        share = np.minimum((count - k) * time / way, 1.0)
+        share *= share * (3.0 - 2.0 * share)
+        places = _across(np.repeat(rows, each), y)
+        before = places[np.maximum(k - 1, 0)]
+        return np.asarray(before + share[:, None] * (places[k] - before))
+
+    return draw
+
+
+def _sweep(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
+    """Return sweeps across a jet at about 0.1 m/s."""
+    legs = max(1, round(0.1 * (t[-1] - _RAMP) / (2.0 * _REACH)))
+    share = legs * np.clip((t - _RAMP) / (t[-1] - _RAMP), 0.0, 1.0)
+    y = _REACH * (1.0 - 2.0 * np.abs(1.0 - np.mod(share, 2.0)))
+    return _across(np.zeros(len(t)), y)
 
 
 def _yaw(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
@@ -107,6 +145,9 @@ TRAJECTORIES: dict[str, _Draw] = {
         (0.0, 0.0, 1.2, math.pi),
         ((0.25, 0.03, 0.1), (0.7, 0.05, 0.2), (0.12, 0.05, 0.2), (0.3, 0.05, 0.2)),
     ),
+    "hovers": _hovers((0.0,)),
+    "grid": _hovers((-0.5, 0.0, 0.5)),
+    "sweep": _sweep,
 }
 
 
@@ -156,6 +197,8 @@ def record_flight(
     push: Callable[[ClosedLoop], Array | None] | None = None,
     report: Callable[[float], None] = lambda share: None,
     imu: bool = False,
+    fan: Fan | None = None,
+    distance: float = 2.3,
 ) -> dict[str, Array]:
     """Fly a vehicle with undeclared effects; return the columns of a flight log.
 
@@ -172,6 +215,8 @@ def record_flight(
         imu: whether to add the true ``gyro`` (n, 3) rad/s and ``accelerometer`` (n, 3) m/s2, body
             axes, without noise or bias. They are the angular velocity at the instant of the pose,
             and the specific force of the geometric centre, its mean over one tick on either side.
+        fan: at the origin, blowing along x with gusts; None: none.
+        distance: m, of the trajectory's origin from the fan.
 
     Returns:
         ``t`` (n,) s, ``position`` (n, 3) m, ``quaternion`` (n, 4), ``rotor_speeds`` (n, 4) rad/s at
@@ -190,8 +235,10 @@ def record_flight(
     count = round(seconds / TICK) + 1
     t = TICK * np.arange(count, dtype=np.float64)
     setpoints = draw_trajectory(trajectory, rng, t, vehicle.ceiling_z)
+    if fan is not None:
+        setpoints[:, 0] += distance
     true = replace(vehicle, effects=(*vehicle.effects, *effects))
-    loop = ClosedLoop(vehicle, true, settings=settings or background(vehicle))
+    loop = ClosedLoop(vehicle, true, fan=fan, settings=settings or background(vehicle))
     loop.reset(rng, setpoints[0, :3], float(setpoints[0, 9]))
     samples, external, voltage = np.empty((count, 11)), np.zeros((count, 6)), np.empty(count)
     motion = np.empty((count, 10))  # true attitude, velocity and angular velocity

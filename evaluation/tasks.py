@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..controllers.law_file import is_law_file
 from ..controllers.own_file import is_file_name, load_controller
 from ..controllers.registry import STANDARD_TASK, TASK_LAWS, make_controller, shipped_policies
 from ..controllers.trained_policy import is_policy_path, load_policy
@@ -92,8 +93,8 @@ def make_pilot(name: str, task: str = STANDARD_TASK) -> Any:
     """Return a new controller of a task.
 
     Args:
-        name: a law, one of the kit's policies, the path of a trained policy, or FILE.py:CLASS; the
-            file is then run.
+        name: a law, its YAML file, one of the kit's policies, the path of a trained policy, or
+            FILE.py:CLASS; the file is then run.
         task: one of ``TASKS``.
 
     Raises:
@@ -102,6 +103,8 @@ def make_pilot(name: str, task: str = STANDARD_TASK) -> Any:
     known = task_of(task)
     if is_file_name(name):
         return load_controller(name)
+    if is_law_file(name):
+        return make_controller(name, task)
     shipped = known.policies()
     if name in shipped or is_policy_path(name):
         policy = load_policy(shipped.get(name, name))
