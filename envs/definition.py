@@ -125,7 +125,7 @@ class TaskDefinition:
             self.observation = type(self).observation
         self.winds = None if winds is None else Sum(*winds, where=f"{name}: winds").winds
         self.gains = gains
-        self.fan = Fan(speed=0.0, height=HEIGHT)
+        self.fan = Fan(speed=0.0, height=HEIGHT).sized(self.truth)
         self.drawn: dict[str, float] = {}  # factors of an episode, where the scenario varies
         self.decision_ticks = _ticks(name, self.decision_hz)
         self.max_decisions = round(self.episode_s / (TICK * self.decision_ticks))

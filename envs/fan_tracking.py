@@ -55,7 +55,8 @@ class FanTask(Task):
 
     def __init__(self, *shared: Any, fan: Fan | None = None, **named: Any) -> None:
         super().__init__(*shared, **named)
-        self.fan = replace(fan or self.standard, turbulence=self.scenario.turbulence)
+        fan = fan or self.standard.sized(self.truth)
+        self.fan = replace(fan, turbulence=self.scenario.turbulence)
 
     @property
     def times(self) -> Array:

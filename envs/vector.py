@@ -19,7 +19,7 @@ from .actions import take
 from .closed_loop import ClosedLoop
 from .definition import TaskDefinition
 from .observations import limit
-from .state import Episodes, Flags, Frame, Motion, Start, State, gather
+from .state import Episodes, Flags, Frame, Start, State, gather
 from .untimed import Untimed
 
 Infos = dict[str, Any]

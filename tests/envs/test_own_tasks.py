@@ -1,4 +1,4 @@
-"""Tasks of one's own: what is overridden holds in a single environment, side by side, and in lanes."""
+"""Tasks of one's own: what is overridden holds alone, side by side, and in lanes."""
 
 import gymnasium as gym
 import numpy as np
@@ -158,7 +158,7 @@ def test_a_start_in_which_no_flight_loop_can_stay_is_refused():
         def start(self, rng, n):
             return Start(np.array([[0.0, 0.0, -1.0, 0.0]]))
 
-    with pytest.raises(InputError, match="^Floor: the vehicle is lost before"):
+    with pytest.raises(InputError, match=r"^Floor: the vehicle is lost before"):
         Floor().reset(seed=0)
 
 

@@ -298,7 +298,8 @@ def seed_of(environment, episode):
 
 
 def make(count, limit, scenario="static"):
-    return FeatureVecEnv(TaskVectorEnv(count, limit, task=FanTrackingEnv, scenario=scenario), FEATURES, seed_of)
+    envs = TaskVectorEnv(count, limit, task=FanTrackingEnv, scenario=scenario)
+    return FeatureVecEnv(envs, FEATURES, seed_of)
 
 
 def away(seed):
