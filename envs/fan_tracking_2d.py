@@ -8,7 +8,7 @@ import numpy as np
 from ..dynamics.motion import Array
 from .definition import LOST_OFFSET
 from .fan import Fan
-from .fan_tracking import AWAY, LIMITS, SCALES, FanTask
+from .fan_task import AWAY, LIMITS, SCALES, FanTask
 from .scenarios import draw_fan_path
 from .state import Flags, State
 
@@ -65,6 +65,7 @@ class FanTracking2DEnv(FanTask):
 
     ## Version history
 
+    * v2: normalised, ``observation="wrench"``; truncates its episodes itself.
     * v1: ``normalize``, True by default; ``info`` has ``observation`` and ``command`` in SI units.
     * v0: v1 with ``normalize=False``, as an alias until 3.0.
     """  # noqa: E501

@@ -95,14 +95,14 @@ class WindHoverEnv(Task):
     | Parameter     | Default      | Description                                                          |
     | ------------- | ------------ | -------------------------------------------------------------------- |
     | `scenario`    | `"base"`     | one of `windwrench.envs.wind_scenarios.WIND_SCENARIOS`, or a `WindScenario` |
-    | `winds`       | `None`       | winds in place of the scenario's: any object with ``velocity(points, time)`` |
-    | `model_in_loop` | `True`     | whether the flight loop counters the effects that `vehicle` declares    |
-    | `gains`       | `None`       | a `FlightGains`: of the flight loop                                    |
+    | `action`      | `"acceleration"` | one of `windwrench.envs.ACTIONS`                                   |
+    | `observation` | `"own"`      | one of `windwrench.envs.OBSERVATIONS`, or the table above; `"wrench"` in v2 |
 
-    All arguments of ``windwrench.envs.task.Task`` come beside these. ``reset`` refuses any ``options``.
+    All arguments of ``windwrench.envs.Task`` come beside these. ``reset`` refuses any ``options``.
 
     ## Version history
 
+    * v2: normalised, ``observation="wrench"``; truncates its episodes itself.
     * v1: ``normalize``, True by default; ``info`` has ``observation`` and ``command`` in SI units.
     * v0: v1 with ``normalize=False``, as an alias until 3.0.
     """  # noqa: E501
@@ -170,6 +170,7 @@ class WindTrajectoryEnv(WindHoverEnv):
 
     ## Version history
 
+    * v2: normalised, ``observation="wrench"``; truncates its episodes itself.
     * v1: ``normalize``, True by default; ``info`` has ``observation`` and ``command`` in SI units.
     * v0: v1 with ``normalize=False``, as an alias until 3.0.
     """
