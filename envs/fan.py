@@ -5,11 +5,12 @@ jet: ``dynamics.mean_jet``.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..controllers.briefing import standard_vehicle
 from ..dynamics.mean_jet import (
     AIR_DENSITY,
     COUNT_R,
@@ -21,6 +22,7 @@ from ..dynamics.mean_jet import (
     STEP_X,
 )
 from ..dynamics.rotation import product
+from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled
 from ..runtime.vector_lanes import any_of, choose, corners
 
@@ -45,6 +47,23 @@ class Fan:
     # rad, of the hull's stations in turn above and below the rotors' plane, as seen from the
     # centre: 0 is a ring, and a jet above pitches nothing; 0.6 is a spherical cage
     hull_elevation: float = 0.0
+    hull_radius: float = HULL_RADIUS  # m, of the hull's stations
+
+    def sized(self, vehicle: Vehicle) -> Fan:
+        """Return the fan with a hull for a vehicle: drag by the weight, lengths by the root of the
+        arm, over the standard vehicle's. Then the wind's force goes with the weight, and its torque
+        with weight and arm.
+        """
+        standard = standard_vehicle()
+        weight, length = vehicle.weight / standard.weight, vehicle.arm_l / standard.arm_l
+        length = math.sqrt(length)
+        return replace(
+            self,
+            rotor_drag=weight * self.rotor_drag,
+            hull_area=weight * self.hull_area,
+            hull_radius=length * self.hull_radius,
+            gust_length=length * self.gust_length,
+        )
 
 
 FAN = np.dtype(
@@ -75,11 +94,11 @@ def fan_record(fan: Fan, rotor_positions: Array, period: float) -> np.ndarray:
         f[name] = getattr(fan, name)
     f["keep"] = math.exp(-period / fan.gust_time)
     angle = np.arange(8) * math.pi / 4
-    ring = HULL_RADIUS * np.stack([np.cos(angle), np.sin(angle), np.zeros(8)], axis=1)
+    ring = fan.hull_radius * np.stack([np.cos(angle), np.sin(angle), np.zeros(8)], axis=1)
     if fan.hull_elevation != 0.0:
         above = fan.hull_elevation * (-1.0) ** np.arange(8)
         ring[:, :2] *= np.cos(above)[:, None]
-        ring[:, 2] = HULL_RADIUS * np.sin(above)
+        ring[:, 2] = fan.hull_radius * np.sin(above)
     stations = np.concatenate([rotor_positions, ring])
     f["stations"] = stations
     distance = np.linalg.norm(stations[:, None] - stations[None], axis=2)

@@ -14,6 +14,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from ..controllers.briefing import standard_vehicle
 from ..dynamics.model import (
     MODEL_FIELDS,
     apply_effects,
@@ -64,10 +65,14 @@ class PlantSettings:
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle) -> "PlantSettings":
-        """Return the settings with the AR.Drone's disturbance scaled to a vehicle."""
-        force = vehicle.weight / 4.56
+        """Return the settings with the AR.Drone's disturbance scaled to a vehicle: force by the
+        weight, torque by the inertia, for the same accelerations.
+        """
+        standard = standard_vehicle()
+        torque = 0.01 * (standard.weight / 4.56) * standard.arm_l / 0.1262
+        inertia = vehicle.inertia[0, 0] / standard.inertia[0, 0]
         return cls(
-            disturbance_force=0.03 * force, disturbance_torque=0.01 * force * vehicle.arm_l / 0.1262
+            disturbance_force=0.03 * (vehicle.weight / 4.56), disturbance_torque=torque * inertia
         )
 
 

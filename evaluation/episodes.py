@@ -90,7 +90,7 @@ def fly_episode(
     if hasattr(controller, "reset"):
         controller.reset()
     loop, rows, total = env.unwrapped.loop, [], 0.0
-    whole = decisions or env.unwrapped.decisions()
+    whole = decisions or env.unwrapped.max_decisions
     for _ in range(whole):
         action = np.asarray(controller(observation, info), dtype=np.float32)
         observation, reward, terminated, _, info = env.step(action)

@@ -62,7 +62,7 @@ pictures["moved"] = env.render()
 np.savez("pictures.npz", **pictures)
 env.close()
 warnings.simplefilter("error")
-check_env(gym.make("windwrench/FanTracking-v1", render_mode="rgb_array").unwrapped)
+check_env(gym.make("windwrench/FanTracking-v2", render_mode="rgb_array").unwrapped)
 import mujoco  # after the kit, which tells MuJoCo how to draw
 def broken(*arguments):
     raise RuntimeError("no display")
@@ -153,11 +153,13 @@ def test_an_episode_is_written_as_a_gif_that_keeps_the_colours_of_the_arrows(tmp
 
 
 RECORDED = """
-import gymnasium as gym, windwrench
+import gymnasium as gym, itertools, windwrench
 from gymnasium.wrappers import RecordVideo
-for task in TASKS:
-    env = gym.make(f"windwrench/{task}-v1", render_mode="rgb_array", width=320, height=240)
-    env = RecordVideo(env, task)
+from windwrench.envs import ACTIONS, OBSERVATIONS
+for task, action, observation in itertools.product(TASKS, ACTIONS, OBSERVATIONS):
+    seen = {"action": action, "observation": observation, "width": 64, "height": 48}
+    env = gym.make(f"windwrench/{task}-v2", render_mode="rgb_array", **seen)
+    env = RecordVideo(env, f"{task}-{action}-{observation}")
     env.reset(seed=0)
     for _ in range(3):
         env.step(env.action_space.sample())
@@ -168,10 +170,11 @@ for task in TASKS:
 @pytest.mark.skipif(
     find_spec("moviepy") is None, reason="moviepy is not installed: pip install 'windwrench[video]'"
 )
-def test_gymnasium_s_recorder_films_every_task(tmp_path):
+def test_gymnasium_s_recorder_films_every_task_action_and_observation(tmp_path):
     import imageio_ffmpeg
 
     run(tmp_path, RECORDED.replace("TASKS", repr(TASKS)), MUJOCO_GL=BACKEND)
-    for task in TASKS:
-        (film,) = (tmp_path / task).glob("*.mp4")
+    films = list(tmp_path.glob("*/*.mp4"))
+    assert len(films) == 5 * 4 * len(TASKS)
+    for film in films[::7]:
         assert imageio_ffmpeg.count_frames_and_secs(str(film))[0] == 4
