@@ -5,6 +5,7 @@ scenario and command in ``tuned.yaml``), and the kit's trained policies.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cache, partial
 from importlib import resources
 from pathlib import Path
@@ -14,9 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..runtime.errors import unknown_name
+from ..runtime.forms import STRICT, checked
+from ..runtime.python_file import is_file_name
 from ..runtime.yaml_file import read_yaml
 from .fan_laws import Admittance, AdmittancePID, Hover, Lead, Ratio
 from .lqg import LQG
+from .own_file import load_controller
 from .preview import Oracle, WindOracle
 from .tracker import InformedTracker, Limit, Tracker, TrackerLQG
 from .wind_laws import INDI, PID, FlightLoopAlone, L1Adaptive, PIDWithForce, PIDWithWrench
@@ -109,26 +113,49 @@ TASK_LAWS: dict[str, Laws] = {
     "WindHover": _WIND,
     "WindTrajectory": _WIND,
 }
+# laws of a user's own by name, for every task: ``OWN_LAWS["me/gentle"] = Gentle``
+OWN_LAWS: Laws = {}
 # tasks that are flown with the gains of another where the file has none of their own
 _AS = {"WindTrajectory": "WindHover"}
 
 
+@dataclass(frozen=True)
+class LawFile:
+    """A law of a YAML file: ``law: pid`` and ``gains: {kp: 9.0}``."""
+
+    __pydantic_config__ = STRICT
+
+    law: str
+    gains: dict[str, float] = field(default_factory=dict)
+
+
 def make_controller(name: str, task: str = STANDARD_TASK) -> Any:
-    """Return a new ``Controller`` of a task by its name. In tasks other than FanTracking a law has
-    its tuned gains, where there are some.
+    """Return a new ``Controller`` of a task by its name, of a YAML file (``LawFile``), or of a
+    Python file (``FILE.py:CLASS``). In tasks other than FanTracking a law has its tuned gains,
+    where there are some; those of a file come before.
 
     Raises:
-        InputError: no task or no controller has this name.
+        InputError: no task or no controller has this name, or a file holds none.
     """
+    if is_file_name(name):
+        return load_controller(name)
     if task not in TASK_LAWS:
         raise unknown_name("task", task, TASK_LAWS)
-    laws = TASK_LAWS[task]
-    if name not in laws:
-        raise unknown_name("controller", name, laws)
-    if task == STANDARD_TASK:
-        return laws[name]()
-    entry = tuned_gains(task).get(name) or tuned_gains(_AS.get(task, task)).get(name, {})
-    return laws[name](**entry.get("gains", {}))
+    laws, given, where = OWN_LAWS | TASK_LAWS[task], LawFile(name), ""
+    if name.endswith((".yaml", ".yml")):
+        where = name
+        given = checked(LawFile, read_yaml(Path(name), "a law's file"), name, "law, gains")
+    law = given.law
+    if law not in laws:
+        raise unknown_name("controller", law, [*laws, *shipped_policies(task)], where)
+    known = vars(laws[law]()) if given.gains else {}
+    for gain in given.gains:
+        if gain not in known:
+            raise unknown_name("gain", gain, known, f"{where}: {law}")
+    entry: dict[str, Any] = {}
+    if task != STANDARD_TASK:
+        entry = tuned_gains(task).get(law) or tuned_gains(_AS.get(task, task)).get(law, {})
+    return laws[law](**{**entry.get("gains", {}), **given.gains})
 
 
 @cache
