@@ -168,22 +168,20 @@ def _markdown(columns: dict[str, list[str]]) -> str:
 
 def legend(task: str, rows: Sequence[Standing]) -> str:
     """Return the words below the tables of a leaderboard."""
-    known, by_error = task_of(task), rows[0].ranked_by == SETTLED
+    known, first = task_of(task), rows[0]
+    by_error = first.ranked_by == SETTLED
     ranked = "RMSE after 3 s" if by_error else "return: the task states no error"
-    sentences = (
-        (
-            f"{task}: {rows[0].episodes} paired episodes per scenario, seed {rows[0].seed}, ranked by "
-            f"{ranked}.",
-            True,
-        ),
-        ("IQM: interquartile mean.", by_error),
-        ("Activity: mean squared change of the command, of its largest.", True),
-        (f"P: probability of improvement over {known.rival}.", True),
-        ("Score: 0 = hover, 1 = oracle.", "oracle" in known.laws),
-        ("A terminated episode's rest counts 2.5 m.", any(row.lost_episodes for row in rows)),
-        ("*: reads the truth or a preview.", any(row.uses_truth for row in rows)),
-    )
-    return " ".join(text for text, holds in sentences if holds)
+    sentences = {
+        f"{task}: {first.episodes} paired episodes per scenario, seed {first.seed}.": True,
+        f"Ranked by {ranked}.": True,
+        "IQM: interquartile mean.": by_error,
+        "Activity: mean squared change of the command, of its largest.": True,
+        f"P: probability of improvement over {known.rival}.": True,
+        "Score: 0 = hover, 1 = oracle.": "oracle" in known.laws,
+        "A terminated episode's rest counts 2.5 m.": any(row.lost_episodes for row in rows),
+        "*: reads the truth or a preview.": any(row.uses_truth for row in rows),
+    }
+    return " ".join(text for text, holds in sentences.items() if holds)
 
 
 def in_mm(value: float, interval: tuple[float, float] | None = None) -> str:

@@ -5,7 +5,6 @@ environment. Its ``info`` states ``error`` (m); without one the leaderboard rank
 """
 
 import inspect
-import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -64,13 +63,12 @@ class BenchmarkTask:
     # 95 % interval of one law's mean RMSE
     interval: Callable[..., tuple[float, float]] = hierarchical_bootstrap
     spec: EnvSpec | None = None  # of a task of a user's own
-    own_name: str = ""  # likewise
     kin: str = ""  # the kit's task whose class it extends, and whose laws it has
 
     @property
     def name(self) -> str:
-        """Its name on the command line and in results."""
-        return self.own_name or str(self.environment.name)
+        """Its name in results: one of ``TASKS``, or the registered id."""
+        return self.spec.id if self.spec else str(self.environment.name)
 
     @property
     def scenarios(self) -> Mapping[str, Any]:
@@ -164,6 +162,26 @@ class BenchmarkTask:
         mode = "vector_entry_point" if native else "sync"
         return gym.make_vec(spec, count, vectorization_mode=mode, **given)
 
+    def units(self, envs: gym.vector.VectorEnv) -> dict[str, Any]:
+        """Return the entries of a policy's card that lead from a learner's units to those of
+        ``make``: ``scale`` of the observation, ``largest`` of the action.
+
+        Raises:
+            InputError: the spaces of ``envs`` are no boxes of one dimension, or the action's range
+                is not -1 to 1.
+        """
+        seen, action = envs.single_observation_space, envs.single_action_space
+        boxes = all(isinstance(s, gym.spaces.Box) and len(s.shape) == 1 for s in (seen, action))
+        if not boxes or np.any(action.high != 1.0) or np.any(action.low != -1.0):
+            raise InputError(
+                f"train: {self.name}: expected observations (n,) and actions (k,) in [-1, 1], got "
+                f"{seen} and {action}"
+            )
+        if self.kin or self.spec is None:
+            kind = self.environment
+            return {"scale": [float(x) for x in kind.scales], "largest": kind.largest_action}
+        return {"scale": [1.0] * seen.shape[0], "largest": 1.0}
+
 
 TASKS: dict[str, BenchmarkTask] = {
     task.environment.name: task
@@ -187,14 +205,11 @@ TASKS: dict[str, BenchmarkTask] = {
 def import_files(paths: Iterable[str]) -> None:
     """Run Python files that register tasks, laws, scenarios or rewards; each once in a process.
 
-    An entry point ``stem:name`` of such a file is found, unless another module has this name.
-
     Raises:
         InputError: as ``import_file``.
     """
     for path in paths:
-        module = import_file(path, "a Python file that registers a task, a law or a reward")
-        sys.modules.setdefault(Path(path).stem, module)
+        import_file(path, "a Python file that registers a task, a law or a reward")
 
 
 @cache
@@ -236,9 +251,9 @@ def task_of(name: str) -> BenchmarkTask:
     kin = next((n for n, t in TASKS.items() if t.environment in getattr(kind, "__mro__", ())), "")
     if kin:
         known = TASKS[kin]
-        return replace(known, environment=kind, spec=spec, own_name=name, kin=kin)
+        return replace(known, environment=kind, spec=spec, kin=kin)
     worlds = tuple(getattr(kind, "scenarios", ()))[:1] or (ALONE,)
-    return BenchmarkTask(kind, "hover", "hover", worlds, spec=spec, own_name=name)
+    return BenchmarkTask(kind, "hover", "hover", worlds, spec=spec)
 
 
 def _is_environment(value: Any) -> bool:

@@ -60,7 +60,7 @@ def import_file(path: str | Path, what: str) -> ModuleType:
     errors.
 
     Its name among the modules is the absolute path, so the module never hides another and is run
-    once.
+    once. An entry point ``stem:name`` finds the module, too, unless another has this name.
 
     Raises:
         InputError: no such file, or an error while it runs; the message names the line.
@@ -87,4 +87,7 @@ def import_file(path: str | Path, what: str) -> ModuleType:
         raise InputError(
             f"{path}{where}: {type(error).__name__}: {error}; expected {what}"
         ) from error
+    other = importlib.util.find_spec(path.stem) if path.stem.isidentifier() else spec
+    if other is None or other.origin == name:
+        sys.modules.setdefault(path.stem, module)
     return module
