@@ -25,8 +25,10 @@ _WHAT = "a Python file with a function of info that returns a reward, or a dicti
 
 @dataclass(frozen=True)
 class WeightedTerms:
-    """A weighted sum of the terms ``reward_NAME`` of ``info``; ``squared`` is minus the squared
-    error, m2, at most that of 2.5 m.
+    """A weighted sum of the terms ``reward_NAME`` of ``info``, and of two terms of the error.
+
+    Errors count at most 2.5 m. ``error`` is 1 minus the error over 2.5 m: its return ranks
+    controllers as their RMSE after 3 s does. ``squared`` is minus the squared error, m2.
     """
 
     weights: Mapping[str, float]
@@ -40,14 +42,15 @@ def _term(name: str, info: Mapping[str, Any]) -> Any:
     if f"reward_{name}" in info:
         return info[f"reward_{name}"]
     error = error_of(info)
-    if name != "squared" or error is None:
+    if name not in ("squared", "error") or error is None:
         known = [key.removeprefix("reward_") for key in info if key.startswith("reward_")]
-        raise unknown_name("term", name, [*known, "squared"], "reward")
-    return -(np.minimum(error, LOST_OFFSET) ** 2)
+        raise unknown_name("term", name, [*known, "squared", "error"], "reward")
+    limited = np.minimum(error, LOST_OFFSET)
+    return -(limited**2) if name == "squared" else 1.0 - limited / LOST_OFFSET
 
 
 # rewards by name; a user's own file may add some: ``REWARDS["me/soft"] = soft``
-REWARDS: dict[str, Reward] = {"squared": WeightedTerms({"squared": 1.0, "change": 1.0})}
+REWARDS: dict[str, Reward] = {"error": WeightedTerms({"error": 1.0})}
 
 
 def find_reward(name: str) -> Reward:

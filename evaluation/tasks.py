@@ -225,7 +225,8 @@ def task_of(name: str) -> BenchmarkTask:
     if is_file_name(name):
         kind = named_in_file(name, "task", _WHAT, _is_environment)
         many = getattr(kind, "vector", None)
-        spec = next((s for s in gym.registry.values() if s.entry_point is kind), None)
+        entries = kind, f"{Path(kind.__module__).stem}:{kind.__name__}"
+        spec = next((s for s in gym.registry.values() if s.entry_point in entries), None)
         spec = spec or EnvSpec(f"own/{kind.__name__}-v0", kind, vector_entry_point=many)
     else:
         try:

@@ -59,9 +59,8 @@ def train(
         from .imitation import imitate
 
         if not standard or reward is not None:
-            raise InputError(
-                f"train {config['algorithm']}: flies {STANDARD_TASK} and its own reward"
-            )
+            name = config["algorithm"]
+            raise InputError(f"train {name}: expected the task {STANDARD_TASK} and no --reward")
         return imitate(run, advance)
     from .checkpoint import load_checkpoint, save_checkpoint
     from .learners import make_learner, weights_of
