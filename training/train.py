@@ -53,14 +53,14 @@ def train(
         InputError: an unknown name, a folder with another run, or a task without such a learner.
     """
     import_files(imports)
+    standard, imitates = task == STANDARD_TASK, config["algorithm"] in IMITATIONS
+    if imitates and not (standard and reward is None):
+        name = config["algorithm"]
+        raise InputError(f"train {name}: expected the task {STANDARD_TASK} and no --reward")
     run = Run(config, scenario, seed, folder, report, task, reward)
-    standard = task == STANDARD_TASK
-    if config["algorithm"] in IMITATIONS:
+    if imitates:
         from .imitation import imitate
 
-        if not standard or reward is not None:
-            name = config["algorithm"]
-            raise InputError(f"train {name}: expected the task {STANDARD_TASK} and no --reward")
         return imitate(run, advance)
     from .checkpoint import load_checkpoint, save_checkpoint
     from .learners import make_learner, weights_of
