@@ -38,7 +38,7 @@ def captioned(env: Task, title: str, flown: Sequence[Mapping[str, Any]]) -> NDAr
     from PIL import Image, ImageDraw
 
     image = Image.fromarray(np.asarray(env.render()))
-    loop, viewer, info = env.loop, env.viewer, flown[-1]
+    loop, viewer, info = env.loop, env.many.viewers[0], flown[-1]
     width, height = image.size
     size = height / _HEIGHT
     draw = ImageDraw.Draw(image)

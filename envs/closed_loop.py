@@ -17,7 +17,6 @@ A user's own ``Stage`` stands before one of them.
 from __future__ import annotations
 
 import ctypes
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -27,12 +26,14 @@ import mujoco
 import numpy as np
 
 from ..controllers.flight import (
+    BESIDE,
     FLIGHT,
+    ROTORS,
     FlightGains,
     flight_record,
-    fly,
     move_setpoint,
     reset_flight,
+    steer,
 )
 from ..controllers.model_inverse import foresee, through_the_rotors
 from ..dynamics.effects import compile_effects
@@ -49,7 +50,6 @@ from ..runtime.addresses import call_at, call_step
 from ..runtime.compiled import Record, compiled, compiled_without_gil, specialised
 from ..runtime.errors import InputError, unknown_name
 from .fan import FAN, STATIONS, Fan, fan_record
-from .observing import Motion
 from .plant import (
     NOISE,
     PLANT,
@@ -63,13 +63,12 @@ from .plant import (
     reset_plant,
     sense,
 )
+from .state import REFERENCE_SIZE, Motion, is_healthy
 from .untimed import Untimed
 from .wind.field import Calls, Sum, Wind, add_winds
 
 _C_FUNCTION = ctypes.CFUNCTYPE(None)
-FASTEST = 200.0  # m/s and rad/s, beyond any vehicle
 WIND_EVERY = 2  # ticks between two evaluations of the winds at the stations
-REFERENCE_SIZE = 10  # position, velocity, acceleration, yaw
 ACCELEROMETER_NOISE = 3  # unit normals of a tick with an accelerometer, behind the plant's
 
 LOOP = np.dtype(
@@ -85,7 +84,8 @@ LOOP = np.dtype(
         ("rotation", "f8", (3, 3)),  # of the vehicle, body to world, when the winds blew last
         ("points", "f8", (3, STATIONS)),  # m, world, of the vehicle's stations then
         ("air", "f8", (3, STATIONS)),  # m/s, world, of the winds there
-        ("action", "f8", (3,)),  # m/s2, beside the flight loop's own
+        ("action", "f8", (4,)),  # the command, of a kind that ``controllers.flight.steer`` knows
+        ("kind", "i8"),
         ("model_in_loop", "i8"),  # whether the flight loop counters the effects of its model
         ("accelerometer_sigma", "f8"),  # m/s2, a tick
         ("accelerometer_bias", "f8", (3,)),  # m/s2, body axes
@@ -207,16 +207,6 @@ def _estimate(record: Record, world: World, path: Array, noise: Array, k: int) -
 
 
 @compiled
-def fly_beside(flight: Record, x: Array, action: Array) -> None:
-    """Fly to the set point with an acceleration (3,) m/s2 beside the flight loop's own."""
-    for i in range(3):
-        flight.setpoint[6 + i] += action[i]
-    fly(flight, x, TICK)
-    for i in range(3):
-        flight.setpoint[6 + i] -= action[i]
-
-
-@compiled
 def _steer(record: Record, world: World, path: Array, noise: Array, k: int) -> None:
     """Write the rotor speeds that fly to the reference, or to the set point where there is none."""
     loop = record[0]
@@ -229,8 +219,8 @@ def _steer(record: Record, world: World, path: Array, noise: Array, k: int) -> N
         move_setpoint(flight, ukf.x, TICK)
     if loop.model_in_loop > 0:
         foresee(flight, ukf, ukf.x)
-    fly_beside(flight, ukf.x, loop.action)
-    if loop.model_in_loop > 0:
+    steer(flight, ukf.x, loop.action, loop.kind, TICK)
+    if loop.model_in_loop > 0 and loop.kind != ROTORS:
         through_the_rotors(flight, ukf)
 
 
@@ -291,15 +281,6 @@ def run_ticks(record: Record, world: World, path: Array, noise: Array, move: int
         record[0].ticks += 1
 
 
-@compiled
-def is_healthy(state: Array, qvel: Array) -> bool:
-    """Return whether an estimate (20,) is finite and each velocity (6,) a vehicle's."""
-    healthy = math.isfinite(state[:19].sum())
-    for velocity in qvel:
-        healthy = healthy and abs(velocity) < FASTEST
-    return healthy
-
-
 def _compiled_stage(function: Callable[..., None]) -> Callable[[ClosedLoop], None]:
     def run(loop: ClosedLoop) -> None:
         function(loop.record, loop.world, loop.fan_path, loop.noise, loop.row)
@@ -333,13 +314,15 @@ class ClosedLoop:
         accelerometer: standard deviation in m/s2 of its noise, a tick, and of its bias. None: there
             is no accelerometer, and a tick uses ``NOISE`` unit normals instead of three more.
         model_in_loop: whether the flight loop counters the effects of ``declared``.
+        kind: of the commands in ``action``, once the filter has settled.
         stages: a user's own, in the pipeline of a tick.
 
     Attributes:
         state: (20,) estimated state, laid out as in ``estimator.estimate``.
         covariance: (18, 18) of the estimate.
         setpoint: (11,) position, velocity, acceleration, yaw and yaw rate to fly to.
-        action: (3,) m/s2, world, beside the flight loop's own acceleration.
+        action: (4,) the command, of the kind ``kind``: in m/s2, world, beside the flight loop's own
+            acceleration, or as of ``controllers.flight.steer``.
         command: (4,) rad/s, of the rotors.
         sample: (11,) rotor speeds, position and quaternion of the last measurement.
         unrounded: (4,) rad/s, these rotor speeds before rounding.
@@ -369,6 +352,7 @@ class ClosedLoop:
         estimator: str = "ukf",
         accelerometer: tuple[float, float] | None = None,
         model_in_loop: bool = False,
+        kind: int = BESIDE,
         stages: Sequence[Stage] = (),
     ) -> None:
         if estimator not in ESTIMATORS:
@@ -382,7 +366,7 @@ class ClosedLoop:
         loop["plant"] = plant[0]
         # the flight loop's model has no effects but those of the body: mass, inertia and its centre
         loop["flight"] = flight_record(compile_effects(declared).vehicle, gains)[0]
-        loop["model_in_loop"] = model_in_loop
+        loop["model_in_loop"], self.kind = model_in_loop, kind
         self.jet_table: Array = np.zeros((2, COUNT_X, COUNT_R))  # axial and radial
         if fan is not None:
             loop["fan"] = fan_record(fan, self._body.positions, TICK)[0]
@@ -454,7 +438,16 @@ class ClosedLoop:
         self.position, self.quaternion, self.velocity = p[:3], p[3:7], v[:3]
         xfrc: Array = self.data.xfrc_applied[self.model.body("vehicle").id]
         self.world = World(self.jet_table, p[:7], v[:6], xfrc, self.reference, self.winds.calls)
-        shown = p[:7], v[:6], self.external, self.state, self.specific, self.thrust, self.air
+        shown = (
+            p[:7],
+            v[:6],
+            self.external,
+            self.state,
+            self.covariance,
+            self.specific,
+            self.thrust,
+            self.air,
+        )
         self.shown = Motion(*(values[np.newaxis, ..., np.newaxis] for values in shown))
 
     @property
@@ -512,7 +505,7 @@ class ClosedLoop:
         self._look_at_world()
         loop = self.record[0]
         loop["winds"] = len(blowing.winds)
-        self.action[:] = 0.0
+        self.action[:], loop["kind"] = 0.0, self.kind
         if self.accelerometer is not None:
             loop["accelerometer_bias"] = self.accelerometer[1] * rng.standard_normal(3)
         loop["ticks"] = self._settled = 0
@@ -538,8 +531,9 @@ class ClosedLoop:
             ticks: even: the winds blow from the first.
             fan_path: the fan's place meanwhile, as in ``run``.
         """
-        self.record[0]["ticks"], self._settled = -ticks, ticks
+        self.record[0]["ticks"], self._settled, self.record[0]["kind"] = -ticks, ticks, BESIDE
         self.run(rng.standard_normal((ticks, self.noise_size)), fan_path)
+        self.record[0]["kind"] = self.kind
 
     def run(self, noise: Array, fan_path: Array | None = None) -> None:
         """Run one tick for each row of ``noise``.

@@ -34,7 +34,7 @@ _SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
 
 
 class Viewer:
-    """Draws a closed loop; one along a reference counts as one in the wind.
+    """Draws a closed loop, in the wind or in the jet of a fan.
 
     Args:
         mode: ``"rgb_array"`` for pictures, ``"human"`` for a window.
@@ -92,11 +92,11 @@ class Viewer:
                 "install Debian's libegl1 or libosmesa6"
             ) from error
 
-    def draw(self, loop: ClosedLoop) -> NDArray[np.uint8] | None:
-        """Draw the loop as it is now; return the picture (height, width, 3), or None from a
-        window.
+    def draw(self, loop: ClosedLoop, goal: Array | None = None) -> NDArray[np.uint8] | None:
+        """Draw the loop as it is now, in the wind with its ``goal`` (3,) m; return the picture
+        (height, width, 3), or None from a window.
         """
-        in_wind = len(loop.reference) > 0
+        in_wind = goal is not None
         self.scales = _WIND_SCALES if in_wind else SCALES
         self._open(loop.model, loop.data, not in_wind)
         step = min(loop.time - self._last, 0.08)
@@ -112,16 +112,16 @@ class Viewer:
         if self._window is not None:
             with self._window.lock():
                 self._window.user_scn.ngeom = 0
-                self._mark(self._window.user_scn, loop, air)
+                self._mark(self._window.user_scn, loop, air, goal)
             self._window.sync()
             return None
         self._renderer.update_scene(loop.data, camera="chase")
-        self._mark(self._renderer.scene, loop, air)
+        self._mark(self._renderer.scene, loop, air, goal)
         picture: NDArray[np.uint8] = self._renderer.render()
         return picture
 
-    def _mark(self, scene: Any, loop: ClosedLoop, air: Array) -> None:
-        """Add drops, fans, the reference, the path and the wrench to a scene."""
+    def _mark(self, scene: Any, loop: ClosedLoop, air: Array, goal: Array | None) -> None:
+        """Add drops, fans, the goal, the path and the wrench to a scene."""
         for drop, speed in zip(self._drops, np.linalg.norm(air, axis=1), strict=True):
             colour = np.array([0.25, 0.55, 0.95, 0.08 + 0.1 * min(speed, 6.0)])
             if speed > _STILL:
@@ -129,9 +129,9 @@ class Viewer:
         for wind in loop.winds.winds:
             if isinstance(wind, FanWall):
                 _add_wall(scene, wind, loop.time)
-        for row in loop.reference[max(loop.ticks, 0) :][:1]:
+        if goal is not None:
             yellow = np.array([0.95, 0.75, 0.10, 0.6])
-            add_shape(scene, _SPHERE, np.full(3, 0.035), row[:3], yellow)
+            add_shape(scene, _SPHERE, np.full(3, 0.035), goal, yellow)
         at, true, seen = loop.position, loop.external, loop.state
         add_shadow(scene, at)
         add_path(scene, self._path[-_TRAIL:])

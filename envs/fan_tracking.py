@@ -5,50 +5,95 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ..controllers.briefing import Air, Briefing, FilterNoise, Jet, Motions
+from ..controllers.observation import MAX_COMMAND
 from ..dynamics.motion import Array
-from ..runtime.compiled import compiled_without_gil
-from ..runtime.errors import InputError
+from ..runtime.errors import InputError, unknown_name
+from .definition import EPISODE_SECONDS, LOST_OFFSET
 from .fan import Fan
-from .observing import LIMITS, SCALES, Episodes, Motion, View
 from .plant import TICK, PlantSettings
 from .scenarios import SCENARIOS, draw_fan_path
-from .task import (
-    COMMON_VALUES,
-    EPISODE_SECONDS,
-    LOST_OFFSET,
-    Frame,
-    Task,
-    is_flying,
-    keep_within,
-    note,
-    vehicle_of,
-)
+from .state import Flags, Start, State
+from .task import Task
 
-DECISION_TICKS = 16  # 12.5 Hz
 DISTANCE = 2.3  # m, from the fan
 TRACKING_WIDTH = 0.3  # m, offset at which the tracking reward is a half
-CHANGE_COST = 0.05  # per (m/s)^2 of change of the command
-_LIMITS = np.array(LIMITS)
+CHANGE_COST = 0.05  # of a change of an action from 0 to 1
 AWAY = 1.0  # m, off its height or its distance, at which a vehicle is lost
-FAN_TIMES = TICK * np.arange(round(EPISODE_SECONDS / TICK) + 2, dtype=np.float64)
+FRAMES = 25  # decisions of a history, 2 s
+# largest size of a frame's numbers: N, Nm, m/s and m/s
+LIMITS = (10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 5.0, MAX_COMMAND)
+# divisors: N, Nm, m/s and m/s; the jet's effect on the standard vehicle
+SCALES = (0.5, 0.5, 0.5, 0.03, 0.03, 0.03, 0.5, 1.0)
+# for the pose: position (m), velocity (m/s), tilt, yaw (rad), command (m/s)
+_POSE_LIMITS = (5.0, 5.0, 5.0, 5.0, 1.0, 1.0, math.pi, MAX_COMMAND)
+_POSE_SCALES = (1.0, 1.0, 1.0, 0.5, 0.1, 0.1, 0.2, 1.0)
+# limits and scales of the views
+_VIEWS = {
+    "wrench": (LIMITS, SCALES),
+    "wrench-without-fx": (LIMITS[1:], SCALES[1:]),
+    "history": (LIMITS * FRAMES, SCALES * FRAMES),
+    "pose": (_POSE_LIMITS, _POSE_SCALES),
+}
 
 
 class FanTask(Task):
-    """Base of the tasks in front of a fan: the fan moves along a path of y and height (n, 2) m, a
-    row a tick, and the agent commands velocities across its jet.
+    """Base of the tasks in front of a fan: the fan moves along a path of y and height, and the
+    agent moves across its jet along ``axes``.
     """
 
     scenarios = SCENARIOS
-    decision_ticks = DECISION_TICKS
+    action, observation, decision_hz, normalize = "velocity", "own", 12.5, False
+    follows, model_in_loop, accelerometer = False, False, None
+    label, draws = "fan_motion", 1
+    largest_action = MAX_COMMAND
+    standard: ClassVar[Fan]
 
-    def __init__(self, *shared: Any, fan: Fan, **named: Any) -> None:
+    def __init__(self, *shared: Any, fan: Fan | None = None, **named: Any) -> None:
         super().__init__(*shared, **named)
-        self.fan = replace(fan, turbulence=self.scenario.turbulence)
+        self.fan = replace(fan or self.standard, turbulence=self.scenario.turbulence)
+
+    @property
+    def times(self) -> Array:
+        """Times (n,) s of the ticks of an episode."""
+        times: Array = TICK * np.arange(round(self.episode_s / TICK) + 2, dtype=np.float64)
+        return times
+
+    def start(self, rng: np.random.Generator, n: int) -> Start:
+        """Draw paths of the fan; hover beside their starts, facing the fan."""
+        drawn = [self.draw_path(rng) for _ in range(n)]
+        distance = self.drawn.get("distance", DISTANCE)
+        places = [[distance, *(path[0] + beside), math.pi] for _, path, beside in drawn]
+        labels, paths, _ = zip(*drawn, strict=True)
+        return Start(np.array(places), paths=paths, labels=labels)
+
+    def draw_path(self, rng: np.random.Generator) -> tuple[str, Array, Array]:
+        """Return the motion's name, the fan's path (m, 2) m, and the vehicle's start (2,) m beside
+        the fan's axis.
+        """
+        raise NotImplementedError
+
+    def off_axis(self, s: State) -> Array:
+        """Return the vehicles' offsets (n, axes) m from the fan's axis."""
+        raise NotImplementedError
+
+    def observe(self, s: State) -> Array:
+        """Return the task's own observation (n, 6 + 2 axes)."""
+        e, axes = s.estimate, self.axes
+        own = e.velocity[:, axes[0] : axes[-1] + 1]
+        return np.concatenate([e.force, e.torque, own, s.command], axis=1)
+
+    def reward_terms(self, s: State) -> dict[str, Any]:
+        """Return ``tracking`` and ``change``."""
+        ratio = self.off_axis(s) / TRACKING_WIDTH
+        return {
+            "tracking": 1.0 / (1.0 + (ratio * ratio).sum(axis=1)),
+            "change": -CHANGE_COST * s.change,
+        }
 
     def briefing(self) -> Briefing:
         """Return beside the declared vehicle the standard fan, the tuning of the filter, the
@@ -68,12 +113,6 @@ class FanTask(Task):
         motions = Motions(scenario.motions, scenario.speed, offset=scenario.offset)
         return Briefing(self.vehicle, FilterNoise.of(self.tuning, TICK), air, jet, motions)
 
-    def _start(self, path: Array, offset: Array) -> None:
-        """Hover ``offset`` (2,) m beside the fan's axis."""
-        self.path, self.distance = path, self.drawn.get("distance", DISTANCE)
-        start = np.array([self.distance, *(path[0] + offset)])
-        self.loop.reset(self.np_random, start, math.pi)
-
     def _truth(self) -> dict[str, Any]:
         """Return ``Task._truth``, the places (3,) m of vehicle and set point, and the fan's axis
         now and after each decision to come, (foresight + 1, 2) m.
@@ -85,33 +124,6 @@ class FanTask(Task):
             "setpoint": loop.setpoint[:3].copy(),
             "fan_ahead": path[np.clip(rows, 0, len(path) - 1)],
         }
-
-
-@compiled_without_gil
-def look_along_y(
-    which: np.ndarray, episodes: Episodes, motion: Motion, frames: Frame, values: np.ndarray
-) -> None:
-    """Write frames and values of ``FanTrackingEnv`` for the episodes ``which``."""
-    for n in np.flatnonzero(which):
-        p, v, wrench, state = vehicle_of(motion, n)
-        path, value, frame = episodes.paths[n], values[n], frames[n]
-        for i in range(3):
-            frame[i], frame[3 + i] = state[16 + i], state[13 + i]  # force, torque
-        frame[6], frame[7] = state[8], episodes.commands[n, 0]
-        keep_within(frame, _LIMITS)
-        k = min(episodes.ticks[n], len(path) - 1)
-        value.fan_y = path[max(k - 1, 0), 0]
-        value.fan_velocity = (path[k, 0] - value.fan_y) / TICK
-        value.y, value.offset = p[1], p[1] - value.fan_y
-        ratio, change = value.offset / TRACKING_WIDTH, episodes.changes[n, 0]
-        note(value, episodes, n, wrench, ratio * ratio, -CHANGE_COST * change * change)
-        # in this form a number that is not finite counts as lost
-        value.lost = episodes.broken[n] or not (
-            is_flying(state, p, v)
-            and abs(value.offset) <= LOST_OFFSET
-            and abs(p[0] - episodes.distance[n]) <= AWAY
-            and abs(p[2] - path[0, 1]) <= AWAY
-        )
 
 
 class FanTrackingEnv(FanTask):
@@ -207,42 +219,76 @@ class FanTrackingEnv(FanTask):
     """  # noqa: E501
 
     name = "FanTracking"
-    action_size = 1
-
-    look = look_along_y
-    values = np.dtype(
-        [*COMMON_VALUES, *[(name, "f8") for name in ("fan_y", "fan_velocity", "y", "offset")]],
-        align=True,
-    )
+    axes = (1,)
     limits, scales = LIMITS, SCALES
+    standard = Fan()
 
     def __init__(
         self,
         *shared: Any,
-        fan: Fan | None = None,
         fan_path: Callable[[Array], Array] | None = None,
         observe: str = "wrench",
         **named: Any,
     ) -> None:
-        super().__init__(*shared, fan=fan or Fan(), **named)
-        self._see_by(View(observe, self.normalize))
-        self.fan_path = fan_path
+        if observe not in _VIEWS:
+            raise unknown_name("view", str(observe), _VIEWS, "FanTracking: observe")
+        self.fan_path, self.view = fan_path, observe
+        self.limits, self.scales = _VIEWS[observe]
+        super().__init__(*shared, **named)
 
-    def hover(self) -> None:
-        """Draw a path of the fan, and place the vehicle in hover beside its start."""
-        rng, scenario = self.np_random, self.scenario
-        self.drawn_label, fan_y = draw_fan_path(scenario, rng, FAN_TIMES)
+    def draw_path(self, rng: np.random.Generator) -> tuple[str, Array, Array]:
+        """Return the motion's name, the fan's path, and the vehicle's start beside its axis."""
+        label, fan_y = draw_fan_path(self.scenario, rng, self.times)
         if self.fan_path is not None:
-            self.drawn_label = "given"
-            fan_y = np.asarray(self.fan_path(FAN_TIMES), dtype=np.float64)
-            if fan_y.shape != FAN_TIMES.shape or not np.all(np.isfinite(fan_y)):
-                n = FAN_TIMES.size
+            label, n = "given", self.times.size
+            fan_y = np.asarray(self.fan_path(self.times), dtype=np.float64)
+            if fan_y.shape != (n,) or not np.all(np.isfinite(fan_y)):
                 raise InputError(
                     f"FanTracking: fan_path must return {n} finite numbers for {n} times"
                 )
-        offset = float(rng.uniform(*scenario.offset) * rng.choice([-1.0, 1.0]))
+        offset = float(rng.uniform(*self.scenario.offset) * rng.choice([-1.0, 1.0]))
         path = np.column_stack([fan_y, np.full(len(fan_y), self.fan.height)])
-        self._start(path, np.array([offset, 0.0]))
+        return label, path, np.array([offset, 0.0])
+
+    def off_axis(self, s: State) -> Array:
+        """Return the vehicles' offsets (n, 1) m."""
+        return s.position[:, 1:2] - s.fan[:, :1]
+
+    def observe(self, s: State) -> Array:
+        """Return the frame, or what ``observe`` chose of it."""
+        frame, n = super().observe(s), len(s.time)
+        if self.view == "history":
+            past = s.memory.setdefault("past", np.zeros((n, FRAMES, frame.shape[1])))
+            past[s.decision == 0] = frame[s.decision == 0, None]
+            rows, now = np.arange(n), s.decision % FRAMES
+            past[rows, now] = frame
+            ordered = (now[:, None] + 1 + np.arange(FRAMES)) % FRAMES
+            return past[rows[:, None], ordered].reshape(n, -1)
+        if self.view == "pose":
+            e = s.estimate
+            w, i, j, k = e.quaternion.T
+            yaw = np.arctan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k)) - math.pi
+            tilt = 2.0 * (i * k + w * j), 2.0 * (j * k - w * i)
+            turned = np.column_stack([*tilt, np.arctan2(np.sin(yaw), np.cos(yaw))])
+            moved = e.position - s.first("place", e.position)
+            return np.concatenate([moved, frame[:, 6:7], turned, frame[:, 7:]], axis=1)
+        return frame[:, 1:] if self.view == "wrench-without-fx" else frame
+
+    def is_lost(self, s: State) -> Flags:
+        """Return whether each vehicle is lost (n,)."""
+        away = np.abs(s.position - s.reference[:, :3])
+        near = (away[:, 0] <= AWAY) & (away[:, 2] <= AWAY)
+        return ~(s.flying & near & (np.abs(self.off_axis(s)[:, 0]) <= LOST_OFFSET))
+
+    def info(self, s: State) -> dict[str, Any]:
+        """Return the fan's motion and the true offset, force and torque."""
+        y, fan_y = s.position[:, 1], s.fan[:, 0]
+        told = {"fan_y": fan_y, "fan_velocity": s.fan_velocity[:, 0], "y": y, "offset": y - fan_y}
+        if self.view != "wrench" and self.chosen is None:
+            frame = np.clip(super().observe(s), -np.array(LIMITS), LIMITS)
+            told["observation"] = np.nan_to_num(frame).astype(np.float32)
+        return {"time": s.time, "force": s.force, "torque": s.torque, **told}
 
 
-__all__ = ["DECISION_TICKS", "EPISODE_SECONDS", "LOST_OFFSET", "FanTrackingEnv"]
+fan_tracking_vector = FanTrackingEnv.vector
+__all__ = ["EPISODE_SECONDS", "LOST_OFFSET", "FanTrackingEnv", "fan_tracking_vector"]

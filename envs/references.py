@@ -13,15 +13,17 @@ REFERENCE_FADE = 1.5  # s, over which a moving reference gets up to speed
 
 def hold(position: Array, yaw: float, seconds: float) -> Array:
     """Return a reference (n, 10) at rest at ``position`` (3,) m."""
-    return _rows(np.tile(position, (round(seconds / TICK) + 1, 1)), yaw)
+    return along(np.tile(position, (round(seconds / TICK) + 1, 1)), yaw)
 
 
-def _rows(position: Array, yaw: float) -> Array:
-    """Return a reference from places (n, 3) m a tick apart, with velocity and acceleration by
-    central differences.
+def along(position: Array, yaw: float) -> Array:
+    """Return a reference (n, 10) from places (n, 3) m a tick apart, with velocity and acceleration
+    by central differences.
     """
     rows = np.zeros((len(position), 10))
     rows[:, :3], rows[:, 9] = position, yaw
+    if len(position) < 2:
+        return rows
     rows[:, 3:6] = np.gradient(position, TICK, axis=0)
     rows[:, 6:9] = np.gradient(rows[:, 3:6], TICK, axis=0)
     return rows
@@ -47,10 +49,10 @@ def figure_of_eight(
     """
     t = _warped(seconds)
     phase = 2.0 * math.pi / period * t
-    along, across = size[0] * np.sin(phase), size[1] * np.sin(2.0 * phase)
+    far, side = size[0] * np.sin(phase), size[1] * np.sin(2.0 * phase)
     c, s = math.cos(turn), math.sin(turn)
-    position = centre + np.column_stack([c * along - s * across, s * along + c * across, 0.0 * t])
-    return _rows(position, yaw)
+    position = centre + np.column_stack([c * far - s * side, s * far + c * side, 0.0 * t])
+    return along(position, yaw)
 
 
 def random_spline(
@@ -63,4 +65,4 @@ def random_spline(
     points = centre + size * rng.uniform(-1.0, 1.0, (count, 3))
     points[0] = centre
     spline = CubicSpline(every * np.arange(count), points, bc_type=((1, np.zeros(3)), "not-a-knot"))
-    return _rows(np.asarray(spline(_warped(seconds))), yaw)
+    return along(np.asarray(spline(_warped(seconds))), yaw)

@@ -122,12 +122,11 @@ def length_of(env: Any) -> int:
         InputError: neither its registration nor its class says.
     """
     steps = env.spec.max_episode_steps if env.spec is not None else None
-    if steps is None and hasattr(env.unwrapped, "decisions"):
-        steps = env.unwrapped.decisions()
+    steps = steps or getattr(env.unwrapped, "max_decisions", None)
     if steps is None:
         raise InputError(
             f"{type(env.unwrapped).__name__}: states no length of an episode; expected "
-            "max_episode_steps in gymnasium.register, or a method decisions()"
+            "max_episode_steps in gymnasium.register, or an attribute max_decisions"
         )
     return int(steps)
 
@@ -162,13 +161,14 @@ def fly_episode(
         controller.reset()
     whole, low, high = decisions or length_of(env), env.action_space.low, env.action_space.high
     rows, total, uses_truth = [], 0.0, bool(foresight)
+    rate = getattr(world, "decision_hz", world.metadata.get("render_fps", 1))
     for k in range(whole):
         seen = WatchedInfo(info)
         action = np.asarray(controller(observation, seen), dtype=np.float32)
         uses_truth = uses_truth or seen.told
         observation, reward, terminated, truncated, info = env.step(action)
         total += float(reward)
-        time = info.get("time", (k + 1) / world.metadata.get("render_fps", 1))
+        time = info.get("time", (k + 1) / rate)
         rows.append((time, *_motion(world, info), observation, action))
         each(info)
         if terminated or truncated:

@@ -63,7 +63,7 @@ class BenchmarkTask:
     # 95 % interval of one law's mean RMSE
     interval: Callable[..., tuple[float, float]] = hierarchical_bootstrap
     spec: EnvSpec | None = None  # of a task of a user's own
-    kin: str = ""  # the kit's task whose class it extends, and whose laws it has
+    kin: str = ""  # the kit's task whose class it extends, with its action and observation
 
     @property
     def name(self) -> str:
@@ -248,13 +248,21 @@ def task_of(name: str) -> BenchmarkTask:
                 f"{name}: states no length of an episode; expected max_episode_steps in "
                 "gymnasium.register, or a class method decisions()"
             )
-        spec.max_episode_steps = kind.decisions()
-    kin = next((n for n, t in TASKS.items() if t.environment in getattr(kind, "__mro__", ())), "")
+        spec = replace(spec, max_episode_steps=kind.decisions())
+    kin = next((n for n, t in TASKS.items() if _is_kin(kind, spec.kwargs, t.environment)), "")
     if kin:
-        known = TASKS[kin]
-        return replace(known, environment=kind, spec=spec, kin=kin)
-    worlds = tuple(getattr(kind, "scenarios", ()))[:1] or (ALONE,)
+        return replace(TASKS[kin], environment=kind, spec=spec, kin=kin)
+    known = tuple(getattr(kind, "scenarios", ())) or (ALONE,)
+    worlds = ("base",) if "base" in known else known[:1]
     return BenchmarkTask(kind, "hover", "hover", worlds, spec=spec)
+
+
+def _is_kin(kind: Any, given: Mapping[str, Any], kit: Any) -> bool:
+    """Return whether a class extends the kit's, with the action and observation of its laws."""
+    fields = ("action", "observation", "decision_hz", "observe")
+    return kit in getattr(kind, "__mro__", ()) and all(
+        given.get(name, getattr(kind, name)) == getattr(kit, name) for name in fields
+    )
 
 
 def _is_environment(value: Any) -> bool:

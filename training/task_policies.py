@@ -17,7 +17,6 @@ import torch
 from numpy.typing import NDArray
 
 from ..controllers.trained_policy import TaskPolicy, save_policy
-from ..envs.plant import TICK
 from ..evaluation.tasks import TASKS
 from .belief_network import BeliefNetwork
 from .flown_sequences import Flights
@@ -58,7 +57,7 @@ class FanPlaneLesson:
     """
 
     _kind = TASKS["FanTracking2D"].environment
-    decisions, period = _kind.decisions(), TICK * _kind.decision_ticks
+    decisions, period = _kind.decisions(), 1.0 / _kind.decision_hz
     largest, scale = _kind.largest_action, np.array(_kind.scales, dtype=np.float32)
 
     def begin(self, envs: Any, leads: bool) -> None:

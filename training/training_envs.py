@@ -58,24 +58,23 @@ def scenarios_of(name: str) -> tuple[str, ...]:
 class MixedFanTracking(FanTrackingEnv):
     """Each episode in one of several scenarios, drawn from the episode's seed."""
 
+    mixes = True
+
     def __init__(self, scenario: Sequence[str], **named: Any) -> None:
         super().__init__(scenario[0], **named)
         self._names = scenario
-        self._loops: dict[str, ClosedLoop | None] = {}  # of the scenarios that were flown
 
-    def draw_loop(self) -> None:
-        """Draw a scenario, and the closed loop of an episode in it.
+    def draw_loop(self, rng: np.random.Generator, kept: dict[Any, ClosedLoop]) -> ClosedLoop:
+        """Draw a scenario; return the closed loop of an episode in it.
 
         The state of the episode's generator seeds another one for the scenario: a draw of the
         former would settle the fan's motion, too.
         """
-        state = self.np_random.bit_generator.state["state"]["state"]
-        generator = np.random.default_rng((state, _SCENARIO))
+        generator = np.random.default_rng((rng.bit_generator.state["state"]["state"], _SCENARIO))
         name = self._names[int(generator.integers(len(self._names)))]
-        self.scenario, self._loop = SCENARIOS[name], self._loops.get(name)
+        self.scenario = SCENARIOS[name]
         self.fan = replace(self.fan, turbulence=self.scenario.turbulence)
-        super().draw_loop()
-        self._loops[name] = self._loop
+        return super().draw_loop(rng, kept)
 
 
 def make_training_env(name: str, task: str = STANDARD_TASK, reward: str | None = None) -> Any:
@@ -112,7 +111,7 @@ def make_training_envs(
     if estimator == LANES:
         if name in TIERS:
             raise InputError(f"training: {LANES} flies one scenario, got {name!r}")
-        return TaskLanes(count, DECISIONS, scenario=name)
+        return TaskLanes(count, DECISIONS, task=FanTrackingEnv, scenario=name)
     kind = MixedFanTracking if name in TIERS else FanTrackingEnv
     world = TIERS.get(name, name)
     return TaskVectorEnv(count, DECISIONS, task=kind, scenario=world, estimator=estimator)

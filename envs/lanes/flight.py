@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...controllers.flight import FLIGHT, FlightGains, move_setpoint
+from ...controllers.flight import FLIGHT, FlightGains, move_setpoint, steer
 from ...dynamics.motion import BODY, Array, accelerations, rotor_wrench
 from ...dynamics.rotation import normalise, quaternion_to_matrix, turn_body
 from ...estimator.ukf_lanes import (
@@ -29,10 +29,8 @@ from ..closed_loop import (
     ClosedLoop,
     accelerate,
     blow_at,
-    fly_beside,
 )
 from ..fan import FAN, STATIONS
-from ..observing import Episodes, Motion
 from ..plant import (
     NOISE,
     PLANT,
@@ -47,6 +45,7 @@ from ..plant import (
     lose_pose,
     measure,
 )
+from ..state import Episodes, Motion
 
 
 def _between(form: np.dtype, first: str, last: str) -> tuple[str, ...]:
@@ -123,7 +122,7 @@ def fly_freely(loop: Record, dt: float) -> None:
 
 @compiled
 def tick_lanes(
-    address: int, work: int, step: int, jet: Array, accelerates: bool, feels: bool
+    address: int, work: int, step: int, jet: Array, follows: bool, kind: int, feels: bool
 ) -> None:
     """Fly a tick of the loops with their record at ``address``: ``closed_loop.run_ticks`` without
     winds, and then the rigid body.
@@ -138,9 +137,9 @@ def tick_lanes(
     for i in range(11):
         f.z[i] = plant.z[i]
     call_at(step, work)
-    if not accelerates:
+    if not follows:
         move_setpoint(flight, f.x, TICK)
-    fly_beside(flight, f.x, loop.action)
+    steer(flight, f.x, loop.action, kind, TICK)
     follow(plant, flight.command)
     log_speeds(plant, plant.speeds)
     rotor_wrench(plant.body, plant.speeds, plant.rotor_wrench)
@@ -172,7 +171,10 @@ def fly_blocks(
     winds: np.ndarray,
     ticks: int,
     noise_size: int,
-    accelerates: bool,
+    follows: bool,
+    kind: int,
+    moves: bool,
+    places: np.ndarray,
 ) -> None:
     """Fly blocks ``begin`` to ``end - 1`` of loops side by side.
 
@@ -193,7 +195,10 @@ def fly_blocks(
         winds: (n,) their number.
         ticks: number of ticks of ``TICK`` s.
         noise_size: unit normals of a tick.
-        accelerates: whether commands are accelerations beside a reference, or velocities.
+        follows: whether the set point is a row of the reference, or moves by itself.
+        kind: of the commands, as of ``controllers.flight.steer``.
+        moves: whether commands are velocities of the set point.
+        places: (commands,) indices of the commands in the set point, or in the loop's ``action``.
     """
     pose, rotation, time = np.empty(7), np.empty((3, 3)), np.empty(1)
     points, air = np.empty((3, STATIONS)), np.empty((3, STATIONS))
@@ -208,10 +213,10 @@ def fly_blocks(
         for lane in range(WIDTH):
             n = members[lane]
             for i in range(episodes.commands.shape[1] if n >= 0 else 0):
-                if accelerates:
-                    fields.action[b, i, lane] = episodes.commands[n, i]
+                if moves:
+                    fields.setpoint[b, places[i], lane] = episodes.commands[n, i]
                 else:
-                    fields.setpoint[b, 4 + i, lane] = episodes.commands[n, i]
+                    fields.action[b, places[i], lane] = episodes.commands[n, i]
         for k in range(ticks):
             for lane in range(WIDTH):
                 n = members[lane]
@@ -221,7 +226,7 @@ def fly_blocks(
                 row = min(now, episodes.paths.shape[1] - 1)
                 fields.fan_y[b, lane] = episodes.paths[n, row, 0]
                 fields.fan_height[b, lane] = episodes.paths[n, row, 1]
-                if accelerates:
+                if follows:
                     row = min(now, episodes.references.shape[1] - 1)
                     for i in range(episodes.references.shape[2]):
                         fields.setpoint[b, i, lane] = episodes.references[n, row, i]
@@ -234,7 +239,7 @@ def fly_blocks(
                 generator = generators[n]
                 for i in range(noise_size):
                     fields.noise[b, i, lane] = generator.standard_normal()
-            tick_lanes(loop, work, step, jet, accelerates, feels)
+            tick_lanes(loop, work, step, jet, follows, kind, feels)
         for n in members:
             if n >= 0:
                 first[n] += ticks
@@ -265,6 +270,7 @@ class LoopBlocks:
             loops["qvel"],
             loops["plant"]["external"],
             self.filters["x"],
+            self.filters["P"],
             loops["specific"],
             loops["thrust"],
             fan["air"],

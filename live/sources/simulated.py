@@ -11,7 +11,7 @@ import time
 import numpy as np
 
 from ...controllers import make_controller
-from ...envs.fan_tracking import DECISION_TICKS, FanTrackingEnv
+from ...envs.fan_tracking import FanTrackingEnv
 from ...envs.plant import NOISE, TICK
 from ...envs.scenarios import SCENARIOS, draw_fan_path, find_scenario
 from ...runtime.errors import InputError
@@ -19,6 +19,7 @@ from ..messages import SECOND, Array, Measurement
 from .base import WAITS, Source
 
 _AT_ONCE = 0.05  # s of flight caught up at once, at most
+DECISION_TICKS = round(1.0 / (TICK * FanTrackingEnv.decision_hz))
 _BEHIND = 1.0  # s: after a longer delay the flight goes on from now
 
 

@@ -15,7 +15,7 @@ from gymnasium.vector import AutoresetMode
 from tests.support.vector_flights import fly_alone, make, make_single
 from windwrench.dynamics import EffectSetting
 from windwrench.envs import SCENARIOS, FanTrackingEnv
-from windwrench.envs.observing import FRAMES, SCALES
+from windwrench.envs.fan_tracking import FRAMES, SCALES
 from windwrench.envs.scenarios import Variation
 from windwrench.evaluation.tasks import TASKS
 
@@ -99,7 +99,7 @@ def test_gymnasium_s_checker_finds_nothing_and_spaces_are_scaled(task):
     check_env(env.unwrapped, skip_render_check=True)
     kind = TASKS[task].environment
     assert env.spec.max_episode_steps == TASKS[task].decisions
-    np.testing.assert_array_equal(env.action_space.high, np.ones(kind.action_size))
+    np.testing.assert_array_equal(env.action_space.high, np.ones(env.action_space.shape))
     bound = np.array(kind.limits, dtype=np.float32) / np.array(kind.scales, dtype=np.float32)
     np.testing.assert_array_equal(env.observation_space.high, bound)
     np.testing.assert_array_equal(env.observation_space.low, -bound)

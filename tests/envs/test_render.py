@@ -62,7 +62,7 @@ pictures["moved"] = env.render()
 np.savez("pictures.npz", **pictures)
 env.close()
 warnings.simplefilter("error")
-check_env(gym.make("windwrench/FanTracking-v1", render_mode="rgb_array").unwrapped)
+check_env(gym.make("windwrench/FanTracking-v2", render_mode="rgb_array").unwrapped)
 import mujoco  # after the kit, which tells MuJoCo how to draw
 def broken(*arguments):
     raise RuntimeError("no display")

@@ -108,7 +108,7 @@ def test_stable_baselines_checker_finds_nothing():
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        checker.check_env(gym.make("windwrench/FanTracking-v1"), warn=True)
+        checker.check_env(gym.make("windwrench/FanTracking-v2"), warn=True)
 
 
 def test_the_name_with_its_module_makes_it_without_an_import_from_any_folder(tmp_path):

@@ -44,7 +44,7 @@ def test_one_state_that_is_no_number_is_lost_and_the_others_fly_on(plant, tmp_pa
     for one in (envs, healthy):
         one.reset(seed=0)
     if plant == "mujoco":
-        envs.envs[1].loop.data.qvel[0] = np.nan
+        envs.loops[1].data.qvel[0] = np.nan
     else:
         envs._flying.loops["qvel"][0, 0, 1] = np.nan
     frames, rewards, lost, _, infos = envs.step(actions)

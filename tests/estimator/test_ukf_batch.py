@@ -12,7 +12,7 @@ import pytest
 
 from tests.support.flights import yawing_flight
 from windwrench.dynamics import EffectSetting, load_vehicle
-from windwrench.envs.vector import TaskVectorEnv
+from windwrench.envs import FanTrackingEnv
 from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF, WrenchUKFBatch
 from windwrench.estimator.estimate import REJECTED
 
@@ -170,7 +170,7 @@ def test_steps_and_episodes_hold_on_to_nothing():
     """Bytes that a filter and environments hold after five times as many steps: the least of three
     times, since a leak grows in each.
     """
-    ukf, envs = WrenchUKF(VEHICLE), TaskVectorEnv(2, scenario="base")
+    ukf, envs = WrenchUKF(VEHICLE), FanTrackingEnv.vector(2, scenario="base")
     ukf.reset(*POSE)
 
     def work():

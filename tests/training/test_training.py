@@ -299,7 +299,8 @@ def seed_of(environment, episode):
 
 
 def make(count, limit, scenario="static"):
-    return FeatureVecEnv(TaskVectorEnv(count, limit, scenario=scenario), FEATURES, seed_of)
+    envs = TaskVectorEnv(count, limit, task=FanTrackingEnv, scenario=scenario)
+    return FeatureVecEnv(envs, FEATURES, seed_of)
 
 
 def away(seed):
@@ -374,7 +375,7 @@ def test_rewards_are_weighted_terms():
     env.reset()
     assert_allclose([env.step(np.array([[c]]))[1][0] for c in commands], rewards, rtol=1e-6)
     squared = FeatureVecEnv(
-        TaskVectorEnv(1, 50, scenario="static"),
+        TaskVectorEnv(1, 50, task=FanTrackingEnv, scenario="static"),
         FEATURES,
         seed_of,
         WeightedTerms({"tracking": 0.0, "change": 0.0, "squared": 1.0}),
