@@ -110,7 +110,7 @@ def table(rows: Sequence[Standing]) -> dict[str, list[str]]:
             "scenario": row.scenario,
             "law": f"{names[row.controller]}{policies}{'*' if row.uses_truth else ''}",
             **(_by_error(row) if row.ranked_by == SETTLED else _by_return(row)),
-            "activity (1e-3)": f"{1e3 * row.command_activity:.3g}",
+            "activity": f"{row.command_activity:.3g}",
             "at bound": f"{100 * row.saturated_fraction:.0f} %",
             "terminated": _lost(row),
             "score": "-" if math.isnan(row.score) else f"{row.score:.2f}",
