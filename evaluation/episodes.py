@@ -28,6 +28,7 @@ class Episode:
     seed: int
     motion: str  # of the fan, or the name of the reference
     lost: bool
+    uses_truth: bool  # whether the controller read a true value or a preview
     total_reward: float
     decisions: int  # of a whole episode
     time: Array  # (n,) s
@@ -40,7 +41,6 @@ class Episode:
     fan_y: Array  # (n,) m; not a number in a task without one fan path
     observation: Array  # (n, size)
     action: Array  # (n, k) flown, -1 to 1 over the range of the action space
-    uses_truth: bool  # whether the controller read a true value or a preview
 
     @property
     def y(self) -> Array:
@@ -86,7 +86,7 @@ class Episode:
 
     @property
     def _split(self) -> int:
-        return min(round(TRANSIENT * len(self.time) / self.time[-1]), self.decisions // 2)
+        return min(round(TRANSIENT * len(self.time) / float(self.time[-1])), self.decisions // 2)
 
     def _rmse(self, part: slice) -> float:
         return float(np.sqrt(np.mean(self.offset[part] ** 2))) if len(self.error) else np.nan
@@ -135,7 +135,7 @@ def fly_episode(
     env: Any,
     controller: Any,
     seed: int,
-    each: Callable[[Mapping[str, Any]], None] = lambda info: None,
+    each: Callable[[dict[str, Any]], None] = lambda info: None,
     decisions: int | None = None,
 ) -> Episode:
     """Fly and return one episode of a task.
@@ -173,21 +173,13 @@ def fly_episode(
         each(info)
         if terminated or truncated:
             break
-    *columns, action = (np.array(column, dtype=np.float64) for column in zip(*rows, strict=True))
-    error = columns.pop(1)
-    share = 2.0 * (np.clip(action, low, high) - low) / (high - low) - 1.0
-    return Episode(
-        seed,
-        info.get("fan_motion") or info.get("trajectory", ""),
-        bool(info.get("lost", terminated)),
-        total,
-        whole,
-        columns[0],
-        np.zeros(0) if error_of(info) is None else error,
-        *columns[1:],
-        share,
-        uses_truth,
-    )
+    columns = [np.array(column, dtype=np.float64) for column in zip(*rows, strict=True)]
+    columns[-1] = 2.0 * (np.clip(columns[-1], low, high) - low) / (high - low) - 1.0
+    if error_of(info) is None:
+        columns[1] = np.zeros(0)
+    motion = info.get("fan_motion") or info.get("trajectory", "")
+    lost = bool(info.get("lost", terminated))
+    return Episode(seed, motion, lost, uses_truth, total, whole, *columns)
 
 
 def _motion(world: Any, info: Mapping[str, Any]) -> tuple[Any, ...]:
@@ -195,7 +187,8 @@ def _motion(world: Any, info: Mapping[str, Any]) -> tuple[Any, ...]:
     them.
     """
     error, loop, unknown = error_of(info), getattr(world, "loop", None), np.full(3, np.nan)
-    position, quaternion, estimate = info.get("position", unknown), np.full(4, np.nan), [np.nan] * 6
+    position, quaternion = info.get("position", unknown), np.full(4, np.nan)
+    estimate = np.full(6, np.nan)
     if loop is not None:
         position, quaternion = loop.position.copy(), loop.quaternion.copy()
         estimate = np.concatenate([loop.state[16:19], loop.state[13:16]])

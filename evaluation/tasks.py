@@ -14,8 +14,8 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from gymnasium.envs.registration import EnvSpec, load_env_creator
-from numpy.typing import NDArray
 
+from ..controllers.fan_laws import Hover
 from ..controllers.registry import (
     OWN_LAWS,
     STANDARD_TASK,
@@ -35,19 +35,6 @@ from .statistics import episode_bootstrap, hierarchical_bootstrap
 
 ALONE = "default"  # scenario of a task without scenarios
 _WHAT = "a Python file with the class of a Gymnasium environment"
-
-
-class Still:
-    """The middle of the action space: the lower end of the score in a task of a user's own."""
-
-    def __init__(self, action: NDArray[np.float32]) -> None:
-        self.action = action
-
-    def __call__(
-        self, observation: NDArray[np.floating[Any]], info: Mapping[str, Any] | None = None
-    ) -> NDArray[np.float32]:
-        """Return the same action (k,) for any observation."""
-        return self.action
 
 
 @dataclass(frozen=True)
@@ -79,7 +66,7 @@ class BenchmarkTask:
     @property
     def laws(self) -> Mapping[str, Callable[..., Any]]:
         """All of its designed laws, by name."""
-        return TASK_LAWS.get(self.kin or self.name, {"hover": Still})
+        return TASK_LAWS.get(self.kin or self.name, {"hover": Hover})
 
     @property
     def standard(self) -> tuple[str, ...]:
@@ -170,7 +157,8 @@ class BenchmarkTask:
             InputError: the spaces of ``envs`` are no boxes of one dimension, or the action's range
                 is not -1 to 1.
         """
-        seen, action = envs.single_observation_space, envs.single_action_space
+        seen: Any = envs.single_observation_space
+        action: Any = envs.single_action_space
         boxes = all(isinstance(s, gym.spaces.Box) and len(s.shape) == 1 for s in (seen, action))
         if not boxes or np.any(action.high != 1.0) or np.any(action.low != -1.0):
             raise InputError(
@@ -291,7 +279,8 @@ def make_pilot(name: str, task: str = STANDARD_TASK) -> Any:
 
     Args:
         name: a law, one of the kit's policies, the path of a trained policy, a YAML file of a law,
-            or FILE.py:CLASS; a Python file is then run.
+            or FILE.py:CLASS; a Python file is then run. In a task of a user's own ``hover`` is the
+            middle of the action space.
         task: as of ``task_of``.
 
     Raises:
@@ -311,7 +300,7 @@ def make_pilot(name: str, task: str = STANDARD_TASK) -> Any:
     if name not in known.laws:
         raise unknown_name("controller", name, [*known.laws, *OWN_LAWS])
     space = known.make(known.defaults[0]).action_space
-    return Still((0.5 * (space.low + space.high)).astype(np.float32))
+    return lambda observation, info=None: 0.5 * (space.low + space.high)
 
 
 def short_names(names: Sequence[str]) -> dict[str, str]:

@@ -30,7 +30,7 @@ def _board(submission: dict[str, Any]) -> dict[str, str]:
 
 def standing(row: dict[str, Any]) -> Standing:
     """Return a row of a leaderboard from its file: null is not a number, but for a p-value."""
-    values = {
+    values: dict[str, Any] = {
         field.name: math.nan
         if row[field.name] is None and field.name != "p_over_best"
         else row[field.name]

@@ -28,7 +28,7 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
     of another run, ``reset`` goes on with the episodes that follow.
 
     Args:
-        envs: with the option ``reset_mask``.
+        envs: of Gymnasium, with the option ``reset_mask``.
         features: of a policy of FanTracking; None: the observations as they are.
         seed_of: from environment and episode to the episode's seed.
         reward: of ``infos``; None: the environments' own.
@@ -38,7 +38,7 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
 
     def __init__(
         self,
-        envs: gym.vector.VectorEnv,
+        envs: Any,
         features: Features | None,
         seed_of: Callable[[int, int], int],
         reward: Reward | None = None,

@@ -135,8 +135,8 @@ def episode(seed, level, lost, flown=500):
     n = flown
     blank, time = np.zeros((n, 3)), 0.04 * np.arange(1, n + 1)
     return Episode(
-        seed, "", lost, 0.0, 500, time, np.where(time <= 3.0, 1.0, level), blank, np.zeros((n, 4)),
-        np.zeros((n, 6)), blank, blank, np.full(n, np.nan), blank, blank, False,
+        seed, "", lost, False, 0.0, 500, time, np.where(time <= 3.0, 1.0, level), blank,
+        np.zeros((n, 4)), np.zeros((n, 6)), blank, blank, np.full(n, np.nan), blank, blank,
     )  # fmt: skip
 
 
