@@ -40,6 +40,7 @@ def demo(
         from ..demo.steps import Step, write_page
         from ..demo.story import LAWS, Story
         from ..dynamics.vehicle_file import load_vehicle
+        from ..evaluation.benchmark import Request
         from ..evaluation.tasks import task_of
 
         model = load_vehicle(vehicle)
@@ -55,9 +56,10 @@ def demo(
         with working(text) as progress:
             new = part(progress)
         _tell(steps, new)
-    worlds, board = list(task_of("FanTracking").defaults), folder / "leaderboard"
-    with working("comparing controllers", len(LAWS) * len(worlds) * episodes) as progress:
-        rows, _ = write_board(board, LAWS, worlds, episodes, seed, progress, jobs=1)
+    board = folder / "leaderboard"
+    request = Request(LAWS, task_of("FanTracking").defaults, episodes, seed)
+    with working("comparing controllers", request.flights()) as progress:
+        rows, _ = write_board(board, request, progress, jobs=1)
     _tell(steps, story.compare(rows, board))
     page = folder / "demo.html"
     seconds = time.monotonic() - begun

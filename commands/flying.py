@@ -17,10 +17,12 @@ from .terminal import (
 
 def fly(
     task: str = "FanTracking",
-    scenario: str = "base",
+    scenario: str | None = None,
     controller: str | None = None,
+    reward: str | None = None,
+    imports: list[str] | None = None,
     seed: int = 4,  # a moving fan in FanTracking; the fan of seed 0 stands still
-    vehicle: str = "ardrone2",
+    vehicle: str | None = None,
     truth: str | None = None,
     effect: list[str] | None = None,
     gif: bool = False,
@@ -39,26 +41,27 @@ def fly(
     from ..envs.captions import captioned
     from ..envs.fan_tracking import EPISODE_SECONDS
     from ..envs.gif import write_gif
-    from ..evaluation.benchmark import check_request
+    from ..evaluation.benchmark import Request
     from ..evaluation.episodes import fly_episode, time_series
     from ..evaluation.pictures import draw_episode
-    from ..evaluation.tasks import make_pilot, short_names, task_of
+    from ..evaluation.tasks import import_files, make_pilot, short_names, task_of
     from ..runtime.whole_files import replaced
 
     if view and gif:
         raise InputError("--view shows the flight in a window; expected it without --gif")
     effects = [parse_setting(e) for e in effect or []]
+    import_files(imports or ())
     known = task_of(task)
-    controller = controller or known.flown
-    check_request([controller], [scenario], 1, 0, task)
-    env = known.environment(
+    controller, scenario = controller or known.flown, scenario or known.flown_in
+    Request((controller,), (scenario,), 1, 0, task, reward, tuple(imports or ())).check()
+    env = known.make(
         scenario,
-        "rgb_array" if gif else "human" if view else None,
-        vehicle,
-        effects,
+        reward,
+        render_mode="rgb_array" if gif else "human" if view else None,
+        vehicle=vehicle,
+        effects=effects or None,
         truth=truth,
-        width=960,
-        height=540,
+        **({"width": 960, "height": 540} if gif or view else {}),
     )
     folder = results_folder(out)
     shown = short_names([controller])[controller]
@@ -76,7 +79,7 @@ def fly(
                 return
             flown.append(dict(info))
             if len(flown) % every == 0 and len(pictures) < most:
-                pictures.append(captioned(env, title, flown))
+                pictures.append(captioned(env.unwrapped, title, flown))
 
         episode = fly_episode(env, make_pilot(controller, task), seed, each, known.decisions)
     env.close()
@@ -92,11 +95,12 @@ def fly(
 
         write_csv(time_series(episode), folder / "fly.csv")
         paths.append(folder / "fly.csv")
-    rmse, reward = f"{episode.rmse:.3f}", f"{episode.total_reward:.1f}"
     terminated = "yes" if episode.lost else "no"
+    figures = (episode.rmse, episode.rmse_settled)
+    stated = ("-" if figure != figure else f"{figure:.3f}" for figure in figures)
     show_table(
-        ("controller", "scenario", "motion", "RMSE (m)", "terminated", "reward"),
-        [(shown, scenario, episode.motion, rmse, terminated, reward)],
+        ("controller", "scenario", "motion", "RMSE (m)", "after 3 s", "terminated", "return"),
+        [(shown, scenario, episode.motion, *stated, terminated, f"{episode.total_reward:.1f}")],
     )
     say(*paths)
     return {
@@ -105,6 +109,7 @@ def fly(
         "scenario": scenario,
         "motion": episode.motion,
         "rmse_m": episode.rmse,
+        "rmse_settled_m": episode.rmse_settled,
         "lost": episode.lost,
         "reward": episode.total_reward,
     }

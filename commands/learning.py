@@ -4,6 +4,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from ..controllers.registry import STANDARD_TASK
 from ..runtime.errors import InputError
 from ..runtime.extras import need
 from ..runtime.workers import every
@@ -14,7 +15,10 @@ from .terminal import command_line, console, results_folder, say, working
 @expensive
 def train(
     algorithm: str,
-    scenario: str = "base",
+    scenario: str | None = None,
+    task: str | None = None,
+    reward: str | None = None,
+    imports: list[str] | None = None,
     seed: int = 0,
     steps: int | None = None,
     setting: list[str] | None = None,
@@ -27,27 +31,40 @@ def train(
 
     Example: windwrench train sac --scenario base --seed 0 --steps 60000 --out results/sac-0
     """
+    from ..evaluation.rewards import find_reward
+    from ..evaluation.tasks import import_files, task_of
     from ..training.configuration import load_config
     from ..training.training_envs import check_training_env
 
     need("stable_baselines3", "rl")
     if algorithm == "recurrent-ppo":
         need("sb3_contrib", "rl")
-    given = load_config(
-        algorithm, [*(setting or []), *([f"steps={steps}"] if steps else [])], config
-    )
+    import_files(imports or ())
+    known = task_of(task or STANDARD_TASK)
+    if reward is not None:
+        find_reward(reward)
+    values = [*(setting or []), *([f"steps={steps}"] if steps else [])]
     if algorithm == "tune":
-        if cluster:
-            raise InputError("train tune: expected no --cluster")
-        return _tune(given, scenario, seed, out)
-    check_training_env(scenario)
+        if cluster or reward is not None:
+            raise InputError("train tune: expected no --cluster and no --reward")
+        values = [*([f"task={task}"] if task else []), *values]
+        return _tune(load_config(algorithm, values, config), scenario or "base", seed, out)
+    given = load_config(algorithm, values, config, task=task)
+    scenario = scenario or known.flown_in
+    check_training_env(scenario, task or STANDARD_TASK)
     if cluster:
         need("ray", "cluster")
-    return _learn(given, scenario, seed, cluster, out)
+    what = {"task": task or STANDARD_TASK, "reward": reward, "imports": tuple(imports or ())}
+    return _learn(given, scenario, seed, cluster, out, what)
 
 
 def _learn(
-    given: dict[str, Any], scenario: str, seed: int, cluster: str | None, out: Path
+    given: dict[str, Any],
+    scenario: str,
+    seed: int,
+    cluster: str | None,
+    out: Path,
+    what: dict[str, Any],
 ) -> dict[str, Any]:
     from ..training.run import Progress, read_progress
     from ..training.train import train
@@ -55,6 +72,7 @@ def _learn(
     folder = results_folder(
         out,
         algorithm=given["algorithm"],
+        **what,
         scenario=scenario,
         seed=seed,
         decisions=given["steps"],
@@ -64,19 +82,19 @@ def _learn(
     with working(told, given["steps"]) as progress:
 
         def report(now: Progress) -> None:
-            error = f"validation RMSE {now.rmse_m[-1]:.3f} m"
-            progress(text=f"{told}: {error}")
-            console.print(f"{now.steps[-1]:8d} decisions: {error}, {now.lost[-1]} lost")
+            progress(text=f"{told}: validation {now.words(-1)}")
+            figures = f"validation {now.words(-1)}, {now.lost[-1]} lost"
+            console.print(f"{now.steps[-1]:8d} decisions: {figures}")
 
         if cluster:  # a run whose worker is lost resumes elsewhere, from its last checkpoint
-            there = partial(train, given, scenario, seed)
+            there = partial(train, given, scenario, seed, **what)
             ((_, path),) = every(there, [folder.resolve()], cluster=cluster)
         else:
-            path = train(given, scenario, seed, folder, progress, report)
+            path = train(given, scenario, seed, folder, progress, report, **what)
     done = read_progress(folder)
     assert done is not None
     console.print(
-        f"best: {done.best_rmse:.3f} m at {done.steps[done.best]} decisions; {done.seconds:.0f} s",
+        f"best: {done.words(done.best)} at {done.steps[done.best]} decisions; {done.seconds:.0f} s",
     )
     say(path, path.with_suffix(".json"), folder / "last.npz", folder / "progress.json")
     return {

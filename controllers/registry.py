@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..runtime.errors import unknown_name
+from ..runtime.python_file import is_file_name
 from ..runtime.yaml_file import read_yaml
 from .fan_laws import Admittance, AdmittancePID, Hover, Lead, Ratio
 from .law_file import is_law_file, load_law
 from .lqg import LQG
+from .own_file import load_controller
 from .preview import Oracle, WindOracle
 from .tracker import InformedTracker, Limit, Tracker, TrackerLQG
 from .wind_laws import INDI, PID, FlightLoopAlone, L1Adaptive, PIDWithForce, PIDWithWrench
@@ -110,24 +112,29 @@ TASK_LAWS: dict[str, Laws] = {
     "WindHover": _WIND,
     "WindTrajectory": _WIND,
 }
+# laws of a user's own by name, for every task: ``OWN_LAWS["me/gentle"] = Gentle``
+OWN_LAWS: Laws = {}
 # tasks that are flown with the gains of another where the file has none of their own
 _AS = {"WindTrajectory": "WindHover"}
 
 
 def make_controller(name: str, task: str = STANDARD_TASK) -> Any:
-    """Return a new ``Controller`` of a task by its name, or by a law's YAML file. In tasks other
-    than FanTracking a law has its tuned gains, where there are some.
+    """Return a new ``Controller`` of a task by its name, by a law's YAML file, or of a
+    Python file (``FILE.py:CLASS``). In tasks other than FanTracking a law has its tuned gains,
+    where there are some; those of a file come before.
 
     Raises:
-        InputError: no task or no controller has this name, or as ``load_law``.
+        InputError: no task or no controller has this name, or a file holds none.
     """
+    if is_file_name(name):
+        return load_controller(name)
     if task not in TASK_LAWS:
         raise unknown_name("task", task, TASK_LAWS)
-    laws = TASK_LAWS[task]
+    laws = OWN_LAWS | TASK_LAWS[task]
     if is_law_file(name):
         return load_law(name, task, laws)
     if name not in laws:
-        raise unknown_name("controller", name, laws)
+        raise unknown_name("controller", name, [*laws, *shipped_policies(task)])
     if task == STANDARD_TASK:
         return laws[name]()
     entry = tuned_gains(task).get(name) or tuned_gains(_AS.get(task, task)).get(name, {})

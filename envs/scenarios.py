@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Literal, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,14 @@ from pydantic import AfterValidator, Field
 
 from ..controllers.briefing import PLACES
 from ..dynamics.vehicle import NotNegative
-from ..runtime.errors import unknown_name
+from ..runtime.errors import InputError, unknown_name
 from ..runtime.forms import STRICT, Positive, checked, expected
+from ..runtime.python_file import is_file_name, named_in_file
 from ..runtime.yaml_file import read_yaml
 
 Array = NDArray[np.float64]
 AnyScenario = TypeVar("AnyScenario")
+_YAML = (".yaml", ".yml")
 
 
 def _ordered(value: tuple[float, float]) -> tuple[float, float]:
@@ -108,16 +110,42 @@ def kept_scenarios(section: str, form: type[AnyScenario]) -> dict[str, AnyScenar
 SCENARIOS = kept_scenarios("fan", Scenario)
 
 
-def find_scenario(name: str, known: Mapping[str, AnyScenario]) -> AnyScenario:
-    """Return a scenario by its name, or of a YAML file. A file states any fields of the known
-    scenarios; others keep their defaults.
+def scenarios_in(path: str, known: Mapping[str, AnyScenario]) -> dict[str, AnyScenario]:
+    """Return the scenarios of a YAML file by name: ``FILE.yaml`` where the file states the fields
+    of one, ``FILE.yaml:NAME`` where it has the groups of ``scenarios.yaml``.
 
     Raises:
-        InputError: an unknown name; no such file; or a field is unknown, malformed or out of range.
+        InputError: no such file; no group of this kind; or a field is unknown, malformed or out of
+            range.
     """
-    if name.endswith((".yaml", ".yml")):
+    form = type(next(iter(known.values())))
+    data, group = read_yaml(Path(path), "a scenario file"), "fan" if form is Scenario else "wind"
+    if not isinstance(data, Mapping) or not data or not set(data) <= {"fan", "wind"}:
+        return {path: checked(form, data, path)}
+    some = data.get(group)
+    if not isinstance(some, Mapping) or not some:
+        raise InputError(f"{path}: {group}: expected scenarios by name, as in scenarios.yaml")
+    return {f"{path}:{n}": checked(form, fields, f"{path}: {n}") for n, fields in some.items()}
+
+
+def find_scenario(name: str, known: Mapping[str, AnyScenario]) -> AnyScenario:
+    """Return a scenario by its name, of a YAML file, or of a Python file: ``FILE.py:NAME``. A file
+    states any fields of the known scenarios; others keep their defaults.
+
+    Raises:
+        InputError: an unknown name, or as ``scenarios_in`` and ``named_in_file``.
+    """
+    if is_file_name(name):
         form = type(next(iter(known.values())))
-        return checked(form, read_yaml(Path(name), "a scenario file"), name)
+        what = f"a Python file with a {form.__name__}"
+        found = named_in_file(name, "scenario", what, lambda value: isinstance(value, form))
+        return cast(AnyScenario, found)
+    path = name if name.endswith(_YAML) else name.rpartition(":")[0]
+    if path.endswith(_YAML):
+        listed = scenarios_in(path, known)
+        if name == path and len(listed) == 1:
+            return next(iter(listed.values()))
+        known = listed
     if name not in known:
         raise unknown_name("scenario", name, known)
     return known[name]

@@ -21,7 +21,8 @@ from ..runtime.drawing import (
 from ..runtime.page_files import write_png
 from .benchmark import Results
 from .episodes import Episode
-from .leaderboard import Standing, shown
+from .leaderboard import SETTLED, Standing, figures, shown
+from .tables import in_mm
 from .tasks import short_names
 
 # fixed in every picture; other controllers take turns
@@ -57,7 +58,7 @@ def draw_episode(episode: Episode, title: str, path: Path) -> None:
         command.axhline(0, color=BLACK, lw=0.5)
         command.set_ylabel("command (m/s)")
     else:
-        top.plot(t, episode.error, color=COLOURS["admittance"], lw=2)
+        top.plot(t[: len(episode.error)], episode.error, color=COLOURS["admittance"], lw=2)
         top.set_ylabel("error (m)")
         top.set_ylim(bottom=0)
     for axes, (i, label) in zip(others, wrench, strict=True):
@@ -77,8 +78,9 @@ def _legend(axes: Any, columns: int) -> None:
 
 @styled()
 def draw_leaderboard(rows: Sequence[Standing], results: Results, path: Path) -> None:
-    """Draw a scenario a row: the RMSE of every episode and the mean with its interval, and the
-    rival's median episode. A kind has the episodes of all policies, and the first one's path.
+    """Draw a scenario a row: the RMSE after 3 s of every episode and the mean with its interval,
+    and the rival's median episode. A kind has the episodes of all policies, and the first one's
+    path. Where the task states no error, the return stands in place of the RMSE.
     """
     rows = shown(rows)
     scenarios = list(dict.fromkeys(row.scenario for row in rows))
@@ -90,34 +92,41 @@ def draw_leaderboard(rows: Sequence[Standing], results: Results, path: Path) -> 
         all_of_it = [row for row in rows if row.scenario == scenario]
         some = all_of_it[:MOST_ROWS]
         flights = {name: each for (name, world), each in results.items() if world == scenario}
-        rival = flights[some[0].rival]
-        middle = int(np.argsort([e.rmse for e in rival])[len(rival) // 2])
+        rival, by_error = flights[some[0].rival], some[0].ranked_by == SETTLED
+        kept = "rmse_settled" if by_error else "total_reward"
+        middle = int(np.argsort(figures([rival], kept)[0])[len(rival) // 2])
         for i, row in enumerate(some):
             flown = [
                 each
                 for name, each in flights.items()
                 if (name if row.policies == 1 else name.rpartition("-")[0]) == row.controller
             ]
-            values = np.array([e.rmse for each in flown for e in each])
+            values = figures(flown, kept).ravel()
+            shown_mean = row.rmse_settled_m if by_error else row.return_mean
+            mean_text = f"{in_mm(shown_mean)} mm" if by_error else f"{shown_mean:.4g}"
             jitter = np.random.default_rng(0).uniform(-0.24, 0.24, len(values))
             colour = colours[row.controller]
             left.scatter(values, i + jitter, s=11, color=colour, alpha=0.4, lw=0)
-            left.plot(row.rmse_ci95_m, [i, i], color=BLACK, lw=2.2, solid_capstyle="butt", zorder=4)
-            left.plot(row.rmse_m, i, "o", color=colour, mec=BLACK, ms=8, zorder=5)
-            lost = f", {100 * row.lost_fraction:.1f} % terminated" if row.lost_fraction else ""
-            beside, text = ("axes fraction", "data"), f"{row.rmse_m:.3f} m{lost}"
+            if by_error:
+                ends = row.rmse_settled_ci95_m
+                left.plot(ends, [i, i], color=BLACK, lw=2.2, solid_capstyle="butt", zorder=4)
+            left.plot(shown_mean, i, "o", color=colour, mec=BLACK, ms=8, zorder=5)
+            lost = f", {row.lost_episodes} terminated" if row.lost_episodes else ""
+            beside, text = ("axes fraction", "data"), f"{mean_text}{lost}"
             left.annotate(text, (1.01, i), xycoords=beside, va="center")
             episode = flown[0][middle]
             way = episode.y if episode.in_jet else episode.error
-            right.plot(episode.time, way, color=colour)
+            right.plot(episode.time[: len(way)], way, color=colour)
         longest = max((each[middle] for each in flights.values()), key=lambda e: len(e.time))
         right.plot(longest.time, longest.fan_y, "--", color=BLACK, lw=1.3)
         left.set_yticks(range(len(some)), [names[row.controller] for row in some])
         left.invert_yaxis()
-        left.set_xlim(left=0)
+        if by_error:
+            left.set_xlim(left=0)
         of = f", the best {len(some)} of {len(all_of_it)}" if some != all_of_it else ""
-        left.set_title(f"{scenario}{of}: RMSE of each episode, mean, 95 % interval")
-        left.set_xlabel("RMSE (m)")
+        what, interval = ("RMSE after 3 s", ", 95 % interval") if by_error else ("return", "")
+        left.set_title(f"{scenario}{of}: {what} of each episode, mean{interval}")
+        left.set_xlabel(f"{what}{' (m)' * by_error}")
         told = "y (m), fan dashed" if longest.in_jet else "error (m)"
         right.set_title(f"median episode of {some[0].rival}")
         right.set_xlabel("time (s)")

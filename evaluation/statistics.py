@@ -8,12 +8,12 @@ the edge of the statistical precipice*, NeurIPS 2021.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import bootstrap
+from scipy.stats import bootstrap, trim_mean
 
 from ..runtime.errors import InputError
 
@@ -41,6 +41,12 @@ def score_matrix(scores: ArrayLike) -> Array:
 def mean(scores: ArrayLike) -> Any:
     """Return the mean over runs and tasks."""
     return score_matrix(scores).mean(axis=_LAST_TWO)
+
+
+def interquartile_mean(scores: ArrayLike) -> Any:
+    """Return the mean over the middle half of all runs and tasks together."""
+    matrix = score_matrix(scores)
+    return trim_mean(matrix.reshape(*matrix.shape[:-2], -1), 0.25, axis=-1)
 
 
 def probability_of_improvement(x: ArrayLike, y: ArrayLike) -> Any:
@@ -106,6 +112,7 @@ def hierarchical_draws(
     *matrices: ArrayLike,
     resamples: int = _RESAMPLES,
     seed: int = 0,
+    strata: Sequence[int] = (),
 ) -> Array:
     """Return a statistic of one or more score matrices over many draws of policies and episodes.
 
@@ -120,6 +127,8 @@ def hierarchical_draws(
         *matrices: (runs, tasks).
         resamples: number of draws.
         seed: for the draws.
+        strata: numbers of episodes that are drawn among themselves, as of each scenario; they add
+            up to ``tasks``. Default: all.
 
     Returns:
         (resamples,).
@@ -133,7 +142,12 @@ def hierarchical_draws(
     values = []
     for first in range(0, resamples, step):
         k = min(step, resamples - first)
-        columns = rng.integers(count, size=(k, max(count - 1, 1)))
+        columns = np.hstack(
+            [
+                end - size + rng.integers(size, size=(k, max(size - 1, 1)))
+                for size, end in zip(strata or (count,), np.cumsum(strata or (count,)), strict=True)
+            ]
+        )
         drawn = []
         for m in given:
             rows = rng.integers(len(m), size=(k, max(len(m) - 1, 1)))
@@ -149,10 +163,10 @@ def interval_of(draws: ArrayLike) -> tuple[float, float]:
 
 
 def hierarchical_bootstrap(
-    statistic: Callable[..., Any], *matrices: ArrayLike, resamples: int = _RESAMPLES, seed: int = 0
+    statistic: Callable[..., Any], *matrices: ArrayLike, **given: Any
 ) -> tuple[float, float]:
     """Return the 95 % percentile interval of ``hierarchical_draws``, with its arguments."""
-    return interval_of(hierarchical_draws(statistic, *matrices, resamples=resamples, seed=seed))
+    return interval_of(hierarchical_draws(statistic, *matrices, **given))
 
 
 def sign_probability(draws: ArrayLike) -> float:

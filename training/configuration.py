@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ..controllers.features import Features
+from ..controllers.registry import STANDARD_TASK
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.yaml_file import parse_yaml, read_yaml
 
@@ -15,24 +16,32 @@ ALGORITHMS = ("sac", "ppo", "recurrent-ppo", "td3", *IMITATIONS, "tune")
 _COUNTS = ("steps", "environments", "rounds", "state", "ahead", "checkpoint")
 
 
-def load_config(algorithm: str, overrides: Sequence[str] = (), file: Path | None = None) -> Config:
+def load_config(
+    algorithm: str,
+    overrides: Sequence[str] = (),
+    file: Path | None = None,
+    task: str | None = None,
+) -> Config:
     """Return an algorithm's configuration.
 
     Args:
         algorithm: one of ``ALGORITHMS``.
         overrides: ``KEY=VALUE`` in YAML, with dots for deeper keys: ``learner.gamma=0.98``.
         file: a YAML file of such keys, nested, merged before ``overrides``.
+        task: a task's name; one other than FanTracking has the values of ``tasks.yaml`` first.
 
     Raises:
         InputError: an unknown algorithm or key, or a value of another kind.
     """
     if algorithm not in ALGORITHMS:
         raise unknown_name("algorithm", algorithm, ALGORITHMS)
-    config: Config = read_yaml(
-        Path(__file__).parent / "configs" / f"{algorithm}.yaml", "a configuration of training"
-    )
+    folder, what = Path(__file__).parent / "configs", "a configuration of training"
+    config: Config = read_yaml(folder / f"{algorithm}.yaml", what)
+    others = {} if task in (None, STANDARD_TASK) else read_yaml(folder / "tasks.yaml", what)
+    for key, value in others.get(algorithm, {}).items():
+        config[key] = {**config[key], **value} if isinstance(value, dict) else value
     if file is not None:
-        changes = read_yaml(file, "a configuration of training")
+        changes = read_yaml(file, what)
         if not isinstance(changes, dict):
             raise InputError(
                 f"{file}: expected keys and values, as in training/configs/{algorithm}.yaml"

@@ -51,7 +51,8 @@ def make_learner(config: Config, env: VecEnv, seed: int) -> Any:
 
         kind = FastSAC
     elif algorithm == "td3":
-        given["action_noise"] = NormalActionNoise(np.zeros(1), np.full(1, config["noise"]))
+        size = env.action_space.shape
+        given["action_noise"] = NormalActionNoise(np.zeros(size), np.full(size, config["noise"]))
     elif algorithm == "recurrent-ppo":
         from sb3_contrib import RecurrentPPO
 

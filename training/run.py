@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..controllers.registry import STANDARD_TASK
 from ..controllers.trained_policy import TaskPolicy, TrainedPolicy, save_policy
 from ..evaluation.episodes import fly_episode
+from ..evaluation.tasks import task_of
 from ..runtime.errors import InputError
 from ..runtime.forms import STRICT, checked
 from ..runtime.page_files import write_json
@@ -31,7 +33,9 @@ class Progress:
     __pydantic_config__ = STRICT
 
     steps: list[int] = field(default_factory=list)  # at each validation
-    rmse_m: list[float] = field(default_factory=list)  # mean over the validation episodes
+    # after 3 s, mean over the validation episodes; without errors minus the mean return
+    rmse_m: list[float] = field(default_factory=list)
+    by_error: bool = True
     lost: list[int] = field(default_factory=list)  # episodes of each validation
     best: int = -1  # index of the best
     seconds: float = 0.0  # of all parts of the run, validation included
@@ -40,6 +44,11 @@ class Progress:
     def best_rmse(self) -> float:
         """The smallest validation RMSE, m."""
         return self.rmse_m[self.best]
+
+    def words(self, index: int) -> str:
+        """Return a validation's figure in words."""
+        figure = self.rmse_m[index]
+        return f"RMSE after 3 s {figure:.3f} m" if self.by_error else f"return {-figure:.1f}"
 
 
 def progress_from(data: Any, path: Path) -> Progress:
@@ -106,14 +115,19 @@ def card_of(config: Config, scenario: str, seed: int, steps: int) -> dict[str, A
     }
 
 
-def validate(policy: TrainedPolicy | TaskPolicy, env: Any, episodes: int) -> tuple[float, int]:
+def validate(
+    policy: TrainedPolicy | TaskPolicy, env: Any, episodes: int
+) -> tuple[float, int, bool]:
     """Fly validation episodes with the full filter.
 
     Returns:
-        The mean RMSE (m), and how many episodes were lost.
+        The mean RMSE after 3 s (m), or minus the mean return; how many episodes were lost; and
+            whether the task states an error.
     """
     flown = [fly_episode(env, policy, seed) for seed in validation_seeds(episodes)]
-    return float(np.mean([e.rmse for e in flown])), sum(e.lost for e in flown)
+    by_error = all(len(e.error) for e in flown)
+    figures = [e.rmse_settled if by_error else -e.total_reward for e in flown]
+    return float(np.mean(figures)), sum(e.lost for e in flown), by_error
 
 
 class Run:
@@ -128,9 +142,11 @@ class Run:
         seed: the run's.
         folder: for its files.
         report: called after each validation.
+        task: a name, as of ``evaluation.tasks.task_of``.
+        reward: one's own, as of ``evaluation.rewards.find_reward``; None: the task's.
 
     Raises:
-        InputError: an unknown scenario, or a folder with another run.
+        InputError: an unknown name, or a folder with another run.
     """
 
     def __init__(
@@ -140,19 +156,23 @@ class Run:
         seed: int,
         folder: Path,
         report: Callable[[Progress], None],
+        task: str = STANDARD_TASK,
+        reward: str | None = None,
     ) -> None:
-        check_training_env(scenario)
+        check_training_env(scenario, task)
         self.config, self.scenario, self.seed, self.folder = config, scenario, seed, folder
+        self.own = {} if task == STANDARD_TASK else {"task": task_of(task).name}
+        self.own |= {} if reward is None else {"reward": reward}
         self._claim()
         self.progress, self._report = Progress(), report
         self._began = time.perf_counter()
-        self.judge = make_training_env(scenario)
+        self.judge = make_training_env(scenario, task, reward)
         self.best = folder / "best.npz"
 
     def _claim(self) -> None:
         """Write the run's request into its folder."""
         path = self.folder / "training.json"
-        run = {"config": self.config, "scenario": self.scenario, "seed": self.seed}
+        run = {"config": self.config, "scenario": self.scenario, "seed": self.seed, **self.own}
         if path.exists():
             kept = read_json(path, "what a training in this folder is")
             if not isinstance(kept, dict):
@@ -185,21 +205,24 @@ class Run:
 
     def card(self, steps: int) -> dict[str, Any]:
         """Return the card of the policy after ``steps`` decisions."""
-        return card_of(self.config, self.scenario, self.seed, steps)
+        card = card_of(self.config, self.scenario, self.seed, steps) | self.own
+        unseen = ("features", "repeat") if "task" in card else ()
+        return {key: value for key, value in card.items() if key not in unseen}
 
-    def validate(self, policy: TrainedPolicy) -> tuple[float, int]:
-        """Return a policy's mean RMSE (m) on validation episodes, and how many were lost."""
+    def validate(self, policy: TrainedPolicy | TaskPolicy) -> tuple[float, int, bool]:
+        """Return a policy's figures, as ``validate``."""
         return validate(policy, self.judge, self.config["validation"]["episodes"])
 
-    def take_stock(self, policy: TrainedPolicy) -> tuple[float, int]:
+    def take_stock(self, policy: TrainedPolicy | TaskPolicy) -> tuple[float, int]:
         """Validate a policy, save the policy as the last one, and as the best where no earlier one
         is better.
 
         Returns:
-            As ``validate``.
+            Its RMSE and losses, as of ``validate``.
         """
-        rmse, lost = self.validate(policy)
+        rmse, lost, by_error = self.validate(policy)
         card, now = policy.card, self.progress
+        now.by_error = by_error
         now.steps.append(card["steps"])
         now.rmse_m.append(rmse)
         now.lost.append(lost)

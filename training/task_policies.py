@@ -1,11 +1,10 @@
-"""Policies of the tasks beside ``FanTracking``: a GRU taught by a law with knowledge, and SAC.
+"""Policies of the tasks beside ``FanTracking``: a GRU taught by a law with knowledge.
 
-``python -m windwrench.training.task_policies --task WindHover --kind gru --seed 0 --out FOLDER``.
+``python -m windwrench.training.task_policies --task WindHover --seed 0 --out FOLDER``.
 
 ``gru`` is imitation with a memory (``imitation``): in the wind it is taught the best commands in
 view of the future (``hindsight``), in a mix of scenarios or in one. In ``FanTracking2D`` the
-simulator gives place and motion of the fan. ``sac`` is stable-baselines3's on the task's version 1.
-Beside the wind all learn on ``base``.
+simulator gives place and motion of the fan, on ``base``.
 """
 
 import argparse
@@ -13,7 +12,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -21,11 +19,9 @@ from numpy.typing import NDArray
 from ..controllers.trained_policy import TaskPolicy, save_policy
 from ..evaluation.tasks import TASKS
 from .belief_network import BeliefNetwork
-from .configuration import load_config
 from .flown_sequences import Flights
 from .hindsight import MIX, WindLesson, lanes_of
 from .imitation import rounds as taught_in_rounds
-from .learners import make_learner, weights_of
 from .run import origin, validate
 
 Array = NDArray[np.float32]
@@ -39,14 +35,6 @@ _FIT: dict[bool, dict[str, Any]] = {
 _ACTIVATION = "tanh"
 # of the error added to half of the flights: a share of the largest action, and s that it lasts
 _WANDER, _WANDER_TIME = 0.3, 0.5
-_SAC = (
-    "learner.gamma=0.9",
-    "learner.learning_rate=0.001",
-    "learning_rate_end=0.001",
-    "learner.tau=0.005",
-    "learner.train_freq=2",
-    "learner.gradient_steps=1",
-)
 # signs of a frame of FanTracking2D after half a turn about the jet's axis: it changes the sign of
 # all that is taught
 _TURNED = np.array([1, -1, -1, 1, -1, -1, -1, -1, -1, -1], dtype=np.float32)
@@ -55,12 +43,12 @@ VALIDATION = 10  # episodes
 BASE = "base"
 
 
-def _card(task: str, kind: str, scenario: str, seed: int, steps: int) -> dict[str, Any]:
+def _card(task: str, scenario: str, seed: int, steps: int) -> dict[str, Any]:
     """Return the card of a policy."""
     env = TASKS[task].environment
     told = {"task": task, "scale": [float(f"{x:.6g}") for x in env.scales]}
-    activation = _ACTIVATION if kind == "gru" else "relu"
-    return origin(kind, scenario, seed, steps, activation) | told | {"largest": env.largest_action}
+    own = origin("gru", scenario, seed, steps, _ACTIVATION)
+    return own | told | {"largest": env.largest_action}
 
 
 class FanPlaneLesson:
@@ -115,7 +103,7 @@ def teach(
     shares = _shares(of_fan, _GAINS[1])
     for last in taught_in_rounds(network, flights, shares, config, seed, mirrored, not of_fan):
         print(f"{flights.episodes} episodes{', the last' if last else ''}", flush=True)
-    card = _card(task, "gru", scenario, seed, flights.episodes * lesson.decisions)
+    card = _card(task, scenario, seed, flights.episodes * lesson.decisions)
     if not of_fan:
         return TaskPolicy(card, network.policy_weights(shares))
     tried = [
@@ -126,45 +114,25 @@ def teach(
     return min(tried, key=lambda each: validate(each, env, VALIDATION)[0])
 
 
-def sac(task: str, seed: int, steps: int) -> TaskPolicy:
-    """Return SAC's policy after ``steps`` decisions."""
-    from stable_baselines3.common.monitor import Monitor
-    from stable_baselines3.common.vec_env import DummyVecEnv
-
-    name = f"windwrench/{task}-v1"
-    env = DummyVecEnv([lambda: Monitor(gym.make(name, scenario=BASE))])
-    entropy = f"learner.target_entropy={-float(env.action_space.shape[0])}"
-    config = load_config("sac", [*_SAC, entropy, f"steps={steps}"])
-    learner = make_learner(config, env, seed)
-    learner.learn(steps)
-    return TaskPolicy(_card(task, "sac", BASE, seed, steps), weights_of(learner, "sac"))
-
-
 def main() -> None:
     """Train one policy and write it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--task", choices=[*TASKS], required=True)
-    parser.add_argument("--kind", choices=["gru", "sac"], default="gru")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--rounds", type=int, default=4, help="of DAgger")
     parser.add_argument("--scenario", default=MIX, help=f"of the wind, or a mix of them: {MIX}")
     parser.add_argument("--episodes", type=int, default=256, help="of each round")
     parser.add_argument("--epochs", type=int, default=4, help="of each round; the last, thrice")
-    parser.add_argument("--steps", type=int, default=20_000, help="decisions of SAC")
     parser.add_argument("--out", type=Path, default=Path("training/policies/tasks"))
     given = parser.parse_args()
     torch.set_num_threads(1)
     began = time.process_time()
-    if given.kind == "sac":
-        policy = sac(given.task, given.seed, given.steps)
-    else:
-        scenario = BASE if given.task == "FanTracking2D" else given.scenario
-        lesson = given.rounds, given.episodes, given.epochs
-        policy = teach(given.task, scenario, given.seed, *lesson)
+    scenario = BASE if given.task == "FanTracking2D" else given.scenario
+    policy = teach(given.task, scenario, given.seed, given.rounds, given.episodes, given.epochs)
     given.out.mkdir(parents=True, exist_ok=True)
-    path = given.out / f"{given.task}-{given.kind}-{given.seed}.npz"
+    path = given.out / f"{given.task}-gru-{given.seed}.npz"
     env = TASKS[given.task].environment(BASE)
-    rmse, lost = validate(policy, env, VALIDATION)
+    rmse, lost, _ = validate(policy, env, VALIDATION)
     policy.card |= {
         "validation": {"episodes": VALIDATION, "rmse_m": round(rmse, 5), "lost": lost},
         "training_cpu_s": round(time.process_time() - began),

@@ -1,11 +1,15 @@
 """Training a policy, with stable-baselines3 or by imitation."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ..controllers.trained_policy import TrainedPolicy
+from ..controllers.registry import STANDARD_TASK
+from ..controllers.trained_policy import TaskPolicy, TrainedPolicy
+from ..evaluation.rewards import WeightedTerms, find_reward
+from ..evaluation.tasks import import_files, task_of
+from ..runtime.errors import InputError
 from .configuration import IMITATIONS, Config, features_of
 from .run import Progress, Run, progress_from
 from .seeds import training_seed
@@ -20,6 +24,9 @@ def train(
     advance: Callable[[int], None] = lambda steps: None,
     report: Callable[[Progress], None] = lambda progress: None,
     stop_after: int | None = None,
+    task: str = STANDARD_TASK,
+    reward: str | None = None,
+    imports: Sequence[str] = (),
 ) -> Path:
     """Train a policy; return the path of the best one on the validation episodes.
 
@@ -36,12 +43,22 @@ def train(
         advance: called with the number of decisions so far (over all environments).
         report: called after each validation.
         stop_after: decisions before an early return, at the next checkpoint; for tests.
+        task: a name, as of ``evaluation.tasks.task_of``. FanTracking's policies see the features of
+            the configuration, those of other tasks the observation.
+        reward: one's own, as of ``evaluation.rewards.find_reward``; None: the configuration's in
+            FanTracking, else the task's.
+        imports: Python files that register a task, a scenario or a reward.
 
     Raises:
-        InputError: an unknown scenario, or a folder with another run.
+        InputError: an unknown name, a folder with another run, or a task without such a learner.
     """
-    run = Run(config, scenario, seed, folder, report)
-    if config["algorithm"] in IMITATIONS:
+    import_files(imports)
+    standard, imitates = task == STANDARD_TASK, config["algorithm"] in IMITATIONS
+    if imitates and not (standard and reward is None):
+        name = config["algorithm"]
+        raise InputError(f"train {name}: expected the task {STANDARD_TASK} and no --reward")
+    run = Run(config, scenario, seed, folder, report, task, reward)
+    if imitates:
         from .imitation import imitate
 
         return imitate(run, advance)
@@ -49,11 +66,12 @@ def train(
     from .learners import make_learner, weights_of
     from .vec_env import FeatureVecEnv
 
-    features, algorithm, whole = features_of(config), config["algorithm"], config["steps"]
-    envs = make_training_envs(scenario, config["environments"], config["estimator"])
-    env = FeatureVecEnv(
-        envs, features, lambda i, episode: training_seed(seed, i, episode), config["reward"]
-    )
+    algorithm, whole = config["algorithm"], config["steps"]
+    features = features_of(config) if standard else None
+    envs = make_training_envs(scenario, config["environments"], config["estimator"], task)
+    own = find_reward(reward) if reward else WeightedTerms(config["reward"]) if standard else None
+    env = FeatureVecEnv(envs, features, lambda i, episode: training_seed(seed, i, episode), own)
+    seen = {} if standard else task_of(task).units(envs)
     learner = make_learner(config, env, seed)
     learner.set_logger(_logger(folder))
     checkpoint = folder / "checkpoint.pt"
@@ -66,7 +84,8 @@ def train(
         learner.learn(target - done, callback=follow, reset_num_timesteps=False, log_interval=4)
         done = learner.num_timesteps
         if run.is_due(done, done >= whole):
-            policy = TrainedPolicy(run.card(done), weights_of(learner, algorithm))
+            kind = TrainedPolicy if standard else TaskPolicy
+            policy = kind(run.card(done) | seen, weights_of(learner, algorithm))
             rmse, lost = run.take_stock(policy)
             learner.logger.record("validation/rmse_m", rmse)
             learner.logger.record("validation/lost", lost)

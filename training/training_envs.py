@@ -1,17 +1,20 @@
-"""The environments of training: a scenario, or a tier, a mix of several."""
+"""The environments of training: a scenario, or in FanTracking a tier, a mix of several."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 
+from ..controllers.registry import STANDARD_TASK
 from ..envs.closed_loop import ClosedLoop
 from ..envs.fan_tracking import FanTrackingEnv
 from ..envs.lanes.vector import TaskLanes
 from ..envs.scenarios import SCENARIOS
 from ..envs.vector import TaskVectorEnv
 from ..evaluation.episodes import DECISIONS
+from ..evaluation.tasks import task_of
 from ..runtime.errors import InputError, unknown_name
 
 LANES = "ukf-lanes"
@@ -35,13 +38,15 @@ TIERS: dict[str, tuple[str, ...]] = {
 }
 
 
-def check_training_env(name: str) -> None:
+def check_training_env(name: str, task: str = STANDARD_TASK) -> None:
     """Check the name of a training environment.
 
     Raises:
-        InputError: neither a scenario nor a tier.
+        InputError: neither a scenario of the task nor, in FanTracking, a tier.
     """
-    if name not in SCENARIOS and name not in TIERS:
+    if task != STANDARD_TASK:
+        task_of(task).scenario(name)
+    elif name not in SCENARIOS and name not in TIERS:
         raise unknown_name("scenario", name, [*SCENARIOS, *TIERS])
 
 
@@ -72,19 +77,21 @@ class MixedFanTracking(FanTrackingEnv):
         return super().draw_loop(rng, kept)
 
 
-def make_training_env(name: str, **given: Any) -> FanTrackingEnv:
-    """Return the environment of a scenario or a tier, with other arguments of ``FanTrackingEnv``.
+def make_training_env(name: str, task: str = STANDARD_TASK, reward: str | None = None) -> Any:
+    """Return the environment of a scenario or a tier, in SI units; ``reward`` is one's own.
 
     Raises:
         InputError: a name that does not exist.
     """
-    check_training_env(name)
-    return (
-        MixedFanTracking(TIERS[name], **given) if name in TIERS else FanTrackingEnv(name, **given)
-    )
+    check_training_env(name, task)
+    if name in TIERS and task == STANDARD_TASK:
+        return MixedFanTracking(TIERS[name])
+    return task_of(task).make(name, reward)
 
 
-def make_training_envs(name: str, count: int, estimator: str = "ukf") -> TaskVectorEnv:
+def make_training_envs(
+    name: str, count: int, estimator: str = "ukf", task: str = STANDARD_TASK
+) -> gym.vector.VectorEnv:
     """Return ``count`` training environments side by side.
 
     Args:
@@ -92,11 +99,15 @@ def make_training_envs(name: str, count: int, estimator: str = "ukf") -> TaskVec
         count: how many.
         estimator: of the environments: ``ukf``, ``constant-gain``, its fast stand-in, or
             ``ukf-lanes``: the full filter, plant and flight loop in the lanes of a vector unit.
+        task: a name, as of ``evaluation.tasks.task_of``.
 
     Raises:
         InputError: an unknown name, or ``ukf-lanes`` with a tier.
     """
-    check_training_env(name)
+    check_training_env(name, task)
+    if task != STANDARD_TASK:
+        given = {"plant": "lanes"} if estimator == LANES else {"estimator": estimator}
+        return task_of(task).make_many(count, name, **({} if estimator == "ukf" else given))
     if estimator == LANES:
         if name in TIERS:
             raise InputError(f"training: {LANES} flies one scenario, got {name!r}")

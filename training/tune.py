@@ -30,6 +30,8 @@ def check_request(task: str, law: str, scenario: str, trials: int, episodes: int
         InputError: an unknown task, law or scenario, no trials, or too many episodes.
     """
     environment = task_of(task).environment
+    if task not in RANGES:
+        raise unknown_name("task", task, RANGES, "train tune")
     if law not in RANGES[task]:
         raise unknown_name("law", law, RANGES[task])
     if task == STANDARD_TASK:

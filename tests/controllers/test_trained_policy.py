@@ -14,7 +14,7 @@ from windwrench.controllers.trained_policy import (
 )
 from windwrench.dynamics import InputError
 from windwrench.envs.fan_tracking import FanTrackingEnv
-from windwrench.evaluation.benchmark import fly_all
+from windwrench.evaluation.benchmark import Request, fly_all
 from windwrench.evaluation.episodes import FIRST_TEST_SEED, benchmark_seeds, fly_episode
 from windwrench.evaluation.leaderboard import leaderboard
 from windwrench.evaluation.tasks import TASKS, make_pilot
@@ -39,7 +39,7 @@ def follower(gain=18.0):
 
 def test_a_linear_policy_is_the_admittance_law(tmp_path):
     path = save_policy(CARD, follower(), tmp_path / "law.npz")
-    results = fly_all([str(path), "admittance"], ["base"], 3, seed=0, jobs=1)
+    results = fly_all(Request((str(path), "admittance"), ("base",), 3, 0), jobs=1)
     rows = {row.controller: row for row in leaderboard(results, [str(path), "admittance"], 0)}
     assert rows[str(path)].rmse_m == pytest.approx(rows["admittance"].rmse_m, rel=1e-4)
     assert rows["admittance"].rmse_m < 0.3

@@ -11,6 +11,7 @@ from windwrench.evaluation.statistics import (
     hierarchical_bootstrap,
     hierarchical_draws,
     holm,
+    interquartile_mean,
     interval_of,
     mean,
     paired_wins,
@@ -46,6 +47,28 @@ def test_paired_wins_are_of_an_episode_and_changes_of_the_means():
     assert paired_wins([[1.0, 5.0], [3.0, 5.0]], [[2.0, 5.0]]) == (1 + 0.5 + 0 + 0.5) / 4
     # a rival of several runs is their mean, neither the best of them nor the worst
     assert paired_wins([[1.9], [2.1]], [[1.0], [3.0]]) == 0.5
+
+
+def test_the_interquartile_mean_is_that_of_the_middle_half_of_all():
+    assert interquartile_mean([[0.0, 1.0], [2.0, 99.0]]) == 1.5
+    flat = np.sort(X.ravel())
+    assert interquartile_mean(X) == pytest.approx(flat[15:45].mean())
+    np.testing.assert_allclose(
+        interquartile_mean(np.stack([X, 2.0 * X])), np.array([1.0, 2.0]) * flat[15:45].mean()
+    )
+    lost = np.append(X.ravel()[:-1], 1e3)  # one lost episode
+    assert interquartile_mean(lost) < flat.max()
+
+
+def test_strata_are_drawn_among_themselves():
+    """Between strata that differ, and hold equal numbers, nothing varies."""
+    scores = np.repeat([1.0, 5.0], [6, 6])[None]
+    apart = hierarchical_draws(mean, scores, resamples=50, strata=(6, 6))
+    np.testing.assert_array_equal(apart, np.full(50, 3.0))
+    assert hierarchical_draws(mean, scores, resamples=50).std() > 0.1
+    uneven = [1.0, 2.0, 7.0, 9.0, 5.0]
+    draws = hierarchical_draws(lambda x: x.max(axis=(1, 2)), [uneven], strata=(2, 3))
+    assert set(draws) == {5.0, 7.0, 9.0}
 
 
 def test_the_bootstrap_covers_the_truth_as_often_as_it_says():

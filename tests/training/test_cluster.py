@@ -13,7 +13,7 @@ import pytest
 from tests.runtime.test_workers import work
 from tests.training.tiny import TINY
 from windwrench.dynamics import InputError
-from windwrench.evaluation.benchmark import fly_all
+from windwrench.evaluation.benchmark import Request, fly_all
 from windwrench.runtime.workers import each, every
 from windwrench.training.configuration import load_config
 from windwrench.training.run import read_progress
@@ -82,8 +82,8 @@ def test_a_task_that_fails_is_named(cluster):
 
 @pytest.mark.slow
 def test_flights_on_a_cluster_are_the_local_ones(cluster):
-    there = fly_all(["admittance"], ["base"], 4, seed=0, cluster=cluster)
-    here = fly_all(["admittance"], ["base"], 4, seed=0, jobs=1)
+    request = Request(("admittance",), ("base",), 4, 0)
+    there, here = fly_all(request, cluster=cluster), fly_all(request, jobs=1)
     assert list(there) == list(here)
     for key, flown in here.items():
         for a, b in zip(flown, there[key], strict=True):

@@ -21,6 +21,7 @@ from windwrench.dynamics import InputError
 from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.envs.scenarios import SCENARIOS
 from windwrench.envs.vector import TaskVectorEnv
+from windwrench.evaluation.rewards import WeightedTerms
 from windwrench.training.configuration import ALGORITHMS, load_config
 
 pytest.importorskip("torch", reason="pip install 'windwrench[rl]'")
@@ -377,7 +378,7 @@ def test_rewards_are_weighted_terms():
         TaskVectorEnv(1, 50, task=FanTrackingEnv, scenario="static"),
         FEATURES,
         seed_of,
-        {"tracking": 0.0, "change": 0.0, "squared": 1.0},
+        WeightedTerms({"tracking": 0.0, "change": 0.0, "squared": 1.0}),
     )
     squared.reset()
     assert squared.step(np.array([[0.0]]))[1][0] == pytest.approx(-0.64, abs=0.1)  # about 0.8 m off
