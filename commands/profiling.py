@@ -22,8 +22,8 @@ def profile(
     write: Path | None = None,
     out: Path = Path("results/profile"),
 ) -> dict[str, Any]:
-    """Draw force and torque over the place of a flight through a wind. Design the admittance law
-    that follows its fan.
+    """Draw a wind's force and torque over the place, from a flight. Design the admittance law that
+    follows the fan.
 
     Example: windwrench profile hovers.csv --vehicle ardrone2 --write law.yaml
     """

@@ -27,6 +27,7 @@ _LEAST = 50, 0.5  # s, and m of the line, of a profile
 _ROUND = 0.25  # ratio of the variances across and along a flight, above which no line is told
 _BAND, _SHARE = 0.1, 0.03  # m of a bin across the line, and its least share of the flight
 _KNOT, _ROUGHNESS = 0.08, 0.25  # m, between knots, and over which the errors' variance is averaged
+_TOGETHER = 0.5  # least correlation of means over 1 s: the smoother alone makes it
 _WEIGHTS = np.logspace(-4.0, 8.0, 37)  # of the penalty
 _DRAWS = 40
 
@@ -181,7 +182,7 @@ def _curve(place: Array, second: Rows, y: Array, at: Array) -> tuple[Array, Arra
     rough = np.sqrt(np.maximum(variance, 0.05 * np.mean(residual**2) + 1e-300))
     unit = residual / rough
     pairs = np.flatnonzero(np.diff(seconds) == 1)
-    rho = float(np.clip(np.mean(unit[pairs] * unit[pairs + 1]), 0.0, 0.9))
+    rho = float(np.clip(np.mean(unit[pairs] * unit[pairs + 1]), _TOGETHER, 0.9))
     more = (1.0 + rho) / (1.0 - rho)  # means that are worth one
     weight = 1.0 / (rough * math.sqrt(more))
     beta, covariance = _fit(X * weight[:, None], y * weight)
