@@ -186,19 +186,20 @@ def _motion(world: Any, info: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return error, position, quaternion, estimate, force, torque and fan as an episode has
     them.
     """
-    error, loop, unknown = error_of(info), getattr(world, "loop", None), np.full(3, np.nan)
-    position, quaternion = info.get("position", unknown), np.full(4, np.nan)
+    error, loop, wrench = error_of(info), getattr(world, "loop", None), np.full(6, np.nan)
+    position, quaternion = info.get("position", np.full(3, np.nan)), np.full(4, np.nan)
     estimate = np.full(6, np.nan)
     if loop is not None:
         position, quaternion = loop.position.copy(), loop.quaternion.copy()
         estimate = np.concatenate([loop.state[16:19], loop.state[13:16]])
+        wrench = loop.external.copy()
     return (
         np.nan if error is None else error,
         position,
         quaternion,
         estimate,
-        info.get("force", unknown),
-        info.get("torque", unknown),
+        info.get("force", wrench[:3]),
+        info.get("torque", wrench[3:]),
         info.get("fan_y", np.nan),
     )
 

@@ -33,7 +33,8 @@ _OTHERS = (*SERIES[2:], "#5f0f40", "#6a994e", "#8c564b", "#e08dac", "#3d405b")
 @styled()
 def draw_episode(episode: Episode, title: str, path: Path) -> None:
     """Draw an episode over time. In the jet of a fan on one path: fan and vehicle, torque, force
-    and command, as the paper's Fig. 7; in other tasks: the error and the three forces.
+    and command, as the paper's Fig. 7; in other tasks: the error and the three forces. Where the
+    task states no error: the actions, and up to three numbers of the observation.
     """
     t, estimate = episode.time, episode.estimate
     true = np.hstack([episode.force, episode.torque])
@@ -45,8 +46,11 @@ def draw_episode(episode: Episode, title: str, path: Path) -> None:
     figure = new_figure(7.0)
     top, *others = figure.subplots(4, 1, sharex=True, height_ratios=[2, 1, 1, 1])
     end = "terminated" if episode.lost else "not terminated"
-    told = f" ({episode.motion}, seed {episode.seed})"
-    top.set_title(f"{title}: RMSE {episode.rmse:.3f} m, {end}{told}")
+    told = ", ".join(filter(None, (episode.motion, f"seed {episode.seed}")))
+    figure_text = f"return {episode.total_reward:.4g}"
+    if len(episode.error):
+        figure_text = f"RMSE after 3 s {episode.rmse_settled:.3g} m"
+    top.set_title(f"{title}: {figure_text}, {end} ({told})")
     if episode.in_jet:
         fan, command = episode.fan_y, others.pop()
         top.fill_between(t, fan - 0.45, fan + 0.45, color=JET, label="width of the fan")
@@ -57,11 +61,18 @@ def draw_episode(episode: Episode, title: str, path: Path) -> None:
         command.step(t, episode.command, where="post", color=BLACK)
         command.axhline(0, color=BLACK, lw=0.5)
         command.set_ylabel("command (m/s)")
-    else:
-        top.plot(t[: len(episode.error)], episode.error, color=COLOURS["admittance"], lw=2)
+    elif len(episode.error):
+        top.plot(t, episode.error, color=COLOURS["admittance"], lw=2)
         top.set_ylabel("error (m)")
         top.set_ylim(bottom=0)
-    for axes, (i, label) in zip(others, wrench, strict=True):
+    else:
+        top.step(t, episode.action, where="post")
+        top.set_ylabel("action, -1 to 1")
+        for i, (axes, seen) in enumerate(zip(others, episode.observation.T, strict=False)):
+            axes.plot(t, seen, color=ESTIMATE)
+            axes.set_ylabel(f"observation {i}")
+        others.clear()
+    for axes, (i, label) in zip(others, wrench, strict=False):
         axes.plot(t, true[:, i], color=TRUTH, lw=1, label="true")
         axes.plot(t, estimate[:, i], color=ESTIMATE, lw=1.6, label="estimated")
         axes.axhline(0, color=BLACK, lw=0.5)
