@@ -6,6 +6,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from .linear_policy import LinearLaw
 from .seeds import training_seed
 from .taught_network import Sequences, TaughtNetwork
 
@@ -48,7 +49,7 @@ class Flights:
             )
         )
 
-    def fly(self, network: TaughtNetwork | None, shares: Frames) -> None:
+    def fly(self, network: TaughtNetwork | LinearLaw | None, shares: Frames) -> None:
         """Fly a round at ``shares`` (axes, taught) of the network's means, or with the teacher
         where there is no network.
         """
@@ -61,7 +62,7 @@ class Flights:
             self.episodes += n
 
     def _fly(
-        self, env: Any, network: TaughtNetwork | None, shares: Frames, size: Array
+        self, env: Any, network: TaughtNetwork | LinearLaw | None, shares: Frames, size: Array
     ) -> Sequences:
         lesson, n, state = self._lesson, env.num_envs, None
         shape = n, env.single_action_space.shape[0]

@@ -1,13 +1,14 @@
 """Policies taught by a law with knowledge in rounds of DAgger, and SAC.
 
-``python -m windwrench.training.task_policies --task WindHover --kind gru --seed 0 --out FOLDER``.
+``python -m windwrench.training.task_policies --task WindHover --seed 0 --out FOLDER``.
 
 In every round of DAgger (Ross, Gordon and Bagnell, 2011) the newest network flies, with the inputs
 of any policy. For every decision a law with knowledge gives the answer, and the network is fitted
 to all answers so far, over whole episodes. In the wind and in ``FanTracking`` the answers are the
 best commands in view of the future (``hindsight``, ``fan_hindsight``), in a mix of scenarios. In
-``FanTracking2D`` the simulator gives place and motion of the fan. ``sac`` is stable-baselines3's on
-the task's version 1, on ``base``.
+``FanTracking2D`` the simulator gives place and motion of the fan. ``linear`` is a linear law fitted
+in the wind to the same answers, in seconds. ``sac`` is stable-baselines3's on the task's version 1,
+on ``base``.
 """
 
 import argparse
@@ -30,6 +31,7 @@ from .fan_hindsight import FEATURES, FanHindsight, fan_lanes
 from .flown_sequences import Flights
 from .hindsight import MIX, WindLesson, lanes_of
 from .learners import make_learner, weights_of
+from .linear_policy import MEMORY, LinearLaw
 from .run import origin, validate
 from .taught_network import TaughtNetwork, fit
 
@@ -42,11 +44,12 @@ FAN, FAN_PLANE, WIND = "FanTracking", "FanTracking2D", "wind"
 _FIT: dict[str, dict[str, Any]] = {
     FAN: {"cell": "lstm", "state": 96, "net": [64], "rounds": 4, "episodes": 1024, "epochs": 5}
     | {"batch_size": 32, "learning_rate": 3e-3, "wander": (0.4, 1.0)},
-    FAN_PLANE: {"cell": "gru", "state": 64, "net": [64], "rounds": 4, "episodes": 256, "epochs": 4}
-    | {"batch_size": 32, "learning_rate": 5e-3, "wander": (0.3, 0.5)},
-    WIND: {"cell": "gru", "state": 48, "net": [32], "rounds": 4, "episodes": 256, "epochs": 4}
+    FAN_PLANE: {"cell": "gru", "state": 48, "net": [32], "rounds": 4, "episodes": 256, "epochs": 4}
     | {"batch_size": 16, "learning_rate": 3e-3, "wander": (0.3, 0.5)},
+    WIND: {"cell": "gru", "state": 64, "net": [64], "rounds": 4, "episodes": 256, "epochs": 4}
+    | {"batch_size": 32, "learning_rate": 5e-3, "wander": (0.3, 0.5)},
 }
+_LINEAR = {"rounds": 3, "episodes": 64}
 _LEAST_RATE = 0.1  # share of the learning rate that is left at the end of a round
 _ACTIVATION = "tanh"
 _SAC = (
@@ -191,6 +194,20 @@ def teach(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy | T
     return min(tried, key=lambda each: validate(each, env, VALIDATION)[0])
 
 
+def linear(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy:
+    """Return a linear law of a task in the wind; arguments as of ``teach``."""
+    given = _LINEAR | changed
+    lesson, envs, _, _ = _lesson(task, scenario, given["episodes"])
+    size, lasts = _FIT[WIND]["wander"]
+    wander = {"wander": {"size": size * lesson.largest, "time": lasts}}
+    law, flights = LinearLaw(), Flights(envs, lesson, wander, seed)
+    for number in range(given["rounds"]):
+        flights.fly(law if number else None, _shares(task))
+        law.fit(flights.sequences())
+    card = _card(task, "linear", scenario, seed, flights.episodes * lesson.decisions)
+    return TaskPolicy(card | {"fit": given, "memory": list(MEMORY)}, law.weights())
+
+
 def sac(task: str, seed: int, steps: int) -> TaskPolicy:
     """Return SAC's policy after ``steps`` decisions."""
     from stable_baselines3.common.monitor import Monitor
@@ -209,7 +226,7 @@ def main() -> None:
     """Train one policy and write it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--task", choices=[*TASKS], required=True)
-    parser.add_argument("--kind", choices=["taught", "sac"], default="taught")
+    parser.add_argument("--kind", choices=["taught", "linear", "sac"], default="taught")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--scenario", default=MIX, help=f"of the wind, or a mix of them: {MIX}")
     for name, said in (
@@ -231,7 +248,12 @@ def main() -> None:
             scenario = "wide" if task == FAN else BASE
         asked = {name: getattr(given, name) for name in ("rounds", "episodes", "epochs")}
         changed = {name: count for name, count in asked.items() if count is not None}
-        policy = teach(task, scenario, given.seed, **changed)
+        if given.kind == "linear":
+            if task in (FAN, FAN_PLANE):
+                parser.error("--kind linear: expected a task in the wind")
+            kind, policy = "linear", linear(task, scenario, given.seed, **changed)
+        else:
+            policy = teach(task, scenario, given.seed, **changed)
     policies = Path("training/policies")
     out, start = (policies, "") if task == FAN else (policies / "tasks", f"{task}-")
     out = given.out or out

@@ -1,4 +1,4 @@
-"""Training a policy, with stable-baselines3 or by imitation."""
+"""Training a policy with stable-baselines3."""
 
 from collections.abc import Callable
 from dataclasses import asdict
@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ..controllers.trained_policy import TrainedPolicy
-from .configuration import IMITATIONS, Config, features_of
+from .configuration import Config, features_of
 from .run import Progress, Run, progress_from
 from .seeds import training_seed
 from .training_envs import make_training_envs
@@ -26,7 +26,6 @@ def train(
     ``folder`` then holds ``best.npz`` and ``last.npz`` with their cards, ``progress.json``,
     ``training.json``, TensorBoard's events, and ``checkpoint.pt``. A killed run resumes from its
     last checkpoint at the next call. Its policies are, bit for bit, the ones of an undisturbed run.
-    Imitation has neither events nor checkpoint and starts anew.
 
     Args:
         config: as of ``load_config``.
@@ -41,10 +40,6 @@ def train(
         InputError: an unknown scenario, or a folder with another run.
     """
     run = Run(config, scenario, seed, folder, report)
-    if config["algorithm"] in IMITATIONS:
-        from .imitation import imitate
-
-        return imitate(run, advance)
     from .checkpoint import load_checkpoint, save_checkpoint
     from .learners import make_learner, weights_of
     from .vec_env import FeatureVecEnv
