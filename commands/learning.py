@@ -27,7 +27,7 @@ def train(
     out: Path = Path("results/train"),
 ) -> dict[str, Any]:
     """Train a policy, or tune a designed controller. An interrupted run resumes from its last
-    checkpoint, or, of imitation and tune, starts anew.
+    checkpoint; tune starts anew.
 
     Example: windwrench train sac --scenario base --seed 0 --steps 60000 --out results/sac-0
     """

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 
 MOTOR_LAG = 0.04  # s, of the tasks' plant
 PLACE, SPEED, TILT, RATE, ALPHA = range(5)  # of a horizontal axis; its last state is the integral
+SET_POINT = 6  # of a horizontal axis with its set point
 THRUST = 2  # of the vertical axis: place, speed, the rotors' acceleration, integral
 
 

@@ -13,21 +13,29 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .axis_models import PLACE, SPEED
+from .axis_models import PLACE, SET_POINT, axis_models
+from .axis_observer import AxisFilter, AxisObserver, WrenchProcess, axis_filter
 from .briefing import PLACES, Air, Briefing
 from .observation import DECISION_PERIOD, MAX_COMMAND
-from .preview import Oracle, lasting, preview, pushing
+from .preview import preview, pushing
 from .sensor_model import Sensing, sensor_model
 from .tracker_filter import MEMORY
+from .wrench_lag import lags
 
 Array = NDArray[np.float64]
 
 _ALONG_Y, _LOOK = 1, 24  # the axis that is commanded; decisions that ``Limit`` looks ahead
+# of the wrench along y, N and Nm: standard deviations and correlation times (s)
+_SIZES, _TIMES = (0.1, 0.01), (1.0, 0.5)
+_MODEL = (0.05, 0.5)  # m/s2 and rad/s2 that the model lacks, per root of a second
+# standard deviations of place (m), speed (m/s) and estimated wrench (N, Nm)
+_NOISE = (0.002, 0.02, 0.02, 0.002)
 _SEED = 2016  # of the own generator, the same in every episode
 FEW = 0.5  # share of effective particles below which they are drawn anew
 # what a fan that changes its velocity at once does: a third of them stop, half turn round, the rest
@@ -252,8 +260,8 @@ class InformedTracker(_Belief):
 class _Regulated(_Belief):
     """A belief with the oracle's regulator along the expected path.
 
-    Place and speed of the vehicle are observed. Tilt, its rates and the set point follow from
-    commands and estimated wrench by the model of the flight loop.
+    Place and speed of the vehicle are observed. A Kalman filter of the flight loop
+    (``axis_observer``) finds tilt, its rates, set point and wrench.
     """
 
     gain: float = 0.0  # the regulator has its own
@@ -263,33 +271,49 @@ class _Regulated(_Belief):
     def reset(self) -> None:
         """Forget the last episode."""
         super().reset()
-        self._model = Oracle.steps(self._briefing.vehicle)[_ALONG_Y]
-        self._gains = preview(*self._model, self.effort, _LOOK)
-        # its expected state a decision later; places from where it was at first
-        self._moved = np.zeros(len(self._model[0]))
+        self._observer, self._gain, self._ahead_gains = _regulator(self._briefing, self.effort)
+        self._last = 0.0  # command
 
     @abstractmethod
     def _ahead(self, seconds: float) -> Array:
         """Return where the fan is expected to be after some time, (n,) m, a place a particle."""
 
     def _command(self, observation: NDArray[np.floating[Any]], shares: Array) -> float:
-        A, B, D = self._model
         sensing = self._sensing
         # every second decision, and evenly between
         knots = np.arange(0, _LOOK + 1, 2)
         expected = [float(shares @ self._ahead(k * DECISION_PERIOD)) for k in knots]
         path = np.interp(np.arange(_LOOK + 1), knots, expected)
-        state = self._moved.copy()
-        state[[PLACE, SPEED]] = sensing.own, sensing.velocity
-        off = state.copy()
-        off[[PLACE, -1]] -= path[0]
-        felt = pushing(np.asarray(observation[:6], dtype=np.float64)[None])[_ALONG_Y]
-        comes = np.column_stack([lasting(felt[0], _LOOK, DECISION_PERIOD), np.diff(path)])
-        gain, ahead = self._gains
-        command = -float(gain @ off + np.sum(ahead * comes))
-        command = min(max(command, -MAX_COMMAND), MAX_COMMAND)
-        self._moved = A @ state + B[:, 0] * command + D[:, :2] @ felt[0]
-        return command
+        o = np.asarray(observation[:6], dtype=np.float64)
+        felt = pushing(o[None])[_ALONG_Y][0]
+        seen = np.array([sensing.own, sensing.velocity, *felt])
+        off = self._observer.update(self._last, seen).copy()
+        off[[PLACE, SET_POINT]] -= path[0]
+        command = -float(self._gain @ off + self._ahead_gains @ np.diff(path))
+        self._last = min(max(command, -MAX_COMMAND), MAX_COMMAND)
+        return self._last
+
+
+def _regulator(briefing: Briefing, effort: float) -> tuple[AxisObserver, Array, Array]:
+    """Return an observer of the vehicle along y, the regulator's gain on its states (n,), and on
+    the fan's coming moves (decisions,).
+    """
+    model = _own_motion(briefing)
+    fan = np.zeros((len(model.A), 1))
+    fan[[PLACE, SET_POINT]] = -1.0
+    gain, ahead = preview(model.A, model.B[:, None], fan, effort, _LOOK)
+    return AxisObserver(model), gain, ahead[:, 0]
+
+
+@lru_cache(maxsize=16)
+def _own_motion(briefing: Briefing) -> AxisFilter:
+    """Return the Kalman filter of a briefed vehicle along y."""
+    vehicle = briefing.vehicle
+    axis = axis_models(vehicle)[_ALONG_Y].with_set_point()
+    mass, inertia = vehicle.mass, float(vehicle.inertia[2, 2])
+    _, force = lags(mass, inertia, briefing.noise, briefing.air, DECISION_PERIOD)
+    wrench = WrenchProcess(_SIZES, _TIMES, DECISION_PERIOD * force.delay)
+    return axis_filter(axis, DECISION_PERIOD, wrench, _MODEL, _NOISE)
 
 
 @dataclass(eq=False, kw_only=True)

@@ -210,7 +210,9 @@ class TaskPolicy(_Network):
 
     Args:
         card: ``task``; ``scale`` (n,), divisors of the observation; ``largest``, of the action;
-            ``activation``; ``squash`` (a tanh of the output is a share of ``largest``).
+            ``activation``; ``squash`` (a tanh of the output is a share of ``largest``). ``memory``
+            (m,), if any: the layers see m first-order low-passes of the observation, each of so
+            many decisions.
         weights: as of a ``TrainedPolicy``.
 
     Raises:
@@ -221,16 +223,29 @@ class TaskPolicy(_Network):
         with _entries_named(name):
             self.task, largest = str(card["task"]), float(card["largest"])
             self._scale = np.array(card["scale"], dtype=np.float32)
+            memory = np.array(card.get("memory", [1.0]), dtype=np.float32)
             if self._scale.ndim != 1:
                 raise InputError(f"{name}: scale must be a list of numbers")
-            super().__init__(card, weights, len(self._scale), largest, name)
+            if memory.ndim != 1 or not np.all(memory >= 1.0):
+                raise InputError(f"{name}: memory must be a list of numbers from 1 on")
+            self._rates = 1.0 / memory[:, None]
+            seen = len(self._scale) * len(memory)
+            super().__init__(card, weights, seen, largest, name)
         self.reset()
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+        super().reset()
+        self._remembered: Array | None = None
 
     def __call__(
         self, observation: NDArray[np.floating[Any]], info: Mapping[str, Any] | None = None
     ) -> Array:
         """Return the action of the task, in its units, for an observation in SI units."""
-        return self.act((np.asarray(observation) / self._scale).astype(np.float32))
+        seen = (np.asarray(observation) / self._scale).astype(np.float32)
+        kept = seen if self._remembered is None else self._remembered
+        self._remembered = kept + self._rates * (seen - kept)
+        return self.act(self._remembered.ravel())
 
 
 def save_policy(card: Mapping[str, Any], weights: Weights, path: Path) -> Path:

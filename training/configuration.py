@@ -11,9 +11,8 @@ from ..runtime.errors import InputError, unknown_name
 from ..runtime.yaml_file import parse_yaml, read_yaml
 
 Config = dict[str, Any]
-IMITATIONS = ("imitation", "recurrent-imitation")
-ALGORITHMS = ("sac", "ppo", "recurrent-ppo", "td3", *IMITATIONS, "tune")
-_COUNTS = ("steps", "environments", "rounds", "state", "ahead", "checkpoint")
+ALGORITHMS = ("sac", "ppo", "recurrent-ppo", "td3", "tune")
+_COUNTS = ("steps", "environments", "checkpoint")
 
 
 def load_config(
@@ -96,7 +95,7 @@ def _like(old: Any, value: Any, where: str) -> Any:
 
 
 def _check(config: Config) -> None:
-    name, imitates = config["algorithm"], config["algorithm"] in IMITATIONS
+    name = config["algorithm"]
     counts = {key: config[key] for key in _COUNTS if key in config}
     counts |= {f"validation.{key}": count for key, count in config["validation"].items()}
     for key, count in counts.items():
@@ -105,17 +104,10 @@ def _check(config: Config) -> None:
     if not all(isinstance(n, int) and n > 0 for n in config["net"]):
         raise InputError(f"{name}: net must list sizes of hidden layers, got {config['net']}")
     words = {"activation": ("relu", "tanh"), "estimator": ("ukf", "constant-gain", "ukf-lanes")}
-    if imitates:
-        words["estimator"] = words["estimator"][:2]
-        words |= {"says": ("motion", "command"), "cell": ("lstm", "gru", "none")}
     for key, known in words.items():
         if config[key] not in known:
             raise unknown_name(key, config[key], known, name)
     features_of(config)
-    for key in ("gains", "dampings") if imitates else ():
-        numbers = all(isinstance(x, int | float) for x in config[key])
-        if not config[key] or not numbers:
-            raise InputError(f"{name}: {key} must list numbers, got {config[key]}")
 
 
 def features_of(config: Config) -> Features:

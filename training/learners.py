@@ -46,11 +46,7 @@ def make_learner(config: Config, env: VecEnv, seed: int) -> Any:
     }
     kind: Any = {"sac": SAC, "td3": TD3, "ppo": PPO}.get(algorithm)
     network: Any = "MlpPolicy"
-    if algorithm == "sac" and config["activation"] == "relu":
-        from .fast_sac import FastSAC
-
-        kind = FastSAC
-    elif algorithm == "td3":
+    if algorithm == "td3":
         size = env.action_space.shape
         given["action_noise"] = NormalActionNoise(np.zeros(size), np.full(size, config["noise"]))
     elif algorithm == "recurrent-ppo":

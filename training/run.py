@@ -187,11 +187,6 @@ class Run:
                 )
         write_json({**run, "versions": versions()}, path)
 
-    def is_finished(self) -> bool:
-        """Whether the folder already holds the whole run."""
-        done = read_progress(self.folder)
-        return bool(done and done.steps and done.steps[-1] >= self.config["steps"])
-
     def resume(self, progress: Progress) -> None:
         """Go on from the progress of an earlier part of the run."""
         self.progress = progress

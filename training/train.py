@@ -1,4 +1,4 @@
-"""Training a policy, with stable-baselines3 or by imitation."""
+"""Training a policy with stable-baselines3."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
@@ -9,8 +9,7 @@ from ..controllers.registry import STANDARD_TASK
 from ..controllers.trained_policy import TaskPolicy, TrainedPolicy
 from ..evaluation.rewards import WeightedTerms, find_reward
 from ..evaluation.tasks import import_files, task_of
-from ..runtime.errors import InputError
-from .configuration import IMITATIONS, Config, features_of
+from .configuration import Config, features_of
 from .run import Progress, Run, progress_from
 from .seeds import training_seed
 from .training_envs import make_training_envs
@@ -33,7 +32,6 @@ def train(
     ``folder`` then holds ``best.npz`` and ``last.npz`` with their cards, ``progress.json``,
     ``training.json``, TensorBoard's events, and ``checkpoint.pt``. A killed run resumes from its
     last checkpoint at the next call. Its policies are, bit for bit, the ones of an undisturbed run.
-    Imitation has neither events nor checkpoint and starts anew.
 
     Args:
         config: as of ``load_config``.
@@ -53,15 +51,8 @@ def train(
         InputError: an unknown name, a folder with another run, or a task without such a learner.
     """
     import_files(imports)
-    standard, imitates = task == STANDARD_TASK, config["algorithm"] in IMITATIONS
-    if imitates and not (standard and reward is None):
-        name = config["algorithm"]
-        raise InputError(f"train {name}: expected the task {STANDARD_TASK} and no --reward")
+    standard = task == STANDARD_TASK
     run = Run(config, scenario, seed, folder, report, task, reward)
-    if imitates:
-        from .imitation import imitate
-
-        return imitate(run, advance)
     from .checkpoint import load_checkpoint, save_checkpoint
     from .learners import make_learner, weights_of
     from .vec_env import FeatureVecEnv

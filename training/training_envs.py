@@ -50,11 +50,6 @@ def check_training_env(name: str, task: str = STANDARD_TASK) -> None:
         raise unknown_name("scenario", name, [*SCENARIOS, *TIERS])
 
 
-def scenarios_of(name: str) -> tuple[str, ...]:
-    """Return the scenarios of a tier, as often as they are drawn, or the one scenario."""
-    return TIERS.get(name, (name,))
-
-
 class MixedFanTracking(FanTrackingEnv):
     """Each episode in one of several scenarios, drawn from the episode's seed."""
 

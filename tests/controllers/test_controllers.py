@@ -138,6 +138,14 @@ def test_what_lasts_longer_is_answered_by_more(felt, axes, time, other):
         assert_allclose(answer(**{other: share * getattr(LQG, other)}), usual, rtol=5e-3)
 
 
+def test_a_steady_bias_of_the_accelerometer_is_no_wind():
+    """Where neither pose nor wrench shows a force, what the accelerometer shows is its bias."""
+    biased = frame(SPECIFIC_FORCE=[0.05, -0.05, 9.86], ROTOR_FORCE=[0, 0, 9.81])
+    told, untold = (np.abs([law(biased) for _ in range(101)]) for law in (LQG(), LQG(bias=1e-6)))
+    assert_allclose(told[0], untold[0], rtol=0.01)
+    assert (told[100] < 0.5 * untold[100]).all()
+
+
 VEHICLE = load_vehicle("ardrone2")
 
 

@@ -15,11 +15,14 @@ from windwrench.controllers.wind_observation import WIND_PERIOD
 from windwrench.envs.lanes.vector import TaskLanes
 from windwrench.envs.plant import PlantSettings
 from windwrench.evaluation.tasks import TASKS
-from windwrench.training.belief_network import BeliefNetwork
 from windwrench.training.hindsight import AHEAD, LATE, MIX, WindLesson, lanes_of, mix_of
-from windwrench.training.task_policies import _card, teach
+from windwrench.training.linear_policy import MEMORY, LinearLaw
+from windwrench.training.run import validate
+from windwrench.training.task_policies import _card, linear, teach
+from windwrench.training.taught_network import Sequences, TaughtNetwork
 
 HOVER = TASKS["WindHover"].environment
+MEMORIES = {"memory": list(MEMORY)}
 
 
 def test_lanes_tell_the_truth_of_the_single_environment():
@@ -68,7 +71,7 @@ def test_hindsight_knows_what_came_beside_the_model(late):
 
 def test_a_policy_sees_what_its_network_saw_whitened():
     torch.manual_seed(0)
-    network, rng = BeliefNetwork(27, 3, "gru", 8, [5], "tanh"), np.random.default_rng(0)
+    network, rng = TaughtNetwork(27, 3, "gru", 8, [5], "tanh"), np.random.default_rng(0)
     mixed = np.diag(np.full(27, 0.01)) + 0.1 * rng.standard_normal((1, 27))
     seen = (rng.standard_normal((40, 6, 27)) @ mixed + 1.0).astype(np.float32)
     network.whiten(seen)
@@ -82,6 +85,34 @@ def test_a_policy_sees_what_its_network_saw_whitened():
     )
     flown = [policy(frame * np.float32(HOVER.scales)) for frame in seen[:, 2]]
     assert_allclose(flown, said[:, 2], atol=1e-4)
+
+
+def test_a_linear_policy_learns_a_lagging_answer_and_flies_as_it_was_fitted():
+    """The answer is a low-pass of the position error, of four decisions."""
+    rng, law = np.random.default_rng(0), LinearLaw()
+    seen = rng.standard_normal((120, 8, 27)).astype(np.float32)
+    kept, truth = seen[0], []
+    for frames in seen:
+        kept = kept + 0.25 * (frames - kept)
+        truth.append(kept[:, :3])
+    ones = np.ones(seen.shape[:2], dtype=np.float32)
+    law.fit(Sequences(seen, np.array(truth), ones))
+    policy, state = (
+        TaskPolicy(_card("WindHover", "linear", MIX, 0, 0) | MEMORIES, law.weights()),
+        None,
+    )
+    for k, frames in enumerate(seen):
+        said, _, state = law(torch.from_numpy(frames[None]), state)
+        flown = policy(frames[2] * np.float32(HOVER.scales))
+        assert_allclose(flown, said[0, 2].numpy(), atol=1e-4)
+        assert_allclose(flown, truth[k][2], atol=0.05)
+
+
+@pytest.mark.slow
+def test_a_linear_law_is_fitted_in_the_wind():
+    policy = linear("WindHover", "calm", 0, rounds=2, episodes=8)
+    rmse, lost = validate(policy, HOVER("calm"), 2)
+    assert (rmse < 0.05, lost) == (True, 0)
 
 
 def test_a_mix_has_all_of_its_scenarios():

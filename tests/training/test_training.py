@@ -9,7 +9,6 @@ import pickle
 import shutil
 import zipfile
 
-import gymnasium as gym
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -28,7 +27,6 @@ pytest.importorskip("torch", reason="pip install 'windwrench[rl]'")
 pytest.importorskip("stable_baselines3", reason="pip install 'windwrench[rl]'")
 import stable_baselines3 as sb3
 import torch
-from stable_baselines3.common.vec_env import DummyVecEnv
 
 from windwrench.training.checkpoint import load_checkpoint
 from windwrench.training.configuration import features_of
@@ -89,42 +87,6 @@ def test_the_shipped_policy_does_what_the_learner_would(algorithm):
         assert_allclose(policy.act(x), expected[0], atol=1e-5)
 
 
-def wind_env(config):
-    """An environment with three actions."""
-    return DummyVecEnv([lambda: gym.make("windwrench/WindHover-v1")])
-
-
-@pytest.mark.parametrize("make_env", [make_env, wind_env])
-def test_the_fast_update_is_that_of_stable_baselines3(make_env):
-    config = tiny("sac", "learning_rate_end=0.0008")
-    learned = []
-    for kind in (sb3.SAC, None):
-        env = make_env(config)
-        learner = make_learner(config, env, 0)
-        if kind is not None:
-            learner = kind(
-                "MlpPolicy",
-                make_env(config),
-                seed=0,
-                device="cpu",
-                policy_kwargs={"net_arch": config["net"]},
-                **{**config["learner"], "learning_rate": 0.0008},
-            )
-        learner.learn(60)  # the first updates too
-        torch.manual_seed(1)
-        np.random.seed(1)  # noqa: NPY002
-        learner.train(20, 64)
-        learned.append(
-            {**learner.policy.state_dict(), "log_ent_coef": learner.log_ent_coef.detach()}
-        )
-    for name, value in learned[0].items():
-        assert_allclose(value.numpy(), learned[1][name].numpy(), atol=2e-5, err_msg=name)
-    fresh = make_learner(config, make_env(config), 0).policy.state_dict()
-    assert (
-        float((fresh["actor.mu.weight"] - learned[0]["actor.mu.weight"]).abs().max()) > 1e-3
-    )  # something was learned
-
-
 def test_a_run_says_beside_the_policy_what_it_was_and_another_is_refused(tmp_path):
     path = train(tiny("sac", "learner.gamma=0.9"), "base", 2, tmp_path)
     other = tiny("sac", "net=[9]")
@@ -142,19 +104,6 @@ def test_a_run_says_beside_the_policy_what_it_was_and_another_is_refused(tmp_pat
     kept = json.loads((tmp_path / "training.json").read_text())
     assert kept["config"] == card["config"]
     assert any((tmp_path / "tensorboard").iterdir()) or (tmp_path / "progress.csv").exists()
-
-
-def test_imitation_learns_the_oracle_s_commands(tmp_path):
-    short = ["steps=3000", "rounds=3", "epochs=15", "net=[32]"]
-    short += ["validation.every=1000", "validation.episodes=3"]
-    config = load_config("imitation", short)
-    train(config, "base", 0, tmp_path)
-    progress = read_progress(tmp_path)
-    assert progress.steps[-1] >= 3000
-    assert progress.best_rmse < 0.35
-    before = (tmp_path / "best.npz").read_bytes()
-    train(config, "base", 0, tmp_path)  # done already
-    assert (tmp_path / "best.npz").read_bytes() == before
 
 
 def test_every_key_can_be_overridden_and_no_other():

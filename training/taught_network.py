@@ -1,4 +1,4 @@
-"""A network with a tracker's belief as its output, and its fit to episodes."""
+"""A recurrent network with taught quantities as its output, and its fit to episodes."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -27,22 +27,15 @@ class Sequences:
     truth: Array  # (decisions, episodes, quantities that are taught)
     counts: Array  # (decisions, episodes), 0 where the vehicle is lost or the truth unknown
 
-    def single_decisions(self) -> "Sequences":
-        """Return each counting decision as an episode of its own."""
-        some = self.counts.ravel() > 0.0
-        seen, truth = (x.reshape(1, len(some), -1)[:, some] for x in (self.seen, self.truth))
-        return Sequences(seen, truth, self.counts.reshape(1, -1)[:, some])
 
-
-class BeliefNetwork(torch.nn.Module):
-    """A recurrent cell or none, dense layers, and for each taught quantity a mean and the logarithm
+class TaughtNetwork(torch.nn.Module):
+    """A recurrent cell, dense layers, and for each taught quantity a mean and the logarithm
     of a standard deviation.
 
     Args:
         quantities: of a frame.
         taught: quantities of the output.
-        cell: ``gru``, ``lstm`` or ``none``; torch fits an LSTM in less than half the time, but with
-            more epochs.
+        cell: ``gru`` or ``lstm``; torch fits an LSTM in half the time.
         state: size of the cell.
         net: sizes of the dense layers between.
         activation: of these layers.
@@ -54,13 +47,11 @@ class BeliefNetwork(torch.nn.Module):
         super().__init__()
         self.taught, self._name = taught, cell
         self._white: tuple[torch.Tensor, torch.Tensor] | None = None
-        make_cell = CELLS.get(cell)
-        self.cell = None if make_cell is None else make_cell(quantities, state)
+        self.cell = CELLS[cell](quantities, state)
         if cell == "lstm":  # it begins by keeping what it has, or it never learns to keep it long
             with torch.no_grad():
-                self.cell.bias_ih_l0[state : 2 * state] = 1.0  # type: ignore[union-attr]
-        first = state if self.cell else quantities
-        self.dense = dense_layers([first, *net, 2 * taught], activation)
+                self.cell.bias_ih_l0[state : 2 * state] = 1.0
+        self.dense = dense_layers([state, *net, 2 * taught], activation)
 
     def forward(
         self, frames: torch.Tensor, state: Any = None
@@ -71,9 +62,7 @@ class BeliefNetwork(torch.nn.Module):
         if self._white is not None:
             turn, mean = self._white
             frames = (frames - mean) @ turn
-        remembered = frames
-        if self.cell is not None:
-            remembered, state = self.cell(frames, state)
+        remembered, state = self.cell(frames, state)
         said = self.dense(remembered)
         deviations = said[..., self.taught :].clamp(_SURE, _UNSURE)
         return said[..., : self.taught], deviations, state
@@ -97,8 +86,6 @@ class BeliefNetwork(torch.nn.Module):
         last = layers_of(weights) - 1
         for name in (f"weight{last}", f"bias{last}"):
             weights[name] = shares @ weights[name][: self.taught]
-        if self.cell is None:
-            return weights
         weights |= cell_weights(self._name, self.cell)
         if self._white is not None:
             turn, mean = (x.numpy() for x in self._white)
@@ -108,7 +95,7 @@ class BeliefNetwork(torch.nn.Module):
 
 
 def fit(
-    network: BeliefNetwork,
+    network: TaughtNetwork,
     episodes: Sequences,
     epochs: int,
     batch_size: int,
