@@ -207,7 +207,7 @@ def test_a_benchmark_writes_its_leaderboard_and_how_it_came_about(call, tmp_path
     arguments = f"{command}--seed 7 --out out".split()
     assert call(*arguments)[0] == 0
     out = tmp_path / "out"
-    files = ("leaderboard.json", "leaderboard.md", "leaderboard.png", "run.json")
+    files = ("leaderboard.json", "leaderboard.md", "leaderboard.png", "submission.json", "run.json")
     assert sorted(p.name for p in out.iterdir()) == sorted(files)
     rows = json.loads((out / "leaderboard.json").read_text(encoding="utf-8"))
     said = [(row["controller"], row["scenario"], row["episodes"], row["seed"]) for row in rows]

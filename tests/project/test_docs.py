@@ -92,7 +92,7 @@ def run_shell(content, environment, dry, where):
 
 def prepare(page, folder):
     """Put there what a page takes for given: logs of others, and a law of the reader's."""
-    if page.name == "cite.md":
+    if page.name in ("cite.md", "leaderboard.md"):
         law = "class MyLaw:\n    def __call__(self, observation, info):\n        return [0.0] * 3\n"
         (folder / "my_law.py").write_text(law)
     if page.name == "diagnose.md":
