@@ -111,13 +111,13 @@ def identify(
     for line in identified.advice:
         console.print(line)
     for of, errors in identified.predicted.items():
-        simplest = identified.simplest.get(of)
+        beside = identified.simplest.get(of)
         after = f"{errors.horizon[-1]:.2g} s after {errors.starts} starts"
         console.print(f"{of.replace('_', ' ')}: {after}, by what was not fitted to them:")
-        simple = () if simplest is None else ("thrust and drag",)
+        simple = () if beside is None else ("thrust and drag",)
         show_table(
             ("mean error", "of the vehicle", *simple, "if nothing changes", "unit"),
-            table_of(errors, simplest),
+            table_of(errors, beside),
         )
     console.print(use_of(identified))
     result = identified_data(identified)

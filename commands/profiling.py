@@ -49,7 +49,7 @@ def profile(
     log_notes(found.notes)
     p, law = found.profile, found.law
     seen = {"direction_deg": math.degrees(p.direction), "along_wind_m": p.beside}
-    jet = found.shape and dict(zip(_JET, astuple(found.shape), strict=True))
+    jet = dict(zip(_JET, astuple(found.shape), strict=True)) if found.shape else None
     result = {
         "log": flight.name,
         "vehicle": model.name,
@@ -76,7 +76,7 @@ def profile(
             raise InputError(f"{log}: no law was written: {found.why}")
         console.print(f"No law: {found.why}.", soft_wrap=True)
         return result
-    low, high = law["fastest_fan_ci95_m_s"]  # type: ignore[misc]
+    low, high = law["fastest_fan_ci95_m_s"]
     left, right = (place - jet["axis_m"] for place in jet["torques_at_m"])
     console.print(
         f"A gain of {law['gain']:.3g} m/s per Nm follows fans of up to "

@@ -106,7 +106,7 @@ class LQG:
         weight, noise = self.vehicle.weight, self.noise
         sizes = (self.force * weight, self.torque * weight * self.vehicle.arm_l)[:k]
         wrench = WrenchProcess(sizes, (self.force_time, self.torque_time)[:k], self.estimate_lag)
-        names = ("place", "speed", "tilt", "force", "torque", "accelerometer")
+        names: tuple[str, ...] = ("place", "speed", "tilt", "force", "torque", "accelerometer")
         if k == 1:
             names = ("place", "speed", "force", "accelerometer")
         seen = tuple(noise[name] for name in names)

@@ -66,7 +66,7 @@ def recorded(
     """Return the log of a flight through a fan's jet, with the disturbances of the tasks."""
     vehicle = load_vehicle("ardrone2")
     settings = PlantSettings.for_vehicle(vehicle)
-    columns = record_flight(
+    columns: dict[str, Any] = record_flight(
         vehicle, (), kind, seconds, seed, settings=settings, fan=fan, distance=distance
     )
     return FlightLog(**columns, name=f"{kind} {seed}")

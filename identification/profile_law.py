@@ -51,7 +51,7 @@ class ProfiledJet:
     others: tuple[WindProfile, ...]
     why: str
     shape: JetShape | None
-    law: dict[str, float | list[float]] | None
+    law: dict[str, Any] | None
     notes: tuple[str, ...]
 
 

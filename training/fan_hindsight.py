@@ -38,7 +38,10 @@ FEATURES = Features(("torque_z", "force_x", "force_y", "velocity_y", "command", 
 def fan_lanes(episodes: int) -> list[TaskLanes]:
     """Return environments for about so many episodes in the mix of scenarios."""
     total = sum(MIX.values())
-    return [TaskLanes(max(1, episodes * n // total), scenario=name) for name, n in MIX.items()]
+    return [
+        TaskLanes(max(1, episodes * n // total), task=FanTrackingEnv, scenario=name)
+        for name, n in MIX.items()
+    ]
 
 
 class FanHindsight:
@@ -59,7 +62,9 @@ class FanHindsight:
 
     def begin(self, envs: TaskLanes, leads: bool) -> None:
         """Start an episode in each of ``envs``."""
-        self._envs, self._history, self._set_point = envs, None, None
+        self._envs = envs
+        self._history: History | None = None
+        self._set_point: Array | None = None
         self._flown: list[tuple[Array, ...]] = []
 
     def look(self, observations: Frames, infos: dict[str, Any]) -> tuple[Frames, Array]:

@@ -32,7 +32,7 @@ class LinearLaw:
     """The law as ``Flights`` flies it."""
 
     def __init__(self) -> None:
-        self._rates = np.float32(1.0 / np.array(MEMORY))[:, None]
+        self._rates: Array = (1.0 / np.array(MEMORY, dtype=np.float32))[:, None]
 
     def _remember(self, kept: Array | None, frames: Array) -> Array:
         """Return the low-passes (n, memory, quantities) after frames (n, quantities)."""

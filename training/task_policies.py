@@ -220,7 +220,8 @@ def main() -> None:
     if given.kind == "linear":
         if task in (FAN, FAN_PLANE):
             parser.error("--kind linear: expected a task in the wind")
-        kind, policy = "linear", linear(task, scenario, given.seed, **changed)
+        kind = "linear"
+        policy: TaskPolicy | TrainedPolicy = linear(task, scenario, given.seed, **changed)
     else:
         policy = teach(task, scenario, given.seed, **changed)
     policies = Path("training/policies")

@@ -36,8 +36,8 @@ def draw_profile(found: ProfiledJet, title: str, path: Path) -> Path:
         panel.set_ylabel(f"{name} ({unit})")
     if shape is not None:
         panels[0].axvspan(*shape.edges, color=JET, alpha=0.45, lw=0, zorder=0, label="jet")
-        for peak, label in zip(shape.peaks, ("beyond, the fan is lost", None), strict=True):
-            panels[0].axvline(peak, color=SERIES[1], ls="--", lw=1.1, label=label)
+        for peak, once in zip(shape.peaks, ("beyond, the fan is lost", None), strict=True):
+            panels[0].axvline(peak, color=SERIES[1], ls="--", lw=1.1, label=once)
     room_above(panels[0], 0.35)
     panels[0].legend(loc="upper left", ncols=3)
     angle = math.degrees(p.direction)

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...dynamics.effects import Role, get
-from ...dynamics.vehicle import ModelStatus, Vehicle
-from ...runtime.arrays import Array
+from ...dynamics.vehicle import ModelStatus, Standing, Vehicle
+from ...runtime.arrays import Array, Index
 from ..logs.flight_log import FlightLog
 from ..prediction import QUANTITIES, PredictionErrors, errors_of_models
 from .channels import MotionPiece
@@ -139,7 +139,8 @@ def judged(errors: Mapping[str, Sequence[PredictionErrors]]) -> HeldOut:
 
 def status_of(force: bool, torque: bool) -> ModelStatus:
     """Return the status of a vehicle whose force or torque is refuted."""
-    return ModelStatus(*("refuted" if part else "identified" for part in (force, torque)))
+    words: tuple[Standing, Standing] = ("identified", "refuted")
+    return ModelStatus(words[force], words[torque])
 
 
 def _reason(errors: Mapping[str, Sequence[PredictionErrors]]) -> str:
@@ -161,7 +162,7 @@ def _reason(errors: Mapping[str, Sequence[PredictionErrors]]) -> str:
     )
 
 
-def _by_balance(fit: VehicleFit, fold: Array) -> HeldOut:
+def _by_balance(fit: VehicleFit, fold: Index) -> HeldOut:
     """Return what the balance of held-out segments says: the fit must leave less power of specific
     force along z, and of turning, than no model.
     """
