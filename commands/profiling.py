@@ -82,13 +82,8 @@ def profile(
         f"A gain of {law['gain']:.3g} m/s per Nm follows fans of up to "
         f"{law['fastest_fan_m_s']:.2g} m/s in 80 % of flights of 20 s ({low:.2g} to {high:.2g} "
         f"m/s; its bound k tau_max is {law['bound_m_s']:.2g} m/s), loses the jet beyond "
-<<<<<<< HEAD
-        f"{left:.2f} and {right:+.2f} m from the "
-        f"axis, and allows the filter a rise time of up to {law['largest_rise_time_s']:.2g} s.",
-=======
         f"{left:.2f} and {right:+.2f} m from the axis, and allows the filter a rise time of up to "
         f"{law['largest_rise_time_s']:.2g} s.",
->>>>>>> profile68
         soft_wrap=True,
     )
     each = ((key, np.atleast_1d(value).tolist()) for key, value in (jet | law).items())
