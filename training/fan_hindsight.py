@@ -84,6 +84,7 @@ class FanHindsight:
     def _own(self, infos: dict[str, Any]) -> Array:
         """Return the states (n, 7) of the vehicles along y."""
         truth = self._envs.truth()
+        assert self._set_point is not None
         up, y = truth["up"], _ALONG_Y
         turning, turned = tilting(truth["rate"])[y], tilting(truth["angular_acceleration"])[y]
         middle = up[:, y] / up[:, 2], turning, turned, truth["integral"][:, y]
