@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from typing import Any, Self
 
 import numpy as np
@@ -17,7 +17,7 @@ from ..dynamics.vehicle import Vehicle
 from ..dynamics.vehicle_file import load_vehicle
 
 # the vehicle of the tasks
-standard_vehicle = partial(load_vehicle, "ardrone2")
+standard_vehicle = cache(partial(load_vehicle, "ardrone2"))
 
 
 def _along(value: ArrayLike, axis: int) -> float:

@@ -26,7 +26,7 @@ from .observations import FELT, as_numbers, bounds, parts
 from .plant import TICK, PlantSettings
 from .references import along
 from .scenarios import Drawn, find_scenario
-from .state import REFERENCE_SIZE, Episodes, Flags, Start, State
+from .state import REFERENCE_SIZE, Episodes, Flags, Frame, Start, State
 from .wind import Sum, Wind
 from .wind_scenarios import HEIGHT, START, WIND_SCENARIOS, draw_winds
 
@@ -59,6 +59,8 @@ class TaskDefinition:
     limits: Sequence[float] | None = None  # largest sizes of the observation's numbers
     scales: Sequence[float] | None = None  # their divisors, with ``normalize``
     fan: Fan
+    action_space: gym.Space[Frame]
+    observation_space: gym.Space[Frame]
 
     def __init__(
         self,
@@ -145,8 +147,8 @@ class TaskDefinition:
         in_si = not self.normalize and self.action in UNITS
         self.action_unit = UNITS[self.action] if in_si else "units of the largest"
         self.action_scale = float(self.flown.above[0]) if in_si else 1.0
-        bound = self.action_scale
-        self.action_space = gym.spaces.Box(-bound, bound, (self.action_size,), np.float32)
+        most = self.action_scale
+        self.action_space = gym.spaces.Box(-most, most, (self.action_size,), np.float32)
         blank = State(Episodes.zeros(1, self.action_size), [np.random.default_rng(0)])
         blank.rows[:, [3, 22]] = 1.0  # quaternions of no turn
         with np.errstate(all="ignore"):
@@ -160,7 +162,7 @@ class TaskDefinition:
                 f"{len(kept)} and {len(divisors)}"
             )
         self.kept, self.divisors, bound = kept, divisors, kept / divisors
-        self.observation_space = gym.spaces.Box(-bound, bound, bound.shape, np.float32)
+        self.observation_space = gym.spaces.Box(-bound, bound, (size,), np.float32)
 
     def bounds(self) -> tuple[Sequence[float] | None, Sequence[float] | None]:
         """Return largest sizes and scales of the observation's numbers; None: any, and 1."""

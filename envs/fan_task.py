@@ -34,7 +34,8 @@ class FanTask(Task):
 
     scenarios = SCENARIOS
     action, observation, decision_hz, normalize = "velocity", "own", 12.5, False
-    follows, model_in_loop, accelerometer = False, False, None
+    follows, model_in_loop = False, False
+    accelerometer: ClassVar[tuple[float, float] | None] = None
     label, draws = "fan_motion", 1
     largest_action = MAX_COMMAND
     standard: ClassVar[Fan]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -125,7 +125,8 @@ class FanTrackingEnv(FanTask):
 
     name = "FanTracking"
     axes = (1,)
-    limits, scales = LIMITS, SCALES
+    limits: Sequence[float] | None = LIMITS
+    scales: Sequence[float] | None = SCALES
     standard = Fan()
 
     def __init__(
@@ -168,7 +169,8 @@ class FanTrackingEnv(FanTask):
             rows, now = np.arange(n), s.decision % FRAMES
             past[rows, now] = frame
             ordered = (now[:, None] + 1 + np.arange(FRAMES)) % FRAMES
-            return past[rows[:, None], ordered].reshape(n, -1)
+            history: Array = past[rows[:, None], ordered].reshape(n, -1)
+            return history
         if self.view == "pose":
             e = s.estimate
             w, i, j, k = e.quaternion.T
@@ -183,7 +185,8 @@ class FanTrackingEnv(FanTask):
         """Return whether each vehicle is lost (n,)."""
         away = np.abs(s.position - s.reference[:, :3])
         near = (away[:, 0] <= AWAY) & (away[:, 2] <= AWAY)
-        return ~(s.flying & near & (np.abs(self.off_axis(s)[:, 0]) <= LOST_OFFSET))
+        lost: Flags = ~(s.flying & near & (np.abs(self.off_axis(s)[:, 0]) <= LOST_OFFSET))
+        return lost
 
     def info(self, s: State) -> dict[str, Any]:
         """Return the fan's motion and the true offset, force and torque."""

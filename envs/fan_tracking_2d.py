@@ -95,7 +95,8 @@ class FanTracking2DEnv(FanTask):
         """Return whether each vehicle is lost (n,)."""
         near = np.abs(s.position[:, 0] - s.reference[:, 0]) <= AWAY
         error = np.hypot(*self.off_axis(s).T)
-        return ~(s.flying & near & (s.position[:, 2] > 0.0) & (error <= LOST_OFFSET))
+        lost: Flags = ~(s.flying & near & (s.position[:, 2] > 0.0) & (error <= LOST_OFFSET))
+        return lost
 
     def info(self, s: State) -> dict[str, Any]:
         """Return the fan's motion and the true place, force and torque."""

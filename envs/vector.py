@@ -92,7 +92,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         self._seeded, self._begun, self._over = np.zeros((3, num_envs), dtype=np.bool_)
         self._fresh = np.zeros(num_envs, dtype=np.bool_)  # no step since the episode's start
         self._some_fresh = self._ready = False
-        self._frames, self._si = np.zeros((2, *self.observation_space.shape), dtype=np.float32)
+        self._frames, self._si = np.zeros((2, num_envs, len(task.kept)), dtype=np.float32)
         self._labels, self._all = (
             np.zeros(num_envs, dtype=object),
             np.ones(num_envs, dtype=np.bool_),

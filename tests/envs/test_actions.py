@@ -3,6 +3,7 @@
 import copy
 import pickle
 import warnings
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
@@ -114,6 +115,38 @@ def test_observations_are_of_the_estimate_relative_to_the_reference():
 def test_what_is_unknown_is_named(given, said):
     with pytest.raises(InputError, match=said):
         gym.make("windwrench/WindHover-v2", **given)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_a_small_and_a_large_vehicle_find_the_task_as_hard_as_the_standard_one(task):
+    """Force over weight, torque over weight times arm, and the error, of 10 s under the flight
+    loop alone.
+    """
+    large = replace(
+        load_vehicle("ardrone2"),
+        name="large",
+        mass=1.86,
+        arm_l=0.2524,
+        inertia=load_vehicle("ardrone2").inertia * 16.0,
+        k=load_vehicle("ardrone2").k * 4.0,
+        p=load_vehicle("ardrone2").p * 4.0,
+    )
+    felt = {}
+    for vehicle in (load_vehicle("ardrone2"), load_vehicle("crazyflie"), large):
+        scale = vehicle.weight * np.array([1.0, vehicle.arm_l])
+        env, rows = gym.make(f"windwrench/{task}-v2", vehicle=vehicle, decision_hz=50), []
+        for seed in range(2):
+            env.reset(seed=seed)
+            for _ in range(250):
+                *_, lost, _, info = env.step(np.zeros(env.action_space.shape, np.float32))
+                assert not lost
+                size = [np.linalg.norm(info[name]) for name in ("force", "torque")]
+                rows.append([*(size / scale), info.get("error", abs(info.get("offset", 0.0)))])
+        felt[vehicle.name] = np.sqrt(np.mean(np.square(rows), axis=0))
+    for name in ("crazyflie", "large"):
+        force, torque, error = felt[name] / felt["ardrone2"]
+        assert (force, error) == (pytest.approx(1.0, abs=0.25), pytest.approx(1.0, abs=0.35))
+        assert 0.4 < torque < 2.0  # the rotors' own part goes with the inertia
 
 
 def numbers(envs, decisions, seed=3):
