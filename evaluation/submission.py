@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import platform
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -91,7 +92,7 @@ def write_submission(
         for (name, scenario), flown in results.items()
     ]
     named = (*request.controllers, *request.scenarios, request.task, request.reward or "")
-    files = {name.partition(".py:")[0] + ".py" * (".py:" in name) for name in named}
+    files = {re.sub(r"(\.(?:py|ya?ml)):.*", r"\1", name) for name in named}
     data: dict[str, Any] = {
         "windwrench": __version__,
         "commit": commit(),

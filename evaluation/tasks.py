@@ -228,7 +228,7 @@ def task_of(name: str) -> BenchmarkTask:
             ) from error
         kind = spec.entry_point
         kind = load_env_creator(kind) if isinstance(kind, str) else kind
-    if spec.namespace == "windwrench" and spec.name in TASKS:
+    if spec.namespace == "windwrench" and spec.name in TASKS and spec.version in (0, 1):
         return TASKS[spec.name]
     if spec.max_episode_steps is None:
         if not hasattr(kind, "decisions"):

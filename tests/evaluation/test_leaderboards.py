@@ -196,10 +196,12 @@ def test_a_law_that_reads_the_truth_is_seen(read, told):
 def test_a_submission_says_what_flew_and_its_hash_is_of_the_results(tmp_path, flown):
     names, results, rows = flown("FanTracking2D")
     (tmp_path / "laws.py").write_text(OWN)
-    request = Request((*names, f"{tmp_path / 'laws.py'}:Still"), ("base",), EPISODES, SEED)
+    (tmp_path / "mine.yaml").write_text("fan: {}")
+    own = [f"{tmp_path / 'laws.py'}:Still", f"{tmp_path / 'mine.yaml'}:gale"]
+    request = Request((*names, own[0]), ("base", own[1]), EPISODES, SEED)
     kept = strict_json(write_submission(request, rows, results, tmp_path))
     assert kept["sha256"] == results_hash(kept)
-    assert list(kept["files"]) == [str(tmp_path / "laws.py")]
+    assert [*kept["files"]] == [str(tmp_path / name) for name in ("laws.py", "mine.yaml")]
     assert {"commit", "windwrench", "packages"} <= set(kept)
     flight = next(one for one in kept["flights"] if one["controller"] == "hover")
     assert flight["rmse_settled"] == [e.rmse_settled for e in results["hover", "base"]]
