@@ -7,8 +7,8 @@ of any policy. For every decision a law with knowledge gives the answer, and the
 to all answers so far, over whole episodes. In the wind and in ``FanTracking`` the answers are the
 best commands in view of the future (``hindsight``, ``fan_hindsight``), in a mix of scenarios. In
 ``FanTracking2D`` the simulator gives place and motion of the fan. ``linear`` is a linear law fitted
-in the wind to the same answers, in seconds. ``sac`` is stable-baselines3's on the task's version 1,
-on ``base``.
+in the wind to the same answers in one scenario, in seconds. ``sac`` is stable-baselines3's on the
+task's version 1, on ``base``.
 """
 
 import argparse
@@ -49,7 +49,7 @@ _FIT: dict[str, dict[str, Any]] = {
     WIND: {"cell": "gru", "state": 64, "net": [64], "rounds": 4, "episodes": 256, "epochs": 4}
     | {"batch_size": 32, "learning_rate": 5e-3, "wander": (0.3, 0.5)},
 }
-_LINEAR = {"rounds": 3, "episodes": 64}
+_LINEAR = {"rounds": 4, "episodes": 64}
 _LEAST_RATE = 0.1  # share of the learning rate that is left at the end of a round
 _ACTIVATION = "tanh"
 _SAC = (
@@ -228,7 +228,9 @@ def main() -> None:
     parser.add_argument("--task", choices=[*TASKS], required=True)
     parser.add_argument("--kind", choices=["taught", "linear", "sac"], default="taught")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--scenario", default=MIX, help=f"of the wind, or a mix of them: {MIX}")
+    parser.add_argument(
+        "--scenario", help=f"of the wind; default: {BASE} for a linear law, else a mix: {MIX}"
+    )
     for name, said in (
         ("rounds", "of DAgger"),
         ("episodes", "of each round"),
@@ -243,7 +245,8 @@ def main() -> None:
     if given.kind == "sac":
         kind, policy = "sac", sac(task, given.seed, given.steps)
     else:
-        kind, scenario = _fit_of(task)["cell"], given.scenario
+        usual = BASE if given.kind == "linear" else MIX
+        kind, scenario = _fit_of(task)["cell"], given.scenario or usual
         if task in (FAN, FAN_PLANE):
             scenario = "wide" if task == FAN else BASE
         asked = {name: getattr(given, name) for name in ("rounds", "episodes", "epochs")}
