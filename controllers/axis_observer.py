@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .axis_models import RATE, SPEED, AxisModel
+from .axis_models import RATE, SPEED, TILT, AxisModel
 
 Array = NDArray[np.float64]
 
@@ -100,11 +100,15 @@ class AxisObserver:
         """Forget the last episode."""
         self.state, self._count = np.zeros(len(self.model.A)), 0
 
-    def update(self, action: float, seen: Array) -> Array:
-        """Return the states (n,) after a decision at ``action`` and what is ``seen`` then."""
+    def update(self, action: float, seen: Array, turned: float = 0.0) -> Array:
+        """Return the states (n,) after a decision at ``action`` and what is ``seen`` then.
+
+        The reference has ``turned`` by so much in the meantime: rad of its tilt, upwards m/s2.
+        """
         model, x = self.model, self.state
         if self._count:
             x = model.A @ x + model.B * action
+            x[TILT] -= turned
         gain = model.gains[min(self._count, len(model.gains) - 1)]
         self.state, self._count = x + gain @ (seen - model.C @ x), self._count + 1
         return self.state

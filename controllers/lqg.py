@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from ..dynamics.vehicle import Vehicle
 from ..runtime.errors import InputError
-from .axis_models import AxisModel, axis_models, tilting
+from .axis_models import TILT, AxisModel, axis_models, tilting
 from .axis_observer import AxisObserver, WrenchProcess, axis_filter
 from .briefing import Briefing, standard_vehicle
-from .preview import regulator
+from .preview import preview
 from .wind_observation import (
     FORCE,
     MAX_ACCELERATION,
@@ -33,6 +33,8 @@ from .wind_observation import (
 
 Array = NDArray[np.floating[Any]]
 Wide = NDArray[np.float64]
+_TURN_TIME = 0.3  # s, over which the reference goes on to change its acceleration
+_LOOK = 25  # decisions
 
 
 @dataclass(eq=False)
@@ -43,7 +45,8 @@ class LQG:
     Quadratic Methods*, 1990). Force and torque are Ornstein-Uhlenbeck processes. Their estimates
     from the wrench filter follow behind a lag of first order. The accelerometer less the rotors'
     force shows the force at once, but biased: its bias is a state, found in the first seconds. The
-    rotors' force shows the tilt. The torque matters: a tilt comes before any motion.
+    rotors' force shows the tilt. The torque matters: a tilt comes before any motion. A reference
+    that changes its acceleration goes on with that for a while.
 
     Everything but ``effort`` describes the wind, the filter and the sensors. The numbers were
     searched on six validation episodes each of WindHover's base and noisy and WindTrajectory's
@@ -96,12 +99,15 @@ class LQG:
 
     def reset(self) -> None:
         """Forget the last episode."""
-        for observer, _ in self._laws:
+        for observer, *_ in self._laws:
             observer.reset()
         self._action = np.zeros(3)
+        self._wanted: Wide | None = None  # acceleration of the reference, in tilts and m/s2
 
-    def _law(self, axis: AxisModel) -> tuple[AxisObserver, Wide]:
-        """Return the observer of an axis, and the regulator's gain (n,) on its states."""
+    def _law(self, axis: AxisModel) -> tuple[AxisObserver, Wide, float]:
+        """Return the observer of an axis, the regulator's gain (n,) on its states, and the gain on
+        the reference's last turn, which is expected to go on.
+        """
         k = axis.D.shape[1]
         weight, noise = self.vehicle.weight, self.noise
         sizes = (self.force * weight, self.torque * weight * self.vehicle.arm_l)[:k]
@@ -111,20 +117,29 @@ class LQG:
             names = ("place", "speed", "force", "accelerometer")
         seen = tuple(noise[name] for name in names)
         model = axis_filter(axis, WIND_PERIOD, wrench, self.model, seen, self.bias)
-        return AxisObserver(model), regulator(model.A, model.B[:, None], self.effort)[0][0]
+        turn = np.zeros((len(model.A), 1))
+        turn[TILT] = -1.0
+        gain, ahead = preview(model.A, model.B[:, None], turn, self.effort, _LOOK)
+        lasts = np.exp(-WIND_PERIOD / _TURN_TIME * np.arange(1, _LOOK + 1))
+        return AxisObserver(model), gain, float(lasts @ ahead[:, 0])
 
     def __call__(self, observation: Array, info: Mapping[str, Any] | None = None) -> Array:
         """Return the action (3,) m/s2 for an observation (27,)."""
         o = np.asarray(observation, dtype=np.float64)
         place, speed = -o[POSITION_ERROR], o[VELOCITY] - o[REFERENCE_VELOCITY]
         rotors, felt = o[ROTOR_FORCE], o[SPECIFIC_FORCE] - o[ROTOR_FORCE]
-        tilt = (rotors - o[REFERENCE_ACCELERATION]) / self.vehicle.gravity
+        gravity = self.vehicle.gravity
+        wanted = o[REFERENCE_ACCELERATION] / np.array([gravity, gravity, 1.0])
+        turned = np.zeros(3) if self._wanted is None else wanted - self._wanted
+        tilt = rotors / gravity - wanted
         torque = tilting(o[TORQUE])
         action = np.zeros(3)
-        for i, (observer, gain) in enumerate(self._laws):
+        for i, (observer, gain, ahead) in enumerate(self._laws):
             seen = [place[i], speed[i], o[FORCE][i], felt[i]]
             if i < 2:
                 seen = [place[i], speed[i], tilt[i], o[FORCE][i], torque[i], felt[i]]
-            action[i] = -float(gain @ observer.update(self._action[i], np.array(seen)))
+            x = observer.update(self._action[i], np.array(seen), turned[i])
+            action[i] = -float(gain @ x) - ahead * turned[i]
+        self._wanted = wanted
         self._action = np.minimum(np.maximum(action, -MAX_ACCELERATION), MAX_ACCELERATION)
         return self._action.astype(np.float32)

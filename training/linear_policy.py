@@ -1,7 +1,9 @@
 """A linear law of a task in the wind, fitted to the best commands in hindsight: a baseline.
 
 Each quantity of the observation passes through first-order low-passes of several times; an axis'
-command is a weighted sum of its own quantities. The weights are a ridge regression (Hoerl and
+command is a weighted sum of its own quantities. No sum suits two levels of noise: taught in
+``hindsight.MIX`` the law has 2.7 times the error on WindTrajectory's base after 3 s (24 validation
+episodes). The weights are a ridge regression (Hoerl and
 Kennard, Technometrics 12(1), 1970) on all flights so far, in rounds as of ``task_policies``.
 """
 
@@ -17,7 +19,7 @@ from .taught_network import Sequences
 Array = NDArray[np.float32]
 
 # decisions of the low-passes; 1: the newest observation itself
-MEMORY = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0)
+MEMORY = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 32.0)
 RIDGE = 3e-3  # of the quantities' variances
 # columns of each axis' quantities in an observation: position error, velocity, velocity and
 # acceleration of the reference, force, tilting torque, specific forces, last action

@@ -7,7 +7,7 @@ of any policy. For every decision a law with knowledge gives the answer, and the
 to all answers so far, over whole episodes. In the wind and in ``FanTracking`` the answers are the
 best commands in view of the future (``hindsight``, ``fan_hindsight``), in a mix of scenarios. In
 ``FanTracking2D`` the simulator gives place and motion of the fan. ``linear`` is a linear law fitted
-in the wind to the same answers, in seconds.
+in the wind to the same answers in one scenario, in seconds.
 """
 
 import argparse
@@ -44,7 +44,7 @@ _FIT: dict[str, dict[str, Any]] = {
     WIND: {"cell": "gru", "state": 64, "net": [64], "rounds": 4, "episodes": 256, "epochs": 4}
     | {"batch_size": 32, "learning_rate": 5e-3, "wander": (0.3, 0.5)},
 }
-_LINEAR = {"rounds": 3, "episodes": 64}
+_LINEAR = {"rounds": 4, "episodes": 64}
 _LEAST_RATE = 0.1  # share of the learning rate that is left at the end of a round
 _ACTIVATION = "tanh"
 # signs of a frame of FanTracking2D after half a turn about the jet's axis: it changes the sign of
@@ -201,7 +201,9 @@ def main() -> None:
     parser.add_argument("--task", choices=[*TASKS], required=True)
     parser.add_argument("--kind", choices=["taught", "linear"], default="taught")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--scenario", default=MIX, help=f"of the wind, or a mix of them: {MIX}")
+    parser.add_argument(
+        "--scenario", help=f"of the wind; default: {BASE} for a linear law, else a mix: {MIX}"
+    )
     for name, said in (
         ("rounds", "of DAgger"),
         ("episodes", "of each round"),
@@ -212,7 +214,8 @@ def main() -> None:
     given = parser.parse_args()
     torch.set_num_threads(1)
     began, task = time.process_time(), given.task
-    kind, scenario = _fit_of(task)["cell"], given.scenario
+    usual = BASE if given.kind == "linear" else MIX
+    kind, scenario = _fit_of(task)["cell"], given.scenario or usual
     if task in (FAN, FAN_PLANE):
         scenario = "wide" if task == FAN else BASE
     asked = {name: getattr(given, name) for name in ("rounds", "episodes", "epochs")}

@@ -24,7 +24,9 @@ from windwrench.controllers.wind_observation import WIND_PERIOD
 from windwrench.dynamics import load_vehicle
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.plant import TICK, PlantSettings
+from windwrench.envs.wind_tasks import WindTrajectoryEnv
 from windwrench.estimator.estimate import STATE_SIZE
+from windwrench.evaluation.episodes import fly_episode
 
 
 @pytest.mark.parametrize("task", sorted(TASK_LAWS.keys() - {"FanTracking"}))
@@ -136,6 +138,20 @@ def test_what_lasts_longer_is_answered_by_more(felt, axes, time, other):
     assert (answer(**{time: 0.25 * getattr(LQG, time)}) < 0.97 * usual).all()
     for share in (0.25, 4.0):
         assert_allclose(answer(**{other: share * getattr(LQG, other)}), usual, rtol=5e-3)
+
+
+class Unturned(LQG):
+    """Takes every reference for one that has not changed its acceleration."""
+
+    def __call__(self, observation, info=None):
+        self._wanted = None
+        return super().__call__(observation, info)
+
+
+def test_a_reference_that_turns_is_followed_closer_where_the_turn_is_known():
+    env = WindTrajectoryEnv("calm")
+    known, unknown = (fly_episode(env, law, 3).error[75:] for law in (LQG(), Unturned()))
+    assert np.sqrt(np.mean(known**2)) < 0.8 * np.sqrt(np.mean(unknown**2))
 
 
 def test_a_steady_bias_of_the_accelerometer_is_no_wind():

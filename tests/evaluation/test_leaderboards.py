@@ -56,7 +56,7 @@ def tolerance(controller):
     were tried a law in turbulence by 5e-5, and policies, whose sums of single precision each orders
     by itself, by 2.1 % of an end of an interval.
     """
-    return (5e-2, 1e-2) if re.search(r"^(sac|gru|recurrent)", controller) else (2e-4, 1e-9)
+    return (5e-2, 1e-2) if re.search(r"^(sac|gru|lstm)", controller) else (2e-4, 1e-9)
 
 
 @pytest.mark.parametrize("task", mostly_slow(TASKS, lambda task: task != "WindTrajectory"))
