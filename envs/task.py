@@ -133,7 +133,7 @@ class Task(TaskDefinition, gym.Env[Frame, Frame]):
             InputError: the action has another shape or is not finite, or there was no reset.
         """
         many = self.many
-        judged = many.go_on([action], self.np_random)
+        judged = many.go_on(action, self.np_random)
         seen, lost, over = judged.observations[0].copy(), bool(judged.lost[0]), many.truncated[0]
         return seen, float(judged.rewards[0]), lost, bool(over), self._told(judged)
 

@@ -23,6 +23,7 @@ from .state import Episodes, Flags, Frame, Start, State, gather
 from .untimed import Untimed
 
 Infos = dict[str, Any]
+_COUNTS = ("no", "one", "two", "three", "four")
 SETTLE_TICKS = 300  # the filter settles before an episode starts
 
 
@@ -177,14 +178,21 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         self._start(self._all)
         return self._judge()
 
-    def go_on(self, actions: Any, rng: np.random.Generator) -> Judged:
+    def go_on(self, action: Any, rng: np.random.Generator) -> Judged:
         """Fly a decision of the one environment, which draws from ``rng``.
 
         Raises:
             InputError: as ``step``.
         """
-        self.generators[0] = rng
-        self.fly(actions, self._all)
+        self.generators[0], task = rng, self.task
+        if not self._taken([action], self._all):
+            count = f"{_COUNTS[task.action_size]} finite number{'s' * (task.action_size > 1)}"
+            raise InputError(
+                f"{task.name}: action must be {count} in {task.action_unit}, shape "
+                f"({task.action_size},), got {action!r}"
+            )
+        self._fly(self._all)
+        self._fresh[0] = self._some_fresh = False
         return self._judge()
 
     @property
@@ -199,20 +207,27 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         Raises:
             InputError: as ``step``.
         """
-        task, e = self.task, self.episodes
-        wanted, flown = np.array(actions, dtype=np.float64), task.flown
-        if not self._ready:
-            raise InputError(f"{task.name}: call reset before step")
-        how = task.action_scale, flown.hover, flown.below, flown.above
-        if wanted.shape != e.actions.shape or not self._call(take, wanted, which, *how, e):
-            one = self.num_envs == 1
+        if not self._taken(actions, which):
+            task, shape = self.task, self.episodes.actions.shape
             raise InputError(
                 f"{task.name}: actions must be finite numbers in {task.action_unit}, shape "
-                f"{e.actions.shape[one:]}, got {wanted[0] if one else wanted!r}"
+                f"{shape}, got {np.asarray(actions, dtype=np.float64)!r}"
             )
         self._fly(which)
         self._fresh[which] = False
         self._some_fresh = which is not self._all and bool(self._fresh.any())
+
+    def _taken(self, actions: Any, which: Flags) -> bool:
+        """Return whether actions (num_envs, n) are finite and of the right shape; then those of
+        ``which`` are written down.
+        """
+        if not self._ready:
+            raise InputError(f"{self.task.name}: call reset before step")
+        wanted, flown = np.array(actions, dtype=np.float64), self.task.flown
+        how = self.task.action_scale, flown.hover, flown.below, flown.above
+        if wanted.shape != self.episodes.actions.shape:
+            return False
+        return bool(self._call(take, wanted, which, *how, self.episodes))
 
     def _judge(self) -> Judged:
         """Return what the task says of the present state."""
