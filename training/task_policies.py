@@ -242,6 +242,7 @@ def main() -> None:
     given = parser.parse_args()
     torch.set_num_threads(1)
     began, task = time.process_time(), given.task
+    policy: Any
     if given.kind == "sac":
         kind, policy = "sac", sac(task, given.seed, given.steps)
     else:
