@@ -112,10 +112,8 @@ class LQG:
         weight, noise = self.vehicle.weight, self.noise
         sizes = (self.force * weight, self.torque * weight * self.vehicle.arm_l)[:k]
         wrench = WrenchProcess(sizes, (self.force_time, self.torque_time)[:k], self.estimate_lag)
-        names: tuple[str, ...] = ("place", "speed", "tilt", "force", "torque", "accelerometer")
-        if k == 1:
-            names = ("place", "speed", "force", "accelerometer")
-        seen = tuple(noise[name] for name in names)
+        horizontal = ("tilt", "force", "torque") if k == 2 else ("force",)
+        seen = tuple(noise[name] for name in ("place", "speed", *horizontal, "accelerometer"))
         model = axis_filter(axis, WIND_PERIOD, wrench, self.model, seen, self.bias)
         turn = np.zeros((len(model.A), 1))
         turn[TILT] = -1.0

@@ -57,8 +57,9 @@ class FanHindsight:
         needs a mean of commands far beyond 1.
         """
         oracle = Oracle()
-        self._limit, self._model = limit * self.largest, Oracle.steps(oracle.vehicle)[_ALONG_Y]
-        self._gain, self._ahead = preview(*self._model, oracle.effort, AHEAD)
+        self._limit = limit * self.largest
+        model = Oracle.steps(oracle.vehicle)[_ALONG_Y]
+        self._gain, self._ahead = preview(*model, oracle.effort, AHEAD)
 
     def begin(self, envs: TaskLanes, leads: bool) -> None:
         """Start an episode in each of ``envs``."""
