@@ -48,7 +48,7 @@ class TaskDefinition:
     decision_hz: float = 25.0
     episode_s: float = EPISODE_SECONDS
     normalize: bool = True
-    largest_action: float | None = None  # m/s or m/s2; None: as of ``make_action``
+    largest_action: Any = None  # m/s or m/s2; None: as of ``make_action``
     axes: ClassVar[tuple[int, ...]] = (0, 1, 2)  # of velocities and accelerations
     follows: ClassVar[bool] = True  # whether accelerations are beside a flight to the reference
     model_in_loop: bool = True
@@ -56,8 +56,8 @@ class TaskDefinition:
     label: ClassVar[str] = "trajectory"  # entry of ``info`` with the name of the episode's draw
     draws: ClassVar[int] = 20  # at most, until an episode begins with the vehicle not lost
     mixes: ClassVar[bool] = False  # whether episodes differ in what lanes share
-    limits: Sequence[float] | None = None  # largest sizes of the observation's numbers
-    scales: Sequence[float] | None = None  # their divisors, with ``normalize``
+    limits: Any = None  # (k,) largest sizes of the observation's numbers
+    scales: Any = None  # (k,) their divisors, with ``normalize``
     fan: Fan
     action_space: gym.Space[Frame]
     observation_space: gym.Space[Frame]

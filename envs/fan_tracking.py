@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -125,8 +125,8 @@ class FanTrackingEnv(FanTask):
 
     name = "FanTracking"
     axes = (1,)
-    limits: Sequence[float] | None = LIMITS
-    scales: Sequence[float] | None = SCALES
+    limits: Any = LIMITS
+    scales: Any = SCALES
     standard = Fan()
 
     def __init__(
