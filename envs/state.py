@@ -106,7 +106,7 @@ def _lay(target: object, rows: Array, first: int, fields: dict[str, int]) -> Non
         first += size
 
 
-class Estimate:
+class WorldEstimates:
     """The filter's estimate of n worlds.
 
     Attributes:
@@ -138,7 +138,7 @@ class State:
         position: (n, 3) m, world, true; ``quaternion`` (n, 4) body to world, ``velocity`` (n, 3)
             m/s, world, and ``angular_velocity`` (n, 3) rad/s, body, likewise.
         force: (n, 3) N, world, true and external; ``torque`` (n, 3) Nm.
-        estimate: an ``Estimate``.
+        estimate: ``WorldEstimates``.
         reference: (n, 10) position, velocity, acceleration (world) and yaw.
         distance: (n,) m, of the true position from the reference's.
         action: (n, k) of this decision, -1 to 1; ``last_action`` that before.
@@ -178,7 +178,7 @@ class State:
 
     def bind(self, episodes: Episodes) -> None:
         """Lay the fields over the rows, and those of the episodes beside them."""
-        self.estimate = Estimate()
+        self.estimate = WorldEstimates()
         _lay(self, self.rows, 0, _TRUE)
         _lay(self.estimate, self.rows, _FIRST, _ESTIMATED)
         _lay(self, self.rows, _REST, _BESIDE)

@@ -15,7 +15,7 @@ from .definition import TaskDefinition
 from .lanes.vector import TaskLanes
 from .state import Frame
 from .truth import true_motion
-from .vector import Judged, TaskVectorEnv
+from .vector import JudgedStep, TaskVectorEnv
 
 PLANTS: dict[str, type[TaskVectorEnv]] = {"mujoco": TaskVectorEnv, "lanes": TaskLanes}
 
@@ -79,8 +79,15 @@ class Task(TaskDefinition, gym.Env[Frame, Frame]):
             **given: arguments of these, and of this class.
 
         Raises:
-            InputError: an unknown plant, or a refusal of the class.
+            InputError: an unknown plant, a class with its own ``step`` or ``reset``, never called
+                side by side, or a refusal of the class.
         """
+        for name in ("step", "reset"):
+            if getattr(cls, name) is not getattr(Task, name):
+                raise InputError(
+                    f"{cls.__name__}: {name} of its own is not called side by side; expected "
+                    "start, observe, reward_terms, is_lost or info, or vector modes sync and async"
+                )
         if plant not in PLANTS:
             raise unknown_name("plant", str(plant), PLANTS, f"{cls.name}: plant")
         return PLANTS[plant](num_envs, task=cls, **given)
@@ -137,7 +144,7 @@ class Task(TaskDefinition, gym.Env[Frame, Frame]):
         seen, lost, over = judged.observations[0].copy(), bool(judged.lost[0]), many.truncated[0]
         return seen, float(judged.rewards[0]), lost, bool(over), self._told(judged)
 
-    def _told(self, judged: Judged) -> dict[str, Any]:
+    def _told(self, judged: JudgedStep) -> dict[str, Any]:
         """Return ``info``, with the truth for a controller with foresight."""
         info = {}
         for name, values in judged.values.items():

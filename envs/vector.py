@@ -27,7 +27,7 @@ _COUNTS = ("no", "one", "two", "three", "four")
 SETTLE_TICKS = 300  # the filter settles before an episode starts
 
 
-class Judged(NamedTuple):
+class JudgedStep(NamedTuple):
     """What a task says of the state of n worlds."""
 
     observations: Frame  # (n, k) as the agent sees them
@@ -172,13 +172,13 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         infos = self._infos(again, self._all) | {"final_obs": final, "final_info": ended} | masks
         return again.observations.copy(), judged.rewards, judged.lost, truncated, infos
 
-    def begin(self, rng: np.random.Generator) -> Judged:
+    def begin(self, rng: np.random.Generator) -> JudgedStep:
         """Start an episode of the one environment, which draws from ``rng``."""
         self.generators[0], self._seeded[0] = rng, True
         self._start(self._all)
         return self._judge()
 
-    def go_on(self, action: Any, rng: np.random.Generator) -> Judged:
+    def go_on(self, action: Any, rng: np.random.Generator) -> JudgedStep:
         """Fly a decision of the one environment, which draws from ``rng``.
 
         Raises:
@@ -229,7 +229,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
             return False
         return bool(self._call(take, wanted, which, *how, self.episodes))
 
-    def _judge(self) -> Judged:
+    def _judge(self) -> JudgedStep:
         """Return what the task says of the present state."""
         task, s = self.task, self.state
         seen = np.ascontiguousarray(task.see(s), dtype=np.float64)
@@ -252,7 +252,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
             rewards[self._fresh], lost[self._fresh] = 0.0, False
         if self.render_mode == "human":
             self.render()
-        return Judged(self._frames, rewards, lost, values)
+        return JudgedStep(self._frames, rewards, lost, values)
 
     def _start(self, which: Flags, seeds: Sequence[int | None] | None = None) -> None:
         """Start an episode in the environments of ``which`` (num_envs,)."""
@@ -369,7 +369,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         for each in working:
             each.result()
 
-    def _infos(self, judged: Judged, which: Flags) -> Infos:
+    def _infos(self, judged: JudgedStep, which: Flags) -> Infos:
         """Return the ``infos`` of some environments as Gymnasium's vector environments do: an array
         and a mask for each entry; zeros, or None, outside the mask.
         """

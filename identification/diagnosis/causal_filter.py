@@ -40,7 +40,7 @@ class Poses:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class FlightState:
     """A piece of flight (n samples)."""
 
     t: Array  # (n,) s
@@ -53,7 +53,7 @@ class State:
 
 
 @dataclass(frozen=True, eq=False)
-class Track(State):
+class Track(FlightState):
     """A piece of a flight as the filter saw it, half a step on from sample k.
 
     Row k describes the step from sample k to k + 1; its predictions are of sample k. The

@@ -13,7 +13,7 @@ from scipy.signal import bilinear, lfilter
 from ...dynamics.vehicle import Vehicle
 from ..logs.table import Array
 from ..motion.signals import in_body
-from .causal_filter import State
+from .causal_filter import FlightState
 from .priors import UNKNOWN
 from .regression import Column, RegressedFlights
 
@@ -61,11 +61,11 @@ def weight_and_torque(vehicle: Vehicle) -> Array:
     return vehicle.weight * np.repeat([1.0, TORQUE_ARM * vehicle.arm_l], 3)
 
 
-def joined(tracks: Sequence[State]) -> tuple[State, Array]:
+def joined(tracks: Sequence[FlightState]) -> tuple[FlightState, Array]:
     """Return all pieces, one after the other, and their ends without the last."""
     ends = np.cumsum([len(track.position) for track in tracks])[:-1]
-    columns = (np.concatenate([getattr(x, f.name) for x in tracks]) for f in fields(State))
-    return State(*columns), ends
+    columns = (np.concatenate([getattr(x, f.name) for x in tracks]) for f in fields(FlightState))
+    return FlightState(*columns), ends
 
 
 def _scaled(x: Array) -> Array:
@@ -74,7 +74,7 @@ def _scaled(x: Array) -> Array:
     return x / size if size > 1e-9 else np.zeros_like(x)
 
 
-def discrepancy_columns(whole: State, ends: Array, flights: RegressedFlights) -> Columns:
+def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFlights) -> Columns:
     """Return accelerations (n, 6) by column, each of a standard deviation of the weight, or of the
     weight times the arm.
 
@@ -157,7 +157,7 @@ def _resonance(drive: Array, hertz: float, period: float, ends: Array) -> Array:
     return np.concatenate([lfilter(*shape, x, axis=0) for x in np.split(drive, ends)])
 
 
-def variables(whole: State) -> dict[str, Array]:
+def variables(whole: FlightState) -> dict[str, Array]:
     """Return the variables (n,) of a changing coefficient by name, of mean zero and standard
     deviation one.
     """

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...dynamics.effects import Role, playing
 from ..logs.table import Array
-from .causal_filter import State
+from .causal_filter import FlightState
 from .climbing import Height, height, linearised, mode
 from .discrepancy import changing_columns, discrepancy_columns, joined, variables
 from .log_offsets import LAG_ASYMMETRY
@@ -134,7 +134,7 @@ class RowLikelihood:
             rotors = delivered(s, vehicle) / flights.inertias[2:]
             # the acceleration is the rotors' alone, without disturbances
             push, rate = rotors[:, :1] * s.rotation[:, :, 2], s.angular_velocity
-            states.append(State(s.t, s.position, s.rotation, s.velocity, rate, push, rotors))
+            states.append(FlightState(s.t, s.position, s.rotation, s.velocity, rate, push, rotors))
         whole, ends = joined(states)
         out: dict[Column, Array] = {}
         for column, made in discrepancy_columns(whole, ends, flights).items():

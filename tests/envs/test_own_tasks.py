@@ -162,6 +162,13 @@ def test_a_start_in_which_no_flight_loop_can_stay_is_refused():
         Floor().reset(seed=0)
 
 
+@pytest.mark.parametrize("name", ["step", "reset"])
+def test_a_method_that_is_not_called_side_by_side_is_refused(name):
+    mine = type("Mine", (WindHoverEnv,), {name: lambda self, *_, **__: None})
+    with pytest.raises(InputError, match=f"Mine: {name} of its own is not called side by side"):
+        mine.vector(2)
+
+
 def test_training_s_mixed_task_flies_with_mujoco_alone():
     MixedFanTracking.vector(1, scenario=("base", "fast")).close()
     with pytest.raises(InputError, match="plant='lanes' flies one scenario"):
