@@ -32,8 +32,8 @@ def is_law_file(name: str) -> bool:
     return name.endswith((".yaml", ".yml"))
 
 
-def load_law(name: str, task: str, laws: Mapping[str, Callable[..., Any]]) -> Any:
-    """Return a new controller by a file.
+def read_law(name: str, task: str, laws: Mapping[str, Callable[..., Any]]) -> LawFile:
+    """Return a file's law and gains.
 
     Args:
         name: the file.
@@ -48,9 +48,8 @@ def load_law(name: str, task: str, laws: Mapping[str, Callable[..., Any]]) -> An
         raise InputError(f"{name}: task: a law of {stated.task}; expected one of {task}")
     if stated.law not in laws:
         raise unknown_name("law", stated.law, laws, name)
-    law = laws[stated.law]
-    known = inspect.signature(law).parameters
+    known = inspect.signature(laws[stated.law]).parameters
     for gain in stated.gains:
         if gain not in known:
             raise unknown_name("gain", gain, known, f"{name}: {stated.law}")
-    return law(**stated.gains)
+    return stated

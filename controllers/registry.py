@@ -17,7 +17,7 @@ from ..runtime.errors import unknown_name
 from ..runtime.python_file import is_file_name
 from ..runtime.yaml_file import read_yaml
 from .fan_laws import Admittance, AdmittancePID, Hover, Lead, Ratio
-from .law_file import is_law_file, load_law
+from .law_file import is_law_file, read_law
 from .lqg import LQG
 from .own_file import load_controller
 from .preview import Oracle, WindOracle
@@ -131,14 +131,16 @@ def make_controller(name: str, task: str = STANDARD_TASK) -> Any:
     if task not in TASK_LAWS:
         raise unknown_name("task", task, TASK_LAWS)
     laws = OWN_LAWS | TASK_LAWS[task]
+    gains: dict[str, Any] = {}
     if is_law_file(name):
-        return load_law(name, task, laws)
+        stated = read_law(name, task, laws)
+        name, gains = stated.law, stated.gains
     if name not in laws:
         raise unknown_name("controller", name, [*laws, *shipped_policies(task)])
     if task == STANDARD_TASK:
-        return laws[name]()
+        return laws[name](**gains)
     entry = tuned_gains(task).get(name) or tuned_gains(_AS.get(task, task)).get(name, {})
-    return laws[name](**entry.get("gains", {}))
+    return laws[name](**{**entry.get("gains", {}), **gains})
 
 
 @cache

@@ -168,7 +168,7 @@ def test_registered_laws_and_scenarios_and_a_law_with_gains(tmp_path, monkeypatc
     stiff = written(tmp_path, "stiff.yaml", "law: pid\ngains: {kp: 12.5}\n")
     law, tuned = make_pilot(stiff, "WindHover"), make_pilot("pid", "WindHover")
     assert (law.kp, law.ki) == (12.5, tuned.ki)
-    wrong = {"law: pid\ngains: {kq: 1}\n": "unknown gain 'kq'", "law: pod\n": "controller 'pod'"}
+    wrong = {"law: pid\ngains: {kq: 1}\n": "unknown gain 'kq'", "law: pod\n": "unknown law 'pod'"}
     for text, words in wrong.items():
         with pytest.raises(InputError, match=rf"wrong\.yaml.*{words}"):
             make_pilot(written(tmp_path, "wrong.yaml", text), "WindHover")

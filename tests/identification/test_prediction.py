@@ -254,7 +254,7 @@ def test_a_turn_at_one_rate_is_no_change():
     found = prediction_errors([log], VEHICLE)
     assert np.all(found.still < 2e-3)
     assert np.all(found.model < 2e-3)
-    with pytest.raises(InputError, match=r"flight: expected poses at one rate, unbroken for 4 s"):
+    with pytest.raises(InputError, match=r"flight: expected a pose, unbroken for 4 s"):
         prediction_errors([replace(log, name="flight")], VEHICLE, 3.0, [[(0.0, 2.0)]])
 
 

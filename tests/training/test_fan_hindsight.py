@@ -22,7 +22,7 @@ from windwrench.training.taught_network import Sequences, TaughtNetwork, fit
 
 def flown(lesson, scenario, size, time=1.0, seed=3, count=8):
     flights = Flights(
-        [TaskLanes(count, scenario=scenario)],
+        [TaskLanes(count, task=FanTrackingEnv, scenario=scenario)],
         lesson,
         {"wander": {"size": size, "time": time}},
         seed,

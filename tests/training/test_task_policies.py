@@ -81,7 +81,7 @@ def test_a_policy_sees_what_its_network_saw_whitened():
     with torch.no_grad():
         said = network(torch.from_numpy(seen))[0].numpy()
     policy = TaskPolicy(
-        _card("WindHover", MIX, 0, 0), network.policy_weights(np.eye(3, dtype=np.float32))
+        _card("WindHover", "gru", MIX, 0, 0), network.policy_weights(np.eye(3, dtype=np.float32))
     )
     flown = [policy(frame * np.float32(HOVER.scales)) for frame in seen[:, 2]]
     assert_allclose(flown, said[:, 2], atol=1e-4)
